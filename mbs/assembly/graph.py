@@ -1,0 +1,233 @@
+"""The connection graph: bodies welded together are one node, joints are the edges."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import SX
+
+from mbs.components import Component, Fixed, Joint, Mechanism, Point, RigidBody
+from mbs.components.placement import KhalilStep
+from mbs.errors import AssemblyError
+from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose
+
+_SAME_PLACE = 1e-8
+
+Port = tuple[str, str]
+"""A component's name and which of its frames: "" of a body, "a" or "b" of a joint."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Node:
+    """Bodies and joint frames that are welded together: one rigid body.
+
+    Attributes:
+        name: of the body whose reference frame is the frame of the node.
+        members: pose of every body and joint frame in that frame.
+    """
+
+    name: str
+    members: Mapping[Port, Pose]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edge:
+    """A joint between two nodes.
+
+    Attributes:
+        joint: its description.
+        a, b: the nodes that carry its frame_a and frame_b.
+        pose_a, pose_b: these frames in the frames of the nodes.
+        khalil: the parameters that place frame_a, when they were given as such.
+    """
+
+    joint: Joint
+    a: int
+    b: int
+    pose_a: Pose
+    pose_b: Pose
+    khalil: Khalil | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Graph:
+    """Rigid bodies and the joints between them; node 0 holds the world."""
+
+    nodes: tuple[Node, ...]
+    edges: tuple[Edge, ...]
+
+
+def connection_graph(
+    mechanism: Mechanism, symbols: Mapping[str, SX], values: Mapping[str, float]
+) -> Graph:
+    """The graph of a mechanism.
+
+    Args:
+        mechanism: components and connections.
+        symbols: CasADi symbol of every parameter.
+        values: a number for every parameter, to compare places with.
+
+    Raises:
+        AssemblyError: something is not connected, or welds contradict each other.
+    """
+    joints = {joint.name for joint in mechanism.joints() if not _is_weld(mechanism, joint)}
+    if not joints:
+        raise AssemblyError(
+            f"{mechanism.name}: there is no joint that moves; connect bodies by joints"
+        )
+    welds = _welds(mechanism, symbols)
+    _require_connected(mechanism, welds)
+    at = _evaluator(symbols, values)
+    nodes: list[Node] = []
+    home: dict[Port, int] = {}
+    for port in _ports(mechanism):
+        if port not in home:
+            members = _grow(port, welds, at)
+            home.update(dict.fromkeys(members, len(nodes)))
+            nodes.append(Node(port[0], members))
+    edges = tuple(
+        _edge(mechanism, joint, nodes, home, symbols)
+        for joint in mechanism.joints()
+        if joint.name in joints
+    )
+    return Graph(tuple(nodes), edges)
+
+
+def inertia_of(node: Node, mechanism: Mechanism, symbols: Mapping[str, SX]) -> Inertia:
+    """Inertia of all bodies of a node about the origin of its frame."""
+    total = Inertia.zero()
+    for (name, _), pose in node.members.items():
+        component = mechanism.components[name]
+        if isinstance(component, RigidBody):
+            total = total + component.inertial(symbols).seen_from(MatrixTurn(pose.R), pose.p)
+    return total
+
+
+def _is_weld(mechanism: Mechanism, joint: Joint) -> bool:
+    return isinstance(joint, Fixed) and joint.name not in mechanism.cuts
+
+
+def _ports(mechanism: Mechanism) -> Iterator[Port]:
+    yield mechanism.world.name, ""
+    yield from ((body.name, "") for body in mechanism.bodies())
+    for joint in mechanism.joints():
+        yield joint.name, "a"
+        yield joint.name, "b"
+
+
+Weld = tuple[Port, Pose, Point]
+
+
+def _welds(mechanism: Mechanism, symbols: Mapping[str, SX]) -> dict[Port, list[tuple[Port, Pose]]]:
+    """For each port, the ports welded to it and where they are, seen from it."""
+    welds: dict[Port, list[tuple[Port, Pose]]] = {port: [] for port in _ports(mechanism)}
+
+    def weld(a: Port, b: Port, pose: Pose) -> None:
+        welds[a].append((b, pose))
+        welds[b].append((a, pose.inverse()))
+
+    for a, b in mechanism.connections:
+        pose = a.placement.pose(symbols) @ b.placement.pose(symbols).inverse()
+        weld((a.owner.name, a.port), (b.owner.name, b.port), pose)
+    for joint in mechanism.joints():
+        if _is_weld(mechanism, joint):
+            weld((joint.name, "a"), (joint.name, "b"), Pose.identity())
+    return welds
+
+
+def _require_connected(mechanism: Mechanism, welds: Mapping[Port, list[tuple[Port, Pose]]]) -> None:
+    for (name, side), neighbours in welds.items():
+        if not neighbours and name != mechanism.world.name:
+            component: Component = mechanism.components[name]
+            what = f"frame_{side} of joint {name!r}" if side else f"{name!r}"
+            raise AssemblyError(
+                f"{mechanism.name}: {what} is connected to nothing; "
+                + ("connect it" if isinstance(component, Joint) else "connect it or leave it out")
+            )
+
+
+def _grow(
+    start: Port,
+    welds: Mapping[Port, list[tuple[Port, Pose]]],
+    at: _Evaluator,
+) -> dict[Port, Pose]:
+    """Every port welded to `start`, with its pose seen from there."""
+    members = {start: Pose.identity()}
+    queue = deque([start])
+    while queue:
+        port = queue.popleft()
+        for neighbour, pose in welds[port]:
+            place = members[port] @ pose
+            if neighbour not in members:
+                members[neighbour] = place
+                queue.append(neighbour)
+            else:
+                _require_same_place(neighbour, members[neighbour], place, at)
+    return members
+
+
+class _Evaluator:
+    """Numbers of expressions at given values of the parameters."""
+
+    def __init__(self, symbols: Mapping[str, SX], values: Mapping[str, float]) -> None:
+        self.p = casadi.vertcat(*symbols.values()) if symbols else SX(0, 1)
+        self.values = [values[name] for name in symbols]
+
+    def __call__(self, value: SX) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        if not casadi.symvar(value):
+            return np.array(casadi.DM(value))
+        return np.array(casadi.Function("f", [self.p], [value])(self.values))
+
+
+def _evaluator(symbols: Mapping[str, SX], values: Mapping[str, float]) -> _Evaluator:
+    return _Evaluator(symbols, values)
+
+
+def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -> None:
+    difference = at(first.matrix - second.matrix)
+    gap, turn = np.abs(difference[:3, 3]).max(), np.abs(difference[:3, :3]).max()
+    if max(gap, turn) > _SAME_PLACE:
+        raise AssemblyError(
+            f"{port[0]!r} is welded at two places that differ by {gap:.3g} m and {turn:.3g} rad;"
+            " take one of the welds away"
+        )
+
+
+def _edge(
+    mechanism: Mechanism,
+    joint: Joint,
+    nodes: list[Node],
+    home: Mapping[Port, int],
+    symbols: Mapping[str, SX],
+) -> Edge:
+    a, b = home[joint.name, "a"], home[joint.name, "b"]
+    if a == b:
+        raise AssemblyError(
+            f"{mechanism.name}: joint {joint.name!r} connects {nodes[a].name!r} to itself;"
+            " connect it to two bodies"
+        )
+    return Edge(
+        joint,
+        a,
+        b,
+        nodes[a].members[joint.name, "a"],
+        nodes[b].members[joint.name, "b"],
+        _given_khalil(mechanism, joint, nodes[a], symbols),
+    )
+
+
+def _given_khalil(
+    mechanism: Mechanism, joint: Joint, node: Node, symbols: Mapping[str, SX]
+) -> Khalil | None:
+    """The Khalil parameters that place frame_a on the frame of its node, if written as such."""
+    for a, b in mechanism.connections:
+        if b.owner is joint and b.port == "a" and not b.placement.steps:
+            steps = a.placement.steps
+            on_frame = node.members[a.owner.name, a.port].is_identity()
+            if on_frame and len(steps) == 1 and isinstance(steps[0], KhalilStep):
+                return steps[0].khalil(symbols)
+    return None

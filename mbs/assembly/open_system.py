@@ -1,0 +1,191 @@
+"""From a mechanism to a System whose loops are not yet analysed."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import casadi
+from casadi import SX
+
+from mbs.assembly.graph import Graph, connection_graph
+from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
+from mbs.assembly.rates import zero_position
+from mbs.assembly.spanning_tree import spanning_tree
+from mbs.assembly.system import CoordinateCoupling, System
+from mbs.assembly.tables import (
+    BodyRow,
+    Coordinate,
+    LoopRow,
+    position_coordinates,
+    velocity_coordinates,
+)
+from mbs.components import Joint, Mechanism
+from mbs.errors import AssemblyError
+from mbs.expressions import Parameter, expression, to_float, to_sx
+from mbs.spatial import Pose
+
+
+def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
+    """Tree, cuts and tables of a mechanism, its loops still open.
+
+    Args:
+        mechanism: the components.
+        guessed: coordinates whose joints should stay in the tree.
+
+    Raises:
+        AssemblyError: the components do not form a mechanism.
+    """
+    parameters = mechanism.parameters()
+    symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
+    graph = connection_graph(mechanism, symbols, _trial_values(parameters))
+    keep = {name for joint in mechanism.joints() for name in _owners(joint, guessed)}
+    spanning = spanning_tree(
+        mechanism.name, graph, keep=keep, cut=mechanism.cuts, given_order=mechanism.keep_order
+    )
+    framed = khalil_frames(mechanism, graph, spanning, symbols)
+    joints = {joint.name: joint for joint in mechanism.joints()}
+    in_loops = _looped_joints(framed)
+    moved = [
+        (link.motion, link.name, joints[name])
+        for link, name in zip(framed.tree.links, framed.joints, strict=True)
+    ]
+    actuated = [_is_actuated(joint, in_loops) for _, _, joint in moved]
+    coordinates = position_coordinates(moved, actuated)
+    return System(
+        name=mechanism.name,
+        source=mechanism.source,
+        tree=framed.tree,
+        cuts=framed.cuts,
+        couplings=_couplings(mechanism, coordinates, symbols),
+        parameters=parameters,
+        p=casadi.vertcat(*symbols.values()) if symbols else SX(0, 1),
+        coordinates=coordinates,
+        speeds=velocity_coordinates(moved, actuated),
+        cut_coordinates=_cut_coordinates(framed.cuts),
+        bodies=_bodies(mechanism, graph, framed),
+        frames=_frames(mechanism, graph, framed, symbols),
+        loops=_loop_rows(mechanism, framed),
+        posture=tuple(zero_position(framed.tree)),
+    )
+
+
+def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
+    """A number for every parameter; an irregular one where none is given."""
+    return {
+        p.name: 0.731 + 0.217 * number if p.default is None else p.default
+        for number, p in enumerate(parameters)
+    }
+
+
+def _owners(joint: Joint, guessed: Collection[str]) -> list[str]:
+    return [
+        joint.name for name in guessed if name == joint.name or name.startswith(f"{joint.name}.")
+    ]
+
+
+def _is_actuated(joint: Joint, in_loops: set[str]) -> bool:
+    return joint.name not in in_loops if joint.actuated is None else joint.actuated
+
+
+def _loop_joints(framed: Framed, cut: Cut) -> list[str]:
+    """The joints in the loop that a cut opened, in the order of the links."""
+    a, b = (set(framed.tree.path(link)) for link in (cut.link_a, cut.link_b))
+    names = [framed.joints[j] for j in sorted(a ^ b)]
+    return list(dict.fromkeys(names))
+
+
+def _looped_joints(framed: Framed) -> set[str]:
+    return {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
+
+
+def _loop_rows(mechanism: Mechanism, framed: Framed) -> tuple[LoopRow, ...]:
+    loops = [
+        LoopRow(
+            name=cut.edge.joint.name,
+            closing="weld" if cut.welded else type(cut.edge.joint).__name__.lower(),
+            joints=tuple(_loop_joints(framed, cut)),
+            rows=(),
+        )
+        for cut in framed.cuts
+    ]
+    couplings = [
+        LoopRow(c.name, "coupling", (c.driven, c.driver), ()) for c in mechanism.couplings()
+    ]
+    return (*loops, *couplings)
+
+
+def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
+    rows: list[Coordinate] = []
+    for cut in cuts:
+        joint = cut.edge.joint
+        if not cut.welded:
+            for freedom in joint.freedoms:
+                name = f"{joint.name}.{freedom.suffix}" if freedom.suffix else joint.name
+                rows.extend(
+                    position_coordinates([(freedom.motion, name, joint)], [False], cut=True)
+                )
+    return tuple(rows)
+
+
+def _bodies(mechanism: Mechanism, graph: Graph, framed: Framed) -> tuple[BodyRow, ...]:
+    """The moving bodies, in the order in which their links are numbered."""
+    homes = {
+        name: framed.homes[number][0]
+        for number, node in enumerate(graph.nodes)
+        for name, port in node.members
+        if not port
+    }
+    rows: list[BodyRow] = []
+    for body in mechanism.bodies():
+        if homes[body.name] >= 0:
+            mass = _mass(mechanism, body.name)
+            rows.append(BodyRow(body.name, homes[body.name], mass))
+    return tuple(sorted(rows, key=lambda row: row.link))
+
+
+def _mass(mechanism: Mechanism, name: str) -> float | None:
+    body = mechanism.components[name]
+    values = {p.name: p.default for p in mechanism.parameters() if p.default is not None}
+    for attribute in ("solid_mass", "mass", "M"):
+        scalar = getattr(body, attribute, None)
+        if scalar is not None:
+            return to_float(expression(scalar), values)
+    return 0.0
+
+
+def _frames(
+    mechanism: Mechanism, graph: Graph, framed: Framed, symbols: Mapping[str, SX]
+) -> dict[str, tuple[int, Pose]]:
+    """The base, every body's reference frame, and every frame that was given a name."""
+    places: dict[tuple[str, str], tuple[int, Pose]] = {}
+    for node, (link, pose) in zip(graph.nodes, framed.homes, strict=True):
+        for port, inside in node.members.items():
+            places[port] = link, pose @ inside
+    frames = {"base": places[mechanism.world.name, ""]}
+    for body in (mechanism.world, *mechanism.bodies()):
+        frames[body.name] = places[body.name, ""]
+    for name, point in mechanism.frames.items():
+        link, pose = places[point.owner.name, point.port]
+        frames[name] = link, pose @ point.placement.pose(symbols)
+    return frames
+
+
+def _couplings(
+    mechanism: Mechanism, coordinates: Sequence[Coordinate], symbols: Mapping[str, SX]
+) -> tuple[CoordinateCoupling, ...]:
+    numbers = {coordinate.name: number for number, coordinate in enumerate(coordinates)}
+    result = []
+    for coupling in mechanism.couplings():
+        for name in (coupling.driven, coupling.driver):
+            if name not in numbers:
+                raise AssemblyError(
+                    f"{coupling.name}: there is no coordinate {name!r} in the tree; the coordinates"
+                    f" are {', '.join(numbers)}"
+                )
+        terms = tuple(to_sx(c, symbols) for c in coupling.coefficients)
+        result.append(
+            CoordinateCoupling(
+                coupling.name, numbers[coupling.driven], numbers[coupling.driver], terms
+            )
+        )
+    return tuple(result)

@@ -1,0 +1,74 @@
+"""What was assembled, in plain sentences."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mbs.assembly.system import System
+
+
+def report(system: System) -> str:
+    """Tree, cut joints, mobility, dropped rows and whether the cut forces are unique."""
+    return "\n".join([*_tree(system), *_loops(system), *_parameters(system)])
+
+
+def _tree(system: System) -> list[str]:
+    links = system.tree.links
+    lines = [
+        f"{system.name}: {_count(len(links), 'moving link')} in a tree,"
+        f" {_count(system.nq, 'position')} q and {_count(system.nv, 'velocity')} v."
+    ]
+    for number, link in enumerate(links, start=1):
+        carried = [row.name for row in system.bodies if row.link == number - 1]
+        before = "the base" if link.antecedent < 0 else f"link {link.antecedent + 1}"
+        what = ", ".join(carried) if carried else "a frame without a body"
+        lines.append(
+            f"  link {number}: {link.motion.value} {link.name} from {before} carries {what}"
+        )
+    return lines
+
+
+def _loops(system: System) -> list[str]:
+    if system.closure is None:
+        return ["No loop: every coordinate is independent."]
+    closure = system.closure
+    lines = []
+    for loop in system.loops:
+        if loop.closing == "coupling":
+            lines.append(f"Coupling {loop.name}: {' follows '.join(loop.joints)}.")
+            continue
+        kept = len(loop.rows) - len(loop.dropped)
+        lines.append(
+            f"1 loop cut at {loop.name} ({loop.closing}), through {', '.join(loop.joints)}:"
+            f" {kept} of {len(loop.rows)} rows are independent."
+        )
+        if loop.dropped:
+            lines.append(
+                f"  Dropped, since the others imply them: {', '.join(loop.dropped)};"
+                " the cut forces along them are not unique."
+            )
+        else:
+            lines.append("  The cut forces are unique.")
+    active = ", ".join(system.speeds[k].name for k in closure.active) or "none"
+    lines.append(
+        f"Mobility {closure.mobility} (Gruebler-Kutzbach counts {closure.gruebler});"
+        f" independent: {active}."
+    )
+    lines.append(f"The loops close to {closure.residual:.1e} at the assembled posture.")
+    return lines
+
+
+def _parameters(system: System) -> list[str]:
+    if not system.parameters:
+        return []
+    values = ", ".join(
+        f"{p.name} = {'no value' if p.default is None else format(p.default, 'g')}"
+        for p in system.parameters
+    )
+    return [f"Parameters: {values}."]
+
+
+def _count(number: int, noun: str) -> str:
+    plural = noun[:-1] + "ies" if noun.endswith("y") else noun + "s"
+    return f"{number} {noun if number == 1 else plural}"

@@ -1,0 +1,217 @@
+"""The assembled mechanism: frozen, with its tables; every model is built from it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi
+from casadi import DM, MX, SX, Function
+
+from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.rates import position_rate
+from mbs.assembly.report import report
+from mbs.assembly.tables import BodyRow, Closure, Coordinate, LoopRow
+from mbs.assembly.tree import Tree
+from mbs.errors import ModelError
+from mbs.expressions import Parameter
+from mbs.spatial import Pose
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoordinateCoupling:
+    """driven = sum of c_k driver^k between two elements of q.
+
+    Attributes:
+        name: of the coupling.
+        driven, driver: numbers in q.
+        coefficients: c_0, c_1, ...
+    """
+
+    name: str
+    driven: int
+    driver: int
+    coefficients: tuple[SX, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class System:
+    """A mechanism ready for equations.
+
+    Attributes:
+        name: of the mechanism.
+        source: where its data come from.
+        tree: links with frames and inertias.
+        cuts: joints that were cut to open the loops.
+        couplings: relations between coordinates.
+        parameters: symbols in the order of the input p of the Functions.
+        p: (np, 1) these symbols.
+        coordinates: the elements of q.
+        speeds: the elements of v, and of efforts and accelerations.
+        cut_coordinates: the coordinates of cut joints, which are not in q.
+        bodies: the moving bodies of the description, in the order of external wrenches.
+        frames: named frames: link (-1 for the base) and pose in the link's frame.
+        loops: one row for each loop or coupling.
+        posture: a position q that closes the loops, or all zero.
+        closure: how the loops constrain velocities; None for an open chain.
+    """
+
+    name: str
+    source: str
+    tree: Tree
+    cuts: tuple[Cut, ...]
+    couplings: tuple[CoordinateCoupling, ...]
+    parameters: tuple[Parameter, ...]
+    p: SX
+    coordinates: tuple[Coordinate, ...]
+    speeds: tuple[Coordinate, ...]
+    cut_coordinates: tuple[Coordinate, ...]
+    bodies: tuple[BodyRow, ...]
+    frames: Mapping[str, tuple[int, Pose]]
+    loops: tuple[LoopRow, ...]
+    posture: tuple[float, ...]
+    closure: Closure | None = None
+    _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def nq(self) -> int:
+        """Number of positions."""
+        return self.tree.nq
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return self.tree.nv
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether loops or couplings constrain the coordinates."""
+        return self.closure is not None
+
+    @property
+    def active(self) -> tuple[int, ...]:
+        """Numbers of the independent velocities: all of them in an open chain."""
+        return self.closure.active if self.closure else tuple(range(self.nv))
+
+    @property
+    def p_default(self) -> list[float]:
+        """The defaults of the parameters; NaN for a symbol without value."""
+        return [float("nan") if p.default is None else p.default for p in self.parameters]
+
+    def report(self) -> str:
+        """What was assembled, in plain sentences."""
+        return report(self)
+
+    def qdot(self, q: Any, v: Any) -> Any:
+        """(nq, 1) time derivative of q; it differs from v for quaternion joints only.
+
+        Args:
+            q: (nq, 1) positions, as SX, MX, DM or numpy.
+            v: (nv, 1) velocities.
+        """
+        rate: Function = self.cached("qdot", self._rate_function)
+        return rate(q, v)
+
+    def _rate_function(self) -> Function:
+        q, v = SX.sym("q", self.nq), SX.sym("v", self.nv)
+        rate = casadi.densify(position_rate(self.tree, q, v))
+        return Function("qdot", [q, v], [rate], ["q", "v"], ["qdot"])
+
+    def cached(self, key: Any, build: Callable[[], Any]) -> Any:
+        """What `build` made the first time it was asked for under this key."""
+        if key not in self._cache:
+            self._cache[key] = build()
+        return self._cache[key]
+
+    def frame(self, name: str | int) -> tuple[int, Pose]:
+        """A frame by name, or the frame of link number 1, 2, ... (0 is the base).
+
+        Raises:
+            ModelError: there is no such frame.
+        """
+        if isinstance(name, int):
+            if 0 <= name <= len(self.tree.links):
+                return name - 1, Pose.identity()
+            raise ModelError(
+                f"{self.name}: there is no link {name}; the links are 1 to {len(self.tree.links)}"
+            )
+        if name in self.frames:
+            return self.frames[name]
+        raise ModelError(
+            f"{self.name}: there is no frame {name!r}; " + _suggestion(str(name), list(self.frames))
+        )
+
+    def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
+        """q from values by coordinate name, the others as in the assembled posture.
+
+        Raises:
+            ModelError: a name is unknown, or a sequence has the wrong length.
+        """
+        return self._filled(values, self.coordinates, list(self.posture), "position")
+
+    def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
+        """v from values by coordinate name, the others zero; likewise accelerations and efforts."""
+        return self._filled(values, self.speeds, [0.0] * self.nv, "velocity")
+
+    def _filled(
+        self,
+        values: Mapping[str, float] | Sequence[float] | None,
+        coordinates: Sequence[Coordinate],
+        start: list[float],
+        what: str,
+    ) -> list[float]:
+        names = [coordinate.name for coordinate in coordinates]
+        if values is None:
+            return start
+        if not isinstance(values, Mapping):
+            given = [float(x) for x in DM(values).full().ravel()]
+            if len(given) != len(names):
+                raise ModelError(
+                    f"{self.name}: the {what} has {len(given)} values, the system has"
+                    f" {len(names)}: {', '.join(names)}"
+                )
+            return given
+        for name, value in values.items():
+            if name not in names:
+                raise ModelError(
+                    f"{self.name}: there is no coordinate {name!r}; " + _suggestion(name, names)
+                )
+            start[names.index(name)] = float(value)
+        return start
+
+    def parameter_values(self, values: Mapping[str, float] | None = None) -> list[float]:
+        """p from values by name, the others at their defaults.
+
+        Raises:
+            ModelError: a name is unknown, or a symbol has no value.
+        """
+        names = [parameter.name for parameter in self.parameters]
+        given = dict(values or {})
+        for name in given:
+            if name not in names:
+                raise ModelError(
+                    f"{self.name}: there is no parameter {name!r}; " + _suggestion(name, names)
+                )
+        result = []
+        for parameter in self.parameters:
+            value = given.get(parameter.name, parameter.default)
+            if value is None:
+                raise ModelError(
+                    f"{self.name}: parameter {parameter.name!r} has no value; give it a default or"
+                    " pass it in parameters"
+                )
+            result.append(float(value))
+        return result
+
+
+Matrix = SX | MX | DM
+"""A CasADi matrix of any kind."""
+
+
+def _suggestion(name: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=3)
+    if close:
+        return f"did you mean {' or '.join(close)}?"
+    return f"there are: {', '.join(known)}" if known else "there are none"

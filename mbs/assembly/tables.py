@@ -1,0 +1,145 @@
+"""The tables of a system: what a script reads to know its coordinates, bodies and loops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mbs.components import Joint
+from mbs.components.joints import Motion
+
+_POSITIONS = {
+    Motion.REVOLUTE: (("", "revolute", "rad"),),
+    Motion.PRISMATIC: (("", "prismatic", "m"),),
+    Motion.SPHERICAL: tuple((k, "quaternion", "1") for k in ("qw", "qx", "qy", "qz")),
+    Motion.FREE: (
+        *((k, "translation", "m") for k in "xyz"),
+        *((k, "quaternion", "1") for k in ("qw", "qx", "qy", "qz")),
+    ),
+}
+_VELOCITIES = {
+    Motion.REVOLUTE: (("", "revolute", "rad/s"),),
+    Motion.PRISMATIC: (("", "prismatic", "m/s"),),
+    Motion.SPHERICAL: tuple((k, "rotation", "rad/s") for k in ("wx", "wy", "wz")),
+    Motion.FREE: (
+        *((k, "translation", "m/s") for k in ("vx", "vy", "vz")),
+        *((k, "rotation", "rad/s") for k in ("wx", "wy", "wz")),
+    ),
+}
+EFFORT_UNIT = {"rad/s": "N.m", "m/s": "N"}
+"""Unit of the effort that does work with a velocity of this unit."""
+
+ACCELERATION_UNIT = {"rad/s": "rad/s2", "m/s": "m/s2"}
+"""Unit of the rate of a velocity of this unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """One element of q or of v.
+
+    Attributes:
+        name: the joint's name, with a suffix when the joint has several coordinates.
+        kind: revolute, prismatic, translation, rotation or quaternion.
+        unit: of its value.
+        joint: name of the joint it belongs to.
+        actuated: whether a motor drives it.
+        cut: whether its joint is cut, so that it is not in q.
+        limits: (lower, upper), or None.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    joint: str
+    actuated: bool
+    cut: bool = False
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BodyRow:
+    """A body of the description and where it is.
+
+    Attributes:
+        name: of the body.
+        link: number of the link that carries it, -1 for the base.
+        mass: [kg], None when a symbol without value is in it.
+    """
+
+    name: str
+    link: int
+    mass: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LoopRow:
+    """A closed loop, or a coupling of coordinates.
+
+    Attributes:
+        name: of the joint that was cut, or of the coupling.
+        closing: kind of the closing joint in lower case, or "coupling".
+        joints: joints in the loop that remain in the tree.
+        rows: label of every closure row, such as "j3: force x".
+        dropped: those rows that depend on the others.
+    """
+
+    name: str
+    closing: str
+    joints: tuple[str, ...]
+    rows: tuple[str, ...]
+    dropped: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Closure:
+    """How the loops of a system constrain its velocities.
+
+    Attributes:
+        rows: numbers of the independent closure rows.
+        active: numbers of the independent velocities.
+        passive: numbers of the velocities that follow from them.
+        gruebler: mobility by the Gruebler-Kutzbach count of rows.
+        residual: largest closure residual at the assembled posture.
+    """
+
+    rows: tuple[int, ...]
+    active: tuple[int, ...]
+    passive: tuple[int, ...]
+    gruebler: int
+    residual: float
+
+    @property
+    def mobility(self) -> int:
+        """Number of independent velocities."""
+        return len(self.active)
+
+
+def position_coordinates(
+    links: Sequence[tuple[Motion, str, Joint]], actuated: Sequence[bool], *, cut: bool = False
+) -> tuple[Coordinate, ...]:
+    """The elements of q of motions given as (motion, name, joint)."""
+    return _coordinates(_POSITIONS, links, actuated, cut)
+
+
+def velocity_coordinates(
+    links: Sequence[tuple[Motion, str, Joint]], actuated: Sequence[bool]
+) -> tuple[Coordinate, ...]:
+    """The elements of v of motions given as (motion, name, joint)."""
+    return _coordinates(_VELOCITIES, links, actuated, False)
+
+
+def _coordinates(
+    table: dict[Motion, tuple[tuple[str, str, str], ...]],
+    links: Sequence[tuple[Motion, str, Joint]],
+    actuated: Sequence[bool],
+    cut: bool,
+) -> tuple[Coordinate, ...]:
+    rows = []
+    for (motion, name, joint), driven in zip(links, actuated, strict=True):
+        limits = dict(joint.limits or ())
+        for suffix, kind, unit in table[motion]:
+            full = f"{name}.{suffix}" if suffix else name
+            interval = limits.get(name.removeprefix(joint.name).removeprefix("."))
+            bounded = interval if unit in ("rad", "m") and not suffix else None
+            rows.append(Coordinate(full, kind, unit, joint.name, driven, cut, bounded))
+    return tuple(rows)

@@ -1,0 +1,70 @@
+"""The tree of links that every recursion runs over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from casadi import SX
+
+from mbs.components.joints import Motion
+from mbs.spatial import Inertia, Khalil
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """A moving link j and the elementary motion that carries it from its antecedent i.
+
+    Attributes:
+        name: of the motion: the joint's name, with a suffix when the joint has several.
+        antecedent: number of link i, or -1 for the base.
+        motion: how frame j moves from its placement.
+        placement: frame j with respect to frame i at the zero position of the motion.
+        inertia: of everything fixed on the link, about the origin of frame j and in its axes.
+        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
+        Fv: viscous friction [N m s/rad or N s/m].
+        Fs: dry friction [N m or N].
+        q: where its positions stand in q.
+        v: where its velocities stand in v.
+    """
+
+    name: str
+    antecedent: int
+    motion: Motion
+    placement: Khalil
+    inertia: Inertia
+    Ia: SX
+    Fv: SX
+    Fs: SX
+    q: slice
+    v: slice
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tree:
+    """Links in topological order: an antecedent has a smaller number than its link.
+
+    Attributes:
+        links: the moving links.
+        gravity: (3, 1) gravity acceleration in the base frame [m/s^2].
+    """
+
+    links: tuple[Link, ...]
+    gravity: SX
+
+    @property
+    def nq(self) -> int:
+        """Number of positions."""
+        return sum(link.motion.nq for link in self.links)
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return sum(link.motion.nv for link in self.links)
+
+    def path(self, j: int) -> list[int]:
+        """The links from the base to link j, itself included; empty for the base (-1)."""
+        numbers = []
+        while j >= 0:
+            numbers.append(j)
+            j = self.links[j].antecedent
+        return numbers[::-1]

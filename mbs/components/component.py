@@ -1,0 +1,111 @@
+"""What bodies, joints and the world have in common: a name, and points to connect."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypeVar
+
+from mbs.components.placement import KhalilStep, Placement, Rotation, displacement
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Scalar, expression, renamed
+
+_NAME = re.compile(r"[^\s.'\"]+(?:\.[^\s.'\"]+)*")
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A frame fixed on a component, where another component can be connected.
+
+    Attributes:
+        owner: the component that carries the frame.
+        port: which frame of the owner the placement starts at ("" for the reference frame of a
+            body; "a" or "b" for a joint).
+        placement: the frame seen from that port.
+    """
+
+    owner: Component
+    port: str = ""
+    placement: Placement = field(default_factory=Placement)
+
+    def at(
+        self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
+    ) -> Point:
+        """A point displaced by (x, y, z) [m] in this frame, then turned by `rotation`."""
+        steps = displacement(f"{self.owner.name}.at", x, y, z, rotation)
+        return replace(self, placement=self.placement.then(*steps))
+
+    def at_khalil(
+        self,
+        gamma: Scalar = 0,
+        b: Scalar = 0,
+        alpha: Scalar = 0,
+        d: Scalar = 0,
+        theta: Scalar = 0,
+        r: Scalar = 0,
+    ) -> Point:
+        """A point placed by the parameters of Khalil & Kleinfinger 1986, angles in rad."""
+        where = f"{self.owner.name}.at_khalil"
+        values = (gamma, b, alpha, d, theta, r)
+        names = ("gamma", "b", "alpha", "d", "theta", "r")
+        step = KhalilStep(
+            *(expression(v, f"{where}, {n}") for n, v in zip(names, values, strict=True))
+        )
+        return replace(self, placement=self.placement.then(step))
+
+
+C = TypeVar("C", bound="Component")
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A named part of a mechanism.
+
+    Attributes:
+        name: unique in its mechanism; a dot separates the names of nested mechanisms.
+    """
+
+    name: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
+            raise DescriptionError(
+                f"{type(self).__name__} {self.name!r}: a name has no blanks, quotes or empty parts;"
+                " choose another name"
+            )
+
+    def expressions(self) -> Iterator[Expression]:
+        """Every scalar of the component that may hold parameters."""
+        for f in fields(self):
+            yield from _expressions(getattr(self, f.name))
+
+    def _normalise(self, *names: str) -> None:
+        """Turn fields that a user wrote as numbers or texts into expressions, checking each."""
+        for name in names:
+            value = expression(getattr(self, name), f"{self.name}, {name}")
+            object.__setattr__(self, name, value)
+
+    def scoped(self: C, prefix: str) -> C:
+        """The same component inside a mechanism that is placed in another one."""
+        values: dict[str, Any] = {
+            f.name: _scoped(getattr(self, f.name), prefix) for f in fields(self) if f.init
+        }
+        values["name"] = f"{prefix}.{self.name}"
+        return type(self)(**values)
+
+
+def _expressions(value: object) -> Iterator[Expression]:
+    if isinstance(value, Expression):
+        yield value
+    elif isinstance(value, tuple):
+        for element in value:
+            yield from _expressions(element)
+
+
+def _scoped(value: Any, prefix: str) -> Any:
+    if isinstance(value, Expression):
+        return renamed(value, prefix)
+    if isinstance(value, tuple):
+        return tuple(_scoped(element, prefix) for element in value)
+    return value

@@ -1,0 +1,332 @@
+"""Joints: how frame_b may move with respect to frame_a.
+
+A joint is described by its freedoms, elementary motions one after the other from frame_a to
+frame_b. The rows that close a loop through a cut joint follow from the same description
+(`mbs.loops.closure`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.components.component import Component, Point
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Scalar, expression, to_float
+from mbs.spatial import align_z
+
+_NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+class Motion(Enum):
+    """An elementary motion of a frame: about or along its z axis, or free."""
+
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+    SPHERICAL = "spherical"
+    FREE = "free"
+
+    @property
+    def nq(self) -> int:
+        """Number of position coordinates."""
+        return {"spherical": 4, "free": 7}.get(self.value, 1)
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return {"spherical": 3, "free": 6}.get(self.value, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Freedom:
+    """One elementary motion of a joint.
+
+    Attributes:
+        motion: what moves.
+        axis: unit vector of the axis in frame_a at the zero posture (z where none is special).
+        suffix: what distinguishes its coordinates from the others of the same joint.
+    """
+
+    motion: Motion
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    suffix: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Joint(Component):
+    """What every joint has.
+
+    Attributes:
+        actuated: whether a motor drives it; None leaves the choice to the assembly: every joint
+            of an open chain is active, a joint of a loop is passive unless it says otherwise.
+        limits: (lower, upper) of its position, or a mapping from the suffix of a coordinate.
+        Fv: viscous friction [N m s/rad or N s/m].
+        Fs: dry friction [N m or N].
+        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
+    """
+
+    actuated: bool | None = None
+    limits: Any = None
+    Fv: Scalar = 0.0
+    Fs: Scalar = 0.0
+    Ia: Scalar = 0.0
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        self._normalise("Fv", "Fs", "Ia")
+        for name in ("Fv", "Fs", "Ia"):
+            value = to_float(getattr(self, name))
+            if value is not None and value < 0:
+                raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
+        object.__setattr__(self, "limits", self._limits_by_suffix(self.limits))
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The elementary motions from frame_a to frame_b."""
+        raise NotImplementedError
+
+    @property
+    def frame_a(self) -> Point:
+        """The frame that the joint moves with respect to."""
+        return Point(self, "a")
+
+    @property
+    def frame_b(self) -> Point:
+        """The frame that the joint moves."""
+        return Point(self, "b")
+
+    @property
+    def nv(self) -> int:
+        """Number of degrees of freedom."""
+        return sum(freedom.motion.nv for freedom in self.freedoms)
+
+    @property
+    def carries_effort(self) -> bool:
+        """Whether a motor, friction or a rotor acts on it."""
+        efforts = (to_float(expression(value)) for value in (self.Fv, self.Fs, self.Ia))
+        return bool(self.actuated) or any(value != 0 for value in efforts)
+
+    def _limits_by_suffix(self, limits: Any) -> tuple[tuple[str, tuple[float, float]], ...]:
+        if limits is None:
+            return ()
+        known = {f.suffix for f in self.freedoms if f.motion.nq == 1}
+        items: list[tuple[Any, Any]] = [("" if known == {""} else None, limits)]
+        if isinstance(limits, Mapping):
+            items = list(limits.items())
+        elif limits == () or isinstance(limits[0], tuple):
+            items = list(limits)
+        return tuple((suffix, self._interval(suffix, pair, known)) for suffix, pair in items)
+
+    def _interval(self, suffix: Any, pair: Any, known: set[str]) -> tuple[float, float]:
+        if suffix not in known:
+            raise DescriptionError(
+                f"{self.name}: limits {pair!r} name no coordinate of one number; "
+                + (f"give a mapping from {sorted(known)}" if known else "leave them out")
+            )
+        try:
+            low, high = (float(value) for value in pair)
+        except (TypeError, ValueError):
+            low, high = math.nan, math.nan
+        if not low < high:
+            raise DescriptionError(
+                f"{self.name}: limits {pair!r} are not (lower, upper); give two numbers in order"
+            )
+        return low, high
+
+
+@dataclass(frozen=True, slots=True)
+class _AxisJoint(Joint):
+    """A joint with one axis: "x", "y", "z", "-x" .. or three numbers, in frame_a."""
+
+    axis: Any = "z"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", unit_axis(self.name, self.axis))
+        Joint.__post_init__(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Revolute(_AxisJoint):
+    """One rotation about the axis; closes a loop with 5 rows."""
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The angle [rad]."""
+        return (Freedom(Motion.REVOLUTE, self.axis),)
+
+
+@dataclass(frozen=True, slots=True)
+class Prismatic(_AxisJoint):
+    """One translation along the axis; closes a loop with 5 rows."""
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The displacement [m]."""
+        return (Freedom(Motion.PRISMATIC, self.axis),)
+
+
+@dataclass(frozen=True, slots=True)
+class Cylindrical(_AxisJoint):
+    """A translation `s` along and a rotation `phi` about the axis; 4 rows."""
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Displacement [m], then angle [rad]."""
+        return (
+            Freedom(Motion.PRISMATIC, self.axis, "s"),
+            Freedom(Motion.REVOLUTE, self.axis, "phi"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Planar(_AxisJoint):
+    """Translations `s_x`, `s_y` in the plane normal to the axis, a rotation `phi` about it; 3 rows.
+
+    For the axis z the translations are along x and y of frame_a.
+    """
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Displacements [m], then angle [rad]."""
+        u, v = in_plane(self.axis)
+        return (
+            Freedom(Motion.PRISMATIC, u, "s_x"),
+            Freedom(Motion.PRISMATIC, v, "s_y"),
+            Freedom(Motion.REVOLUTE, self.axis, "phi"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Universal(Joint):
+    """Two rotations about orthogonal axes that meet: `phi_a` fixed in frame_a, then `phi_b`; 4 rows.
+
+    Attributes:
+        axes: the two axes in frame_a at the zero posture.
+    """
+
+    axes: tuple[Any, Any] = ("x", "y")
+
+    def __post_init__(self) -> None:
+        first, second = (unit_axis(self.name, axis) for axis in self.axes)
+        if abs(np.dot(first, second)) > 1e-9:
+            raise DescriptionError(
+                f"{self.name}: axes {self.axes!r} are not orthogonal; give two orthogonal axes"
+            )
+        object.__setattr__(self, "axes", (first, second))
+        Joint.__post_init__(self)
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Two angles [rad]."""
+        first, second = self.axes
+        return (
+            Freedom(Motion.REVOLUTE, first, "phi_a"),
+            Freedom(Motion.REVOLUTE, second, "phi_b"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Spherical(Joint):
+    """Any rotation, as a unit quaternion; its velocity is angular, in frame_b; 3 rows."""
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """The orientation of frame_b in frame_a."""
+        return (Freedom(Motion.SPHERICAL),)
+
+
+@dataclass(frozen=True, slots=True)
+class Free(Joint):
+    """No constraint at all: position and unit quaternion.
+
+    Its velocity is [linear; angular] velocity of frame_b with respect to frame_a, in frame_b.
+    """
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Position and orientation of frame_b in frame_a."""
+        return (Freedom(Motion.FREE),)
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed(Joint):
+    """No motion: a weld; closes a loop with 6 rows."""
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """None."""
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling(Component):
+    """A relation between the positions of two joints: driven = sum of c_k driver^k.
+
+    Gears, mimic joints and joint equalities; one row on the coordinates.
+
+    Attributes:
+        driven: name of the coordinate that follows.
+        driver: name of the coordinate that leads.
+        coefficients: c_0, c_1, ... of the polynomial.
+    """
+
+    driven: str = ""
+    driver: str = ""
+    coefficients: tuple[Scalar, ...] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        terms = tuple(expression(c, f"{self.name}, coefficients") for c in self.coefficients)
+        object.__setattr__(self, "coefficients", terms)
+        if self.driven == self.driver:
+            raise DescriptionError(
+                f"{self.name}: the coordinate {self.driven!r} cannot follow itself; name two"
+            )
+
+    def scoped(self, prefix: str) -> Coupling:
+        """The same relation inside a mechanism that is placed in another one."""
+        inner = Component.scoped(self, prefix)
+        return replace(inner, driven=f"{prefix}.{self.driven}", driver=f"{prefix}.{self.driver}")
+
+
+def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
+    """The unit vector of an axis that a user wrote as a letter or as three numbers."""
+    if isinstance(axis, str):
+        sign, letter = (-1.0, axis[1:]) if axis.startswith("-") else (1.0, axis)
+        if letter not in _NAMED_AXES:
+            raise DescriptionError(
+                f"{name}: axis {axis!r} is unknown; give 'x', 'y', 'z', '-x' .. or three numbers"
+            )
+        x, y, z = _NAMED_AXES[letter]
+        return sign * x, sign * y, sign * z
+    try:
+        values: NDArray[np.float64] = np.array([float(v) for v in axis])
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.shape != (3,) or not np.all(np.isfinite(values)):
+        raise DescriptionError(f"{name}: axis {axis!r} is not a direction; give three numbers")
+    length = float(np.linalg.norm(values))
+    if length < 1e-9:
+        raise DescriptionError(f"{name}: axis {axis!r} has zero length; give a direction")
+    x, y, z = (float(v) for v in values / length)
+    return x, y, z
+
+
+def in_plane(
+    axis: tuple[float, float, float],
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Two unit vectors u, v with u x v = axis; x and y for the axis z."""
+    R = align_z(np.array(axis))
+    u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
+    return (u[0], u[1], u[2]), (v[0], v[1], v[2])
+
+
+def joint_scalars(joint: Joint) -> tuple[Expression, Expression, Expression]:
+    """Ia, Fv, Fs of a joint."""
+    return expression(joint.Ia), expression(joint.Fv), expression(joint.Fs)

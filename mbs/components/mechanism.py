@@ -1,0 +1,300 @@
+"""A mechanism under construction: components and how they are connected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar, overload
+
+from mbs.components.bodies import RigidBody, World
+from mbs.components.component import Component, Point
+from mbs.components.joints import Coupling, Joint
+from mbs.components.placement import Symbols
+from mbs.errors import AssemblyError, DescriptionError
+from mbs.expressions import Parameter, Scalar, parameters_of
+from mbs.spatial import Inertia
+
+if TYPE_CHECKING:
+    from mbs.assembly.system import System
+
+C = TypeVar("C", bound=Component)
+
+
+class Mechanism:
+    """Bodies and joints connected in any order; loops are found, never declared.
+
+    Args:
+        name: of the mechanism.
+        gravity: gravity acceleration in the world frame [m/s^2].
+        parameters: values of the symbols that the components use.
+        source: where the data come from, for catalogue entries and files.
+        keep_order: number the links in the order in which the joints were added, as a table of
+            frames does, instead of depth-first.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        gravity: tuple[Scalar, ...] = (0.0, 0.0, -9.81),
+        parameters: Mapping[str, float] | None = None,
+        source: str = "",
+        keep_order: bool = False,
+    ) -> None:
+        self.name = Component(name).name
+        self.source = source
+        self.keep_order = keep_order
+        self.cuts: list[str] = []
+        self.world = World(gravity=gravity)
+        self.components: dict[str, Component] = {self.world.name: self.world}
+        self.connections: list[tuple[Point, Point]] = []
+        self.frames: dict[str, Point] = {}
+        self.values: dict[str, Parameter] = {}
+        for symbol, value in (parameters or {}).items():
+            self.values[symbol] = Parameter(symbol, value)
+
+    @overload
+    def add(self, component: C) -> C: ...
+
+    @overload
+    def add(self, component: Mechanism, name: str | None = None) -> Placed: ...
+
+    def add(self, component: C | Mechanism, name: str | None = None) -> C | Placed:
+        """Add a body, a joint or a whole mechanism, whose names are then scoped by its own.
+
+        Args:
+            component: what to add.
+            name: for a mechanism, its name here; its own name when left out.
+
+        Returns:
+            The component; for a mechanism a handle to the components placed.
+
+        Raises:
+            DescriptionError: the name is taken.
+        """
+        if isinstance(component, Mechanism):
+            return self._place(component, name or component.name)
+        taken = self.components.get(component.name)
+        if taken is not None:
+            raise DescriptionError(
+                f"{self.name}: two components are named {component.name!r}"
+                f" ({type(taken).__name__} and {type(component).__name__}); rename one"
+            )
+        self.components[component.name] = component
+        return component
+
+    def connect(
+        self,
+        a: Point | RigidBody,
+        joint_or_point: Joint | Point | RigidBody,
+        b: Point | RigidBody | None = None,
+    ) -> None:
+        """Put a joint between two points, or weld two points together.
+
+        `connect(a, joint, b)` puts the joint's frame_a on a and its frame_b on b;
+        `connect(a, b)` makes the two frames coincide. A frame of a joint is a point as well.
+
+        Raises:
+            DescriptionError: a component is unknown here, or the joint is connected already.
+        """
+        if isinstance(joint_or_point, Joint):
+            if b is None:
+                raise DescriptionError(
+                    f"{self.name}: joint {joint_or_point.name!r} has nothing on its other side;"
+                    " write connect(point, joint, point)"
+                )
+            if self.components.get(joint_or_point.name) is not joint_or_point:
+                self.add(joint_or_point)
+            self._weld(self._point(a), joint_or_point.frame_a)
+            self._weld(joint_or_point.frame_b, self._point(b))
+            return
+        if b is not None:
+            raise DescriptionError(
+                f"{self.name}: {joint_or_point!r} stands where a joint belongs;"
+                " write connect(point, joint, point)"
+            )
+        self._weld(self._point(a), self._point(joint_or_point))
+
+    def add_frame(self, name: str, point: Point | RigidBody) -> Point:
+        """Name a point, so that models can be asked for it (a tool, a sensor)."""
+        if name in self.frames or name in self.components or name == "base":
+            raise DescriptionError(
+                f"{self.name}: the frame name {name!r} is taken; choose another name"
+            )
+        self.frames[Component(name).name] = self._point(point)
+        return self.frames[name]
+
+    def cut(self, joint: Joint) -> None:
+        """Open the loop that this joint closes here, not where the assembly would choose."""
+        if self.components.get(joint.name) is not joint:
+            raise DescriptionError(
+                f"{self.name}: joint {joint.name!r} is not connected; connect it before the cut"
+            )
+        self.cuts.append(joint.name)
+
+    def assemble(self, guess: Mapping[str, float] | None = None) -> System:
+        """The frozen `System` of this mechanism: tree, cut joints, equations.
+
+        Args:
+            guess: approximate joint positions by coordinate name [rad or m], where the loops are
+                to be closed near to; the others start at zero.
+
+        Raises:
+            AssemblyError: the components do not form a mechanism.
+            Unclosable: no posture closes the loops.
+        """
+        # The one call upwards: the description offers its assembly under the name users expect.
+        from mbs.loops.assemble import assemble
+
+        return assemble(self, guess or {})
+
+    def joints(self) -> Iterator[Joint]:
+        """Every joint, in the order added."""
+        return (c for c in self.components.values() if isinstance(c, Joint))
+
+    def bodies(self) -> Iterator[RigidBody]:
+        """Every body, in the order added, without the world."""
+        return (
+            c for c in self.components.values() if isinstance(c, RigidBody) and c is not self.world
+        )
+
+    def couplings(self) -> Iterator[Coupling]:
+        """Every coupling of coordinates, in the order added."""
+        return (c for c in self.components.values() if isinstance(c, Coupling))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every symbol that the components use, in the order of their first use, with its value.
+
+        Raises:
+            AssemblyError: a value is given for a symbol that no component uses, or a symbol has
+                two different values.
+        """
+        found: dict[str, Parameter] = {}
+        for parameter in self._used_parameters():
+            known = found.setdefault(parameter.name, parameter)
+            if known.default is None:
+                found[parameter.name] = parameter
+            elif parameter.default not in (None, known.default):
+                raise AssemblyError(
+                    f"{self.name}: parameter {parameter.name} has the values {known.default:g} and"
+                    f" {parameter.default:g}; give it one"
+                )
+        for name, value in self.values.items():
+            if name not in found:
+                known_names = ", ".join(found) or "none"
+                raise AssemblyError(
+                    f"{self.name}: parameter {name!r} is used by no component; the parameters are:"
+                    f" {known_names}"
+                )
+            found[name] = replace(found[name], default=value.default)
+        return tuple(found.values())
+
+    def _used_parameters(self) -> Iterator[Parameter]:
+        for component in self.components.values():
+            for value in component.expressions():
+                yield from parameters_of(value)
+        points = [point for pair in self.connections for point in pair]
+        for point in (*points, *self.frames.values()):
+            for value in point.placement.expressions():
+                yield from parameters_of(value)
+
+    def _point(self, point: Point | RigidBody) -> Point:
+        if isinstance(point, RigidBody):
+            point = point.frame
+        if not isinstance(point, Point):
+            raise DescriptionError(
+                f"{self.name}: {point!r} is not a point; give a body, body.at(...) or joint.frame_a"
+            )
+        if self.components.get(point.owner.name) is not point.owner:
+            raise DescriptionError(
+                f"{self.name}: {point.owner.name!r} is connected but is not part of the mechanism;"
+                f" call add({point.owner.name}) first"
+            )
+        return point
+
+    def _weld(self, a: Point, b: Point) -> None:
+        for point in (a, b):
+            if isinstance(point.owner, Joint) and self._is_used(point):
+                raise DescriptionError(
+                    f"{self.name}: frame_{point.port} of joint {point.owner.name!r} is connected"
+                    " twice; use one joint for each connection"
+                )
+        self.connections.append((a, b))
+
+    def _is_used(self, point: Point) -> bool:
+        return any(
+            p.owner is point.owner and p.port == point.port
+            for pair in self.connections
+            for p in pair
+        )
+
+    def _place(self, inner: Mechanism, name: str) -> Placed:
+        scope = Component(name).name
+        if any(taken == scope or taken.startswith(f"{scope}.") for taken in self.components):
+            raise DescriptionError(f"{self.name}: two components are named {scope!r}; rename one")
+        placed: dict[str, Component] = {}
+        for component in inner.components.values():
+            if component is inner.world:
+                base = _Base(f"{scope}.{component.name}")
+                placed[component.name] = self.add(base)
+            else:
+                placed[component.name] = self.add(component.scoped(scope))
+        self.connections.extend(
+            (_moved(a, placed, scope), _moved(b, placed, scope)) for a, b in inner.connections
+        )
+        for frame, point in inner.frames.items():
+            self.frames[f"{scope}.{frame}"] = _moved(point, placed, scope)
+        self.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
+        for symbol, value in inner.values.items():
+            self.values[f"{scope}.{symbol}"] = replace(value, name=f"{scope}.{symbol}")
+        return Placed(self, scope)
+
+
+@dataclass(frozen=True, slots=True)
+class _Base(RigidBody):
+    """The ground of a nested mechanism: a frame without mass, to be connected by its user."""
+
+    def inertial(self, symbols: Symbols) -> Inertia:
+        """No inertia."""
+        return Inertia.zero()
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A mechanism inside another one: `arm["forearm"]` is its component, `arm.base` its ground."""
+
+    outer: Mechanism
+    scope: str
+
+    def __getitem__(self, name: str) -> Component:
+        full = f"{self.scope}.{name}"
+        if full not in self.outer.components:
+            inside = sorted(n for n in self.outer.components if n.startswith(f"{self.scope}."))
+            raise DescriptionError(f"{full!r} does not exist; the components are {inside}")
+        return self.outer.components[full]
+
+    def body(self, name: str) -> RigidBody:
+        """The body of that name."""
+        component = self[name]
+        if not isinstance(component, RigidBody):
+            raise DescriptionError(
+                f"{component.name} is a {type(component).__name__}, not a body; name a body"
+            )
+        return component
+
+    def point(self, name: str) -> Point:
+        """The frame that the inner mechanism gave this name."""
+        full = f"{self.scope}.{name}"
+        if full not in self.outer.frames:
+            inside = sorted(n for n in self.outer.frames if n.startswith(f"{self.scope}."))
+            raise DescriptionError(f"{full!r} is not a frame; the frames are {inside}")
+        return self.outer.frames[full]
+
+    @property
+    def base(self) -> RigidBody:
+        """The ground of the inner mechanism, to be connected to something."""
+        return self.body("world")
+
+
+def _moved(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
+    owner = placed[point.owner.name]
+    return replace(point, owner=owner, placement=point.placement.scoped(scope))

@@ -1,0 +1,60 @@
+"""The exception tree: every error that mbs raises on purpose.
+
+    MbsError
+    ├── DescriptionError      a component or a file says something impossible
+    │   └── ExpressionError   a text is not a number or an expression of symbols
+    ├── AssemblyError         the components do not form a mechanism
+    ├── LoopError             a closed loop has no usable posture
+    │   ├── Unclosable        no posture closes the loop
+    │   └── SingularPosture   the closure loses rank at this posture
+    ├── ModelError            a model was asked for that the system does not have
+    ├── SolverError           a numerical method could not go on
+    ├── CompilerError         no compiler, or the compiler refused the code
+    └── ExportError           a file could not be written
+
+A message is one sentence: which component, what value, which rule, what to do.
+"""
+
+
+class MbsError(Exception):
+    """Base of all errors raised on purpose by mbs."""
+
+
+class DescriptionError(MbsError, ValueError):
+    """A component or a robot file describes something impossible."""
+
+
+class ExpressionError(DescriptionError):
+    """A text is neither a number nor an expression of symbols."""
+
+
+class AssemblyError(MbsError, ValueError):
+    """The components do not form a mechanism."""
+
+
+class LoopError(MbsError):
+    """A closed loop has no usable posture."""
+
+
+class Unclosable(LoopError):
+    """No posture closes the loops of the mechanism."""
+
+
+class SingularPosture(LoopError):
+    """The closure equations lose rank at this posture."""
+
+
+class ModelError(MbsError, ValueError):
+    """A model was asked for that the system does not have."""
+
+
+class SolverError(MbsError, RuntimeError):
+    """A numerical method could not go on."""
+
+
+class CompilerError(MbsError, RuntimeError):
+    """No C compiler was found, or it refused the code."""
+
+
+class ExportError(MbsError, OSError):
+    """A file could not be written."""

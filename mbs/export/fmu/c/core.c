@@ -1,0 +1,205 @@
+#include "internal.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "closure.h"
+
+static core_status say(core *c, core_status status, const char *format, va_list args) {
+    char message[1024];
+    vsnprintf(message, sizeof message, format, args);
+    if (c->log) c->log(c->host, c->name, status, message);
+    return status;
+}
+
+core_status core_refuse(core *c, const char *format, ...) {
+    core_status status;
+    va_list args;
+    va_start(args, format);
+    status = say(c, CORE_ERROR, format, args);
+    va_end(args);
+    return status;
+}
+
+/* No answer here. An integrator outside may try a shorter step; a co-simulation master may only go
+ * back to a saved state, and some repeat a discarded step for ever, so for it this is an error. */
+core_status core_no_answer(core *c, const char *format, ...) {
+    core_status status = c->m.mode & CONTINUOUS ? CORE_DISCARD : CORE_ERROR;
+    va_list args;
+    va_start(args, format);
+    status = say(c, status, format, args);
+    va_end(args);
+    return status;
+}
+
+const char *core_mode_name(int mode) {
+    switch (mode) {
+        case INSTANTIATED: return "before initialization";
+        case INITIALIZATION: return "in initialization mode";
+        case EVENT: return "in event mode";
+        case CONTINUOUS: return "in continuous-time mode";
+        case STEP: return "between steps";
+        default: return "after termination";
+    }
+}
+
+int core_allowed(core *c, int modes, const char *action) {
+    if (c->m.mode & modes) return 1;
+    core_refuse(c, "%s: %s is not possible %s", c->name, action, core_mode_name(c->m.mode));
+    return 0;
+}
+
+static int call_rhs(core *c, double t, const double *x, const double *z, double *xdot, double *y) {
+    c->arg[0] = &t;
+    c->arg[1] = x;
+    c->arg[2] = z;
+    c->arg[3] = c->m.values + INPUTS;
+    c->arg[4] = c->m.values + PARAMETERS;
+    c->res[0] = xdot;
+    c->res[1] = y;
+    return mbs_rhs(c->arg, c->res, c->iw, c->w, 0);
+}
+
+static core_status closure_failed(core *c, int status) {
+    if (status == CLOSURE_SINGULAR)
+        return core_no_answer(c, "%s: singular posture at time %.9g: the states do not determine the "
+                         "dependent coordinates; start elsewhere or choose other states",
+                         c->name, c->m.time);
+    return core_no_answer(c, "%s: unclosable posture at time %.9g: no dependent coordinates near the "
+                     "last ones close the loops", c->name, c->m.time);
+}
+
+core_status core_accept_posture(core *c, const double *x, const double *z) {
+    if (closure_singular(c, x, z)) return closure_failed(c, CLOSURE_SINGULAR);
+    memcpy(c->m.posture_x, x, NX * sizeof *x);
+    memcpy(c->m.posture_z, z, NZ * sizeof *z);
+    c->m.closed = 1;
+    return CORE_OK;
+}
+
+core_status core_refresh(core *c) {
+    double *v = c->m.values, *x = v + STATES;
+    int i, status;
+    if (!c->m.stale) return CORE_OK;
+    status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
+    if (status) return closure_failed(c, status);
+    if (call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
+        return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name, c->m.time);
+    memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
+    for (i = 0; i < N_VALUES; i++)
+        if (!isfinite(v[i]))
+            return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular posture or a "
+                             "zero mass", c->name, MODEL_NAMES[i], c->m.time);
+    c->m.stale = 0;
+    return CORE_OK;
+}
+
+static int solver_rhs(void *user, double t, const double *x, double *xdot) {
+    core *c = user;
+    return closure_solve(c, x, c->z) || call_rhs(c, t, x, c->z, xdot, NULL);
+}
+
+static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
+
+static int allocate(core *c) {
+    long long size[4] = {8, 3, 0, 0}, other[4];
+    int i, f;
+    static int (*const work[])(long long *, long long *, long long *, long long *) = {
+        mbs_rhs_work, mbs_tangent_work,
+#if NZ > 0
+        mbs_closure_work, mbs_sensitivity_work,
+#endif
+    };
+    for (f = 0; f < (int)(sizeof work / sizeof *work); f++) {
+        work[f](other, other + 1, other + 2, other + 3);
+        for (i = 0; i < 4; i++)
+            if (other[i] > size[i]) size[i] = other[i];
+    }
+    c->arg = array(size[0], sizeof *c->arg);
+    c->res = array(size[1], sizeof *c->res);
+    c->iw = array(size[2], sizeof *c->iw);
+    c->w = array(size[3], sizeof *c->w);
+    return c->arg && c->res && c->iw && c->w;
+}
+
+static void to_start(core *c) {
+    int cosimulation = c->m.cosimulation;
+    memset(&c->m, 0, sizeof c->m);
+    c->m.cosimulation = cosimulation;
+    c->m.mode = INSTANTIATED;
+    c->m.stale = 1;
+    c->m.tolerance = MODEL_TOLERANCE;
+    memcpy(c->m.values, MODEL_START, N_VALUES * sizeof *c->m.values);
+    memcpy(c->m.guess, MODEL_START + DEPENDENTS, NZ * sizeof *c->m.guess);
+}
+
+core *core_new(const char *name, int cosimulation, core_logger log, void *host) {
+    core *c = calloc(1, sizeof *c);
+    if (!c) return NULL;
+    c->name = malloc(strlen(name) + 1);
+    if (!c->name || !allocate(c)) {
+        core_free(c);
+        return NULL;
+    }
+    strcpy(c->name, name);
+    c->log = log;
+    c->host = host;
+    c->m.cosimulation = cosimulation;
+    to_start(c);
+    dopri5_init(&c->solver, NX, solver_rhs, c, c->m.solver, c->work);
+    c->solver.nominal = MODEL_NOMINAL + STATES;
+    return c;
+}
+
+void core_free(core *c) {
+    if (!c) return;
+    free(c->name);
+    free((void *)c->arg);
+    free((void *)c->res);
+    free(c->iw);
+    free(c->w);
+    free(c);
+}
+
+core_status core_setup(core *c, double tolerance, double start) {
+    if (!core_allowed(c, INSTANTIATED, "setting up the experiment")) return CORE_ERROR;
+    if (!isfinite(start)) return core_refuse(c, "%s: start time %g is not finite", c->name, start);
+    if (!(tolerance > 0.0) || !isfinite(tolerance))
+        return core_refuse(c, "%s: tolerance %g must be positive", c->name, tolerance);
+    c->m.time = start;
+    c->m.tolerance = tolerance;
+    c->m.stale = 1;
+    return CORE_OK;
+}
+
+core_status core_enter_initialization(core *c) {
+    if (!core_allowed(c, INSTANTIATED, "entering initialization mode")) return CORE_ERROR;
+    c->m.mode = INITIALIZATION;
+    return CORE_OK;
+}
+
+core_status core_exit_initialization(core *c) {
+    core_status status;
+    if (!core_allowed(c, INITIALIZATION, "leaving initialization mode")) return CORE_ERROR;
+    status = core_refresh(c);
+    if (status) return status;
+    status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+    if (status) return status;
+    dopri5_start(&c->solver, c->m.time);
+    c->m.mode = c->m.cosimulation ? STEP : EVENT;
+    return CORE_OK;
+}
+
+core_status core_terminate(core *c) {
+    if (!core_allowed(c, RUNNING, "termination")) return CORE_ERROR;
+    c->m.mode = TERMINATED;
+    return CORE_OK;
+}
+
+core_status core_reset(core *c) {
+    to_start(c);
+    return CORE_OK;
+}

@@ -1,0 +1,234 @@
+"""The one description of an FMU, from which both its XML file and its C tables are written."""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi
+
+from mbs.errors import ExportError
+from mbs.units import UNITS
+
+Kind = Literal["state", "derivative", "input", "output", "parameter", "dependent"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """An input, an output, a parameter or a dependent coordinate of an FMU.
+
+    Attributes:
+        name: as other tools show it.
+        unit: a name of `mbs.units.UNITS`.
+        start: value at the start; of a dependent coordinate, a guess that chooses the posture.
+        nominal: typical size, positive.
+        min: least value; a parameter below it is refused.
+        max: greatest value; a parameter above it is refused.
+        description: one line for people.
+    """
+
+    name: str
+    unit: str = "1"
+    start: float = 0.0
+    nominal: float = 1.0
+    min: float | None = None
+    max: float | None = None
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State(Variable):
+    """A continuous state and its derivative.
+
+    Attributes:
+        derivative: name of the derivative; `der(name)` by default.
+        derivative_unit: a name of `mbs.units.UNITS`.
+        derivative_description: one line for people.
+        output: the state is an output of the FMU too.
+    """
+
+    derivative: str = ""
+    derivative_unit: str = "1/s"
+    derivative_description: str = ""
+    output: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A variable at its place: the value reference is the index in the table of entries."""
+
+    kind: Kind
+    variable: Variable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FmuModel:
+    """All that an FMU says and computes; nx, nz, nu, np, ny count the variables below.
+
+    Attributes:
+        name: of the model; letters, digits and underscores of it make the file names inside.
+        description: one line for people.
+        states: x.
+        inputs: u.
+        outputs: y, those that are not states.
+        parameters: p, tunable.
+        dependents: z, the coordinates that closed loops determine.
+        rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
+        closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
+            absolute closure row at z; None when there is no z.
+        tangent: `tangent(t, x, z, u, p, dx, du, dp) -> (dxdot, dy)`, the total derivative along a
+            direction; None to have it derived from `rhs` and `closure`.
+        stop_time: default end of a simulation, s.
+        tolerance: default relative tolerance of the integration.
+        step_size: default communication step, s.
+        documentation: text for `documentation/index.html`; a blank line starts a paragraph.
+    """
+
+    name: str
+    rhs: casadi.Function
+    description: str = ""
+    states: tuple[State, ...] = ()
+    inputs: tuple[Variable, ...] = ()
+    outputs: tuple[Variable, ...] = ()
+    parameters: tuple[Variable, ...] = ()
+    dependents: tuple[Variable, ...] = ()
+    closure: casadi.Function | None = None
+    tangent: casadi.Function | None = None
+    stop_time: float = 10.0
+    tolerance: float = 1e-8
+    step_size: float = 0.01
+    documentation: str = ""
+
+    def __post_init__(self) -> None:
+        _check_names(self)
+        _check_numbers(self)
+        _check_functions(self)
+
+    @property
+    def identifier(self) -> str:
+        """The name as an identifier of C, which names the files inside the FMU."""
+        text = re.sub(r"\W", "_", self.name, flags=re.ASCII)
+        return text if text[:1].isalpha() else f"model_{text}"
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """Every variable in the order of the value references."""
+        return tuple(_entries(self))
+
+    def first(self, kind: Kind) -> int:
+        """Value reference of the first variable of a kind.
+
+        Args:
+            kind: which variables.
+
+        Returns:
+            its index in `entries`, also where there is none of that kind.
+        """
+        order: tuple[tuple[Kind, int], ...] = (
+            ("state", len(self.states)),
+            ("derivative", len(self.states)),
+            ("input", len(self.inputs)),
+            ("output", len(self.outputs)),
+            ("parameter", len(self.parameters)),
+            ("dependent", len(self.dependents)),
+        )
+        place = 0
+        for name, count in order:
+            if name == kind:
+                break
+            place += count
+        return place
+
+
+def derivative_of(state: State) -> Variable:
+    """The derivative of a state, as a variable.
+
+    Args:
+        state: a state.
+
+    Returns:
+        its derivative, without start value.
+    """
+    return Variable(
+        name=state.derivative or f"der({state.name})",
+        unit=state.derivative_unit,
+        description=state.derivative_description or f"derivative of {state.name}",
+    )
+
+
+def _entries(model: FmuModel) -> Iterator[Entry]:
+    yield from (Entry("state", v) for v in model.states)
+    yield from (Entry("derivative", derivative_of(v)) for v in model.states)
+    yield from (Entry("input", v) for v in model.inputs)
+    yield from (Entry("output", v) for v in model.outputs)
+    yield from (Entry("parameter", v) for v in model.parameters)
+    yield from (Entry("dependent", v) for v in model.dependents)
+
+
+def _check_names(model: FmuModel) -> None:
+    if not model.name:
+        raise ExportError("FMU: the model has no name; give it one")
+    seen: set[str] = set()
+    for entry in model.entries:
+        name = entry.variable.name
+        if not name or not name.isprintable():
+            raise ExportError(f"FMU {model.name}: {name!r} is no name; use printable characters")
+        if name in seen:
+            raise ExportError(f"FMU {model.name}: two variables are called {name!r}; rename one")
+        seen.add(name)
+
+
+def _check_numbers(model: FmuModel) -> None:
+    for entry in model.entries:
+        v = entry.variable
+        place = f"FMU {model.name}: {v.name}"
+        if v.unit not in UNITS:
+            raise ExportError(f"{place} has unit {v.unit!r}; use one of {', '.join(UNITS)}")
+        if not math.isfinite(v.start):
+            raise ExportError(f"{place} starts at {v.start}; use a finite number")
+        if not (v.nominal > 0 and math.isfinite(v.nominal)):
+            raise ExportError(f"{place} has nominal {v.nominal}; use a positive number")
+        low = -math.inf if v.min is None else v.min
+        high = math.inf if v.max is None else v.max
+        if not low <= v.start <= high and entry.kind == "parameter":
+            raise ExportError(f"{place} starts at {v.start}, outside {low} to {high}; move one")
+    for what, value in (
+        ("stop time", model.stop_time),
+        ("tolerance", model.tolerance),
+        ("step size", model.step_size),
+    ):
+        if not (value > 0 and math.isfinite(value)):
+            raise ExportError(f"FMU {model.name}: {what} {value} must be positive")
+
+
+def _check_functions(model: FmuModel) -> None:
+    nx, nz, nu = len(model.states), len(model.dependents), len(model.inputs)
+    ny, n_p = len(model.outputs), len(model.parameters)
+    _check_shape(model, "rhs", model.rhs, (1, nx, nz, nu, n_p), (nx, ny))
+    if (model.closure is None) != (nz == 0):
+        raise ExportError(
+            f"FMU {model.name}: {nz} dependent coordinates need "
+            f"{'a closure' if nz else 'no closure'}; give both or neither"
+        )
+    if model.closure is not None:
+        _check_shape(model, "closure", model.closure, (nx, nz, n_p), (nz, 1))
+    if model.tangent is not None:
+        sizes = (1, nx, nz, nu, n_p, nx, nu, n_p)
+        _check_shape(model, "tangent", model.tangent, sizes, (nx, ny))
+
+
+def _check_shape(
+    model: FmuModel,
+    what: str,
+    function: casadi.Function,
+    inputs: tuple[int, ...],
+    outputs: tuple[int, ...],
+) -> None:
+    found_in = tuple(function.numel_in(k) for k in range(function.n_in()))
+    found_out = tuple(function.numel_out(k) for k in range(function.n_out()))
+    if found_in != inputs or found_out != outputs:
+        raise ExportError(
+            f"FMU {model.name}: {what} has inputs of sizes {found_in} and outputs of sizes "
+            f"{found_out}; the variables ask for {inputs} and {outputs}"
+        )

@@ -1,0 +1,164 @@
+"""An FMU as one file: sources, library, description and documentation, zipped."""
+
+import hashlib
+import html
+import os
+import platform
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+
+from mbs.errors import ExportError
+from mbs.export.fmu.description import FmuModel
+from mbs.export.fmu.tables import header, source
+from mbs.export.fmu.xml import model_description
+from mbs.native.cache import cached_library
+from mbs.native.compiler import FLAGS, LIBRARY_SUFFIX
+
+_CORE = (
+    "core.c",
+    "values.c",
+    "closure.c",
+    "exchange.c",
+    "cosimulation.c",
+    "saved.c",
+    "fmi2.c",
+)
+_CORE_HEADERS = ("core.h", "internal.h", "closure.h")
+_RUNTIME = ("dopri5.c",)
+_RUNTIME_HEADERS = ("dopri5.h",)
+_FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
+SOURCES = ("model.c", *_CORE, *_RUNTIME)
+"""C files to compile, in the folder `sources` of the FMU."""
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # equal models give equal files
+_PAGE = """\
+<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{title}</title></head>
+<body>
+<h1>{title}</h1>
+{paragraphs}
+<table>
+<tr><th>variable</th><th>unit</th><th>what it is</th></tr>
+{rows}
+</table>
+</body>
+</html>
+"""
+
+
+def write_fmu(model: FmuModel, path: str | os.PathLike[str]) -> Path:
+    """Write an FMU for model exchange and co-simulation, FMI 2.0, with sources and library.
+
+    Args:
+        model: what the FMU is.
+        path: file to write; it is replaced as a whole, or left alone.
+
+    Returns:
+        the file.
+
+    Raises:
+        ExportError: the file cannot be written, or a function cannot be written as C.
+        CompilerError: there is no C compiler.
+    """
+    target = Path(path)
+    _check_target(target)
+    texts = fmu_sources(model)
+    library = cached_library(texts, (*FLAGS, "-fvisibility=hidden", "-std=gnu99"))
+    binary = f"binaries/{_platform()}/{model.identifier}{LIBRARY_SUFFIX}"
+    guid = _guid(model)
+    files: dict[str, bytes] = {
+        "modelDescription.xml": model_description(model, guid, SOURCES).encode(),
+        "documentation/index.html": _documentation(model).encode(),
+        binary: library.read_bytes(),
+        **{f"sources/{name}": text.encode() for name, text in texts.items()},
+    }
+    _write(target, files)
+    return target
+
+
+def fmu_sources(model: FmuModel) -> dict[str, str]:
+    """Every C file of the FMU; they compile by themselves.
+
+    Args:
+        model: what the FMU is.
+
+    Returns:
+        file name to text.
+    """
+    c = resources.files("mbs.export.fmu") / "c"
+    runtime = resources.files("mbs.native") / "runtime"
+    fmi = resources.files("fmpy") / "c-code"
+    texts = {"model.c": source(model), "model.h": header(model, _guid(model))}
+    for folder, names in (
+        (c, (*_CORE, *_CORE_HEADERS)),
+        (runtime, (*_RUNTIME, *_RUNTIME_HEADERS)),
+        (fmi, _FMI_HEADERS),
+    ):
+        texts |= {name: (folder / name).read_text(encoding="utf-8") for name in names}
+    return texts
+
+
+def _guid(model: FmuModel) -> str:
+    """An identity made of what the FMU says and computes, so that equal models share it."""
+    digest = hashlib.sha256()
+    for text in (model_description(model, "", SOURCES), source(model)):
+        digest.update(text.encode())
+    h = digest.hexdigest()
+    return "{" + "-".join((h[:8], h[8:12], h[12:16], h[16:20], h[20:32])) + "}"
+
+
+def _platform() -> str:
+    """Name that FMI 2.0 gives to this computer's kind of library."""
+    bits = "64" if sys.maxsize > 2**32 else "32"
+    if platform.machine().lower() not in ("x86_64", "amd64", "x86", "i386", "i686"):
+        return f"{platform.machine()}-{sys.platform}"
+    return {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux") + bits
+
+
+def _documentation(model: FmuModel) -> str:
+    text = model.documentation or model.description or model.name
+    paragraphs = "\n".join(f"<p>{html.escape(part)}</p>" for part in text.split("\n\n"))
+    rows = "\n".join(
+        f"<tr><td>{html.escape(v.name)}</td><td>{html.escape(v.unit)}</td>"
+        f"<td>{html.escape(v.description)}</td></tr>"
+        for v in (entry.variable for entry in model.entries)
+    )
+    return _PAGE.format(title=html.escape(model.name), paragraphs=paragraphs, rows=rows)
+
+
+def _check_target(target: Path) -> None:
+    if not target.parent.is_dir():
+        raise ExportError(f"folder {target.parent} does not exist; create it or choose another one")
+    if target.is_dir():
+        raise ExportError(f"{target} is a folder; give the name of a file, such as model.fmu")
+    try:
+        with tempfile.TemporaryFile(dir=target.parent):
+            pass
+    except OSError as error:
+        raise ExportError(
+            f"folder {target.parent} cannot be written ({error.strerror}); choose another one"
+        ) from error
+
+
+def _write(target: Path, files: Mapping[str, bytes]) -> None:
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
+            for file in sorted(files):
+                info = zipfile.ZipInfo(file, _EPOCH)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = 0o644 << 16
+                archive.writestr(info, files[file])
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise ExportError(f"{target} could not be written ({error.strerror})") from error
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,186 @@
+"""The generated C of an FMU: its tables and the functions that it evaluates."""
+
+import math
+from collections.abc import Iterable
+
+import casadi
+
+from mbs.errors import ExportError
+from mbs.export.fmu.description import FmuModel
+
+_HEADER = """\
+/* Sizes and tables of the model, generated together with modelDescription.xml. */
+#ifndef MBS_MODEL_H
+#define MBS_MODEL_H
+
+#define MODEL_GUID {guid}
+#define MODEL_TOLERANCE {tolerance}
+#define NX {nx}
+#define NU {nu}
+#define NY {ny}
+#define NP {np}
+#define NZ {nz}
+
+extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
+extern const char *const MODEL_NAMES[];
+
+{prototypes}
+#endif
+"""
+_PROTOTYPE = """\
+int {name}(const double **arg, double **res, long long *iw, double *w, int mem);
+int {name}_work(long long *arg, long long *res, long long *iw, long long *w);
+"""
+
+
+def header(model: FmuModel, guid: str) -> str:
+    """The file model.h.
+
+    Args:
+        model: what the FMU is.
+        guid: identity that the library asks for.
+
+    Returns:
+        its text.
+    """
+    names = [f.name() for f in functions(model)]
+    return _HEADER.format(
+        guid=_quoted(guid),
+        tolerance=repr(float(model.tolerance)),
+        nx=len(model.states),
+        nu=len(model.inputs),
+        ny=len(model.outputs),
+        np=len(model.parameters),
+        nz=len(model.dependents),
+        prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
+    )
+
+
+def source(model: FmuModel) -> str:
+    """The file model.c.
+
+    Args:
+        model: what the FMU is.
+
+    Returns:
+        its text.
+
+    Raises:
+        ExportError: a function holds a node that CasADi cannot write as C.
+    """
+    generator = casadi.CodeGenerator("model_functions")
+    for function in functions(model):
+        generator.add(function)
+    code = str(generator.dump())
+    if "#error" in code:
+        reason = code[code.index("#error") :].splitlines()[0]
+        raise ExportError(
+            f"FMU {model.name}: CasADi cannot write it as C ({reason}); "
+            "replace integrators and rootfinders by Newton steps"
+        )
+    variables = [entry.variable for entry in model.entries]
+    low = (-math.inf if v.min is None else v.min for v in variables)
+    high = (math.inf if v.max is None else v.max for v in variables)
+    tables = [
+        _numbers("MODEL_START", (v.start for v in variables)),
+        _numbers("MODEL_NOMINAL", (v.nominal for v in variables)),
+        _numbers("MODEL_MIN", low),
+        _numbers("MODEL_MAX", high),
+        _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
+    ]
+    return (
+        '#include <math.h>\n\n#include "model.h"\n\n'
+        + "\n".join(tables)
+        + "\n/* The functions stay inside the library. */\n#define CASADI_SYMBOL_EXPORT\n"
+        + code
+    )
+
+
+def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
+    """The functions under the names that core.c calls, every input and output dense.
+
+    Args:
+        model: what the FMU computes.
+
+    Returns:
+        `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, `mbs_tangent(t, x, z, u, p, dx, du, dp) ->
+        (dxdot, dy, dz)` and, where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
+        `mbs_sensitivity(x, z, p) -> steepness`.
+    """
+    t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
+    z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
+    p = casadi.MX.sym("p", len(model.parameters))
+    dx, du, dp = (casadi.MX.sym(f"d{v.name()}", v.numel()) for v in (x, u, p))
+    point = [t, x, z, u, p]
+    answers = [
+        casadi.Function("mbs_rhs", point, _dense(model.rhs.call(point))),
+        casadi.Function(
+            "mbs_tangent", [*point, dx, du, dp], _dense(_tangent(model, point, [dx, du, dp]))
+        ),
+    ]
+    if model.closure is not None:
+        loop = [x, z, p]
+        answers.append(casadi.Function("mbs_closure", loop, _dense(model.closure.call(loop))))
+        answers.append(casadi.Function("mbs_sensitivity", loop, [_steepness(model, loop)]))
+    return tuple(answers)
+
+
+def _tangent(model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]) -> list[casadi.MX]:
+    """dxdot, dy and dz along a direction.
+
+    At a solution of the closure, the derivative of one Newton step z - J^-1 r is -J^-1 dr: that
+    of the dependent coordinates themselves.
+    """
+    t, x, z, _, p = point
+    dx, du, dp = seeds
+    dz = casadi.MX(z.numel(), 1)
+    if model.closure is not None:
+        dz = _forward(model.closure, [x, z, p], [dx, dz, dp])[0]
+    if model.tangent is not None:
+        return [*model.tangent.call([*point, *seeds]), dz]
+    dt = casadi.MX(t.numel(), 1)
+    return [*_forward(model.rhs, point, [dt, dx, dz, du, dp]), dz]
+
+
+def _steepness(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
+    """How many nominal sizes z moves when all of x moves by about one: huge where rank is lost."""
+    assert model.closure is not None
+    x, z, p = loop
+    count = max(len(model.states), 1)
+    seed = casadi.DM([v.nominal * (1 + k / count) for k, v in enumerate(model.states)])
+    zero = casadi.MX(z.numel(), 1), casadi.MX(p.numel(), 1)
+    dz = _forward(model.closure, loop, [casadi.MX(seed), *zero])[0]
+    sizes = casadi.DM([v.nominal for v in model.dependents])
+    return casadi.norm_inf(casadi.vec(dz) / sizes)
+
+
+def _forward(
+    function: casadi.Function, point: list[casadi.MX], seeds: list[casadi.MX]
+) -> list[casadi.MX]:
+    values = function.call(point)
+    answer: list[casadi.MX] = function.forward(1).call([*point, *values, *seeds])
+    return answer
+
+
+def _dense(values: Iterable[casadi.MX]) -> list[casadi.MX]:
+    return [casadi.densify(casadi.vec(value)) for value in values]
+
+
+def _numbers(name: str, values: Iterable[float]) -> str:
+    return _table(f"const double {name}", (_number(v) for v in values))
+
+
+def _number(value: float) -> str:
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
+    return repr(float(value))
+
+
+def _table(declaration: str, items: Iterable[str]) -> str:
+    texts = list(items) or ["0"]
+    return f"{declaration}[] = {{\n" + "".join(f"    {text},\n" for text in texts) + "};\n"
+
+
+def _quoted(text: str) -> str:
+    plain = {byte: chr(byte) for byte in range(32, 127) if chr(byte) not in '"\\?'}
+    return '"' + "".join(plain.get(byte, f"\\{byte:03o}") for byte in text.encode()) + '"'

@@ -1,0 +1,317 @@
+"""A robot as a table of frames: the description of Khalil & Kleinfinger 1986 as plain data.
+
+Frames are numbered from 1 in the order of the rows; antecedent 0 is the base. Rows hold what was
+written, as expressions; nothing is computed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Scalar, expression, parameters_of, to_float
+from mbs.formats.files import did_you_mean
+from mbs.spatial.inertia import TEN_PARAMETERS
+
+GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
+"""The six parameters of a frame, in the order in which the displacements are made."""
+
+INERTIAL = (*TEN_PARAMETERS, "Ia", "Fv", "Fs")
+"""The scalars of a body row."""
+
+JOINTS = ("revolute", "prismatic", "fixed")
+"""Names of the joint types sigma = 0, 1, 2."""
+
+LOOP_JOINTS = (*JOINTS, "cylindrical", "universal", "spherical", "planar")
+"""Names of the joint types that may close a loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRow:
+    """Frame j and the joint that moves it with respect to its antecedent.
+
+    Attributes:
+        antecedent: number of the frame it is placed on, 0 for the base.
+        sigma: 0 revolute, 1 prismatic, 2 fixed.
+        actuated: whether a motor drives the joint (mu); None leaves the choice to the assembly.
+        gamma, b, alpha, d, theta, r: Khalil parameters [rad, m]; the joint variable is added to
+            theta of a revolute joint and to r of a prismatic one.
+        limits: (lower, upper) of the joint variable [rad or m].
+        name: of the joint, q<j> when empty.
+    """
+
+    antecedent: int
+    sigma: int = 0
+    actuated: bool | None = None
+    gamma: Scalar = 0.0
+    b: Scalar = 0.0
+    alpha: Scalar = 0.0
+    d: Scalar = 0.0
+    theta: Scalar = 0.0
+    r: Scalar = 0.0
+    limits: tuple[float, float] | None = None
+    name: str = ""
+
+    @property
+    def geometry(self) -> dict[str, Scalar]:
+        """The six Khalil parameters by name."""
+        return {key: getattr(self, key) for key in GEOMETRY}
+
+
+@dataclass(frozen=True, slots=True)
+class BodyRow:
+    """The body fixed on frame j and the drive of joint j.
+
+    Attributes:
+        frame: number of the frame.
+        XX, XY, XZ, YY, YZ, ZZ: inertia about the origin of the frame, in its axes [kg m^2].
+        MX, MY, MZ: first moments [kg m].
+        M: mass [kg].
+        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
+        Fv, Fs: viscous [N m s/rad or N s/m] and dry friction [N m or N].
+        name: of the body, link<j> when empty.
+        grouped: the values are base parameters, which need not belong to a single body.
+    """
+
+    frame: int
+    XX: Scalar = 0.0
+    XY: Scalar = 0.0
+    XZ: Scalar = 0.0
+    YY: Scalar = 0.0
+    YZ: Scalar = 0.0
+    ZZ: Scalar = 0.0
+    MX: Scalar = 0.0
+    MY: Scalar = 0.0
+    MZ: Scalar = 0.0
+    M: Scalar = 0.0
+    Ia: Scalar = 0.0
+    Fv: Scalar = 0.0
+    Fs: Scalar = 0.0
+    name: str = ""
+    grouped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LoopRow:
+    """A loop that is opened at a joint, which then has a frame on either side.
+
+    Attributes:
+        cut: (k, k+B): frame k carries the variable of the cut joint, frame k+B is fixed on the
+            other side; they coincide when the loop is closed.
+        joint: type of the cut joint.
+    """
+
+    cut: tuple[int, int]
+    joint: str = "revolute"
+
+
+@dataclass(frozen=True, slots=True)
+class RobotTable:
+    """A robot by its frames, bodies and loops.
+
+    Attributes:
+        name: of the robot.
+        frames: rows 1 .. N.
+        bodies: at most one row for each frame; frames without one have no mass.
+        loops: where closed loops are opened.
+        gravity: gravity acceleration in the base frame [m/s^2].
+        parameters: values of the symbols in the rows.
+        source: where the data come from.
+        extras: what a file says beyond the mechanism, as texts, kept for writing it again.
+
+    Raises:
+        DescriptionError: a row contradicts itself or the others; the message names the row.
+    """
+
+    name: str
+    frames: tuple[FrameRow, ...]
+    bodies: tuple[BodyRow, ...] = ()
+    loops: tuple[LoopRow, ...] = ()
+    gravity: tuple[Scalar, ...] = (0.0, 0.0, -9.81)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    source: str = ""
+    extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise DescriptionError(f"robot {self.name!r}: the name is not a text; give it a name")
+        if not self.frames:
+            raise DescriptionError(f"{self.name}: there is no frame; give at least one")
+        frames = tuple(
+            _checked_frame(f"{self.name}/frame {j}", j, row) for j, row in enumerate(self.frames, 1)
+        )
+        bodies = tuple(
+            _with_scalars(f"{self.name}/body {b.frame}", b, INERTIAL) for b in self.bodies
+        )
+        gravity = _gravity(self.name, self.gravity)
+        values = _values(self.name, self.parameters, (frames, bodies, gravity))
+        object.__setattr__(self, "frames", tuple(_bare(row, GEOMETRY) for row in frames))
+        object.__setattr__(self, "bodies", tuple(_bare(row, INERTIAL) for row in bodies))
+        object.__setattr__(self, "gravity", tuple(expression(str(g)) for g in gravity))
+        object.__setattr__(self, "parameters", values)
+        _check_bodies(self)
+        _check_loops(self)
+
+    @property
+    def cut_frames(self) -> frozenset[int]:
+        """Numbers of the frames on either side of the cut joints."""
+        return frozenset(frame for loop in self.loops for frame in loop.cut)
+
+
+Row = TypeVar("Row", FrameRow, BodyRow)
+
+
+def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
+    values: dict[str, Any] = {n: expression(getattr(row, n), f"{where}, {n}") for n in names}
+    return replace(row, **values)
+
+
+def _bare(row: Row, names: tuple[str, ...]) -> Row:
+    """The row with symbols that are names only: their values are kept in the table."""
+    values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
+    return replace(row, **values)
+
+
+def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
+    if not _is_int(row.sigma) or row.sigma not in (0, 1, 2):
+        raise DescriptionError(
+            f"{where}: sigma is {row.sigma!r}; use 0 (revolute), 1 (prismatic) or 2 (fixed)"
+        )
+    if not _is_int(row.antecedent) or not 0 <= row.antecedent < j:
+        raise DescriptionError(
+            f"{where}: antecedent {row.antecedent!r} must be 0 (base) or an earlier frame"
+        )
+    if row.sigma == 2 and (row.actuated or row.limits is not None):
+        raise DescriptionError(
+            f"{where}: a fixed frame has a motor or limits; remove them or give it a joint"
+        )
+    row = _with_scalars(where, row, GEOMETRY)
+    return replace(
+        row,
+        actuated=None if row.sigma == 2 else row.actuated,
+        limits=None if row.limits is None else _limits(where, row.limits),
+    )
+
+
+def _limits(where: str, limits: Any) -> tuple[float, float]:
+    pair = list(limits) if isinstance(limits, (list, tuple)) else []
+    values = [to_float(expression(value, f"{where}, limits")) for value in pair]
+    numbers = [value for value in values if value is not None]
+    if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
+        raise DescriptionError(
+            f"{where}: limits {limits!r} are not [lower, upper]; give two numbers in order"
+        )
+    return numbers[0], numbers[1]
+
+
+def _gravity(name: str, gravity: Any) -> tuple[Expression, ...]:
+    if not isinstance(gravity, (list, tuple)) or len(gravity) != 3:
+        raise DescriptionError(f"{name}: gravity {gravity!r} has not three values; give [x, y, z]")
+    return tuple(expression(g, f"{name}, gravity") for g in gravity)
+
+
+def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float]:
+    """The values of the symbols: those given, and the defaults of Parameters in the rows."""
+    used: dict[str, float | None] = {}
+    for scalar in _scalars(rows):
+        for symbol in parameters_of(scalar):
+            if symbol.default is not None or symbol.name not in used:
+                used[symbol.name] = symbol.default
+    values = {symbol: value for symbol, value in used.items() if value is not None}
+    for symbol, value in given.items():
+        if symbol not in used:
+            raise DescriptionError(
+                f"{name}: parameter {symbol!r} is used by no row; {did_you_mean(symbol, used)}"
+            )
+        number = (
+            None if isinstance(value, bool) else to_float(expression(value, f"{name}, {symbol}"))
+        )
+        if number is None:
+            raise DescriptionError(
+                f"{name}: parameter {symbol} is {value!r}; give it a number as its value"
+            )
+        values[symbol] = number
+    return values
+
+
+def _scalars(rows: Any) -> Iterator[Expression]:
+    frames, bodies, gravity = rows
+    for row in frames:
+        yield from (getattr(row, key) for key in GEOMETRY)
+    for row in bodies:
+        yield from (getattr(row, key) for key in INERTIAL)
+    yield from gravity
+
+
+def _check_bodies(table: RobotTable) -> None:
+    seen: set[int] = set()
+    for body in table.bodies:
+        where = f"{table.name}/body {body.frame}"
+        if not _is_int(body.frame) or not 1 <= body.frame <= len(table.frames):
+            raise DescriptionError(f"{where}: there is no such frame; use 1 to {len(table.frames)}")
+        if body.frame in seen:
+            raise DescriptionError(f"{where}: two bodies are on this frame; give their sum once")
+        seen.add(body.frame)
+        if table.frames[body.frame - 1].sigma == 2 and _nonzero(body, ("Ia", "Fv", "Fs")):
+            raise DescriptionError(
+                f"{where}: the frame is fixed but Ia, Fv or Fs is given; set them to zero"
+            )
+
+
+def _check_loops(table: RobotTable) -> None:
+    used: set[int] = set()
+    for number, loop in enumerate(table.loops, 1):
+        where = f"{table.name}/loop {number}"
+        _check_loop(where, loop, table.frames)
+        if used & set(loop.cut):
+            raise DescriptionError(
+                f"{where}: a frame of cut {list(loop.cut)} is in another loop too"
+            )
+        used |= set(loop.cut)
+    for j, row in enumerate(table.frames, 1):
+        if row.antecedent in table.cut_frames:
+            raise DescriptionError(
+                f"{table.name}/frame {j}: antecedent {row.antecedent} is a frame of a cut joint;"
+                " place the frame on a link"
+            )
+    for body in table.bodies:
+        inert = TEN_PARAMETERS if _is_moving(table, body.frame) else INERTIAL
+        if body.frame in table.cut_frames and _nonzero(body, inert):
+            raise DescriptionError(
+                f"{table.name}/body {body.frame}: the frame belongs to a cut joint, which has no"
+                " body; give the inertia to the link it is placed on"
+            )
+
+
+def _is_moving(table: RobotTable, frame: int) -> bool:
+    return any(loop.cut[0] == frame for loop in table.loops)
+
+
+def _check_loop(where: str, loop: LoopRow, frames: tuple[FrameRow, ...]) -> None:
+    if loop.joint not in LOOP_JOINTS:
+        raise DescriptionError(
+            f"{where}: joint {loop.joint!r} is unknown; {did_you_mean(str(loop.joint), LOOP_JOINTS)}"
+        )
+    valid = len(loop.cut) == 2 and all(_is_int(k) and 1 <= k <= len(frames) for k in loop.cut)
+    if not valid or loop.cut[0] == loop.cut[1]:
+        raise DescriptionError(
+            f"{where}: cut {list(loop.cut)} does not name two frames; use numbers from 1 to"
+            f" {len(frames)}"
+        )
+    moving, fixed = (frames[k - 1].sigma for k in loop.cut)
+    expected = {"revolute": 0, "prismatic": 1}.get(loop.joint, 2)
+    if moving != expected or fixed != 2:
+        raise DescriptionError(
+            f"{where}: frames {list(loop.cut)} of a {loop.joint} cut joint have sigma {moving} and"
+            f" {fixed}; they must be {expected} and 2"
+        )
+
+
+def _nonzero(body: BodyRow, names: tuple[str, ...]) -> bool:
+    return any(to_float(getattr(body, name)) != 0 for name in names)
+
+
+def _is_int(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)

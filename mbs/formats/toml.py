@@ -1,0 +1,248 @@
+"""Tables of frames as TOML files, and as dicts of the same schema."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from mbs.errors import DescriptionError
+from mbs.expressions import Number, Scalar
+from mbs.formats.files import did_you_mean, read_text, write_text
+from mbs.formats.table import (
+    GEOMETRY,
+    INERTIAL,
+    JOINTS,
+    BodyRow,
+    FrameRow,
+    LoopRow,
+    RobotTable,
+)
+
+_TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "extras")
+_FRAME = ("antecedent", "joint", "sigma", "actuated", "mu", *GEOMETRY, "limits", "name")
+_BODY = ("frame", *INERTIAL, "name", "grouped")
+_LOOP = ("cut", "joint")
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def read_toml(path: str | Path) -> RobotTable:
+    """The table in a TOML file.
+
+    Raises:
+        DescriptionError: the file is missing or not TOML, or the table is impossible.
+    """
+    try:
+        data = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(f"{path}: the file is not TOML: {error}; correct it") from None
+    return from_dict(data)
+
+
+def from_dict(data: Mapping[str, Any]) -> RobotTable:
+    """The table that a dict of the TOML schema describes.
+
+    Raises:
+        DescriptionError: a key is unknown or missing, a value has the wrong type, or the table
+            is impossible.
+    """
+    if not isinstance(data, Mapping):
+        raise DescriptionError(f"robot: {data!r} is not a table; give a dict with name and frame")
+    name = _text(data, "name", "robot")
+    if not name:
+        raise DescriptionError("robot: the name is missing; give it as name = '...'")
+    _check_keys(data, _TOP, name)
+    return RobotTable(
+        name=name,
+        frames=tuple(_frame(row, where) for row, where in _rows(data, "frame", name)),
+        bodies=tuple(_body(row, where) for row, where in _rows(data, "body", name)),
+        loops=tuple(_loop(row, where) for row, where in _rows(data, "loop", name)),
+        gravity=data.get("gravity", (0.0, 0.0, -9.81)),
+        parameters=_table(data, "parameters", name),
+        source=_text(data, "source", name),
+        extras={key: _texts(v, f"{name}/{key}") for key, v in _table(data, "extras", name).items()},
+    )
+
+
+def write_toml(table: RobotTable, path: str | Path) -> None:
+    """Write the table as a TOML file that `read_toml` reads as an equal table.
+
+    Raises:
+        ExportError: the file cannot be written.
+    """
+    write_text("\n".join(_lines(to_dict(table))) + "\n", path)
+
+
+def to_dict(table: RobotTable) -> dict[str, Any]:
+    """The dict of the TOML schema that describes the table; zeros are left out."""
+    data: dict[str, Any] = {"name": table.name}
+    if table.source:
+        data["source"] = table.source
+    data["gravity"] = [_plain(value) for value in table.gravity]
+    if table.parameters:
+        data["parameters"] = dict(table.parameters)
+    data["frame"] = [_frame_dict(row) for row in table.frames]
+    data["body"] = [_without_zeros(row, INERTIAL, ("frame",), _BODY[-2:]) for row in table.bodies]
+    data["loop"] = [{"cut": list(loop.cut), "joint": loop.joint} for loop in table.loops]
+    if table.extras:
+        data["extras"] = {key: list(texts) for key, texts in table.extras.items()}
+    return data
+
+
+def _frame(row: Mapping[str, Any], where: str) -> FrameRow:
+    _check_keys(row, _FRAME, where)
+    if "antecedent" not in row:
+        raise DescriptionError(f"{where}: the antecedent is missing; give 0 or an earlier frame")
+    limits = row.get("limits")
+    return FrameRow(
+        antecedent=row["antecedent"],
+        sigma=_sigma(row, where),
+        actuated=_actuated(row, where),
+        limits=limits if limits is None or not isinstance(limits, list) else tuple(limits),
+        name=_text(row, "name", where),
+        **{key: row[key] for key in GEOMETRY if key in row},
+    )
+
+
+def _sigma(row: Mapping[str, Any], where: str) -> Any:
+    if "joint" not in row:
+        return row.get("sigma", 0)
+    joint = row["joint"]
+    if joint not in JOINTS:
+        raise DescriptionError(
+            f"{where}: joint {joint!r} is unknown; {did_you_mean(str(joint), JOINTS)}"
+        )
+    sigma = JOINTS.index(joint)
+    if row.get("sigma", sigma) != sigma:
+        raise DescriptionError(
+            f"{where}: sigma {row['sigma']!r} contradicts joint {joint!r}; leave one of them out"
+        )
+    return sigma
+
+
+def _actuated(row: Mapping[str, Any], where: str) -> bool | None:
+    given = [row[key] for key in ("actuated", "mu") if key in row]
+    if any(value not in (True, False) for value in given) or len(set(given)) > 1:
+        raise DescriptionError(
+            f"{where}: actuated (mu) is {given}; give true or false, or mu = 1 or 0"
+        )
+    return bool(given[0]) if given else None
+
+
+def _body(row: Mapping[str, Any], where: str) -> BodyRow:
+    _check_keys(row, _BODY, where)
+    if "frame" not in row:
+        raise DescriptionError(f"{where}: the frame is missing; give the number of its frame")
+    grouped = row.get("grouped", False)
+    if not isinstance(grouped, bool):
+        raise DescriptionError(f"{where}: grouped is {grouped!r}; give true or false")
+    return BodyRow(
+        frame=row["frame"],
+        name=_text(row, "name", where),
+        grouped=grouped,
+        **{key: row[key] for key in INERTIAL if key in row},
+    )
+
+
+def _loop(row: Mapping[str, Any], where: str) -> LoopRow:
+    _check_keys(row, _LOOP, where)
+    cut = row.get("cut")
+    if not isinstance(cut, (list, tuple)) or len(cut) != 2:
+        raise DescriptionError(f"{where}: cut is {cut!r}; give the two frames [k, k+B]")
+    return LoopRow((cut[0], cut[1]), row.get("joint", "revolute"))
+
+
+def _rows(data: Mapping[str, Any], key: str, name: str) -> Iterable[tuple[Mapping[str, Any], str]]:
+    rows = data.get(key, ())
+    if not isinstance(rows, (list, tuple)) or not all(isinstance(row, Mapping) for row in rows):
+        raise DescriptionError(f"{name}: {key} is {rows!r}; give a list of tables [[{key}]]")
+    return ((row, f"{name}/{key} {number}") for number, row in enumerate(rows, 1))
+
+
+def _table(data: Mapping[str, Any], key: str, name: str) -> Mapping[str, Any]:
+    table = data.get(key, {})
+    if not isinstance(table, Mapping):
+        raise DescriptionError(f"{name}: {key} is {table!r}; give a table of names and values")
+    return table
+
+
+def _text(data: Mapping[str, Any], key: str, where: str) -> str:
+    text = data.get(key, "")
+    if not isinstance(text, str):
+        raise DescriptionError(f"{where}: {key} is {text!r}; give a text in quotes")
+    return text
+
+
+def _texts(values: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(values, (list, tuple)) or not all(isinstance(v, str) for v in values):
+        raise DescriptionError(f"{where}: {values!r} is not a list of texts; quote each value")
+    return tuple(values)
+
+
+def _check_keys(data: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    for key in data:
+        if key not in known:
+            raise DescriptionError(f"{where}: key {key!r} is unknown; {did_you_mean(key, known)}")
+
+
+def _frame_dict(row: FrameRow) -> dict[str, Any]:
+    data: dict[str, Any] = {"antecedent": row.antecedent, "joint": JOINTS[row.sigma]}
+    if row.actuated is not None:
+        data["actuated"] = row.actuated
+    data.update(_without_zeros(row, GEOMETRY, (), ()))
+    if row.limits is not None:
+        data["limits"] = list(row.limits)
+    if row.name:
+        data["name"] = row.name
+    return data
+
+
+def _without_zeros(
+    row: FrameRow | BodyRow,
+    scalars: tuple[str, ...],
+    always: tuple[str, ...],
+    if_set: Iterable[str],
+) -> dict[str, Any]:
+    known = {f.name for f in fields(row)}
+    data: dict[str, Any] = {key: getattr(row, key) for key in always}
+    data.update({key: _plain(getattr(row, key)) for key in scalars if key in known})
+    data = {key: value for key, value in data.items() if key in always or value != 0}
+    data.update({key: getattr(row, key) for key in if_set if getattr(row, key)})
+    return data
+
+
+def _plain(value: Scalar) -> float | str:
+    return value.value if isinstance(value, Number) else str(value)
+
+
+def _lines(data: Mapping[str, Any]) -> Iterable[str]:
+    rows = {key: v for key, v in data.items() if key in ("frame", "body", "loop")}
+    tables = {key: v for key, v in data.items() if isinstance(v, Mapping)}
+    for key, value in data.items():
+        if key not in rows and key not in tables:
+            yield f"{key} = {_toml(value)}"
+    for key, table in tables.items():
+        yield f"\n[{key}]"
+        yield from (f"{_key(name)} = {_toml(value)}" for name, value in table.items())
+    for key, group in rows.items():
+        for row in group:
+            yield f"\n[[{key}]]"
+            yield from (f"{name} = {_toml(value)}" for name, value in row.items())
+
+
+def _key(name: str) -> str:
+    return name if _BARE_KEY.fullmatch(name) else json.dumps(name)
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list):
+        return f"[{', '.join(_toml(element) for element in value)}]"
+    return repr(value)

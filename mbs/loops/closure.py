@@ -1,0 +1,142 @@
+"""The equations that close the loops: rows of each cut joint, and couplings of coordinates.
+
+Each closing joint allows some motion between its two frames; the rows say that nothing else
+moves. Lengths are in metres, directions are cosines, so that a row is zero when closed.
+
+Source: Khalil & Creusot 1997, section 3.4; rows by joint type as in Haug 1989, chapter 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.khalil_frames import Cut
+from mbs.components import (
+    Cylindrical,
+    Fixed,
+    Free,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
+from mbs.recursions.poses import LinkPose, link_poses, relative_pose
+from mbs.spatial import Pose, align_z
+
+Rows = list[tuple[str, SX]]
+"""Label and value of each row."""
+
+
+def closure(system: System) -> Function:
+    """``closure(q) -> phi``: zero when every loop is closed.
+
+    Returns:
+        Function of q (nq, 1) and, with symbols, of p; phi (m, 1) [m or 1], one element for each
+        label of `system.loops[..].rows`, dependent rows included.
+    """
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        return Function("closure", [q, system.p], [closure_rows(system, q)], ["q", "p"], ["phi"])
+
+    function: Function = system.cached("closure", build)
+    return function
+
+
+def closure_rows(system: System, q: SX) -> SX:
+    """(m, 1) all closure rows at the positions q, (nq, 1)."""
+    values = [value for _, rows in labelled_rows(system, q) for _, value in rows]
+    return casadi.densify(casadi.vertcat(*values)) if values else SX(0, 1)
+
+
+def labelled_rows(system: System, q: SX) -> list[tuple[str, Rows]]:
+    """For each loop and coupling its name and its rows."""
+    poses = link_poses(system.tree, q)
+    cuts = [(cut.edge.joint.name, _cut_rows(system, poses, cut)) for cut in system.cuts]
+    couplings = []
+    for coupling in system.couplings:
+        x = q[coupling.driver]
+        value = q[coupling.driven] - sum(
+            (c * x**k for k, c in enumerate(coupling.coefficients)), SX(0)
+        )
+        couplings.append((coupling.name, [("coordinate", value)]))
+    return cuts + couplings
+
+
+def facing(system: System, q: SX) -> SX:
+    """(k, 1) cosines that must be positive: axes that are aligned and not opposed.
+
+    The rows of a joint with an axis are zero for opposed axes as well; a posture is only right
+    when these are positive.
+    """
+    poses = link_poses(system.tree, q)
+    cosines: list[SX] = []
+    for cut in system.cuts:
+        pose = _between(system, poses, cut)
+        joint = cut.edge.joint
+        axis = getattr(joint, "axis", None)
+        if cut.welded or isinstance(joint, (Fixed, Prismatic)):
+            cosines.extend(pose.R[k, k] for k in range(3))
+        elif axis is not None:
+            z = SX(DM(list(axis)))
+            cosines.append(casadi.dot(z, casadi.mtimes(pose.R, z)))
+    return casadi.vertcat(*cosines) if cosines else SX(0, 1)
+
+
+def _between(system: System, poses: list[LinkPose], cut: Cut) -> Pose:
+    """Frame_b of a cut joint seen from its frame_a."""
+    a, b = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
+    return relative_pose(system.tree, poses, a, b)
+
+
+def _cut_rows(system: System, poses: list[LinkPose], cut: Cut) -> Rows:
+    pose = _between(system, poses, cut)
+    joint = cut.edge.joint
+    if cut.welded:
+        return [*_position(pose, "xyz"), *_orientation(pose)]
+    axis = getattr(joint, "axis", (0.0, 0.0, 1.0))
+    inside = Pose.turned(align_z(np.array(axis)))
+    along = inside.inverse() @ pose @ inside
+    return _ROWS[type(joint)](along, joint)
+
+
+def _position(pose: Pose, axes: str) -> Rows:
+    return [(f"force {axis}", pose.p["xyz".index(axis)]) for axis in axes]
+
+
+def _tilt(pose: Pose) -> Rows:
+    """The z axis of frame_b has no part along x and y of frame_a."""
+    return [("moment y", pose.R[0, 2]), ("moment x", pose.R[1, 2])]
+
+
+def _orientation(pose: Pose) -> Rows:
+    R = pose.R
+    return [
+        ("moment x", 0.5 * (R[2, 1] - R[1, 2])),
+        ("moment y", 0.5 * (R[0, 2] - R[2, 0])),
+        ("moment z", 0.5 * (R[1, 0] - R[0, 1])),
+    ]
+
+
+def _universal(pose: Pose, joint: Universal) -> Rows:
+    first, second = (SX(DM(list(axis))) for axis in joint.axes)
+    cosine = casadi.dot(first, casadi.mtimes(pose.R, second))
+    return [*_position(pose, "xyz"), ("moment across", cosine)]
+
+
+_ROWS: dict[type, Callable[[Pose, object], Rows]] = {
+    Revolute: lambda pose, joint: [*_position(pose, "xyz"), *_tilt(pose)],
+    Prismatic: lambda pose, joint: [*_position(pose, "xy"), *_orientation(pose)],
+    Cylindrical: lambda pose, joint: [*_position(pose, "xy"), *_tilt(pose)],
+    Planar: lambda pose, joint: [*_position(pose, "z"), *_tilt(pose)],
+    Spherical: lambda pose, joint: _position(pose, "xyz"),
+    Universal: lambda pose, joint: _universal(pose, joint),  # type: ignore[arg-type]
+    Fixed: lambda pose, joint: [*_position(pose, "xyz"), *_orientation(pose)],
+    Free: lambda pose, joint: [],
+}

@@ -1,0 +1,68 @@
+"""Reduction of a closed system to its independent velocities: v = G v_a, a = G a_a + gamma.
+
+Source: Kleinfinger & Khalil 1986; Khalil & Creusot 1997, eq. 13, 14 and 22.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi
+from casadi import SX
+
+from mbs.assembly import System
+from mbs.errors import ModelError
+from mbs.loops.closure import closure_rows
+from mbs.loops.velocity import acceleration_bias, velocity_rows
+from mbs.solvers.small_linear import solve_square
+from mbs.spatial import zeros
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reduction:
+    """Velocities and accelerations of the tree from the independent ones.
+
+    Attributes:
+        G: (nv, m), v = G v_a.
+        gamma: (nv, 1), a = G a_a + gamma; None unless velocities were given.
+    """
+
+    G: SX
+    gamma: SX | None
+
+
+def independent_rows(system: System, q: SX) -> SX:
+    """(r, 1) the closure rows that the analysis kept, at the symbols q."""
+    if system.closure is None:
+        raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
+    rows = closure_rows(system, q)
+    return rows[list(system.closure.rows)]
+
+
+def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
+    """G, and gamma for the independent velocities v_a, at the symbols q.
+
+    Args:
+        system: with closed loops.
+        q: (nq, 1) symbols of positions that close the loops.
+        v_a: (m, 1) independent velocities, or None when gamma is not wanted.
+    """
+    closure = system.closure
+    phi = independent_rows(system, q)
+    assert closure is not None
+    active, passive = list(closure.active), list(closure.passive)
+    J = velocity_rows(system, q, phi)
+    J_p, J_a = J[:, passive], J[:, active]
+    W = -solve_square(J_p, J_a)
+    G = zeros(system.nv, len(active))
+    for column, k in enumerate(active):
+        G[k, column] = SX(1)
+    G[passive, :] = W
+    if v_a is None:
+        return Reduction(G, None)
+    v = casadi.mtimes(G, v_a)
+    speed = SX.sym("v", system.nv)
+    psi = casadi.substitute(acceleration_bias(system, q, speed, J), speed, v)
+    gamma = zeros(system.nv)
+    gamma[passive] = -solve_square(J_p, psi)
+    return Reduction(G, gamma)

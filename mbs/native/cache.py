@@ -1,0 +1,108 @@
+"""Shared libraries kept on disk under the hash of all that made them, so none is built twice."""
+
+import functools
+import hashlib
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import casadi
+
+from mbs.errors import CompilerError
+from mbs.native.compiler import FLAGS, LIBRARY_SUFFIX, compile_library, find_compiler
+
+
+def cache_dir() -> Path:
+    """The folder of built libraries: MBS_CACHE_DIR, else the cache folder of the user.
+
+    Returns:
+        a folder that exists and can be written: one that lasts as long as this process when the
+        usual one cannot.
+    """
+    wanted = _wanted_dir()
+    if wanted is not None and _writable(wanted):
+        return wanted
+    return Path(_process_dir().name)
+
+
+def cached_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Path:
+    """The shared library of these sources, built when nobody has built it yet.
+
+    Two processes may ask at once: each builds in a folder of its own and the last to finish wins.
+
+    Args:
+        files: file name to its text; names that end in .c are compiled, the others are headers.
+        flags: every flag of the compiler.
+
+    Returns:
+        path of the library.
+
+    Raises:
+        CompilerError: there is no compiler, or it refused the code.
+    """
+    folder = cache_dir()
+    target = folder / f"{_key(files, flags)}{LIBRARY_SUFFIX}"
+    if target.exists():
+        return target
+    with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as name:
+        build = Path(name)
+        for file, text in files.items():
+            (build / file).write_text(text, encoding="utf-8")
+        sources = [build / file for file in files if file.endswith(".c")]
+        library = compile_library(sources, [build], flags, build / f"library{LIBRARY_SUFFIX}")
+        _install(library, target)
+    return target
+
+
+def _key(files: Mapping[str, str], flags: Sequence[str]) -> str:
+    compiler = find_compiler()
+    digest = hashlib.sha256()
+    facts = (casadi.CasadiMeta.version(), platform.machine(), *compiler.command, compiler.version)
+    texts = (text for name in sorted(files) for text in (name, files[name]))
+    for text in (*facts, *flags, *texts):
+        digest.update(text.encode())
+        digest.update(b"\0")
+    return digest.hexdigest()[:40]
+
+
+def _install(library: Path, target: Path) -> None:
+    try:
+        os.replace(library, target)
+    except OSError as error:
+        if not target.exists():  # another process may hold it open, which some systems protect
+            raise CompilerError(
+                f"library {target} could not be stored ({error}); set MBS_CACHE_DIR to a folder "
+                "that you may write"
+            ) from error
+
+
+def _wanted_dir() -> Path | None:
+    override = os.environ.get("MBS_CACHE_DIR")
+    if override:
+        return Path(override)
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "mbs" / "cache"
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches" / "mbs"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "mbs"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+@functools.cache
+def _process_dir() -> "tempfile.TemporaryDirectory[str]":
+    return tempfile.TemporaryDirectory(prefix="mbs-", ignore_cleanup_errors=True)

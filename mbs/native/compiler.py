@@ -1,0 +1,115 @@
+"""The C compiler of this computer: which one there is, and shared libraries made with it."""
+
+import functools
+import importlib.util
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mbs.errors import CompilerError
+
+FLAGS = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
+"""Contraction is off so that compiled code gives the very bits of the interpreted Function."""
+
+LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+_KNOWN = ("cc", "gcc", "clang")
+
+
+@dataclass(frozen=True, slots=True)
+class Compiler:
+    """A C compiler.
+
+    Attributes:
+        command: the words that start it.
+        version: what it says it is; two compilers that differ here may give different code.
+    """
+
+    command: tuple[str, ...]
+    version: str
+
+
+def find_compiler() -> Compiler:
+    """The compiler that CC names, else cc, gcc or clang, else the one inside ziglang.
+
+    Returns:
+        the first of them that starts.
+
+    Raises:
+        CompilerError: none is installed, or the one that CC names does not start.
+    """
+    return _find(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@functools.lru_cache(maxsize=8)
+def _find(wanted: str, path: str) -> Compiler:
+    if wanted.strip():
+        compiler = _probe(tuple(shlex.split(wanted, posix=os.name != "nt")), path)
+        if compiler is None:
+            raise CompilerError(
+                f"environment variable CC is {wanted!r} and does not start; set it to a C compiler "
+                "or unset it"
+            )
+        return compiler
+    candidates: list[tuple[str, ...]] = [(name,) for name in _KNOWN]
+    if importlib.util.find_spec("ziglang") is not None:
+        candidates.append((sys.executable, "-m", "ziglang", "cc"))
+    for command in candidates:
+        compiler = _probe(command, path)
+        if compiler is not None:
+            return compiler
+    raise CompilerError(
+        'no C compiler was found; install gcc or clang, or run pip install "mbs[cross]"'
+    )
+
+
+def _probe(command: tuple[str, ...], path: str) -> Compiler | None:
+    program = shutil.which(command[0], path=path)
+    if program is None:
+        return None
+    words = (program, *command[1:])
+    try:
+        answer = subprocess.run(
+            [*words, "--version"], capture_output=True, text=True, timeout=120, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return Compiler(words, answer.stdout) if answer.returncode == 0 else None
+
+
+def compile_library(
+    sources: Sequence[Path],
+    include_dirs: Sequence[Path] = (),
+    flags: Sequence[str] = FLAGS,
+    output: Path = Path("library" + LIBRARY_SUFFIX),
+) -> Path:
+    """Compile C files into one shared library that brings its own libm reference.
+
+    Args:
+        sources: C files.
+        include_dirs: folders searched for headers.
+        flags: every flag, including those that make the library shared.
+        output: library to write.
+
+    Returns:
+        the library.
+
+    Raises:
+        CompilerError: there is no compiler, or it refused the code.
+    """
+    compiler = find_compiler()
+    includes = [f"-I{folder}" for folder in include_dirs]
+    libm = [] if sys.platform == "win32" else ["-lm"]
+    files = [str(source) for source in sources]
+    command = [*compiler.command, *flags, *includes, *files, "-o", str(output), *libm]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    if answer.returncode != 0:
+        complaint = next((s for s in answer.stderr.splitlines() if "error" in s), answer.stderr)
+        names = ", ".join(source.name for source in sources)
+        raise CompilerError(f"{compiler.command[0]} refused {names}: {complaint.strip()[:500]}")
+    return output

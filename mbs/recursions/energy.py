@@ -1,0 +1,34 @@
+"""Kinetic and potential energy.
+
+Source: Khalil & Creusot 1997, eq. 49-50.
+"""
+
+import casadi
+from casadi import SX
+
+from mbs.assembly.tree import Tree
+from mbs.recursions.poses import LinkPose, base_poses
+from mbs.recursions.velocities import cross, link_velocities
+
+
+def kinetic_energy(tree: Tree, poses: list[LinkPose], v: SX) -> SX:
+    """Kinetic energy of links and rotors [J]."""
+    total = SX(0)
+    for link, motion in zip(tree.links, link_velocities(tree, poses, v), strict=True):
+        V, w, body = motion.V, motion.w, link.inertia
+        total += 0.5 * (
+            casadi.dot(w, casadi.mtimes(body.J, w))
+            + body.m * casadi.dot(V, V)
+            + 2 * casadi.dot(body.ms, cross(V, w))
+            + link.Ia * casadi.dot(v[link.v], v[link.v])
+        )
+    return total
+
+
+def potential_energy(tree: Tree, poses: list[LinkPose]) -> SX:
+    """Potential energy of gravity, zero with everything at the origin of the base [J]."""
+    total = SX(0)
+    for link, pose in zip(tree.links, base_poses(tree, poses), strict=True):
+        moment = link.inertia.m * pose.p + casadi.mtimes(pose.R, link.inertia.ms)
+        total -= casadi.dot(tree.gravity, moment)
+    return total

@@ -1,0 +1,258 @@
+"""What a simulation or an identification returns: time and named, united columns."""
+
+import csv
+import importlib
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mbs.errors import ExportError, ModelError
+
+Array = npt.NDArray[np.float64]
+
+_QUANTITIES = {
+    "1": "value",
+    "s": "time",
+    "rad": "angle",
+    "rad/s": "angular velocity",
+    "rad/s2": "angular acceleration",
+    "m": "position",
+    "m/s": "velocity",
+    "m/s2": "acceleration",
+    "kg": "mass",
+    "N": "force",
+    "N.m": "torque",
+    "J": "energy",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """Signals over time: `result["j1.q"]` is one of them, (n,).
+
+    Attributes:
+        time: (n,), s, never decreasing (an event repeats its instant).
+        values: (n, k), a column for each signal, in the order of `units`.
+        units: name of a signal to the name of its unit, in the order of the columns.
+        name: what was simulated.
+        info: facts worth keeping with the numbers, such as the tolerance.
+    """
+
+    time: Array
+    values: Array
+    units: Mapping[str, str]
+    name: str = ""
+    info: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        time = _frozen(self.time)
+        values = _frozen(self.values)
+        if time.ndim != 1 or values.shape != (len(time), len(self.units)):
+            raise ModelError(
+                f"result {self.name!r}: time has shape {time.shape} and values {values.shape} for "
+                f"{len(self.units)} names; give (n,) and (n, number of names)"
+            )
+        if np.any(np.diff(time) < 0):
+            raise ModelError(f"result {self.name!r}: time goes backwards; sort the rows by time")
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+        object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
+
+    @classmethod
+    def from_structured(
+        cls, array: npt.NDArray[Any], units: Mapping[str, str], name: str = ""
+    ) -> "Result":
+        """Signals of a structured array whose first field is time, as fmpy returns them.
+
+        Args:
+            array: (n,) with one number a field.
+            units: unit of each field; a field that it leaves out gets "1".
+            name: what was simulated.
+
+        Returns:
+            the same numbers, with their units.
+        """
+        fields = array.dtype.names or ()
+        columns = fields[1:]
+        values = np.empty((len(array), len(columns)))
+        for k, column in enumerate(columns):
+            values[:, k] = array[column]
+        return cls(array[fields[0]], values, {c: units.get(c, "1") for c in columns}, name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the signals, in the order of the columns."""
+        return tuple(self.units)
+
+    def __getitem__(self, name: str) -> Array:
+        return self.values[:, self._index(name)]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.units
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def at(self, time: float) -> dict[str, float]:
+        """Value of every signal at one instant, on straight lines between rows.
+
+        Args:
+            time: scalar, s, inside the result.
+
+        Returns:
+            name to value, in the unit of the signal.
+
+        Raises:
+            ModelError: the instant lies outside the result.
+        """
+        if not len(self) or not self.time[0] <= time <= self.time[-1]:
+            span = f"{self.time[0]:g} to {self.time[-1]:g} s" if len(self) else "nothing"
+            raise ModelError(f"time {time:g} s is outside the result, which covers {span}")
+        return {n: float(np.interp(time, self.time, self[n])) for n in self.names}
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write a header of names, then a row for each instant; numbers read back bit for bit.
+
+        Args:
+            path: file to write; it is replaced as a whole, or left alone.
+
+        Raises:
+            ExportError: the file cannot be written.
+        """
+        target = Path(path)
+        rows = np.column_stack([self.time, self.values]).tolist()
+        try:
+            _write_table(target, ("time", *self.names), rows)
+        except OSError as error:
+            raise ExportError(
+                f"{target} could not be written ({error.strerror or error}); "
+                "give a file in a folder that exists and that you may write"
+            ) from error
+
+    def to_pandas(self) -> Any:
+        """The signals as a pandas DataFrame indexed by time; units in `.attrs["units"]`."""
+        pandas = _optional("pandas", "pip install pandas")
+        index = pandas.Index(self.time, name="time")
+        frame = pandas.DataFrame(self.values.copy(), index=index, columns=list(self.names))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def to_xarray(self) -> Any:
+        """The signals as an xarray Dataset over time, each with its unit as attribute."""
+        xarray = _optional("xarray", "pip install xarray")
+        signals = {n: ("time", self[n].copy(), {"units": u}) for n, u in self.units.items()}
+        return xarray.Dataset(
+            signals,
+            coords={"time": ("time", self.time.copy(), {"units": "s"})},
+            attrs={"name": self.name, **self.info},
+        )
+
+    def plot(
+        self,
+        names: str | Sequence[str] | None = None,
+        path: str | os.PathLike[str] | None = None,
+    ) -> Any:
+        """Draw signals over time, those of one unit together.
+
+        Args:
+            names: signals to draw; all of them by default.
+            path: file to save the picture to, in the format that its ending names.
+
+        Returns:
+            the matplotlib Figure.
+
+        Raises:
+            ModelError: matplotlib is missing or a name is unknown.
+            ExportError: the file cannot be written.
+        """
+        chosen = (names,) if isinstance(names, str) else self.names if names is None else names
+        groups: dict[str, list[str]] = {}
+        for n in chosen:
+            self._index(n)
+            groups.setdefault(self.units[n], []).append(n)
+        figure = _figure(len(groups), shown=path is None)
+        if self.name:
+            figure.suptitle(self.name)
+        axes = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, (unit, members) in zip(axes, groups.items(), strict=False):
+            for n in members:
+                axis.plot(self.time, self[n], label=n)
+            axis.set_ylabel(_label(unit))
+            axis.grid(True, alpha=0.3)
+            axis.legend(loc="upper right", fontsize="small")
+        axes[-1].set_xlabel("time [s]")
+        if path is not None:
+            _save(figure, Path(path))
+        return figure
+
+    def _index(self, name: str) -> int:
+        if name not in self.units:
+            raise ModelError(
+                f"result {self.name!r} has no signal {name!r}; it has {', '.join(self.names)}"
+            )
+        return self.names.index(name)
+
+
+def _frozen(values: npt.ArrayLike) -> Array:
+    array = np.array(values, dtype=float)
+    array.flags.writeable = False
+    return array
+
+
+def _label(unit: str) -> str:
+    quantity = _QUANTITIES.get(unit, "value")
+    return quantity if unit == "1" else f"{quantity} [{unit}]"
+
+
+def _optional(module: str, remedy: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise ModelError(f"{module} is not installed; run: {remedy}") from error
+
+
+def _figure(rows: int, *, shown: bool) -> Any:
+    size = (8.0, 1.0 + 2.5 * max(rows, 1))
+    remedy = 'pip install "mbs[plot]"'
+    _optional("matplotlib", remedy)
+    if shown:
+        return _optional("matplotlib.pyplot", remedy).figure(figsize=size, layout="constrained")
+    return _optional("matplotlib.figure", remedy).Figure(figsize=size, layout="constrained")
+
+
+def _save(figure: Any, target: Path) -> None:
+    try:
+        figure.savefig(target)
+    except (OSError, ValueError) as error:
+        raise ExportError(
+            f"picture {target} could not be written ({error}); "
+            "give a .png, .svg or .pdf file in a folder that you may write"
+        ) from error
+
+
+def _write_table(target: Path, header: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", text=True)
+    try:
+        with os.fdopen(handle, "w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(header)
+            writer.writerows([repr(v) for v in row] for row in rows)
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,69 @@
+"""How far a long run has come, shown to people who wait for it."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+PATIENCE = 2.0
+
+
+@contextmanager
+def progress(
+    label: str, start: float, stop: float, *, quiet: bool = False
+) -> Iterator[Callable[[float], None]]:
+    """A function to call with the time reached; after two seconds it shows a bar on a terminal.
+
+    Args:
+        label: what is running.
+        start: simulated time at the beginning, s.
+        stop: simulated time at the end, s.
+        quiet: never show anything.
+
+    Yields:
+        a function of the simulated time reached, s.
+    """
+    bar = _Bar(label, start, stop, shown=not quiet and sys.stderr.isatty())
+    try:
+        yield bar.reach
+    finally:
+        bar.close()
+
+
+class _Bar:
+    """A rich progress bar that is made only when somebody has waited long enough."""
+
+    def __init__(self, label: str, start: float, stop: float, *, shown: bool) -> None:
+        self._label = label
+        self._start = start
+        self._stop = stop
+        self._due = time.monotonic() + PATIENCE if shown else float("inf")
+        self._bar: Any = None
+        self._task: Any = None
+
+    def reach(self, simulated: float) -> None:
+        if self._bar is None:
+            if time.monotonic() < self._due:
+                return
+            self._open()
+        self._bar.update(self._task, completed=simulated - self._start)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def _open(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._bar.add_task(self._label, total=max(self._stop - self._start, 0.0))
+        self._bar.start()

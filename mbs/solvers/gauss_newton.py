@@ -1,0 +1,79 @@
+"""Solve r(x) = 0 for more or fewer unknowns than equations, rank-deficient ones included."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+Residual = Callable[[Vector], tuple[Vector, Vector]]
+"""x -> residual (m,), Jacobian (m, n)."""
+
+_STALLED = 1e-14
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """Where the iteration ended.
+
+    Attributes:
+        x: (n,) the unknowns.
+        residual: largest absolute residual there.
+        converged: whether it is below the tolerance.
+    """
+
+    x: Vector
+    residual: float
+    converged: bool
+
+
+def gauss_newton(
+    function: Residual,
+    start: Vector,
+    *,
+    tolerance: float = 1e-12,
+    iterations: int = 100,
+    rank_tolerance: float = 1e-9,
+) -> Root:
+    """Damped Gauss-Newton with the smallest step that solves the linearised equations.
+
+    The step is the minimum-norm least-squares solution, so that dependent equations and free
+    unknowns do no harm; it is halved until the residual falls.
+
+    Args:
+        function: residual and Jacobian.
+        start: (n,) first guess; the root found is near to it.
+        tolerance: of the largest absolute residual.
+        iterations: at most.
+        rank_tolerance: singular values below this part of the largest count as zero.
+
+    Returns:
+        The last iterate, converged or not.
+    """
+    x = np.array(start, dtype=float)
+    r, J = function(x)
+    for _ in range(iterations):
+        if _largest(r) <= tolerance:
+            break
+        step = np.linalg.lstsq(J, -r, rcond=rank_tolerance)[0]
+        length = 1.0
+        while length > 1e-6:
+            trial = x + length * step
+            r_trial, J_trial = function(trial)
+            if np.all(np.isfinite(r_trial)) and np.linalg.norm(r_trial) < np.linalg.norm(r):
+                break
+            length /= 2
+        else:
+            break
+        stalled = length * np.linalg.norm(step) < _STALLED
+        x, r, J = trial, r_trial, J_trial
+        if stalled:
+            break
+    return Root(x, _largest(r), _largest(r) <= tolerance)
+
+
+def _largest(r: Vector) -> float:
+    return float(np.max(np.abs(r), initial=0.0))

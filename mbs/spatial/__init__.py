@@ -1,0 +1,35 @@
+"""Rigid-body algebra on 3-vectors of CasADi scalars whose constants are exact.
+
+Nothing here is larger than 3x3: zeros and ones fold into the graph, which is what keeps the
+operation counts of the models low.
+"""
+
+from mbs.spatial.angles import sin_cos
+from mbs.spatial.inertia import Inertia
+from mbs.spatial.khalil import Khalil
+from mbs.spatial.pose import Pose
+from mbs.spatial.quaternion import quaternion_rate, quaternion_rotation
+from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, align_z, axis_turn
+from mbs.spatial.vectors import X_AXIS, Y_AXIS, Z_AXIS, is_zero, skew, snapped, vector, zeros
+
+__all__ = [
+    "X_AXIS",
+    "Y_AXIS",
+    "Z_AXIS",
+    "Inertia",
+    "Khalil",
+    "MatrixTurn",
+    "Pose",
+    "Rotation",
+    "Turn",
+    "align_z",
+    "axis_turn",
+    "is_zero",
+    "quaternion_rate",
+    "quaternion_rotation",
+    "sin_cos",
+    "skew",
+    "snapped",
+    "vector",
+    "zeros",
+]

@@ -1,0 +1,61 @@
+"""3-vectors of SX scalars, and constants made exact."""
+
+from collections.abc import Iterable
+
+import casadi
+from casadi import DM, SX
+
+X_AXIS = SX(DM([1, 0, 0]))
+Y_AXIS = SX(DM([0, 1, 0]))
+Z_AXIS = SX(DM([0, 0, 1]))
+
+_SNAP = 1e-12
+
+
+def vector(elements: Iterable[SX | float]) -> SX:
+    """The column of these scalars."""
+    return casadi.vertcat(*(SX(element) for element in elements))
+
+
+def zeros(rows: int = 3, columns: int = 1) -> SX:
+    """A dense matrix of zeros."""
+    return SX.zeros(rows, columns)
+
+
+def skew(a: SX) -> SX:
+    """(3, 3) matrix of the vector product: times b it is a x b."""
+    x, y, z = a[0], a[1], a[2]
+    return casadi.vertcat(
+        casadi.horzcat(0, -z, y), casadi.horzcat(z, 0, -x), casadi.horzcat(-y, x, 0)
+    )
+
+
+def is_zero(value: SX) -> bool:
+    """Whether every element is the constant zero (a symbol is not)."""
+    return all(element.is_zero() for element in elements(value))
+
+
+def elements(value: SX) -> list[SX]:
+    """The scalars of a matrix, column by column, zeros included."""
+    dense = casadi.densify(value)
+    return [SX(dense[k]) for k in range(dense.numel())]
+
+
+def snapped(value: SX) -> SX:
+    """The same matrix with constants within 1e-12 of -1, 0 or 1 put exactly there.
+
+    Rotations that come from files carry pi/2 with a dozen digits; without this their zeros
+    never fold.
+    """
+    return casadi.reshape(
+        casadi.vertcat(*(_snapped(element) for element in elements(value))),
+        *value.shape,
+    )
+
+
+def _snapped(element: SX) -> SX:
+    if not element.is_constant():
+        return element
+    number = float(element)
+    nearest = round(number)
+    return SX(nearest) if abs(nearest) <= 1 and abs(number - nearest) < _SNAP else SX(number)

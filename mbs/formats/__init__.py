@@ -1,1 +1,26 @@
-"""formats."""
+"""Robot files: tables of frames (TOML, dict, .par), URDF and MJCF, read as mechanisms."""
+
+from mbs.formats.mujoco_spec import read_mjcf
+from mbs.formats.par import read_par
+from mbs.formats.par_write import write_par
+from mbs.formats.rows import BodyRow, FrameRow, LoopRow
+from mbs.formats.table import RobotTable
+from mbs.formats.table_mechanism import to_mechanism
+from mbs.formats.toml import from_dict, read_toml, to_dict, write_toml
+from mbs.formats.urdf import read_urdf
+
+__all__ = [
+    "BodyRow",
+    "FrameRow",
+    "LoopRow",
+    "RobotTable",
+    "from_dict",
+    "read_mjcf",
+    "read_par",
+    "read_toml",
+    "read_urdf",
+    "to_dict",
+    "to_mechanism",
+    "write_par",
+    "write_toml",
+]

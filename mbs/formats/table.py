@@ -13,98 +13,8 @@ from typing import Any, TypeVar
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, parameters_of, to_float
 from mbs.formats.files import did_you_mean
+from mbs.formats.rows import GEOMETRY, INERTIAL, LOOP_JOINTS, BodyRow, FrameRow, LoopRow
 from mbs.spatial.inertia import TEN_PARAMETERS
-
-GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
-"""The six parameters of a frame, in the order in which the displacements are made."""
-
-INERTIAL = (*TEN_PARAMETERS, "Ia", "Fv", "Fs")
-"""The scalars of a body row."""
-
-JOINTS = ("revolute", "prismatic", "fixed")
-"""Names of the joint types sigma = 0, 1, 2."""
-
-LOOP_JOINTS = (*JOINTS, "cylindrical", "universal", "spherical", "planar")
-"""Names of the joint types that may close a loop."""
-
-
-@dataclass(frozen=True, slots=True)
-class FrameRow:
-    """Frame j and the joint that moves it with respect to its antecedent.
-
-    Attributes:
-        antecedent: number of the frame it is placed on, 0 for the base.
-        sigma: 0 revolute, 1 prismatic, 2 fixed.
-        actuated: whether a motor drives the joint (mu); None leaves the choice to the assembly.
-        gamma, b, alpha, d, theta, r: Khalil parameters [rad, m]; the joint variable is added to
-            theta of a revolute joint and to r of a prismatic one.
-        limits: (lower, upper) of the joint variable [rad or m].
-        name: of the joint, q<j> when empty.
-    """
-
-    antecedent: int
-    sigma: int = 0
-    actuated: bool | None = None
-    gamma: Scalar = 0.0
-    b: Scalar = 0.0
-    alpha: Scalar = 0.0
-    d: Scalar = 0.0
-    theta: Scalar = 0.0
-    r: Scalar = 0.0
-    limits: tuple[float, float] | None = None
-    name: str = ""
-
-    @property
-    def geometry(self) -> dict[str, Scalar]:
-        """The six Khalil parameters by name."""
-        return {key: getattr(self, key) for key in GEOMETRY}
-
-
-@dataclass(frozen=True, slots=True)
-class BodyRow:
-    """The body fixed on frame j and the drive of joint j.
-
-    Attributes:
-        frame: number of the frame.
-        XX, XY, XZ, YY, YZ, ZZ: inertia about the origin of the frame, in its axes [kg m^2].
-        MX, MY, MZ: first moments [kg m].
-        M: mass [kg].
-        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
-        Fv, Fs: viscous [N m s/rad or N s/m] and dry friction [N m or N].
-        name: of the body, link<j> when empty.
-        grouped: the values are base parameters, which need not belong to a single body.
-    """
-
-    frame: int
-    XX: Scalar = 0.0
-    XY: Scalar = 0.0
-    XZ: Scalar = 0.0
-    YY: Scalar = 0.0
-    YZ: Scalar = 0.0
-    ZZ: Scalar = 0.0
-    MX: Scalar = 0.0
-    MY: Scalar = 0.0
-    MZ: Scalar = 0.0
-    M: Scalar = 0.0
-    Ia: Scalar = 0.0
-    Fv: Scalar = 0.0
-    Fs: Scalar = 0.0
-    name: str = ""
-    grouped: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class LoopRow:
-    """A loop that is opened at a joint, which then has a frame on either side.
-
-    Attributes:
-        cut: (k, k+B): frame k carries the variable of the cut joint, frame k+B is fixed on the
-            other side; they coincide when the loop is closed.
-        joint: type of the cut joint.
-    """
-
-    cut: tuple[int, int]
-    joint: str = "revolute"
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,19 +130,17 @@ def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float
             if symbol.default is not None or symbol.name not in used:
                 used[symbol.name] = symbol.default
     values = {symbol: value for symbol, value in used.items() if value is not None}
-    for symbol, value in given.items():
-        if symbol not in used:
+    for key, value in given.items():
+        if key not in used:
             raise DescriptionError(
-                f"{name}: parameter {symbol!r} is used by no row; {did_you_mean(symbol, used)}"
+                f"{name}: parameter {key!r} is used by no row; {did_you_mean(key, used)}"
             )
-        number = (
-            None if isinstance(value, bool) else to_float(expression(value, f"{name}, {symbol}"))
-        )
+        number = None if isinstance(value, bool) else to_float(expression(value, f"{name}, {key}"))
         if number is None:
             raise DescriptionError(
-                f"{name}: parameter {symbol} is {value!r}; give it a number as its value"
+                f"{name}: parameter {key} is {value!r}; give it a number as its value"
             )
-        values[symbol] = number
+        values[key] = number
     return values
 
 
@@ -292,7 +200,8 @@ def _is_moving(table: RobotTable, frame: int) -> bool:
 def _check_loop(where: str, loop: LoopRow, frames: tuple[FrameRow, ...]) -> None:
     if loop.joint not in LOOP_JOINTS:
         raise DescriptionError(
-            f"{where}: joint {loop.joint!r} is unknown; {did_you_mean(str(loop.joint), LOOP_JOINTS)}"
+            f"{where}: joint {loop.joint!r} is unknown;"
+            f" {did_you_mean(str(loop.joint), LOOP_JOINTS)}"
         )
     valid = len(loop.cut) == 2 and all(_is_int(k) and 1 <= k <= len(frames) for k in loop.cut)
     if not valid or loop.cut[0] == loop.cut[1]:

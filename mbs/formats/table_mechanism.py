@@ -20,7 +20,8 @@ from mbs.components import (
 from mbs.errors import DescriptionError
 from mbs.expressions import expression, to_float
 from mbs.formats.files import component_name
-from mbs.formats.table import BodyRow, FrameRow, LoopRow, RobotTable
+from mbs.formats.rows import BodyRow, FrameRow, LoopRow
+from mbs.formats.table import RobotTable
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 _MOVING = (Revolute, Prismatic)

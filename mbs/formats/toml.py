@@ -13,15 +13,8 @@ from typing import Any
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar
 from mbs.formats.files import did_you_mean, read_text, write_text
-from mbs.formats.table import (
-    GEOMETRY,
-    INERTIAL,
-    JOINTS,
-    BodyRow,
-    FrameRow,
-    LoopRow,
-    RobotTable,
-)
+from mbs.formats.rows import GEOMETRY, INERTIAL, JOINTS, BodyRow, FrameRow, LoopRow
+from mbs.formats.table import RobotTable
 
 _TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "extras")
 _FRAME = ("antecedent", "joint", "sigma", "actuated", "mu", *GEOMETRY, "limits", "name")

@@ -1,9 +1,11 @@
 """Shared libraries kept on disk under the hash of all that made them, so none is built twice."""
 
+import atexit
 import functools
 import hashlib
 import os
 import platform
+import shutil
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -25,7 +27,7 @@ def cache_dir() -> Path:
     wanted = _wanted_dir()
     if wanted is not None and _writable(wanted):
         return wanted
-    return Path(_process_dir().name)
+    return _process_dir()
 
 
 def cached_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Path:
@@ -104,5 +106,7 @@ def _writable(folder: Path) -> bool:
 
 
 @functools.cache
-def _process_dir() -> "tempfile.TemporaryDirectory[str]":
-    return tempfile.TemporaryDirectory(prefix="mbs-", ignore_cleanup_errors=True)
+def _process_dir() -> Path:
+    folder = tempfile.mkdtemp(prefix="mbs-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)

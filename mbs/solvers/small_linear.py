@@ -38,5 +38,7 @@ def _adjugate(A: SX) -> SX:
             )
     rows = [A[k, :].T for k in range(3)]
     return casadi.horzcat(
-        casadi.cross(rows[1], rows[2]), casadi.cross(rows[2], rows[0]), casadi.cross(rows[0], rows[1])
+        casadi.cross(rows[1], rows[2]),
+        casadi.cross(rows[2], rows[0]),
+        casadi.cross(rows[0], rows[1]),
     )

@@ -145,7 +145,7 @@ def _tangent(model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]) ->
 def _steepness(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
     """How many nominal sizes z moves when all of x moves by about one: huge where rank is lost."""
     assert model.closure is not None
-    x, z, p = loop
+    _, z, p = loop
     count = max(len(model.states), 1)
     seed = casadi.DM([v.nominal * (1 + k / count) for k, v in enumerate(model.states)])
     zero = casadi.MX(z.numel(), 1), casadi.MX(p.numel(), 1)

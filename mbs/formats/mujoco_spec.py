@@ -1,0 +1,129 @@
+"""MJCF model files, read through MuJoCo as mechanisms.
+
+The file is compiled by MuJoCo, so that defaults, frames, angle units, orientations and inertias
+from geoms are what MuJoCo makes of them; the mechanism is built from the compiled model. Geoms of
+bodies whose inertia is given are taken out before, with the assets they use, so that meshes may
+be missing. Contacts, cameras, sensors and keyframes are not read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbs.components import Body, Mechanism, Point
+from mbs.errors import DescriptionError
+from mbs.formats.files import component_name
+from mbs.formats.mujoco_checks import check_supported
+from mbs.formats.mujoco_closures import add_closures
+from mbs.formats.mujoco_joints import add_joints, turned_by
+from mbs.formats.mujoco_names import Names
+from mbs.formats.urdf import parse_xml
+
+
+def read_mjcf(path: str | Path) -> Mechanism:
+    """The mechanism in an MJCF file.
+
+    Bodies, joints and sites keep their names, with blanks, dots and quotes replaced by
+    underscores; joints without a name are called after their body. Several joints in a body
+    become a chain over bodies without mass. A closing `connect` becomes a spherical joint and a
+    `weld` a fixed one, where the loop is then opened; an equality of joints becomes a coupling.
+    When the file has actuators, joints without one are passive. Joint positions are MuJoCo's
+    qpos: `ref` is taken into account.
+
+    Raises:
+        DescriptionError: mujoco is not installed, the file is missing or malformed, or it has
+            something that changes the motion and that mbs does not model.
+    """
+    root = parse_xml(path)
+    if root.tag != "mujoco":
+        raise DescriptionError(
+            f"{path}: the root element is <{root.tag}>, not <mujoco>; give an MJCF file, or read a"
+            " URDF file with read_urdf"
+        )
+    mujoco = _mujoco()
+    model = _compiled(mujoco, str(path))
+    check_supported(mujoco, model, str(path))
+    names = Names.of(mujoco, model)
+    mechanism = Mechanism(
+        component_name(root.get("model") or Path(path).stem),
+        gravity=_gravity(mujoco, model),
+        source=f"MJCF file {Path(path).name}",
+    )
+    points: list[Point] = [mechanism.world.frame]
+    for k in range(1, model.nbody):
+        body = mechanism.add(_body(names.bodies[k], model, k))
+        add_joints(mechanism, mujoco, model, names, k, points[model.body_parentid[k]], body)
+        points.append(body.frame)
+    sites = [
+        _placed(points[model.site_bodyid[k]], model.site_pos[k], model.site_quat[k])
+        for k in range(model.nsite)
+    ]
+    for k, point in enumerate(sites):
+        mechanism.add_frame(names.sites[k], point)
+    add_closures(mechanism, mujoco, model, names, points, sites)
+    return mechanism
+
+
+def _mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise DescriptionError(
+            'MJCF files are read by mujoco, which is not installed; install "mbs[import]"'
+        ) from None
+    return mujoco
+
+
+def _compiled(mujoco: Any, path: str) -> Any:
+    try:
+        spec = mujoco.MjSpec.from_file(path)
+        spec.compiler.fusestatic = False
+        spec.compiler.discardvisual = False
+        _strip(mujoco, spec)
+        return spec.compile()
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).removeprefix("Error: ").split())
+        raise DescriptionError(f"{path}: mujoco refuses the file: {reason}; correct it") from None
+
+
+def _strip(mujoco: Any, spec: Any) -> None:
+    """Take out what has no part in the motion, and may name files that are missing."""
+    for kind in ("sensors", "keys", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    from_geoms = spec.compiler.inertiafromgeom
+    always = from_geoms == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    for body in spec.bodies:
+        is_world = body.name == "world" and body.parent is None
+        if is_world or (body.explicitinertial and not always):
+            for geom in list(body.geoms):
+                spec.delete(geom)
+    meshes = {geom.meshname for geom in spec.geoms}
+    fields = {geom.hfieldname for geom in spec.geoms}
+    for geom in spec.geoms:
+        geom.material = ""
+    unused = [mesh for mesh in spec.meshes if mesh.name not in meshes]
+    unused += [hfield for hfield in spec.hfields if hfield.name not in fields]
+    for asset in [*unused, *spec.materials, *spec.textures]:
+        spec.delete(asset)
+
+
+def _gravity(mujoco: Any, model: Any) -> tuple[float, ...]:
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+        return (0.0, 0.0, 0.0)
+    return tuple(float(value) for value in model.opt.gravity)
+
+
+def _body(name: str, model: Any, k: int) -> Body:
+    R = turned_by(model.body_iquat[k])
+    tensor = R @ np.diag(model.body_inertia[k]) @ R.T
+    return Body(
+        name,
+        mass=float(model.body_mass[k]),
+        com=tuple(float(value) for value in model.body_ipos[k]),
+        inertia=((tensor + tensor.T) / 2).tolist(),
+    )

@@ -1,0 +1,122 @@
+"""Tables of frames written as SYMORO+ and OpenSYMORO robot files (.par)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from mbs.errors import DescriptionError
+from mbs.expressions import Scalar, expression, parameters_of
+from mbs.formats.files import write_text
+from mbs.formats.par import BASE_EXTRAS, BODY_KEYS, JOINT_EXTRAS, LINK_EXTRAS
+from mbs.formats.rows import BodyRow, FrameRow
+from mbs.formats.table import RobotTable
+
+_GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
+_VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
+
+
+def write_par(table: RobotTable, path: str | Path) -> None:
+    """Write the table as a .par file.
+
+    The format knows no names of joints and bodies, no limits, and no grouped bodies: they are
+    left out. Values of symbols are written as comments, which `read_par` reads.
+
+    Raises:
+        DescriptionError: a loop or a symbol cannot be said in this format.
+        ExportError: the file cannot be written.
+    """
+    write_text("\n".join(_lines(table)) + "\n", path)
+
+
+def _lines(table: RobotTable) -> Iterator[str]:
+    NF, B = len(table.frames), len(table.loops)
+    NL, NJ = NF - 2 * B, NF - B
+    _check_loops(table, NL, NJ)
+    _check_symbols(table)
+    yield f"(* Robotname = '{re.sub(r'[^A-Za-z0-9 _-]', '_', table.name)}' *)"
+    if table.source:
+        yield f"(* Source = '{_one_line(table.source)}' *)"
+    yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
+    yield f"NL = {NL}\nNJ = {NJ}\nNF = {NF}\nType = {_kind(table)}"
+    yield "\n(* Geometric parameters *)"
+    yield _vector("ant", (row.antecedent for row in table.frames))
+    yield _vector("sigma", (row.sigma for row in table.frames))
+    if any(row.actuated is not None for row in table.frames):
+        yield _vector("mu", (int(bool(row.actuated)) for row in table.frames))
+    for key in _GEOMETRY:
+        yield _vector(key, (_cell(table, key, j, row) for j, row in enumerate(table.frames, 1)))
+    yield "\n(* Dynamic parameters and external forces *)"
+    bodies = {body.frame: body for body in table.bodies}
+    for key, name in BODY_KEYS.items():
+        rows = (bodies.get(j, BodyRow(j)) for j in range(1, NL + 1))
+        yield _vector(key, (_text(getattr(row, name)) for row in rows))
+    yield from _extras(table, LINK_EXTRAS)
+    yield "\n(* Joint parameters *)"
+    yield from _extras(table, JOINT_EXTRAS)
+    yield "\n(* Base: motion, gravity, place *)"
+    yield _vector("G", (_text(value) for value in table.gravity))
+    yield from _extras(table, BASE_EXTRAS)
+    yield "\n(* End of definition *)"
+
+
+def _kind(table: RobotTable) -> int:
+    if table.loops:
+        return 2
+    return int(any(row.antecedent != j for j, row in enumerate(table.frames)))
+
+
+def _cell(table: RobotTable, key: str, j: int, row: FrameRow) -> str:
+    text = _text(getattr(row, key))
+    moved, prefix = _VARIABLE.get(row.sigma, ("", ""))
+    if key != moved:
+        return text
+    if text == "0":
+        return f"{prefix}{j}"
+    return f"{prefix}{j}{text}" if text.startswith("-") else f"{prefix}{j}+{text}"
+
+
+def _text(value: Scalar) -> str:
+    return str(expression(value)).replace("^", "**")
+
+
+def _vector(key: str, values: Iterable[object]) -> str:
+    return f"{key} = {{{','.join(map(str, values))}}}"
+
+
+def _extras(table: RobotTable, keys: Iterable[str]) -> Iterator[str]:
+    for key in keys:
+        if key in table.extras:
+            yield _vector(key, (_text(text) for text in table.extras[key]))
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split()).replace("*)", "* )")
+
+
+def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:
+    for k, loop in enumerate(table.loops, 1):
+        if loop.joint not in ("revolute", "prismatic"):
+            raise DescriptionError(
+                f"{table.name}/loop {k}: a .par file has no {loop.joint} cut joint; write TOML"
+            )
+        if loop.cut != (NL + k, NJ + k):
+            raise DescriptionError(
+                f"{table.name}/loop {k}: a .par file needs the cut [{NL + k}, {NJ + k}], not"
+                f" {list(loop.cut)}; number the frames of loops last"
+            )
+
+
+def _check_symbols(table: RobotTable) -> None:
+    variables = {
+        f"{_VARIABLE[row.sigma][1]}{j}" for j, row in enumerate(table.frames, 1) if row.sigma != 2
+    }
+    for j, row in enumerate(table.frames, 1):
+        for value in row.geometry.values():
+            for symbol in parameters_of(expression(value)):
+                if symbol.name in variables:
+                    raise DescriptionError(
+                        f"{table.name}/frame {j}: parameter {symbol.name} has the name of a joint"
+                        " variable of .par files; rename it"
+                    )

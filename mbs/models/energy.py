@@ -1,0 +1,32 @@
+"""Kinetic and potential energy."""
+
+from __future__ import annotations
+
+from casadi import Function
+
+from mbs.assembly import System
+from mbs.models.model_function import Named, model_function
+from mbs.models.symbols import symbols_of
+from mbs.recursions.energy import kinetic_energy, potential_energy
+
+
+def energy(system: System, coordinates: str = "independent") -> Function:
+    """``energy(q, v) -> E, U``: kinetic energy, rotors included, and potential energy of gravity.
+
+    Source: Khalil & Creusot 1997, eq. 49-50.
+
+    Args:
+        system: open or closed; q must close the loops.
+        coordinates: of a closed system, "independent" or "tree".
+
+    Returns:
+        Function of q (nq, 1) and v (m, 1); E, U [J], U zero with everything at the base's origin.
+    """
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        E = kinetic_energy(system.tree, s.poses, s.v_tree)
+        U = potential_energy(system.tree, s.poses)
+        return [("q", s.q), ("v" + s.suffix, s.v)], [("E", E), ("U", U)]
+
+    return model_function(system, ("energy", coordinates), build)

@@ -1,0 +1,88 @@
+"""The symbols of a model: positions, and velocities in tree or independent coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi
+from casadi import SX
+
+from mbs.assembly import System
+from mbs.errors import ModelError
+from mbs.loops.reduction import Reduction, reduction
+from mbs.recursions.poses import LinkPose, link_poses
+
+COORDINATES = ("independent", "tree")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Symbols:
+    """Positions and velocities of a system, and how the tree follows the independent joints.
+
+    Attributes:
+        q: (nq, 1) positions of the tree; they close the loops.
+        v: (m, 1) velocities that are the model's input.
+        v_tree: (nv, 1) velocities of the tree that follow.
+        suffix: "_a" where the inputs are the independent ones of a closed system.
+        reduction: None in tree coordinates.
+        poses: of every link with respect to its antecedent.
+    """
+
+    q: SX
+    v: SX
+    v_tree: SX
+    suffix: str
+    reduction: Reduction | None
+    poses: list[LinkPose]
+
+    @property
+    def size(self) -> int:
+        """Number of velocities that are input."""
+        return int(self.v.numel())
+
+    def tree_acceleration(self, a: SX) -> SX:
+        """(nv, 1) accelerations of the tree for the accelerations a of the input coordinates."""
+        if self.reduction is None:
+            return a
+        assert self.reduction.gamma is not None
+        return casadi.mtimes(self.reduction.G, a) + self.reduction.gamma
+
+    def reduced_effort(self, tau: SX) -> SX:
+        """Efforts of the tree brought to the input coordinates: G' tau."""
+        return tau if self.reduction is None else casadi.mtimes(self.reduction.G.T, tau)
+
+    def reduced_matrix(self, A: SX) -> SX:
+        """G' A G."""
+        if self.reduction is None:
+            return A
+        G = self.reduction.G
+        return casadi.mtimes(G.T, casadi.mtimes(A, G))
+
+    def input(self, name: str) -> tuple[str, SX]:
+        """An input in the same coordinates as the velocities, such as ("a_a", symbol)."""
+        label = name + self.suffix
+        return label, SX.sym(label, self.size)
+
+
+def symbols_of(system: System, coordinates: str = "independent") -> Symbols:
+    """Fresh symbols of a system.
+
+    Args:
+        system: any.
+        coordinates: "independent" or "tree"; they are the same in an open chain.
+
+    Raises:
+        ModelError: another word was given.
+    """
+    if coordinates not in COORDINATES:
+        raise ModelError(
+            f"{system.name}: coordinates is {coordinates!r}; use 'independent' or 'tree'"
+        )
+    q = SX.sym("q", system.nq)
+    poses = link_poses(system.tree, q)
+    if not system.is_closed or coordinates == "tree":
+        v = SX.sym("v", system.nv)
+        return Symbols(q, v, v, "", None, poses)
+    v = SX.sym("v_a", len(system.active))
+    reduced = reduction(system, q, v)
+    return Symbols(q, v, casadi.mtimes(reduced.G, v), "_a", reduced, poses)

@@ -1,0 +1,60 @@
+import ctypes
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from mbs.errors import CompilerError
+from mbs.native.cache import cache_dir, cached_library
+
+SOURCE = {"f.c": '#include "f.h"\nint f(void) { return ANSWER; }', "f.h": "#define ANSWER 42"}
+
+
+@pytest.fixture
+def cache(monkeypatch, tmp_path):
+    monkeypatch.setenv("MBS_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_a_library_is_built_once(cache):
+    path = cached_library(SOURCE)
+    assert ctypes.CDLL(str(path)).f() == 42
+    stamp = path.stat().st_mtime_ns
+    assert cached_library(SOURCE) == path
+    assert path.stat().st_mtime_ns == stamp
+    assert list(cache.iterdir()) == [path]
+
+
+def test_a_header_or_a_flag_makes_another_library(cache):
+    first = cached_library(SOURCE)
+    assert cached_library({**SOURCE, "f.h": "#define ANSWER 43"}) != first
+    assert cached_library(SOURCE, ("-O0", "-fPIC", "-shared")) != first
+
+
+def test_builders_at_once_do_not_disturb_each_other(cache):
+    with ThreadPoolExecutor(4) as pool:
+        paths = set(pool.map(lambda _: cached_library(SOURCE), range(4)))
+    assert len(paths) == 1
+    assert list(cache.iterdir()) == list(paths)
+
+
+def test_refused_code_leaves_nothing(cache):
+    with pytest.raises(CompilerError):
+        cached_library({"f.c": "nonsense"})
+    assert not list(cache.iterdir())
+
+
+def test_a_cache_that_cannot_be_written_is_replaced(monkeypatch, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    monkeypatch.setenv("MBS_CACHE_DIR", str(blocked / "cache"))
+    assert cache_dir().is_dir()
+    assert ctypes.CDLL(str(cached_library(SOURCE))).f() == 42
+
+
+@pytest.mark.skipif(os.name != "posix", reason="XDG folders")
+def test_the_platform_cache_folder(monkeypatch, tmp_path):
+    monkeypatch.delenv("MBS_CACHE_DIR", raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_dir() == tmp_path / "mbs"

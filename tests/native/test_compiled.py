@@ -1,0 +1,68 @@
+import casadi as ca
+import numpy as np
+import pytest
+
+from mbs.errors import CompilerError
+from mbs.native import compiled
+
+
+def example():
+    x, p = ca.SX.sym("x", 3), ca.SX.sym("p")
+    y = ca.vertcat(ca.sin(x[0]) * x[1] + x[2], p * x[1] ** 2, ca.sqrt(x[2] + 2) / (1 + x[0] ** 2))
+    options = {"default_in": [0.5, 3.0]}
+    return ca.Function("example", [x, p], [y, x[0] * p], ["x", "p"], ["y", "e"], options)
+
+
+def test_the_bits_are_those_of_the_interpreter():
+    f = example()
+    g = compiled(f)
+    assert g.is_a("External")
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        x, p = rng.standard_normal(3), rng.standard_normal()
+        for a, b in zip(f(x, p), g(x, p), strict=True):
+            assert np.array_equal(a.full(), b.full())
+
+
+def test_names_and_defaults_are_kept():
+    f, g = example(), compiled(example())
+    assert (g.name(), g.name_in(), g.name_out()) == (f.name(), f.name_in(), f.name_out())
+    assert [g.default_in(k) for k in range(2)] == [0.5, 3.0]
+    assert g(x=[1, 2, 3])["e"] == 3.0
+
+
+def test_first_derivatives_are_exact_and_sparse():
+    f, g = example(), compiled(example())
+    x = ca.MX.sym("x", 3)
+    jacobians = [ca.jacobian(h(x, 2.0)[0], x) for h in (f, g)]
+    assert jacobians[0].nnz() == jacobians[1].nnz() < 9
+    a, b = (ca.Function("J", [x], [j])([0.3, 1.0, 2.0]).full() for j in jacobians)
+    assert np.array_equal(a, b)
+    seed = ca.MX.sym("s", 3)
+    products = [ca.jtimes(h(x, 2.0)[0], x, seed, True) for h in (f, g)]
+    a, b = (ca.Function("a", [x, seed], [v])([1, 2, 3], [1, 0, 2]).full() for v in products)
+    assert a == pytest.approx(b, rel=1e-15)
+
+
+def test_it_maps():
+    x = np.random.default_rng(0).standard_normal((3, 5))
+    a, b = (f.map(5)(x, 1.0)[0].full() for f in (compiled(example()), example()))
+    assert np.array_equal(a, b)
+
+
+def test_without_a_compiler_the_function_itself_comes_back(monkeypatch):
+    def none():
+        raise CompilerError("none")
+
+    monkeypatch.setitem(compiled.__globals__, "find_compiler", none)
+    f = example()
+    assert compiled(f) is f
+
+
+def test_what_casadi_cannot_write_stays_interpreted(capfd):
+    z, p = ca.SX.sym("z"), ca.SX.sym("p")
+    root = ca.rootfinder("root", "newton", {"x": z, "p": p, "g": z * z - p})
+    q = ca.MX.sym("q")
+    f = ca.Function("f", [q], [root(x0=1, p=q)["x"]])
+    assert compiled(f) is f
+    capfd.readouterr()

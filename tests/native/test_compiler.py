@@ -1,0 +1,48 @@
+import subprocess
+from importlib import resources
+
+import pytest
+
+from mbs.errors import CompilerError
+from mbs.native import compile_library, find_compiler
+
+
+def test_a_compiler_is_found():
+    compiler = find_compiler()
+    assert compiler.command
+    assert compiler.version
+
+
+def test_cc_is_obeyed(monkeypatch):
+    monkeypatch.setenv("CC", "gcc -m64")
+    assert find_compiler().command[-1] == "-m64"
+
+
+def test_cc_that_does_not_start(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(CompilerError, match="CC is 'no-such-compiler' and does not start"):
+        find_compiler()
+
+
+def test_no_compiler_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(CompilerError, match=r"install gcc or clang, or run pip install"):
+        find_compiler()
+
+
+def test_refused_code_names_the_error(tmp_path):
+    source = tmp_path / "bad.c"
+    source.write_text("int f(void) { return nothing; }")
+    with pytest.raises(CompilerError, match=r"refused bad\.c: .*nothing"):
+        compile_library([source], output=tmp_path / "bad.so")
+
+
+@pytest.mark.parametrize("name", ["dopri5.c", "driver.c"])
+def test_the_runtime_is_clean_c99(name, tmp_path):
+    folder = resources.files("mbs.native") / "runtime"
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-DMBS_PROJECT"]
+    command = [*find_compiler().command, *strict, "-c", str(folder / name)]
+    answer = subprocess.run([*command, "-o", str(tmp_path / "x.o")], capture_output=True, text=True)
+    assert answer.returncode == 0, answer.stderr

@@ -1,0 +1,216 @@
+import casadi as ca
+import numpy as np
+import pytest
+
+from mbs.errors import CompilerError, ModelError, SolverError
+from mbs.solvers import integrate
+from mbs.solvers.dopri5 import Dopri5
+
+T, X, P = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")
+OSCILLATOR = ca.Function("oscillator", [T, X, P], [ca.vertcat(X[1], -(P**2) * X[0])])
+PENDULUM = ca.Function("pendulum", [T, X, P], [ca.vertcat(X[1], -P * ca.sin(X[0]))])
+BOTH = pytest.mark.parametrize("compiled", [True, False], ids=["compiled", "python"])
+
+
+def point_on_a_circle():
+    """A heavy point on a circle in Cartesian coordinates, and its projection."""
+    x = ca.SX.sym("x", 4)
+    place, velocity = x[:2], x[2:]
+    pull = (ca.dot(velocity, velocity) - 9.81 * place[1]) / ca.dot(place, place)
+    rhs = ca.Function("circle", [T, x], [ca.vertcat(velocity, -pull * place - ca.DM([0, 9.81]))])
+    rows = ca.vertcat(ca.dot(place, place) - 1, ca.dot(place, velocity))
+    J = ca.jacobian(rows, x)
+    step = x - J.T @ ca.solve(J @ J.T, rows)
+    return rhs, ca.Function("project", [x], [step, ca.norm_inf(rows)])
+
+
+@BOTH
+def test_harmonic_oscillator(compiled):
+    times = np.linspace(0, 10, 201)
+    x = integrate(OSCILLATOR, [1.0, 0.0], times, p=2.0, rtol=1e-10, atol=1e-10, compiled=compiled)
+    assert np.max(np.abs(x[:, 0] - np.cos(2 * times))) < 2e-8
+    assert np.max(np.abs(x[:, 1] + 2 * np.sin(2 * times))) < 4e-8
+
+
+@BOTH
+def test_time_dependent_right_hand_side(compiled):
+    f = ca.Function("f", [T, X], [ca.vertcat(ca.cos(T), 5 * T**4)])
+    times = np.array([1.0, 1.5, 4.0])
+    x = integrate(f, [np.sin(1.0), 1.0], times, compiled=compiled)
+    assert np.allclose(x, np.column_stack([np.sin(times), times**5]), rtol=1e-7)
+
+
+def test_the_twins_agree():
+    times = np.linspace(0, 20, 301)
+    a, b = (integrate(PENDULUM, [2.0, 0.5], times, p=9.81, compiled=c) for c in (True, False))
+    assert np.max(np.abs(a - b)) < 1e-11
+
+
+def test_the_twins_agree_with_projection():
+    rhs, project = point_on_a_circle()
+    times = np.linspace(0, 5, 101)
+    a, b = (integrate(rhs, [1, 0, 0, 0], times, project=project, compiled=c) for c in (True, False))
+    assert np.max(np.abs(a - b)) < 1e-11
+
+
+def test_order_five_in_the_number_of_steps():
+    work, steps_error, dense_error = [], [], []
+    for tolerance in 10.0 ** -np.arange(5, 11):
+        calls = [0]
+
+        def slope(_t, x, calls=calls):
+            calls[0] += 1
+            return np.array([x[1], -x[0]])
+
+        start = np.array([1.0, 0.0])
+        solver = Dopri5(slope, None, 0.0, start, tolerance, tolerance)
+        times = np.linspace(0, 20, 2001)
+        table = np.empty((len(times), 2))
+        while solver.t < 20.0:
+            solver.table(np.array([20.0]), 0, np.empty((1, 2)), 1)
+        steps_error.append(abs(solver.x[0] - np.cos(20.0)))
+        work.append(calls[0])
+        solver = Dopri5(slope, None, 0.0, start, tolerance, tolerance)
+        assert solver.table(times, 0, table, 10**6) == len(times)
+        dense_error.append(np.max(np.abs(table[:, 0] - np.cos(times))))
+    order = -np.polyfit(np.log(work), np.log(steps_error), 1)[0]
+    dense_order = -np.polyfit(np.log(work), np.log(dense_error), 1)[0]
+    assert 4.5 < order < 6.0
+    assert 4.0 < dense_order < 6.0
+
+
+@BOTH
+def test_pendulum_keeps_its_energy(compiled):
+    x = integrate(PENDULUM, [3.0, 0.0], np.linspace(0, 10, 101), p=9.81, compiled=compiled)
+    energy = x[:, 1] ** 2 / 2 - 9.81 * np.cos(x[:, 0])
+    assert np.ptp(energy) < 1e-5
+
+
+@BOTH
+def test_projection_keeps_the_constraints_at_every_row(compiled):
+    rhs, project = point_on_a_circle()
+    times = np.linspace(0, 10, 333)
+    options = {"rtol": 1e-5, "atol": 1e-5, "compiled": compiled}
+    free = integrate(rhs, [1, 0, 0, 0], times, **options)
+    kept = integrate(rhs, [1, 0, 0, 0], times, project=project, **options)
+
+    def violation(x):
+        return np.max(np.abs(np.sum(x[:, :2] ** 2, 1) - 1))
+
+    assert violation(free) > 1e-7
+    assert violation(kept) < 1e-12
+    assert np.max(np.abs(np.sum(kept[:, :2] * kept[:, 2:], 1))) < 1e-12
+    angle = integrate(PENDULUM, [np.pi / 2, 0], times, p=9.81, rtol=1e-10, atol=1e-10)[:, 0]
+    assert np.max(np.abs(kept[:, 0] - np.sin(angle))) < 0.02
+
+
+@BOTH
+def test_the_first_state_is_projected(compiled):
+    rhs, project = point_on_a_circle()
+    x = integrate(rhs, [1.001, 0, 0, 0], [0.0], project=project, compiled=compiled)
+    assert abs(x[0, 0] - 1) < 1e-12
+
+
+@BOTH
+def test_rows_do_not_depend_on_where_other_rows_are(compiled):
+    options = {"p": 9.81, "compiled": compiled}
+    fine = integrate(PENDULUM, [1.0, 0.0], np.linspace(0, 3, 31), **options)
+    coarse = integrate(PENDULUM, [1.0, 0.0], [0.0, 1.5, 3.0], **options)
+    assert np.array_equal(fine[[0, 15, 30]], coarse)
+
+
+@BOTH
+def test_repeated_and_single_times(compiled):
+    x = integrate(PENDULUM, [1, 0], [0, 0, 1, 1], p=1, compiled=compiled)
+    assert np.array_equal(x[0], x[1])
+    assert np.array_equal(x[2], x[3])
+    assert np.array_equal(integrate(PENDULUM, [1, 2], [5.0], p=1, compiled=compiled), [[1, 2]])
+
+
+@BOTH
+def test_blow_up_says_when(compiled):
+    f = ca.Function("f", [T, X], [ca.vertcat(X[0] ** 2, 0)])
+    with pytest.raises(SolverError, match=r"stopped at t = (1|0\.9999\d+) s with step .* s: "):
+        integrate(f, [1.0, 0.0], [0.0, 2.0], compiled=compiled)
+
+
+@BOTH
+def test_not_a_number_is_never_returned(compiled):
+    f = ca.Function("f", [T, X], [ca.vertcat(-1, ca.sqrt(X[0]))])
+    with pytest.raises(SolverError, match="not finite"):
+        integrate(f, [1.0, 0.0], [0.0, 2.0], compiled=compiled)
+
+
+@BOTH
+def test_a_projection_that_fails_is_reported(compiled):
+    rhs, _ = point_on_a_circle()
+    x = ca.SX.sym("x", 4)
+    bad = ca.Function("bad", [x], [x, 1.0])
+    with pytest.raises(SolverError, match="projection onto the constraints does not converge"):
+        integrate(rhs, [1, 0, 0, 0], [0, 1], project=bad, compiled=compiled)
+
+
+@BOTH
+def test_a_wall_is_not_stepped_over(compiled):
+    rhs = ca.Function("f", [T, X], [ca.vertcat(1, 0)])
+    wall = ca.Function("wall", [X], [X, ca.if_else(X[0] > 1, 1.0, 0.0)])
+    with pytest.raises(SolverError, match=r"t = (1|0\.9999\d+) s"):
+        integrate(rhs, [0, 0], [0, 3], project=wall, compiled=compiled)
+
+
+@BOTH
+def test_progress_ends_at_the_last_time(compiled):
+    seen = []
+    integrate(PENDULUM, [1, 0], [0, 5], p=1, progress=seen.append, compiled=compiled)
+    assert seen == sorted(seen)
+    assert seen[-1] == 5.0
+
+
+@BOTH
+def test_an_interrupt_in_progress_stops(compiled):
+    def stop(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        integrate(PENDULUM, [1, 0], [0, 5], p=1, progress=stop, compiled=compiled)
+
+
+def test_no_compiler_falls_back(monkeypatch):
+    def none():
+        raise CompilerError("none")
+
+    expected = integrate(PENDULUM, [1, 0], [0, 1], p=1, compiled=False)
+    monkeypatch.setitem(integrate.__globals__, "find_compiler", none)
+    assert np.array_equal(integrate(PENDULUM, [1, 0], [0, 1], p=1), expected)
+
+
+def test_sparse_outputs_and_interpreted_nodes(capfd):
+    f = ca.Function("f", [T, X], [ca.vertcat(ca.SX(1, 1), -X[1])])
+    assert np.allclose(integrate(f, [3, 1], [0, 1])[1], [3, np.exp(-1)])
+    z, q = ca.SX.sym("z"), ca.SX.sym("q")
+    root = ca.rootfinder("root", "newton", {"x": z, "p": q, "g": z**3 + z - q})
+    t, x = ca.MX.sym("t"), ca.MX.sym("x")
+    g = ca.Function("g", [t, x], [-root(x0=0, p=x)["x"]])
+    assert 0 < integrate(g, [1.0], [0, 1])[1, 0] < 1
+    capfd.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x0": [1.0]}, "1 initial states and 1 parameters were given"),
+        ({"p": None}, "has 2 states and 1 parameters"),
+        ({"x0": [np.nan, 0]}, "not finite"),
+        ({"times": [1.0, 0.0]}, "increasing order"),
+        ({"times": []}, "one or more"),
+        ({"rtol": 0.0}, "must be positive"),
+        ({"rhs": ca.Function("f", [X], [X])}, r"rhs\(t, x, p\) -> xdot"),
+        ({"rhs": ca.Function("f", [T, X, P], [X[0]])}, "1 slopes for 2 states"),
+        ({"project": ca.Function("g", [X], [X])}, r"project\(x, p\) -> \(x, residual\)"),
+    ],
+)
+def test_arguments_that_do_not_fit(arguments, message):
+    call = {"rhs": PENDULUM, "x0": [1.0, 0.0], "times": [0.0, 1.0], "p": 1.0, **arguments}
+    rhs, x0, times = call.pop("rhs"), call.pop("x0"), call.pop("times")
+    with pytest.raises(ModelError, match=message):
+        integrate(rhs, x0, times, **call)

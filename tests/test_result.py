@@ -1,0 +1,132 @@
+import csv
+import sys
+
+import numpy as np
+import pytest
+
+from mbs.errors import ExportError, ModelError
+from mbs.result import Result
+
+
+@pytest.fixture
+def result():
+    time = np.array([0.0, 0.5, 1.0])
+    values = np.array([[0.0, 1.0, 7.0], [0.1, 2.0, 8.0], [0.2, 3.0, 1 / 3]])
+    return Result(time, values, {"j1.q": "rad", "j2.q": "rad", "force": "N"}, "demo", {"rtol": 1})
+
+
+def test_columns_have_names_and_units(result):
+    assert result.names == ("j1.q", "j2.q", "force")
+    assert result.units["force"] == "N"
+    assert np.array_equal(result["j2.q"], [1.0, 2.0, 3.0])
+    assert "force" in result
+    assert "nothing" not in result
+    assert len(result) == 3
+
+
+def test_the_data_cannot_be_changed(result):
+    with pytest.raises(ValueError, match="read-only"):
+        result["j1.q"][0] = 3.0
+    with pytest.raises(TypeError):
+        result.units["x"] = "m"
+
+
+def test_the_callers_array_is_copied():
+    values = np.zeros((2, 1))
+    result = Result(np.array([0.0, 1.0]), values, {"a": "m"})
+    values[0, 0] = 5.0
+    assert result["a"][0] == 0.0
+
+
+def test_unknown_name_lists_the_names(result):
+    with pytest.raises(ModelError, match=r"no signal 'j3\.q'; it has j1\.q, j2\.q, force"):
+        result["j3.q"]
+
+
+def test_shapes_must_fit():
+    with pytest.raises(ModelError, match="number of names"):
+        Result(np.zeros(2), np.zeros((2, 2)), {"a": "m"})
+    with pytest.raises(ModelError, match="backwards"):
+        Result(np.array([1.0, 0.0]), np.zeros((2, 1)), {"a": "m"})
+
+
+def test_at_is_linear(result):
+    assert result.at(0.25) == pytest.approx({"j1.q": 0.05, "j2.q": 1.5, "force": 7.5})
+    with pytest.raises(ModelError, match=r"2 s is outside the result, which covers 0 to 1 s"):
+        result.at(2.0)
+
+
+def test_csv_reads_back_bit_for_bit(result, tmp_path):
+    path = tmp_path / "r.csv"
+    result.to_csv(path)
+    with path.open() as stream:
+        rows = list(csv.reader(stream))
+    assert rows[0] == ["time", "j1.q", "j2.q", "force"]
+    back = np.array(rows[1:], dtype=float)
+    assert np.array_equal(back[:, 0], result.time)
+    assert np.array_equal(back[:, 1:], result.values)
+
+
+def test_csv_in_a_missing_folder_leaves_nothing(result, tmp_path):
+    with pytest.raises(ExportError, match="could not be written"):
+        result.to_csv(tmp_path / "no" / "r.csv")
+    assert not list(tmp_path.iterdir())
+
+
+def test_csv_keeps_the_old_file_when_writing_fails(result, tmp_path, monkeypatch):
+    path = tmp_path / "r.csv"
+    path.write_text("old")
+
+    def refuse(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("mbs.result.os.replace", refuse)
+    with pytest.raises(ExportError, match="disk full"):
+        result.to_csv(path)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_structured_arrays_of_fmpy():
+    array = np.array(
+        [(0.0, 1.0, 2.0), (1.0, 3.0, 4.0)], dtype=[("time", float), ("a", float), ("b", float)]
+    )
+    result = Result.from_structured(array, {"a": "rad"}, "model")
+    assert result.units == {"a": "rad", "b": "1"}
+    assert np.array_equal(result["b"], [2.0, 4.0])
+
+
+def test_plot_has_one_axis_for_each_unit(result, tmp_path):
+    figure = result.plot(path=tmp_path / "r.png")
+    assert [axis.get_ylabel() for axis in figure.axes] == ["angle [rad]", "force [N]"]
+    assert figure.axes[-1].get_xlabel() == "time [s]"
+    assert (tmp_path / "r.png").stat().st_size > 1000
+
+
+def test_plot_of_some_signals(result, tmp_path):
+    assert len(result.plot("force", tmp_path / "r.svg").axes) == 1
+    with pytest.raises(ModelError, match="no signal"):
+        result.plot(["nothing"], tmp_path / "r.svg")
+    with pytest.raises(ExportError, match="picture"):
+        result.plot(path=tmp_path / "no" / "r.png")
+
+
+@pytest.mark.parametrize(
+    ("module", "call", "remedy"),
+    [
+        ("matplotlib", lambda r: r.plot(path="x.png"), r"mbs\[plot\]"),
+        ("pandas", Result.to_pandas, "pip install pandas"),
+        ("xarray", Result.to_xarray, "pip install xarray"),
+    ],
+)
+def test_missing_extras_say_what_to_install(result, monkeypatch, module, call, remedy):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ModelError, match=f"{module} is not installed; run: .*{remedy}"):
+        call(result)
+
+
+def test_pandas_and_xarray_when_installed(result):
+    pandas = pytest.importorskip("pandas")
+    assert isinstance(result.to_pandas(), pandas.DataFrame)
+    pytest.importorskip("xarray")
+    assert result.to_xarray()["force"].attrs["units"] == "N"

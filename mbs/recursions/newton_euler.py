@@ -84,7 +84,7 @@ def euler_moment(J: SX, motion: Acceleration) -> SX:
     for k in range(3):
         m, n = (k + 1) % 3, (k + 2) % 3
         row = J[k, k] * wd[k] - J[k, m] * U[n, k] + J[k, n] * U[m, k]
-        rows.append(row + J[m, n] * (U[n, n] - U[m, m]) + (J[n, n] - J[m, m]) * (w[m] * w[n]))
+        rows.append(row + J[m, n] * (U[m, m] - U[n, n]) + (J[n, n] - J[m, m]) * (w[m] * w[n]))
     return casadi.vertcat(*rows)
 
 

@@ -46,7 +46,7 @@ def fmu(
         path: the FMU.
         duration: s; by default until the stop time that the FMU proposes, else 1 s.
         inputs: input to a number, to a function of time, or to (times, values) with straight
-            lines between them.
+            lines between them. It is held over each step, so shorten `step` where it varies fast.
         parameters: parameter to its value.
         start: state or input to its value at the start.
         kind: the interface that is used; the FMU brings the solver for co-simulation.
@@ -68,8 +68,7 @@ def fmu(
 
     with tempfile.TemporaryDirectory(prefix="mbs-fmu-", ignore_cleanup_errors=True) as folder:
         _extract(Path(path), folder)
-        description = _described(folder, Path(path))
-        _check_kind(description, kind)
+        description = _described(folder, Path(path), kind)
         begin, end = _span(description, duration)
         interval = _interval(description, end - begin, step)
         options: dict[str, Any] = {

@@ -365,7 +365,9 @@ def test_two_instances_in_two_threads(fmu):
     alone, together = ([], []), ([], [])
     for start, rows in zip(starts, alone, strict=True):
         run(start, rows)
-    threads = [threading.Thread(target=run, args=pair) for pair in zip(starts, together)]
+    threads = [
+        threading.Thread(target=run, args=pair) for pair in zip(starts, together, strict=True)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:

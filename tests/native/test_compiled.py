@@ -8,7 +8,8 @@ from mbs.native import compiled
 
 def example():
     x, p = ca.SX.sym("x", 3), ca.SX.sym("p")
-    y = ca.vertcat(ca.sin(x[0]) * x[1] + x[2], p * x[1] ** 2, ca.sqrt(x[2] + 2) / (1 + x[0] ** 2))
+    root = ca.sqrt(x[2] ** 2 + 2) / (1 + x[0] ** 2)
+    y = ca.vertcat(ca.sin(x[0]) * x[1] + x[2], p * x[1] ** 2, root)
     options = {"default_in": [0.5, 3.0]}
     return ca.Function("example", [x, p], [y, x[0] * p], ["x", "p"], ["y", "e"], options)
 

@@ -1,12 +1,12 @@
 """The generated C of an FMU: its tables and the functions that it evaluates."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import casadi
 
 from mbs.errors import ExportError
-from mbs.export.fmu.description import FmuModel
+from mbs.export.fmu.description import FmuModel, Variable
 
 _HEADER = """\
 /* Sizes and tables of the model, generated together with modelDescription.xml. */
@@ -143,15 +143,24 @@ def _tangent(model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]) ->
 
 
 def _steepness(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
-    """How many nominal sizes z moves when all of x moves by about one: huge where rank is lost."""
+    """How many nominal sizes z moves when x and p change by about their own size.
+
+    It is huge where rank is lost; p is there for postures where x and z lose it together.
+    """
     assert model.closure is not None
     _, z, p = loop
-    count = max(len(model.states), 1)
-    seed = casadi.DM([v.nominal * (1 + k / count) for k, v in enumerate(model.states)])
-    zero = casadi.MX(z.numel(), 1), casadi.MX(p.numel(), 1)
-    dz = _forward(model.closure, loop, [casadi.MX(seed), *zero])[0]
+    dx = casadi.DM(
+        [v.nominal * w for v, w in zip(model.states, _weights(model.states), strict=True)]
+    )
+    dp = p * casadi.DM(_weights(model.parameters))
+    dz = _forward(model.closure, loop, [casadi.MX(dx), casadi.MX(z.numel(), 1), dp])[0]
     sizes = casadi.DM([v.nominal for v in model.dependents])
     return casadi.norm_inf(casadi.vec(dz) / sizes)
+
+
+def _weights(variables: Sequence[Variable]) -> list[float]:
+    """Unequal numbers about one, so that effects of the variables do not cancel."""
+    return [1 + k / len(variables) for k in range(len(variables))]
 
 
 def _forward(

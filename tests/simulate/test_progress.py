@@ -1,0 +1,38 @@
+import io
+import subprocess
+import sys
+
+from mbs.simulate import progress as module
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def shown(monkeypatch, *, patience, terminal, quiet=False):
+    stream = Terminal() if terminal else io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(module, "PATIENCE", patience)
+    with module.progress("swinging", 0.0, 10.0, quiet=quiet) as reach:
+        for time in range(11):
+            reach(float(time))
+    return stream.getvalue()
+
+
+def test_long_runs_show_a_bar(monkeypatch):
+    assert "swinging" in shown(monkeypatch, patience=0.0, terminal=True)
+
+
+def test_short_quiet_and_piped_runs_show_nothing(monkeypatch):
+    assert not shown(monkeypatch, patience=2.0, terminal=True)
+    assert not shown(monkeypatch, patience=0.0, terminal=False)
+    assert not shown(monkeypatch, patience=0.0, terminal=True, quiet=True)
+
+
+def test_nothing_heavy_is_imported_early():
+    code = "import mbs.simulate.fmu, mbs.result, mbs.native, mbs.solvers, sys; print(*sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    loaded = set(answer.stdout.split())
+    assert "casadi" in loaded
+    assert not loaded & {"fmpy", "rich", "matplotlib", "pandas", "sympy"}

@@ -1,1 +1,82 @@
-"""mbs."""
+"""Equations of robots and mechanisms with closed loops, on CasADi graphs.
+
+Compose components in a `Mechanism` or `load` a robot, `assemble()` it, and ask `mbs.models` for
+its equations as `casadi.Function`s; `mbs.export` writes C and FMUs, `mbs.simulate` runs them.
+Everything but numpy and casadi is imported where it is used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mbs import (
+        components,
+        errors,
+        export,
+        formats,
+        loops,
+        models,
+        native,
+        robots,
+        simulate,
+    )
+    from mbs.assembly import System
+    from mbs.components import Mechanism
+    from mbs.errors import MbsError
+    from mbs.expressions import Parameter
+    from mbs.result import Result
+    from mbs.robots import load
+
+__version__ = "0.1.0"
+
+_NAMES = {
+    "Mechanism": "mbs.components",
+    "MbsError": "mbs.errors",
+    "Parameter": "mbs.expressions",
+    "Result": "mbs.result",
+    "System": "mbs.assembly",
+    "load": "mbs.robots",
+}
+_MODULES = (
+    "components",
+    "errors",
+    "export",
+    "formats",
+    "loops",
+    "models",
+    "native",
+    "robots",
+    "simulate",
+)
+
+__all__ = [
+    "MbsError",
+    "Mechanism",
+    "Parameter",
+    "Result",
+    "System",
+    "components",
+    "errors",
+    "export",
+    "formats",
+    "load",
+    "loops",
+    "models",
+    "native",
+    "robots",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _NAMES:
+        return getattr(importlib.import_module(_NAMES[name]), name)
+    if name in _MODULES:
+        return importlib.import_module(f"mbs.{name}")
+    raise AttributeError(f"module 'mbs' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -179,7 +179,7 @@ def to_sx(value: Scalar, symbols: Mapping[str, SX]) -> SX:
 
 
 def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float | None:
-    """The number, with `values` (else the defaults) for its parameters; None when one is unknown."""
+    """The number, with `values` or the defaults for its parameters; None if one is unknown."""
     known = values or {}
 
     def symbol(parameter: Parameter) -> float:

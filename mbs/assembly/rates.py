@@ -42,7 +42,7 @@ def normalised(tree: Tree, q: SX) -> SX:
 
 
 def zero_position(tree: Tree) -> list[float]:
-    """q of the posture in which every joint is at zero, quaternions at the identity."""
+    """Positions of the posture in which every joint is at zero, quaternions at the identity."""
     q = [0.0] * tree.nq
     for part in quaternion_slices(tree):
         q[part.start] = 1.0

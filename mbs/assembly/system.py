@@ -144,7 +144,7 @@ class System:
         )
 
     def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-        """q from values by coordinate name, the others as in the assembled posture.
+        """Positions q from values by coordinate name, the others as in the assembled posture.
 
         Raises:
             ModelError: a name is unknown, or a sequence has the wrong length.
@@ -152,7 +152,7 @@ class System:
         return self._filled(values, self.coordinates, list(self.posture), "position")
 
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-        """v from values by coordinate name, the others zero; likewise accelerations and efforts."""
+        """Velocities v from values by name, the others zero; likewise for efforts."""
         return self._filled(values, self.speeds, [0.0] * self.nv, "velocity")
 
     def _filled(
@@ -182,7 +182,7 @@ class System:
         return start
 
     def parameter_values(self, values: Mapping[str, float] | None = None) -> list[float]:
-        """p from values by name, the others at their defaults.
+        """Parameters p from values by name, the others at their defaults.
 
         Raises:
             ModelError: a name is unknown, or a symbol has no value.

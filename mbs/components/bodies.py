@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from casadi import SX
 
 from mbs.components.component import Component, Point
 from mbs.components.placement import Rotation, Symbols

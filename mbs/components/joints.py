@@ -204,7 +204,7 @@ class Planar(_AxisJoint):
 
 @dataclass(frozen=True, slots=True)
 class Universal(Joint):
-    """Two rotations about orthogonal axes that meet: `phi_a` fixed in frame_a, then `phi_b`; 4 rows.
+    """Two rotations about orthogonal axes that meet, `phi_a` then `phi_b`; 4 rows.
 
     Attributes:
         axes: the two axes in frame_a at the zero posture.

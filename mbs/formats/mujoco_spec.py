@@ -8,7 +8,6 @@ be missing. Contacts, cameras, sensors and keyframes are not read.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,8 @@ from mbs.errors import DescriptionError
 from mbs.formats.files import component_name
 from mbs.formats.mujoco_checks import check_supported
 from mbs.formats.mujoco_closures import add_closures
-from mbs.formats.mujoco_joints import add_joints, turned_by
-from mbs.formats.mujoco_names import Names
+from mbs.formats.mujoco_joints import add_joints
+from mbs.formats.mujoco_model import MjcfModel, matrix_of, placed
 from mbs.formats.urdf import parse_xml
 
 
@@ -46,25 +45,25 @@ def read_mjcf(path: str | Path) -> Mechanism:
         )
     mujoco = _mujoco()
     model = _compiled(mujoco, str(path))
-    check_supported(mujoco, model, str(path))
-    names = Names.of(mujoco, model)
+    mjcf = MjcfModel.of(mujoco, model, str(path))
+    check_supported(mjcf)
     mechanism = Mechanism(
         component_name(root.get("model") or Path(path).stem),
-        gravity=_gravity(mujoco, model),
+        gravity=_gravity(mjcf),
         source=f"MJCF file {Path(path).name}",
     )
     points: list[Point] = [mechanism.world.frame]
     for k in range(1, model.nbody):
-        body = mechanism.add(_body(names.bodies[k], model, k))
-        add_joints(mechanism, mujoco, model, names, k, points[model.body_parentid[k]], body)
+        body = mechanism.add(_body(mjcf, k))
+        add_joints(mechanism, mjcf, k, points[model.body_parentid[k]])
         points.append(body.frame)
     sites = [
-        _placed(points[model.site_bodyid[k]], model.site_pos[k], model.site_quat[k])
+        placed(points[model.site_bodyid[k]], model.site_pos[k], model.site_quat[k])
         for k in range(model.nsite)
     ]
-    for k, point in enumerate(sites):
-        mechanism.add_frame(names.sites[k], point)
-    add_closures(mechanism, mujoco, model, names, points, sites)
+    for name, point in zip(mjcf.sites, sites, strict=True):
+        mechanism.add_frame(name, point)
+    add_closures(mechanism, mjcf, points, sites)
     return mechanism
 
 
@@ -112,17 +111,18 @@ def _strip(mujoco: Any, spec: Any) -> None:
         spec.delete(asset)
 
 
-def _gravity(mujoco: Any, model: Any) -> tuple[float, ...]:
-    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
+    if mjcf.data.opt.disableflags & mjcf.mujoco.mjtDisableBit.mjDSBL_GRAVITY:
         return (0.0, 0.0, 0.0)
-    return tuple(float(value) for value in model.opt.gravity)
+    return tuple(float(value) for value in mjcf.data.opt.gravity)
 
 
-def _body(name: str, model: Any, k: int) -> Body:
-    R = turned_by(model.body_iquat[k])
+def _body(mjcf: MjcfModel, k: int) -> Body:
+    model = mjcf.data
+    R = matrix_of(model.body_iquat[k])
     tensor = R @ np.diag(model.body_inertia[k]) @ R.T
     return Body(
-        name,
+        mjcf.bodies[k],
         mass=float(model.body_mass[k]),
         com=tuple(float(value) for value in model.body_ipos[k]),
         inertia=((tensor + tensor.T) / 2).tolist(),

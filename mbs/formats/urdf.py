@@ -6,16 +6,12 @@ collisions, and the meshes that they name, are not looked at.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
 from mbs.components import (
     Body,
-    Component,
     Coupling,
     Free,
     Joint,
@@ -27,8 +23,8 @@ from mbs.components import (
 )
 from mbs.errors import DescriptionError
 from mbs.formats.files import component_name, did_you_mean, read_text
-from mbs.formats.urdf_values import Inertial, Reader, origin_of, read_inertial
 from mbs.formats.urdf_tree import JointElement, UrdfTree, read_tree
+from mbs.formats.urdf_values import Inertial, Reader, origin_of, read_inertial
 
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _ONE_AXIS = {"revolute": Revolute, "continuous": Revolute, "prismatic": Prismatic}
@@ -144,7 +140,9 @@ def _add_mimic(mechanism: Mechanism, tree: UrdfTree, joint: JointElement) -> Non
     if joint.name not in axes:
         reader.fail(f"it mimics {driver!r} but is {joint.kind}; only one-axis joints can mimic")
     if driver not in axes:
-        reader.fail(f"it mimics {driver!r}, which is not a one-axis joint; {did_you_mean(driver, axes)}")
+        reader.fail(
+            f"it mimics {driver!r}, which is not a one-axis joint; {did_you_mean(driver, axes)}"
+        )
     offset = reader.number(mimic, "offset", 0.0)
     factor = reader.number(mimic, "multiplier", 1.0)
     mechanism.add(

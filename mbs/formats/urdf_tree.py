@@ -57,8 +57,7 @@ def read_tree(path: str, root: Element) -> UrdfTree:
     if not links:
         raise DescriptionError(f"{path}: there is no <link>; give a URDF file with links")
     joints = [
-        _joint(path, name, element, links)
-        for name, element in _named(path, root, "joint").items()
+        _joint(path, name, element, links) for name, element in _named(path, root, "joint").items()
     ]
     parents: dict[str, str] = {}
     for joint in joints:
@@ -70,7 +69,9 @@ def read_tree(path: str, root: Element) -> UrdfTree:
         parents[joint.child] = joint.name
     roots = [name for name in links if name not in parents]
     if len(roots) != 1:
-        found = f"the roots {', '.join(map(repr, roots))}" if roots else "no root, a cycle of joints"
+        found = (
+            f"the roots {', '.join(map(repr, roots))}" if roots else "no root, a cycle of joints"
+        )
         raise DescriptionError(f"{path}: the links have {found}; connect them as one tree")
     return UrdfTree(path, roots[0], links, _ordered(path, roots[0], links, joints))
 
@@ -78,7 +79,9 @@ def read_tree(path: str, root: Element) -> UrdfTree:
 def _check_elements(path: str, root: Element) -> None:
     for element in root.iter():
         if "xacro" in element.tag:
-            raise DescriptionError(f"{path}: the file holds xacro macros; expand it with xacro first")
+            raise DescriptionError(
+                f"{path}: the file holds xacro macros; expand it with xacro first"
+            )
     if root.find("constraint") is not None:
         raise DescriptionError(
             f"{path}: <constraint> is not read; close the loop with mbs components instead"

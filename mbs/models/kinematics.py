@@ -19,7 +19,7 @@ def jacobian(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """``jacobian(q) -> J``: [V; w] = J v, the velocity of a frame's origin and its angular velocity.
+    """``jacobian(q) -> J``: velocity of a frame, [V; w] = J v, V being that of its origin.
 
     Source: Khalil & Creusot 1997, eq. 3 and 5; for closed systems J G.
 

@@ -68,7 +68,8 @@ def fmu(
 
     with tempfile.TemporaryDirectory(prefix="mbs-fmu-", ignore_cleanup_errors=True) as folder:
         _extract(Path(path), folder)
-        description = _described(folder, Path(path), kind)
+        description = _described(folder, Path(path))
+        _check_kind(description, kind)
         begin, end = _span(description, duration)
         interval = _interval(description, end - begin, step)
         options: dict[str, Any] = {

@@ -49,7 +49,7 @@ REASONS = {
 }
 
 
-class Failure(Exception):  # noqa: N818 - it never leaves this module, except as a SolverError
+class Failure(Exception):
     """An evaluation had no answer, so the step must be shortened."""
 
 

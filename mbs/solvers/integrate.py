@@ -72,6 +72,7 @@ def integrate(
     return _run_python(f, g, x, t, parameters, rtol, atol, progress)
 
 
+@functools.lru_cache(maxsize=64)
 def _dense(
     rhs: casadi.Function, project: casadi.Function | None
 ) -> tuple[casadi.Function, casadi.Function | None]:
@@ -139,10 +140,9 @@ def _run_compiled(
     atol: float,
     progress: Progress | None,
 ) -> Array:
-    source = _source(f, g)
-    if "#error" in source:  # a node that CasADi interprets only
+    library = _library(f, g)
+    if library is None:
         return _run_python(f, g, x, times, p, rtol, atol, progress)
-    library = _library(source, g is not None)
     table = np.empty((len(times), len(x)))
     done = ctypes.c_longlong(0)
     with _opened(library, x, p, rtol, atol, float(times[0])) as driver:
@@ -208,16 +208,17 @@ def _onto(project: casadi.Function, p: Array, _t: float, x: Array) -> Array:
     raise Failure("projection")
 
 
-def _source(f: casadi.Function, g: casadi.Function | None) -> str:
+@functools.lru_cache(maxsize=64)
+def _library(f: casadi.Function, g: casadi.Function | None) -> ctypes.CDLL | None:
+    """The compiled driver of these functions; None when CasADi can only interpret them."""
     generator = casadi.CodeGenerator("system")
     generator.add(f)
     if g is not None:
         generator.add(g)
-    return str(generator.dump())
-
-
-def _library(source: str, constrained: bool) -> ctypes.CDLL:
-    flags = (*FLAGS, "-DMBS_PROJECT") if constrained else FLAGS
+    source = str(generator.dump())
+    if "#error" in source:
+        return None
+    flags = FLAGS if g is None else (*FLAGS, "-DMBS_PROJECT")
     return _load(cached_library({"system.c": source, **_runtime()}, flags))
 
 
@@ -227,7 +228,6 @@ def _runtime() -> dict[str, str]:
     return {name: (folder / name).read_text(encoding="utf-8") for name in _RUNTIME}
 
 
-@functools.lru_cache(maxsize=64)
 def _load(path: Path) -> ctypes.CDLL:
     library = ctypes.CDLL(str(path))
     handle, real, pointer = ctypes.c_void_p, ctypes.c_double, ctypes.POINTER(ctypes.c_double)

@@ -110,7 +110,7 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
     t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
     z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
     p = casadi.MX.sym("p", len(model.parameters))
-    dx, du, dp = (casadi.MX.sym(f"d{v.name()}", v.numel()) for v in (x, u, p))
+    dx, du, dp = (casadi.MX.sym(name, v.numel()) for name, v in (("dx", x), ("du", u), ("dp", p)))
     point = [t, x, z, u, p]
     answers = [
         casadi.Function("mbs_rhs", point, _dense(model.rhs.call(point))),

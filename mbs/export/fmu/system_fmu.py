@@ -1,0 +1,194 @@
+"""What an FMU shows of a mechanism: joint torques in, motions and the tool's pose out."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from mbs.assembly import System
+from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, Coordinate
+from mbs.errors import ExportError, ModelError
+from mbs.export.fmu.description import FmuModel, State, Variable
+from mbs.export.fmu.pack import write_fmu
+from mbs.models.geometry import terminal_frame
+from mbs.models.state_space import MinimalState, consistent_start, minimal_state
+
+
+def fmu(
+    system: System,
+    path: str | os.PathLike[str],
+    *,
+    fmi: str = "2.0",
+    stop_time: float = 10.0,
+    step_size: float = 0.01,
+    tolerance: float = 1e-8,
+) -> Path:
+    """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
+
+    Inputs are the efforts of the actuated joints, `name.tau`. Outputs are positions, velocities
+    and accelerations of all joints, `name.q`, `name.v`, `name.a`, and the terminal frame in the
+    base: `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`. States are
+    the independent joints; in a closed system the others are solved for at every evaluation, so
+    that loops cannot drift. Every symbol of the system is a tunable parameter. A solver for
+    Co-Simulation (Dormand and Prince 5(4)) is inside.
+
+    Args:
+        system: open or closed.
+        path: of the file to write.
+        fmi: "2.0".
+        stop_time: default end of a simulation [s].
+        step_size: default communication step [s].
+        tolerance: default relative tolerance.
+
+    Returns:
+        The path written.
+
+    Raises:
+        ExportError: the file cannot be written, or another FMI version was asked for.
+        ModelError: a parameter has no value, or the system has no minimal state.
+        CompilerError: there is no C compiler.
+    """
+    if fmi != "2.0":
+        raise ExportError(f"{system.name}: FMI version {fmi!r} is not written; use fmi='2.0'")
+    model = fmu_model(system, stop_time=stop_time, step_size=step_size, tolerance=tolerance)
+    write_fmu(model, path)
+    return Path(path)
+
+
+def fmu_model(
+    system: System,
+    *,
+    stop_time: float = 10.0,
+    step_size: float = 0.01,
+    tolerance: float = 1e-8,
+) -> FmuModel:
+    """The description of a mechanism's FMU; arguments as for `fmu`."""
+    system.parameter_values()
+    state = minimal_state(system)
+    x, z = consistent_start(system, state)
+    return FmuModel(
+        name=system.name,
+        description=system.report().splitlines()[0],
+        states=_states(system, state, x),
+        inputs=tuple(_effort(system.speeds[k]) for k in state.inputs),
+        outputs=_outputs(system, state),
+        parameters=_parameters(system),
+        dependents=tuple(
+            _position(system.coordinates[k], f"{system.coordinates[k].name}.solved", start)
+            for k, start in zip(state.dependents, z, strict=True)
+        ),
+        rhs=state.rhs,
+        closure=state.closure,
+        stop_time=stop_time,
+        step_size=step_size,
+        tolerance=tolerance,
+        documentation="\n\n".join([system.report(), system.source]),
+    )
+
+
+def _states(system: System, state: MinimalState, start: list[float]) -> tuple[State, ...]:
+    speeds = {speed.name: speed for speed in system.speeds}
+    positions = []
+    for k, value in zip(state.positions, start, strict=False):
+        coordinate = system.coordinates[k]
+        rate = speeds[coordinate.name].unit if coordinate.name in speeds else _rate(coordinate)
+        positions.append(
+            State(
+                name=f"{coordinate.name}.q",
+                unit=coordinate.unit,
+                start=value,
+                min=coordinate.limits[0] if coordinate.limits else None,
+                max=coordinate.limits[1] if coordinate.limits else None,
+                description=f"position of {coordinate.name}",
+                derivative_unit=rate,
+                output=True,
+            )
+        )
+    velocities = [
+        State(
+            name=f"{speed.name}.v",
+            unit=speed.unit,
+            description=f"velocity of {speed.name}",
+            derivative_unit=ACCELERATION_UNIT[speed.unit],
+            output=True,
+        )
+        for speed in (system.speeds[k] for k in system.active)
+    ]
+    return (*positions, *velocities)
+
+
+def _rate(coordinate: Coordinate) -> str:
+    return {"rad": "rad/s", "m": "m/s"}.get(coordinate.unit, "1/s")
+
+
+def _effort(speed: Coordinate) -> Variable:
+    return Variable(
+        name=f"{speed.name}.tau",
+        unit=EFFORT_UNIT[speed.unit],
+        description=f"effort of the motor of {speed.name}",
+    )
+
+
+def _position(coordinate: Coordinate, name: str, start: float = 0.0) -> Variable:
+    return Variable(
+        name=name, unit=coordinate.unit, start=start, description=f"position of {coordinate.name}"
+    )
+
+
+def _outputs(system: System, state: MinimalState) -> tuple[Variable, ...]:
+    """The elements of y, in the order in which the state equation gives them."""
+    passive = list(system.closure.passive) if system.closure else []
+    rows = [_acceleration(system.speeds[k]) for k in system.active]
+    rows += [
+        _position(system.coordinates[k], f"{system.coordinates[k].name}.q")
+        for k in state.dependents
+    ]
+    rows += [
+        Variable(
+            name=f"{system.speeds[k].name}.v",
+            unit=system.speeds[k].unit,
+            description=f"velocity of {system.speeds[k].name}",
+        )
+        for k in passive
+    ]
+    rows += [_acceleration(system.speeds[k]) for k in passive]
+    frame = terminal_frame(system)
+    where = f"link {frame}" if isinstance(frame, int) else frame
+    rows += [
+        Variable(name=f"tool.{axis}", unit="m", description=f"{axis} of {where} in the base frame")
+        for axis in "xyz"
+    ]
+    rows += [
+        Variable(
+            name=f"tool.R{row}{column}", description=f"orientation of {where} in the base frame"
+        )
+        for row in (1, 2, 3)
+        for column in (1, 2, 3)
+    ]
+    return tuple(rows)
+
+
+def _acceleration(speed: Coordinate) -> Variable:
+    return Variable(
+        name=f"{speed.name}.a",
+        unit=ACCELERATION_UNIT[speed.unit],
+        description=f"acceleration of {speed.name}",
+    )
+
+
+def _parameters(system: System) -> tuple[Variable, ...]:
+    rows = []
+    for parameter in system.parameters:
+        if parameter.default is None:
+            raise ModelError(
+                f"{system.name}: parameter {parameter.name!r} has no value; give it a default"
+            )
+        rows.append(
+            Variable(
+                name=parameter.name,
+                unit=parameter.unit,
+                start=parameter.default,
+                description=parameter.description or f"parameter {parameter.name}",
+            )
+        )
+    return tuple(rows)

@@ -1,0 +1,18 @@
+"""Two bars in a vertical plane: the smallest robot with all terms in its model."""
+
+from __future__ import annotations
+
+from mbs.components import Mechanism
+from mbs.robots.rows import cuboid, frame, robot
+
+_SOURCE = "Textbook arm; lengths, masses and inertias are illustrative"
+
+
+def planar_2r() -> Mechanism:
+    """Double pendulum with motors: q1, q2 about z, gravity along -y, both bars along x at zero.
+
+    Two homogeneous bars of 1 m and 1 kg, 0.05 m thick. Values are illustrative.
+    """
+    frames = [frame(0), frame(1, d=1)]
+    bodies = [cuboid(j, 1, (1, 0.05, 0.05), (0.5, 0, 0)) for j in (1, 2)]
+    return robot("planar_2r", _SOURCE, frames, bodies, gravity=[0, -9.81, 0])

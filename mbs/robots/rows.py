@@ -1,0 +1,73 @@
+"""Rows of tables for the catalogue, from masses and centres of mass as they are published."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mbs.components import Mechanism
+from mbs.formats import from_dict, to_mechanism
+
+Row = dict[str, Any]
+
+
+def frame(antecedent: int, joint: str = "revolute", **values: Any) -> Row:
+    """A frame row; values are Khalil parameters [rad, m], limits, actuated, name."""
+    return {"antecedent": antecedent, "joint": joint, **values}
+
+
+def body(
+    number: int,
+    mass: float,
+    com: Sequence[float],
+    about_com: Sequence[float],
+    **values: Any,
+) -> Row:
+    """The row of a body whose principal inertia is published about its centre of mass.
+
+    Args:
+        number: of the frame it is fixed on.
+        mass: [kg].
+        com: centre of mass in that frame [m].
+        about_com: moments of inertia about the centre of mass, in the frame's axes [kg m^2].
+        **values: Ia, Fv, Fs, name.
+
+    Returns:
+        The row with the ten parameters about the origin of the frame.
+    """
+    c = np.array(com, dtype=float)
+    J = np.diag(about_com) + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return about_origin(number, mass, com, J, **values)
+
+
+def about_origin(number: int, mass: float, com: Sequence[float], J: Any, **values: Any) -> Row:
+    """The row of a body by its (3, 3) inertia about the origin of its frame [kg m^2]."""
+    keys = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+    elements = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    ten = [*(float(J[k, m]) for k, m in elements), *(mass * float(x) for x in com), mass]
+    return {"frame": number, **dict(zip(keys, ten, strict=True)), **values}
+
+
+def cuboid(
+    number: int, mass: float, sides: Sequence[float], com: Sequence[float], **values: Any
+) -> Row:
+    """The row of a homogeneous cuboid along the axes of its frame.
+
+    Args:
+        number: of the frame it is fixed on.
+        mass: [kg].
+        sides: lengths along x, y, z [m].
+        com: its middle in the frame [m].
+        **values: Ia, Fv, Fs, name.
+    """
+    x, y, z = (side * side for side in sides)
+    about_com = [mass * (y + z) / 12, mass * (x + z) / 12, mass * (x + y) / 12]
+    return body(number, mass, com, about_com, **values)
+
+
+def robot(name: str, source: str, frames: list[Row], bodies: list[Row], **values: Any) -> Mechanism:
+    """The mechanism of a table; values are loop and gravity."""
+    table = {"name": name, "source": source, "frame": frames, "body": bodies, **values}
+    return to_mechanism(from_dict(table))

@@ -1,0 +1,163 @@
+"""Simulation of a system, compiled where there is a compiler, loops kept closed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.errors import ModelError
+from mbs.loops.posture import require_closed, solve
+from mbs.loops.reduction import reduction
+from mbs.models.state_space import FullState, full_state
+from mbs.result import Result
+from mbs.simulate.progress import progress
+from mbs.solvers import integrate
+
+Values = Mapping[str, float] | Sequence[float] | None
+Effort = Mapping[str, float] | Sequence[float] | Function | Callable[[Any, Any, Any], Any] | None
+Array = NDArray[np.float64]
+
+_SCALARS = (("kinetic_energy", "J"), ("potential_energy", "J"), ("closure_residual", "1"))
+
+
+def run(
+    system: System,
+    duration: float,
+    *,
+    q0: Values = None,
+    v0: Values = None,
+    tau: Effort = None,
+    parameters: Mapping[str, float] | None = None,
+    step: float = 0.01,
+    tolerance: float = 1e-8,
+    quiet: bool = False,
+) -> Result:
+    """The motion of a system from given positions and velocities under given joint efforts.
+
+    Dormand and Prince's method with error control; after every step positions and velocities are
+    projected onto all closure rows, so that loops do not drift.
+
+    Args:
+        system: open or closed.
+        duration: [s].
+        q0: positions at the start by coordinate name [rad or m], the others as in the assembled
+            posture; in a closed system the loops are closed with the independent ones as given.
+        v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
+            those of independent joints, the others follow.
+        tau: joint efforts [N m or N]: constants by name, or a function of (t, q, v) made of
+            CasADi operations that returns (nv, 1) efforts, or a casadi.Function of (t, q, v).
+        parameters: values of symbols, the others at their defaults.
+        step: time between the rows of the result [s]; it does not change the accuracy.
+        tolerance: relative and absolute tolerance of the error of one integration step.
+        quiet: no progress bar.
+
+    Returns:
+        A `Result` with, for every coordinate, `name.q`, `name.v`, `name.a`, `name.tau`, and
+        `kinetic_energy`, `potential_energy`, `closure_residual`.
+
+    Raises:
+        ModelError: a name is unknown, or an argument has the wrong size.
+        Unclosable: the loops cannot be closed at these positions.
+        SolverError: the integration cannot go on; the message says when and why.
+    """
+    if not (duration > 0 and step > 0):
+        raise ModelError(
+            f"{system.name}: duration is {duration} s and step is {step} s; give positive times"
+        )
+    p = system.parameter_values(parameters)
+    state = full_state(system, _effort(system, tau))
+    x0 = np.concatenate(_start(system, q0, v0, parameters))
+    times = np.linspace(0.0, duration, max(1, round(duration / step)) + 1)
+    with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
+        x = integrate(
+            state.rhs,
+            x0,
+            times,
+            p=p,
+            project=state.project,
+            rtol=tolerance,
+            atol=tolerance,
+            progress=reached,
+        )
+    return _result(system, state, times, x, p)
+
+
+def _effort(system: System, tau: Effort) -> Function | None:
+    """`effort(t, q, v, p) -> tau`, whatever form the user gave it in."""
+    if tau is None:
+        return None
+    t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
+    values = _traced(system, tau, t, q, v) if callable(tau) else SX(DM(system.velocity(tau)))
+    if values.numel() != system.nv:
+        names = ", ".join(speed.name for speed in system.speeds)
+        raise ModelError(
+            f"{system.name}: tau has {values.numel()} values, the system has {system.nv}: {names}"
+        )
+    return Function("effort", [t, q, v, system.p], [casadi.densify(values)])
+
+
+def _traced(system: System, tau: Callable[[Any, Any, Any], Any], t: SX, q: SX, v: SX) -> SX:
+    try:
+        values = tau(t, q, v)
+        return SX(casadi.vertcat(*values)) if isinstance(values, (list, tuple)) else SX(values)
+    except Exception as error:
+        raise ModelError(
+            f"{system.name}: tau(t, q, v) could not be traced with CasADi symbols ({error});"
+            " build it from CasADi operations, such as casadi.sin and casadi.if_else"
+        ) from error
+
+
+def _start(
+    system: System, q0: Values, v0: Values, parameters: Mapping[str, float] | None
+) -> tuple[Array, Array]:
+    """Positions that close the loops and velocities that fit them."""
+    q = np.array(system.position(q0))
+    v = np.array(system.velocity(v0))
+    if not system.is_closed:
+        return q, v
+    if isinstance(q0, Mapping) or q0 is None:
+        q = solve(system, dict(q0 or {}), parameters=parameters)
+    else:
+        require_closed(system, q, parameters)
+    return q, _tree_velocity(system, q, v, parameters)
+
+
+def _tree_velocity(
+    system: System, q: Array, v: Array, parameters: Mapping[str, float] | None
+) -> Array:
+    def build() -> Function:
+        symbols = SX.sym("q", system.nq)
+        return Function("G", [symbols, system.p], [reduction(system, symbols).G])
+
+    G = np.array(system.cached("G", build)(q, system.parameter_values(parameters)))
+    result: Array = G @ v[list(system.active)]
+    return result
+
+
+def _result(system: System, state: FullState, times: Array, x: Array, p: Sequence[float]) -> Result:
+    every = np.repeat(np.array(p, dtype=float).reshape(-1, 1), len(times), axis=1)
+    observed = state.observe.map(len(times))(times.reshape(1, -1), x.T, every)
+    a, tau, *scalars = (np.array(o).T for o in observed)
+    units: dict[str, str] = {}
+    columns: list[Array] = []
+
+    def column(name: str, unit: str, values: Array) -> None:
+        units[name] = unit
+        columns.append(np.ravel(values))
+
+    for k, coordinate in enumerate(system.coordinates):
+        column(f"{coordinate.name}.q", coordinate.unit, x[:, k])
+    for k, speed in enumerate(system.speeds):
+        column(f"{speed.name}.v", speed.unit, x[:, system.nq + k])
+        column(f"{speed.name}.a", ACCELERATION_UNIT[speed.unit], a[:, k])
+        column(f"{speed.name}.tau", EFFORT_UNIT[speed.unit], tau[:, k])
+    for (name, unit), values in zip(_SCALARS, scalars, strict=True):
+        column(name, unit, values)
+    return Result(times, np.column_stack(columns), units, name=system.name)

@@ -1,0 +1,83 @@
+import pytest
+
+import mbs.robots
+from mbs.components import KhalilBody, Mechanism
+from mbs.errors import DescriptionError
+from mbs.robots import catalogue, load
+
+ACTIVE = {
+    "puma560": 6,
+    "stanford": 6,
+    "rx90": 6,
+    "scara": 4,
+    "planar_2r": 2,
+    "cart_pole": 1,
+    "two_branch_tree": 7,
+    "sr400": 6,
+    "five_bar": 2,
+    "four_bar": 1,
+}
+
+
+def test_catalogue_is_complete():
+    assert set(catalogue()) == set(ACTIVE)
+
+
+@pytest.mark.parametrize("name", ACTIVE)
+def test_every_robot(name):
+    m = catalogue()[name]()
+    assert isinstance(m, Mechanism)
+    assert m.name == name
+    assert m.source
+    assert sum(joint.actuated is True for joint in m.joints()) == ACTIVE[name]
+    assert m.parameters() == ()
+    assert getattr(mbs.robots, name) is catalogue()[name]
+    assert catalogue()[name].__doc__
+    for body in m.bodies():
+        assert not isinstance(body, KhalilBody) or not body.grouped
+
+
+GUESSES = {
+    "sr400": {"q2": -1.6, "q3": 3.1, "q8": -1.6, "q9": -1.5},
+    "five_bar": {"q1": 2.1, "q2": -1.2, "q3": 1.0, "q4": 1.2},
+    "four_bar": {"j2": 1.0},
+}
+
+
+@pytest.mark.parametrize("name", ACTIVE)
+def test_every_robot_assembles(name):
+    system = catalogue()[name]().assemble(guess=GUESSES.get(name, {}))
+    assert len(system.tree.links) >= 2
+
+
+def test_load_dict_and_files(tmp_path):
+    data = {"name": "one", "frame": [{"antecedent": 0, "d": "L"}]}
+    assert load(data, {"L": 2.0}).parameters()[0].default == 2.0
+    (tmp_path / "one.toml").write_text('name = "one"\n[[frame]]\nantecedent = 0\nd = "L"\n')
+    assert load(tmp_path / "one.toml", {"L": 3}).parameters()[0].default == 3
+    (tmp_path / "one.par").write_text(
+        "NL = 1\nNJ = 1\nant = {0}\nsigma = {0}\ntheta = {t1}\nd = {L}\nG={0,0,0}"
+    )
+    symbols = load(str(tmp_path / "one.par"), {"L": 1}).parameters()
+    assert next(p.default for p in symbols if p.name == "L") == 1
+    (tmp_path / "one.URDF").write_text('<robot name="one"><link name="a"/></robot>')
+    assert load(tmp_path / "one.URDF").name == "one"
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("puma506", "robot 'puma506' is not in the catalogue; did you mean 'puma560'"),
+        ("arm.stl", r"arm.stl: files of this kind are not read; .*use one of .toml"),
+        ("none.par", "none.par: the file cannot be read"),
+        (3, "neither a name, a dict nor a path"),
+    ],
+)
+def test_unknown_source(source, message):
+    with pytest.raises(DescriptionError, match=message):
+        load(source)
+
+
+def test_unknown_parameter():
+    with pytest.raises(DescriptionError, match=r"puma560: parameter 'D3' is not used"):
+        load("puma560", {"D3": 1})

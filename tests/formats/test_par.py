@@ -67,8 +67,8 @@ def test_old_file_with_a_loop(par):
     assert table.frames[8].d == expression("d3")
     assert table.frames[9].sigma == 2
     assert table.frames[2].actuated is False
-    assert table.bodies[0].ZZ == expression("ZZ1")
-    assert table.bodies[4].XX == expression("XX5")
+    assert expression("ZZ1") == table.bodies[0].ZZ
+    assert expression("XX5") == table.bodies[4].XX
     assert table.gravity[2] == expression("G3")
     assert table.parameters == {"G3": -9.81, "d2": 0.4}
     assert table.extras["FX"][5] == "FX6"

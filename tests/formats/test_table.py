@@ -150,7 +150,10 @@ BAD = {
     "gravity": (dict(gravity=[0, 9.81]), "gravity [0, 9.81] has not three values"),
     "no_name": (dict(name=""), "the name is missing"),
     "name_type": (dict(name=3), "name is 3; give a text"),
-    "parameter": (dict(parameters={"RL": 1}), "parameter 'RL' is used by no row; did you mean 'RL4"),
+    "parameter": (
+        dict(parameters={"RL": 1}),
+        "parameter 'RL' is used by no row; did you mean 'RL4",
+    ),
     "parameter_text": (dict(parameters={"RL4": "A"}), "parameter RL4 is 'A'; give it a number"),
     "two_bodies": (dict(body__1__frame=1), "body 1: two bodies are on this frame"),
     "no_frame": (dict(body__1__frame=9), "body 9: there is no such frame; use 1 to 4"),
@@ -225,5 +228,3 @@ def test_missing_and_broken_files(tmp_path):
         read_toml(path)
     with pytest.raises(DescriptionError, match="give a dict"):
         from_dict([])
-
-

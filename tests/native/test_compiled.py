@@ -67,3 +67,14 @@ def test_what_casadi_cannot_write_stays_interpreted(capfd):
     f = ca.Function("f", [q], [root(x0=1, p=q)["x"]])
     assert compiled(f) is f
     capfd.readouterr()
+
+
+@pytest.mark.parametrize("level", ["-O0", "-O1"])
+def test_every_level_of_optimization_gives_the_same_bits(level, monkeypatch):
+    flags = ("-ffp-contract=off", "-fPIC", "-shared")
+    monkeypatch.setitem(compiled.__globals__, "flags_for", lambda _: (level, *flags))
+    x = [0.1, 2.0, -3.0]
+    assert all(
+        np.array_equal(a.full(), b.full())
+        for a, b in zip(example()(x, 1.7), compiled(example())(x, 1.7), strict=True)
+    )

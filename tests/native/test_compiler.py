@@ -5,6 +5,7 @@ import pytest
 
 from mbs.errors import CompilerError
 from mbs.native import compile_library, find_compiler
+from mbs.native.compiler import FLAGS, flags_for
 
 
 def test_a_compiler_is_found():
@@ -46,3 +47,10 @@ def test_the_runtime_is_clean_c99(name, tmp_path):
     command = [*find_compiler().command, *strict, "-c", str(folder / name)]
     answer = subprocess.run([*command, "-o", str(tmp_path / "x.o")], capture_output=True, text=True)
     assert answer.returncode == 0, answer.stderr
+
+
+def test_long_code_is_optimized_less():
+    assert flags_for("x\n" * 100) == FLAGS
+    assert flags_for("x\n" * 50_000)[0] == "-O1"
+    assert flags_for("x\n" * 500_000)[0] == "-O0"
+    assert flags_for("x\n" * 500_000)[1:] == FLAGS[1:]

@@ -170,7 +170,7 @@ def test_the_sources_are_clean_c(fmu, tmp_path):
 def test_a_target_that_cannot_be_written_is_refused_before_compiling(
     tmp_path, monkeypatch, target, message
 ):
-    monkeypatch.setattr("mbs.export.fmu.pack.cached_library", lambda *_: pytest.fail("compiled"))
+    monkeypatch.setitem(write_fmu.__globals__, "cached_library", lambda *_: pytest.fail("compiled"))
     with pytest.raises(ExportError, match=message):
         write_fmu(pendulum(), tmp_path / target)
 
@@ -182,7 +182,7 @@ def test_a_failing_compiler_leaves_the_old_file(tmp_path, monkeypatch):
     def refuse(*_):
         raise CompilerError("no C compiler was found")
 
-    monkeypatch.setattr("mbs.export.fmu.pack.cached_library", refuse)
+    monkeypatch.setitem(write_fmu.__globals__, "cached_library", refuse)
     with pytest.raises(CompilerError):
         write_fmu(pendulum(), path)
     assert path.read_text() == "old"

@@ -39,7 +39,8 @@ TREE = """<mujoco model="a tree">
         </body>
       </body>
       <frame pos="0.2 0 0" euler="0 0 40">
-        <body name="rod"><joint pos="0 0 .1"/><geom type="box" size=".3 .02 .04" pos=".3 0 0"/></body>
+        <body name="rod"><joint pos="0 0 .1"/>
+          <geom type="box" size=".3 .02 .04" pos=".3 0 0"/></body>
       </frame>
     </body>
     <body name="free body" pos="1 2 3" euler="10 20 30"><freejoint/>
@@ -52,7 +53,8 @@ TREE = """<mujoco model="a tree">
 </mujoco>
 """
 LOOP = """<mujoco><worldbody>
-  <body name="a"><joint name="ja" axis="0 1 0" ref="5"/><geom type="capsule" size=".03" fromto="0 0 0 0 0 .4"/>
+  <body name="a"><joint name="ja" axis="0 1 0" ref="5"/>
+    <geom type="capsule" size=".03" fromto="0 0 0 0 0 .4"/>
     <body name="b" pos="0 0 .4"><joint name="jb" axis="0 1 0"/>
       <geom type="capsule" size=".03" fromto="0 0 0 1 0 0.2"/></body></body>
   <body name="c" pos=".8 0 0"><joint name="jc" axis="0 1 0"/>

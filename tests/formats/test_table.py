@@ -152,7 +152,7 @@ BAD = {
     "name_type": (dict(name=3), "name is 3; give a text"),
     "parameter": (
         dict(parameters={"RL": 1}),
-        "parameter 'RL' is used by no row; did you mean 'RL4",
+        "'RL' is used by no row; did you mean 'RL4",
     ),
     "parameter_text": (dict(parameters={"RL4": "A"}), "parameter RL4 is 'A'; give it a number"),
     "two_bodies": (dict(body__1__frame=1), "body 1: two bodies are on this frame"),

@@ -146,7 +146,7 @@ BAD = {
     "damping": (LINKS + TYPED.format("revolute", '<dynamics damping="-1"/>'), "j: Fv is -1"),
     "mimic": (
         LINKS + TYPED.format("revolute", '<mimic joint="k"/>'),
-        "joint 'j': it mimics 'k', which is not a one-axis joint; did you mean 'j'?",
+        "joint 'j': it mimics 'k', which is not a one-axis joint; use one of j",
     ),
     "self mimic": (LINKS + TYPED.format("revolute", '<mimic joint="j"/>'), "cannot follow itself"),
     "fixed mimic": (LINKS + TYPED.format("fixed", '<mimic joint="k"/>'), "only one-axis joints"),
@@ -156,7 +156,8 @@ BAD = {
         "a: mass is -1 kg",
     ),
     "triangle": (
-        '<link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="3"/></inertial></link>',
+        '<link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="3"/></inertial>'
+        "</link>",
         "break the triangle inequality",
     ),
     "loop": ('<link name="a"/><constraint/>', "<constraint> is not read"),

@@ -20,6 +20,7 @@ from mbs.assembly.tables import (
     velocity_coordinates,
 )
 from mbs.components import Joint, Mechanism
+from mbs.components.bodies import Mount
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
 from mbs.spatial import Pose
@@ -137,7 +138,7 @@ def _bodies(mechanism: Mechanism, graph: Graph, framed: Framed) -> tuple[BodyRow
     }
     rows: list[BodyRow] = []
     for body in mechanism.bodies():
-        if homes[body.name] >= 0:
+        if homes[body.name] >= 0 and not isinstance(body, Mount):
             mass = _mass(mechanism, body.name)
             rows.append(BodyRow(body.name, homes[body.name], mass))
     return tuple(sorted(rows, key=lambda row: row.link))

@@ -299,6 +299,15 @@ class World(RigidBody):
         return Inertia.zero()
 
 
+@dataclass(frozen=True, slots=True)
+class Mount(RigidBody):
+    """A frame without mass: the ground of a nested mechanism, to be connected to something."""
+
+    def inertial(self, symbols: Symbols) -> Inertia:
+        """No inertia."""
+        return Inertia.zero()
+
+
 def check_mass(name: str, mass: Scalar) -> None:
     """Refuse a mass that is a negative number."""
     value = to_float(mass)

@@ -233,7 +233,10 @@ class Universal(Joint):
 
 @dataclass(frozen=True, slots=True)
 class Spherical(Joint):
-    """Any rotation, as a unit quaternion; its velocity is angular, in frame_b; 3 rows."""
+    """Any rotation, as a unit quaternion; its velocity is angular, in frame_b; 3 rows.
+
+    The quaternion orients the frame that is further from the base, seen from the nearer one.
+    """
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -245,7 +248,8 @@ class Spherical(Joint):
 class Free(Joint):
     """No constraint at all: position and unit quaternion.
 
-    Its velocity is [linear; angular] velocity of frame_b with respect to frame_a, in frame_b.
+    They place the frame that is further from the base, seen from the nearer one; the velocity is
+    its [linear; angular] velocity, in its own axes.
     """
 
     @property

@@ -6,13 +6,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeVar, overload
 
-from mbs.components.bodies import RigidBody, World
+from mbs.components.bodies import Mount, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.joints import Coupling, Joint
-from mbs.components.placement import Symbols
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
-from mbs.spatial import Inertia
 
 if TYPE_CHECKING:
     from mbs.assembly.system import System
@@ -234,7 +232,7 @@ class Mechanism:
         placed: dict[str, Component] = {}
         for component in inner.components.values():
             if component is inner.world:
-                base = _Base(f"{scope}.{component.name}")
+                base = Mount(f"{scope}.{component.name}")
                 placed[component.name] = self.add(base)
             else:
                 placed[component.name] = self.add(component.scoped(scope))
@@ -247,15 +245,6 @@ class Mechanism:
         for symbol, value in inner.values.items():
             self.values[f"{scope}.{symbol}"] = replace(value, name=f"{scope}.{symbol}")
         return Placed(self, scope)
-
-
-@dataclass(frozen=True, slots=True)
-class _Base(RigidBody):
-    """The ground of a nested mechanism: a frame without mass, to be connected by its user."""
-
-    def inertial(self, symbols: Symbols) -> Inertia:
-        """No inertia."""
-        return Inertia.zero()
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,7 @@ def _actuators(mjcf: MjcfModel) -> Iterator[str]:
     model = mjcf.data
     for k in range(model.nu):
         name = model.actuator(k).name
-        if model.actuator_trntype[k] not in joint_transmissions(mjcf.mujoco):
+        if int(model.actuator_trntype[k]) not in joint_transmissions(mjcf.mujoco):
             yield f"actuator {name!r} does not act on a joint, which mbs does not model"
         for what in ("armature", "damping", "dampingpoly"):
             if _any(model, f"actuator_{what}", k):

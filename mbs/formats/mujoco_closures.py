@@ -27,10 +27,10 @@ def add_closures(
     """
     model, kinds = mjcf.data, mjcf.mujoco.mjtEq
     flags = mjcf.mujoco.mjtDisableBit
-    if model.opt.disableflags & (flags.mjDSBL_EQUALITY | flags.mjDSBL_CONSTRAINT):
+    if model.opt.disableflags & (int(flags.mjDSBL_EQUALITY) | int(flags.mjDSBL_CONSTRAINT)):
         return
     for k in range(model.neq):
-        kind = model.eq_type[k]
+        kind = kinds(int(model.eq_type[k]))
         if not model.eq_active0[k]:
             continue
         if kind == kinds.mjEQ_JOINT:
@@ -38,7 +38,7 @@ def add_closures(
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             _close(mechanism, mjcf, k, bodies, sites)
         else:
-            name = kinds(kind).name.removeprefix("mjEQ_").lower()
+            name = kind.name.removeprefix("mjEQ_").lower()
             _refuse(mjcf, k, f"it is of the kind {name}; only connect, weld and joint are read")
 
 
@@ -52,8 +52,8 @@ def _close(
     model, mujoco = mjcf.data, mjcf.mujoco
     one, two = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
     values = [float(value) for value in model.eq_data[k]]
-    spherical = model.eq_type[k] == mujoco.mjtEq.mjEQ_CONNECT
-    if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE:
+    spherical = mujoco.mjtEq(int(model.eq_type[k])) == mujoco.mjtEq.mjEQ_CONNECT
+    if int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE):
         a, b = sites[one], sites[two]
     elif spherical:
         a, b = bodies[one].at(*values[:3]), bodies[two].at(*values[3:6])
@@ -71,7 +71,7 @@ def _coupling(mjcf: MjcfModel, k: int) -> Coupling:
     if driver < 0:
         _refuse(mjcf, k, f"it locks joint {mjcf.joints[driven]!r}; leave the joint out instead")
     for j in (driven, driver):
-        if model.jnt_type[j] not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
+        if kinds(int(model.jnt_type[j])) not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
             _refuse(mjcf, k, f"joint {mjcf.joints[j]!r} has not one axis; couple hinges and slides")
     y0, x0 = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (driven, driver))
     polynomial = Polynomial(model.eq_data[k, :5])(Polynomial([-x0, 1.0])) + y0

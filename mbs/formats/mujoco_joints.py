@@ -52,7 +52,7 @@ def _between(mjcf: MjcfModel, k: int, j: int) -> Body:
 
 def _joint(mjcf: MjcfModel, j: int) -> Joint:
     model, kinds = mjcf.data, mjcf.mujoco.mjtJoint
-    kind, dof = model.jnt_type[j], int(model.jnt_dofadr[j])
+    kind, dof = kinds(int(model.jnt_type[j])), int(model.jnt_dofadr[j])
     common: dict[str, Any] = {
         "name": mjcf.joints[j],
         "actuated": j in mjcf.driven if model.nu else None,
@@ -74,13 +74,14 @@ def _joint(mjcf: MjcfModel, j: int) -> Joint:
 def _referred(mjcf: MjcfModel, j: int, point: Point) -> Point:
     """The frame moved back by `ref`, the position that the joint has as it is drawn."""
     model, kinds = mjcf.data, mjcf.mujoco.mjtJoint
-    if model.jnt_type[j] == kinds.mjJNT_BALL:
+    kind = kinds(int(model.jnt_type[j]))
+    if kind == kinds.mjJNT_BALL:
         return point
     ref = float(model.qpos0[model.jnt_qposadr[j]])
     axis = np.array(model.jnt_axis[j], dtype=float)
     if ref == 0:
         return point
-    if model.jnt_type[j] == kinds.mjJNT_SLIDE:
+    if kind == kinds.mjJNT_SLIDE:
         x, y, z = (float(value) for value in -ref * axis)
         return point.at(x, y, z)
     half = -ref / 2

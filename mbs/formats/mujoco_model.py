@@ -55,15 +55,15 @@ class MjcfModel:
             frozenset(
                 int(model.actuator_trnid[k, 0])
                 for k in range(model.nu)
-                if model.actuator_trntype[k] in joint_transmissions(mujoco)
+                if int(model.actuator_trntype[k]) in joint_transmissions(mujoco)
             ),
         )
 
 
-def joint_transmissions(mujoco: Any) -> tuple[Any, ...]:
+def joint_transmissions(mujoco: Any) -> tuple[int, ...]:
     """The ways in which an actuator acts on a joint."""
     kinds = mujoco.mjtTrn
-    return kinds.mjTRN_JOINT, kinds.mjTRN_JOINTINPARENT
+    return int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)
 
 
 def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:

@@ -37,18 +37,13 @@ def read_mjcf(path: str | Path) -> Mechanism:
         DescriptionError: mujoco is not installed, the file is missing or malformed, or it has
             something that changes the motion and that mbs does not model.
     """
-    root = parse_xml(path)
-    if root.tag != "mujoco":
-        raise DescriptionError(
-            f"{path}: the root element is <{root.tag}>, not <mujoco>; give an MJCF file, or read a"
-            " URDF file with read_urdf"
-        )
+    name = _model_name(path)
     mujoco = _mujoco()
     model = _compiled(mujoco, str(path))
     mjcf = MjcfModel.of(mujoco, model, str(path))
     check_supported(mjcf)
     mechanism = Mechanism(
-        component_name(root.get("model") or Path(path).stem),
+        name,
         gravity=_gravity(mjcf),
         source=f"MJCF file {Path(path).name}",
     )
@@ -65,6 +60,16 @@ def read_mjcf(path: str | Path) -> Mechanism:
         mechanism.add_frame(name, point)
     add_closures(mechanism, mjcf, points, sites)
     return mechanism
+
+
+def _model_name(path: str | Path) -> str:
+    root = parse_xml(path)
+    if root.tag != "mujoco":
+        raise DescriptionError(
+            f"{path}: the root element is <{root.tag}>, not <mujoco>; give an MJCF file, or read a"
+            " URDF file with read_urdf"
+        )
+    return component_name(root.get("model") or Path(path).stem)
 
 
 def _mujoco() -> Any:
@@ -95,7 +100,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
         for element in list(getattr(spec, kind)):
             spec.delete(element)
     from_geoms = spec.compiler.inertiafromgeom
-    always = from_geoms == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    always = int(from_geoms) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
     for body in spec.bodies:
         is_world = body.name == "world" and body.parent is None
         if is_world or (body.explicitinertial and not always):
@@ -112,7 +117,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
 
 
 def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
-    if mjcf.data.opt.disableflags & mjcf.mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+    if mjcf.data.opt.disableflags & int(mjcf.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         return (0.0, 0.0, 0.0)
     return tuple(float(value) for value in mjcf.data.opt.gravity)
 

@@ -69,9 +69,7 @@ def read_tree(path: str, root: Element) -> UrdfTree:
         parents[joint.child] = joint.name
     roots = [name for name in links if name not in parents]
     if len(roots) != 1:
-        found = (
-            f"the roots {', '.join(map(repr, roots))}" if roots else "no root, a cycle of joints"
-        )
+        found = f"the roots {', '.join(map(repr, roots))}" if roots else "no root but a cycle"
         raise DescriptionError(f"{path}: the links have {found}; connect them as one tree")
     return UrdfTree(path, roots[0], links, _ordered(path, roots[0], links, joints))
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.rates import quaternion_slices
 from mbs.errors import LoopError, Unclosable
-from mbs.loops.closure import closure_rows, facing
+from mbs.loops.closure import closure_rows, facing, labelled_rows
 from mbs.solvers.gauss_newton import Root, gauss_newton
 
 Vector = NDArray[np.float64]
@@ -139,14 +139,31 @@ def _functions(system: System) -> tuple[Function, Function]:
 
 
 def _why_open(system: System, equations: _Equations, best: Root, start: Vector) -> str:
-    names = ", ".join(loop.name for loop in system.loops)
-    fixed = [c.name for k, c in enumerate(system.coordinates) if k not in equations.free]
-    at = {c.name: start[k] for k, c in enumerate(system.coordinates) if c.name in fixed}
-    where = " with " + ", ".join(f"{n} = {x:.4g}" for n, x in at.items()) if at else ""
+    fixed = [k for k in range(system.nq) if k not in equations.free]
+    at = ", ".join(f"{system.coordinates[k].name} = {start[k]:.4g}" for k in fixed)
     return (
-        f"{system.name}: the loop cannot be closed at {names}{where}; the best posture leaves it"
-        f" open by {best.residual:.3g} (m or direction cosine); change lengths or guesses"
+        f"{system.name}: the loop cannot be closed{' with ' + at if at else ''}; the best posture"
+        f" found leaves {_gap(system, equations, best, start)}; change lengths or guesses"
     )
+
+
+def _gap(system: System, equations: _Equations, best: Root, start: Vector) -> str:
+    """Which joint stays open most, in words and figures."""
+    q = SX.sym("q", system.nq)
+    rows = labelled_rows(system, q)
+    labels = [(name, label) for name, own in rows for label, _ in own]
+    residual = np.abs(equations(best.x, start)[0])
+    gaps: dict[str, list[float]] = {}
+    for (name, label), value in zip(labels, residual, strict=False):
+        distance, other = gaps.setdefault(name, [0.0, 0.0])
+        is_distance = label.startswith("force")
+        gaps[name] = [
+            float(np.hypot(distance, value if is_distance else 0.0)),
+            float(np.hypot(other, 0.0 if is_distance else value)),
+        ]
+    name = max(gaps, key=lambda loop: max(gaps[loop]))
+    distance, other = gaps[name]
+    return f"{name} open by {distance:.3g} m and {other:.3g} in direction cosines"
 
 
 def require_closed(system: System, q: Any, parameters: Mapping[str, float] | None = None) -> None:

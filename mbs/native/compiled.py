@@ -4,7 +4,7 @@ import casadi
 
 from mbs.errors import CompilerError
 from mbs.native.cache import cached_library
-from mbs.native.compiler import find_compiler
+from mbs.native.compiler import find_compiler, flags_for
 
 
 def compiled(function: casadi.Function, *, derivatives: bool = True) -> casadi.Function:
@@ -28,7 +28,7 @@ def compiled(function: casadi.Function, *, derivatives: bool = True) -> casadi.F
     source = c_source(function, derivatives=derivatives)
     if "#error" in source:
         return function
-    library = cached_library({"function.c": source})
+    library = cached_library({"function.c": source}, flags_for(source))
     return casadi.external(function.name(), str(library))
 
 

@@ -16,6 +16,8 @@ from mbs.errors import CompilerError
 FLAGS = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
 """Contraction is off so that compiled code gives the very bits of the interpreted Function."""
 
+_LEVELS = ((20_000, "-O2"), (200_000, "-O1"))  # beyond, compilers need minutes or give up
+
 LIBRARY_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 _KNOWN = ("cc", "gcc", "clang")
@@ -80,6 +82,20 @@ def _probe(command: tuple[str, ...], path: str) -> Compiler | None:
     except (OSError, subprocess.TimeoutExpired):
         return None
     return Compiler(words, answer.stdout) if answer.returncode == 0 else None
+
+
+def flags_for(source: str) -> tuple[str, ...]:
+    """The flags for generated code: the longer it is, the less a compiler can afford.
+
+    Args:
+        source: text of the longest C file.
+
+    Returns:
+        FLAGS with another level of optimization; the numbers that the code gives are the same.
+    """
+    lines = source.count("\n")
+    level = next((name for limit, name in _LEVELS if lines <= limit), "-O0")
+    return (level, *FLAGS[1:])
 
 
 def compile_library(

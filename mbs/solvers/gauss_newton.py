@@ -21,8 +21,8 @@ class Root:
 
     Attributes:
         x: (n,) the unknowns.
-        residual: largest absolute residual there.
-        converged: whether it is below the tolerance.
+        residual: Euclidean norm of the residual there.
+        converged: whether its largest element is below the tolerance.
     """
 
     x: Vector
@@ -72,7 +72,7 @@ def gauss_newton(
         x, r, J = trial, r_trial, J_trial
         if stalled:
             break
-    return Root(x, _largest(r), _largest(r) <= tolerance)
+    return Root(x, float(np.linalg.norm(r)), _largest(r) <= tolerance)
 
 
 def _largest(r: Vector) -> float:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from mbs.errors import CompilerError, ModelError, SolverError
 from mbs.native import cached_library, find_compiler
-from mbs.native.compiler import FLAGS
+from mbs.native.compiler import flags_for
 from mbs.solvers.dopri5 import Dopri5, Failure, failed
 
 Array = npt.NDArray[np.float64]
@@ -218,7 +218,7 @@ def _library(f: casadi.Function, g: casadi.Function | None) -> ctypes.CDLL | Non
     source = str(generator.dump())
     if "#error" in source:
         return None
-    flags = FLAGS if g is None else (*FLAGS, "-DMBS_PROJECT")
+    flags = (*flags_for(source), *(() if g is None else ("-DMBS_PROJECT",)))
     return _load(cached_library({"system.c": source, **_runtime()}, flags))
 
 

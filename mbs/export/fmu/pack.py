@@ -16,7 +16,7 @@ from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.tables import header, source
 from mbs.export.fmu.xml import model_description
 from mbs.native.cache import cached_library
-from mbs.native.compiler import FLAGS, LIBRARY_SUFFIX
+from mbs.native.compiler import LIBRARY_SUFFIX, flags_for
 
 _CORE = (
     "core.c",
@@ -68,7 +68,8 @@ def write_fmu(model: FmuModel, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     _check_target(target)
     texts = fmu_sources(model)
-    library = cached_library(texts, (*FLAGS, "-fvisibility=hidden", "-std=gnu99"))
+    flags = (*flags_for(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
+    library = cached_library(texts, flags)
     binary = f"binaries/{_platform()}/{model.identifier}{LIBRARY_SUFFIX}"
     guid = _guid(model)
     files: dict[str, bytes] = {

@@ -78,15 +78,15 @@ for angle in np.linspace(0.0, 2 * np.pi, 91):
     near = dict(zip(names, turn[-1], strict=True))
 
 COLOURS = {"a": "tab:red", "b": "tab:blue", "c": "tab:green"}
-figure = Figure(figsize=(9.5, 4.4), layout="constrained")
+figure = Figure(figsize=(8.8, 4.0), layout="constrained")
 grid = figure.add_gridspec(2, 2, width_ratios=(1.15, 1))
 drawing, angles, energies = (
     figure.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1])
 )
 for k in range(0, 90, 10):
     for name, length in LENGTHS.items():
-        strong = {"linewidth": 4.0} if k == 10 else {"linewidth": 1.3, "alpha": 0.3}
-        label = f"{name}, {length:g} m" if k == 10 else None
+        strong = {"linewidth": 4.0} if k == 20 else {"linewidth": 1.3, "alpha": 0.3}
+        label = f"{name}, {length:g} m" if k == 20 else None
         drawing.plot(*bar(name, turn[k], 0, length), color=COLOURS[name], label=label, **strong)
 middle = np.hstack([bar("b", posture, LENGTHS["b"] / 2) for posture in turn])
 drawing.plot(*middle, "k--", linewidth=1, label="middle of b")
@@ -95,24 +95,24 @@ drawing.set(title="one turn of the crank", xlabel="x [m]", ylabel="y [m]", aspec
 drawing.legend(loc="lower right", fontsize="small")
 for name in names:
     angles.plot(motion.time, motion[f"{name}.q"], label=name)
-angles.set(title=f"motion under {torque:g} N.m at j1", ylabel="angle [rad]")
+angles.set(title=f"motion under {torque:g} N.m at j1", ylabel="angle [rad]", xticklabels=[])
 energies.plot(motion.time, motion["kinetic_energy"], label="kinetic")
 energies.plot(motion.time, motion["potential_energy"], label="potential")
 energies.plot(motion.time, total - work, "k--", label="sum - work")
 energies.set(xlabel="time [s]", ylabel="energy [J]")
 for axes in (angles, energies):
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper right", fontsize="small", ncols=3)
-figure.savefig(folder / "four_bar.png", dpi=100)
+    axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize="small")
+figure.savefig(folder / "four_bar.png", dpi=90)
 
 # %% C: a folder that compiles anywhere, with a program that calls every function once
-library = mbs.export.c_library([idm, ddm, lagrange], folder / "c")
+library = mbs.export.c_library([idm, ddm, lagrange], folder / "models")
 print(f"\nC library: {', '.join(sorted(path.name for path in library.iterdir()))}")
 try:
     compiler = mbs.native.find_compiler()
 except mbs.errors.CompilerError as error:
     sys.exit(f"The C program and the FMU are left out: {error}")
-sources = [str(library / "example.c"), str(library / "c.c")]
+sources = [str(library / "example.c"), str(library / "models.c")]
 program = folder / "example"
 subprocess.run([*compiler.command, "-O2", *sources, "-o", str(program), "-lm"], check=True)
 answer = subprocess.run([str(program.resolve())], check=True, capture_output=True, text=True)

@@ -28,6 +28,7 @@ class Mechanism:
         source: where the data come from, for catalogue entries and files.
         keep_order: number the links in the order in which the joints were added, as a table of
             frames does, instead of depth-first.
+        guess: joint positions that `assemble` starts from when it closes loops.
     """
 
     def __init__(
@@ -37,11 +38,13 @@ class Mechanism:
         parameters: Mapping[str, float] | None = None,
         source: str = "",
         keep_order: bool = False,
+        guess: Mapping[str, float] | None = None,
     ) -> None:
         self.name = Component(name).name
         self.source = source
         self.keep_order = keep_order
         self.cuts: list[str] = []
+        self.guess = dict(guess or {})
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
         self.connections: list[tuple[Point, Point]] = []
@@ -134,7 +137,8 @@ class Mechanism:
 
         Args:
             guess: approximate joint positions by coordinate name [rad or m], where the loops are
-                to be closed near to; the others start at zero.
+                to be closed near to; it is laid over the guess of the mechanism itself, and what
+                neither names starts at zero.
 
         Raises:
             AssemblyError: the components do not form a mechanism.
@@ -143,7 +147,7 @@ class Mechanism:
         # The one call upwards: the description offers its assembly under the name users expect.
         from mbs.loops.assemble import assemble
 
-        return assemble(self, guess or {})
+        return assemble(self, {**self.guess, **(guess or {})})
 
     def joints(self) -> Iterator[Joint]:
         """Every joint, in the order added."""
@@ -242,6 +246,7 @@ class Mechanism:
         for frame, point in inner.frames.items():
             self.frames[f"{scope}.{frame}"] = _moved(point, placed, scope)
         self.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
+        self.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
         for symbol, value in inner.values.items():
             self.values[f"{scope}.{symbol}"] = replace(value, name=f"{scope}.{symbol}")
         return Placed(self, scope)

@@ -29,6 +29,7 @@ class RobotTable:
         gravity: gravity acceleration in the base frame [m/s^2].
         parameters: values of the symbols in the rows.
         source: where the data come from.
+        guess: joint positions near which the loops are closed, by joint name [rad or m].
         extras: what a file says beyond the mechanism, as texts, kept for writing it again.
 
     Raises:
@@ -42,6 +43,7 @@ class RobotTable:
     gravity: tuple[Scalar, ...] = (0.0, 0.0, -9.81)
     parameters: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
+    guess: Mapping[str, float] = field(default_factory=dict)
     extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -61,6 +63,7 @@ class RobotTable:
         object.__setattr__(self, "bodies", tuple(_bare(row, INERTIAL) for row in bodies))
         object.__setattr__(self, "gravity", tuple(expression(str(g)) for g in gravity))
         object.__setattr__(self, "parameters", values)
+        object.__setattr__(self, "guess", _guess(self.name, self.guess))
         _check_bodies(self)
         _check_loops(self)
 
@@ -141,6 +144,16 @@ def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float
                 f"{name}: parameter {key} is {value!r}; give it a number as its value"
             )
         values[key] = number
+    return values
+
+
+def _guess(name: str, given: Mapping[str, float]) -> dict[str, float]:
+    values: dict[str, float] = {}
+    for joint, value in given.items():
+        number = None if isinstance(value, bool) else to_float(expression(value, f"{name}, guess"))
+        if number is None:
+            raise DescriptionError(f"{name}: guess of {joint} is {value!r}; give a number")
+        values[joint] = number
     return values
 
 

@@ -54,6 +54,7 @@ def to_mechanism(table: RobotTable) -> Mechanism:
         parameters=table.parameters,
         source=table.source,
         keep_order=True,
+        guess=table.guess,
     )
     rows = {row.frame: row for row in table.bodies}
     links: dict[int, RigidBody] = {0: mechanism.world}

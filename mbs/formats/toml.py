@@ -16,7 +16,7 @@ from mbs.formats.files import did_you_mean, read_text, write_text
 from mbs.formats.rows import GEOMETRY, INERTIAL, JOINTS, BodyRow, FrameRow, LoopRow
 from mbs.formats.table import RobotTable
 
-_TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "extras")
+_TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "guess", "extras")
 _FRAME = ("antecedent", "joint", "sigma", "actuated", "mu", *GEOMETRY, "limits", "name")
 _BODY = ("frame", *INERTIAL, "name", "grouped")
 _LOOP = ("cut", "joint")
@@ -57,6 +57,7 @@ def from_dict(data: Mapping[str, Any]) -> RobotTable:
         gravity=data.get("gravity", (0.0, 0.0, -9.81)),
         parameters=_table(data, "parameters", name),
         source=_text(data, "source", name),
+        guess=_table(data, "guess", name),
         extras={key: _texts(v, f"{name}/{key}") for key, v in _table(data, "extras", name).items()},
     )
 
@@ -81,6 +82,8 @@ def to_dict(table: RobotTable) -> dict[str, Any]:
     data["frame"] = [_frame_dict(row) for row in table.frames]
     data["body"] = [_without_zeros(row, INERTIAL, ("frame",), _BODY[-2:]) for row in table.bodies]
     data["loop"] = [{"cut": list(loop.cut), "joint": loop.joint} for loop in table.loops]
+    if table.guess:
+        data["guess"] = dict(table.guess)
     if table.extras:
         data["extras"] = {key: list(texts) for key, texts in table.extras.items()}
     return data

@@ -34,7 +34,8 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
 
     Args:
         system: with open loops.
-        guess: approximate positions by coordinate name.
+        guess: approximate positions by coordinate name; where the posture next to them is
+            singular, a regular one nearby is taken.
 
     Raises:
         Unclosable: no posture closes the loops.
@@ -46,6 +47,7 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
     J = closure_jacobian(system)
     jacobians = [np.array(J(q, p)) for q in postures]
     generic = max(rank(matrix) for matrix in jacobians)
+    posture = next(q for q, m in zip(postures, jacobians, strict=True) if rank(m) == generic)
     regular = [matrix for matrix in jacobians if rank(matrix) == generic]
     rows = independent_rows(np.hstack(regular), generic)
     active = _independent_velocities(system, regular, system.nv - generic)

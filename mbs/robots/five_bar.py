@@ -6,15 +6,15 @@ from mbs.components import Mechanism
 from mbs.robots.rows import cuboid, frame, robot
 
 _SOURCE = "Textbook mechanism; lengths, masses and inertias are illustrative"
+_GUESS = {"q1": 2.1, "q2": -1.2, "q3": 1.0, "q4": 1.2}
 _GROUND, _CRANK, _COUPLER = 0.2, 0.25, 0.35
 
 
 def five_bar() -> Mechanism:
     """Five-bar linkage in a vertical plane: cranks q1, q3 driven, couplers q2, q4, cut joint q5.
 
-    Cranks of 0.25 m turn about points 0.2 m apart, couplers of 0.35 m meet in the cut joint. The
-    zero posture is not closed: give `assemble` a guess such as
-    {"q1": 2.1, "q2": -1.2, "q3": 1.0, "q4": 1.2}. All values are illustrative.
+    Cranks of 0.25 m turn about points 0.2 m apart, couplers of 0.35 m meet in the cut joint. It is
+    assembled symmetric, the cut joint above the ground. All values are illustrative.
     """
     frames = [
         frame(0, actuated=True),
@@ -34,4 +34,6 @@ def five_bar() -> Mechanism:
         )
     ]
     loops = [{"cut": [5, 6], "joint": "revolute"}]
-    return robot("five_bar", _SOURCE, frames, bodies, loop=loops, gravity=[0, -9.81, 0])
+    return robot(
+        "five_bar", _SOURCE, frames, bodies, loop=loops, gravity=[0, -9.81, 0], guess=_GUESS
+    )

@@ -8,14 +8,14 @@ from mbs.components import Box, Mechanism, Revolute
 def four_bar() -> Mechanism:
     """Crank a, coupler b and rocker c of 0.4, 1.0 and 0.9 m on a ground of 0.8 m.
 
-    The crank joint j1 is driven; gravity is along -y. Near the guess {"j2": 1.0} of `assemble`
-    the linkage stands upright. The boxes are of aluminium, 0.05 m wide and high. All values are
-    illustrative.
+    The crank joint j1 is driven; gravity is along -y. It is assembled upright, near j2 = 1. The
+    boxes are of aluminium, 0.05 m wide and high. All values are illustrative.
     """
     m = Mechanism(
         "four_bar",
         gravity=(0, -9.81, 0),
         source="Textbook mechanism; lengths, density and section are illustrative",
+        guess={"j2": 1.0},
     )
     a, b, c = (
         m.add(Box(name, length=length, width=0.05, density=2700))

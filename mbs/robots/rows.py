@@ -68,6 +68,6 @@ def cuboid(
 
 
 def robot(name: str, source: str, frames: list[Row], bodies: list[Row], **values: Any) -> Mechanism:
-    """The mechanism of a table; values are loop and gravity."""
+    """The mechanism of a table; values are loop, guess and gravity."""
     table = {"name": name, "source": source, "frame": frames, "body": bodies, **values}
     return to_mechanism(from_dict(table))

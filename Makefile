@@ -1,0 +1,61 @@
+# `make help` lists what there is. PYTHON names the Python (3.11 or newer) that the environment
+# is made of: make demo PYTHON=python3.12
+
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin
+
+# Without a C compiler on PATH (or in the environment variable CC), the one in ziglang is installed.
+NATIVE_CC := $(shell command -v cc 2>/dev/null || command -v gcc 2>/dev/null || command -v clang 2>/dev/null)
+ifneq ($(origin CC),default)
+NATIVE_CC := $(CC)
+endif
+ifeq ($(strip $(NATIVE_CC)),)
+CROSS := ,cross
+endif
+
+INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --editable
+
+.PHONY: help demo test lint types layers clean
+
+help:
+	@echo "make demo     install mbs into $(VENV) and run examples/01_four_bar.py; files go to build/four_bar"
+	@echo "make test     install the tools and run every check: lint, types, layers, tests"
+	@echo "make lint     ruff: style and format"
+	@echo "make types    mypy, strict"
+	@echo "make layers   import-linter: no module imports a higher layer"
+	@echo "make clean    remove build/, caches and $(VENV)"
+	@echo "PYTHON=...    the Python to make $(VENV) of, 3.11 or newer (now: $(PYTHON))"
+
+demo: $(VENV)/.demo
+	@$(RUN)/python examples/01_four_bar.py build/four_bar
+
+test: lint types layers
+	@$(RUN)/python -m pytest -n 2
+
+lint: $(VENV)/.dev
+	@$(RUN)/ruff check .
+	@$(RUN)/ruff format --check .
+
+types: $(VENV)/.dev
+	@$(RUN)/mypy
+
+layers: $(VENV)/.dev
+	@$(RUN)/lint-imports
+
+clean:
+	rm -rf build dist $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+
+$(VENV)/.python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "$(PYTHON) is not Python 3.11 or newer; run make with PYTHON=python3.12, for example"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.demo: pyproject.toml $(VENV)/.python
+	$(INSTALL) ".[plot$(CROSS)]"
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml $(VENV)/.python
+	$(INSTALL) ".[dev$(CROSS)]"
+	@touch $(VENV)/.demo $@

@@ -1,0 +1,77 @@
+"""Every example runs to its end and finds what it should."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+_NUMBER = r"(-?\d[\d.]*(?:e[-+]\d+)?)"
+
+SMALL = {
+    "01_four_bar": {
+        "idm(ddm(tau)) - tau": 1e-12,
+        "A a + B v + Q - tau": 1e-12,
+        "v' A v / 2 - E": 1e-12,
+        "largest closure residual": 1e-9,
+        "energy gained - work done": 1e-7,
+        "CoSimulation: largest difference of positions and velocities": 1e-7,
+        "ModelExchange: largest difference of positions and velocities": 1e-6,
+    },
+    "02_puma560": {
+        "idm(ddm(tau)) - tau": 1e-11,
+        "A a + B v + Q - tau": 1e-11,
+        "bias(q, 0) - gravity(q)": 1e-12,
+        "J v - d(dgm)/dt": 1e-8,
+        "change of energy": 1e-7,
+        "CoSimulation: largest difference of positions and velocities": 1e-7,
+        "ModelExchange: largest difference of positions and velocities": 1e-6,
+    },
+}
+"""What each example prints, and how large it may be."""
+
+FILES = {
+    "01_four_bar": ["four_bar.png", "four_bar.fmu", "motion.csv", "models/models.c", "example"],
+    "02_puma560": ["puma560.png", "puma560.fmu", "fall.csv", "models/models.h"],
+}
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example_runs_and_finds(path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    answer = subprocess.run(
+        [sys.executable, "-W", "error", str(path), str(folder)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONUTF8": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert answer.returncode == 0, answer.stderr
+    for label, limit in SMALL[path.stem].items():
+        found = re.search(rf"{re.escape(label)}:? {_NUMBER}", answer.stdout)
+        assert found is not None, label
+        assert abs(float(found[1])) < limit, label
+    for name in FILES[path.stem]:
+        assert (folder / name).stat().st_size > 1000, name
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_four_bar_says_what_the_loop_is(tmp_path: Path) -> None:
+    answer = subprocess.run(
+        [sys.executable, str(EXAMPLES[0]), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "2 of 5 rows are independent" in answer.stdout
+    assert "acceleration of j1: 6.709128 rad/s2" in answer.stdout
+    printed = {
+        line.split()[1]: float(line.split()[2])
+        for line in answer.stdout.splitlines()
+        if re.match(r" +(idm|ddm|lagrange) \w+ ", line) and len(line.split()) == 3
+    }
+    assert set(printed) == {"tau_a", "a_a", "A_a", "B_a", "Q_a"}

@@ -1,0 +1,42 @@
+"""Every Python block of the README and of docs/ runs, in order, in an empty folder."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_LINK = re.compile(r"\]\((?!http|#)([^)#]+)")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_python_blocks_run(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = page.read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for block in _BLOCK.finditer(text):
+        line = text.count("\n", 0, block.start(1))
+        exec(compile("\n" * line + block[1], str(page), "exec"), names)
+    if page.name == "README.md":
+        printed = capsys.readouterr().out
+        quoted = re.search(r"The report says what was found:\n\n(.*?)\n\n", text, re.DOTALL)
+        assert quoted is not None
+        assert "\n".join(row[4:] for row in quoted[1].splitlines()) in printed
+        for number in ("6.70913 5", "-3.924", "-19.62", "['L', 'm']"):
+            assert number in printed.replace("DM(", ""), number
+        assert (tmp_path / "motion.png").stat().st_size > 1000
+        assert float(abs(names["result"]["j4.q"] - names["other"]["j4.q"]).max()) < 1e-6
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_between_pages_lead_to_files(page: Path) -> None:
+    for target in _LINK.findall(page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
+
+
+def test_picture_is_small_enough_to_keep() -> None:
+    assert 10_000 < (ROOT / "docs" / "images" / "four_bar.png").stat().st_size < 100_000

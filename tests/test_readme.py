@@ -26,7 +26,7 @@ def test_python_blocks_run(
         quoted = re.search(r"The report says what was found:\n\n(.*?)\n\n", text, re.DOTALL)
         assert quoted is not None
         assert "\n".join(row[4:] for row in quoted[1].splitlines()) in printed
-        for number in ("6.70913 5", "-3.924", "-19.62", "['L', 'm']"):
+        for number in ("6.70913 5", "-3.924", "-19.62", "['m', 'L']"):
             assert number in printed.replace("DM(", ""), number
         assert (tmp_path / "motion.png").stat().st_size > 1000
         assert float(abs(names["result"]["j4.q"] - names["other"]["j4.q"]).max()) < 1e-6

@@ -164,7 +164,12 @@ def _frames(
             places[port] = link, pose @ inside
     frames = {"base": places[mechanism.world.name, ""]}
     for body in (mechanism.world, *mechanism.bodies()):
-        frames[body.name] = places[body.name, ""]
+        link, pose = frames[body.name] = places[body.name, ""]
+        if body.name == "base" and (link >= 0 or not pose.is_identity()):
+            raise AssemblyError(
+                f"{mechanism.name}: the body 'base' is not the frame of the world, which has this"
+                " name; rename the body"
+            )
     for name, point in mechanism.frames.items():
         link, pose = places[point.owner.name, point.port]
         frames[name] = link, pose @ point.placement.pose(symbols)

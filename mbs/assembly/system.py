@@ -13,7 +13,14 @@ from casadi import DM, MX, SX, Function
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.rates import position_rate
 from mbs.assembly.report import report
-from mbs.assembly.tables import BodyRow, Closure, Coordinate, LoopRow
+from mbs.assembly.tables import (
+    BodyRow,
+    Closure,
+    Coordinate,
+    LinkRow,
+    LoopRow,
+    link_rows,
+)
 from mbs.assembly.tree import Tree
 from mbs.errors import ModelError
 from mbs.expressions import Parameter
@@ -84,6 +91,11 @@ class System:
     def nv(self) -> int:
         """Number of velocities."""
         return self.tree.nv
+
+    @property
+    def links(self) -> tuple[LinkRow, ...]:
+        """The links of the tree and the Khalil parameters of their frames."""
+        return link_rows(self.tree)
 
     @property
     def is_closed(self) -> bool:

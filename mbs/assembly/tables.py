@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from casadi import SX
+
+from mbs.assembly.tree import Tree
 from mbs.components import Joint
 from mbs.components.joints import Motion
 
@@ -54,6 +57,31 @@ class Coordinate:
     actuated: bool
     cut: bool = False
     limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LinkRow:
+    """A link of the tree and the Khalil parameters of its frame.
+
+    Attributes:
+        number: of the link, from 1.
+        name: of the motion that moves it.
+        antecedent: number of the link it is placed on, 0 for the base.
+        motion: revolute, prismatic, spherical or free.
+        gamma, b, alpha, d, theta, r: placement at the zero position [rad, m]; numbers, or
+            expressions where a symbol is in them.
+    """
+
+    number: int
+    name: str
+    antecedent: int
+    motion: str
+    gamma: float | SX
+    b: float | SX
+    alpha: float | SX
+    d: float | SX
+    theta: float | SX
+    r: float | SX
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +140,15 @@ class Closure:
     def mobility(self) -> int:
         """Number of independent velocities."""
         return len(self.active)
+
+
+def link_rows(tree: Tree) -> tuple[LinkRow, ...]:
+    """The links and the parameters of their frames."""
+    rows = []
+    for number, link in enumerate(tree.links, start=1):
+        parameters = (float(x) if x.is_constant() else x for x in link.placement.parameters)
+        rows.append(LinkRow(number, link.name, link.antecedent + 1, link.motion.value, *parameters))
+    return tuple(rows)
 
 
 def position_coordinates(

@@ -45,7 +45,7 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
     posture = _assembled(system, guess, p)
     postures = [posture, *_others(system, posture, p)]
     J = closure_jacobian(system)
-    jacobians = [np.array(J(q, p)) for q in postures]
+    jacobians = [np.array(J(q)) for q in postures]
     generic = max(rank(matrix) for matrix in jacobians)
     posture = next(q for q, m in zip(postures, jacobians, strict=True) if rank(m) == generic)
     regular = [matrix for matrix in jacobians if rank(matrix) == generic]
@@ -58,7 +58,7 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
         active=tuple(active),
         passive=tuple(k for k in range(system.nv) if k not in active),
         gruebler=system.nv - count,
-        residual=_residual(system, posture, p),
+        residual=_residual(system, posture),
     )
     return replace(
         system,
@@ -143,5 +143,5 @@ def _with_rows(
     return tuple(result)
 
 
-def _residual(system: System, q: Matrix, p: Sequence[float]) -> float:
-    return float(np.max(np.abs(np.array(closure_function(system)(q, p))), initial=0.0))
+def _residual(system: System, q: Matrix) -> float:
+    return float(np.max(np.abs(np.array(closure_function(system)(q))), initial=0.0))

@@ -16,6 +16,7 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.model_function import Named, model_function
 from mbs.components import (
     Cylindrical,
     Fixed,
@@ -37,16 +38,15 @@ def closure(system: System) -> Function:
     """``closure(q) -> phi``: zero when every loop is closed.
 
     Returns:
-        Function of q (nq, 1) and, with symbols, of p; phi (m, 1) [m or 1], one element for each
-        label of `system.loops[..].rows`, dependent rows included.
+        Function of q (nq, 1); phi (m, 1) [m or 1], one element for each label of
+        `system.loops[..].rows`, dependent rows included.
     """
 
-    def build() -> Function:
+    def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        return Function("closure", [q, system.p], [closure_rows(system, q)], ["q", "p"], ["phi"])
+        return [("q", q)], [("phi", closure_rows(system, q))]
 
-    function: Function = system.cached("closure", build)
-    return function
+    return model_function(system, ("closure",), build)
 
 
 def closure_rows(system: System, q: SX) -> SX:

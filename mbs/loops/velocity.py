@@ -7,6 +7,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
+from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.rates import position_rate
 from mbs.loops.closure import closure_rows
 
@@ -15,16 +16,14 @@ def closure_jacobian(system: System) -> Function:
     """``closure_jacobian(q) -> J``: the rows of J, (m, nv), act on v.
 
     Returns:
-        Function of q (nq, 1) and, with symbols, of p.
+        Function of q (nq, 1); J (m, nv) [m/rad, 1 or 1/m].
     """
 
-    def build() -> Function:
+    def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        J = casadi.densify(velocity_rows(system, q, closure_rows(system, q)))
-        return Function("closure_jacobian", [q, system.p], [J], ["q", "p"], ["J"])
+        return [("q", q)], [("J", velocity_rows(system, q, closure_rows(system, q)))]
 
-    function: Function = system.cached("closure_jacobian", build)
-    return function
+    return model_function(system, ("closure_jacobian",), build)
 
 
 def velocity_rows(system: System, q: SX, phi: SX) -> SX:

@@ -7,11 +7,11 @@ import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
+from mbs.assembly.model_function import Named, model_function
 from mbs.errors import ModelError
 from mbs.loops.reduction import independent_rows
 from mbs.loops.velocity import acceleration_bias, velocity_rows
 from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.model_function import Named, model_function
 from mbs.models.symbols import Symbols, symbols_of
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents

@@ -5,7 +5,7 @@ from __future__ import annotations
 from casadi import Function
 
 from mbs.assembly import System
-from mbs.models.model_function import Named, model_function
+from mbs.assembly.model_function import Named, model_function
 from mbs.models.symbols import symbols_of
 from mbs.recursions.energy import kinetic_energy, potential_energy
 

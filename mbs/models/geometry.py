@@ -6,9 +6,9 @@ import casadi
 from casadi import MX, SX, Function
 
 from mbs.assembly import System
+from mbs.assembly.model_function import ModelFunction, Named, model_function
 from mbs.errors import ModelError
 from mbs.loops.numeric import follow_active
-from mbs.models.model_function import ModelFunction, Named, model_function
 from mbs.recursions.poses import link_poses, relative_pose
 
 

@@ -6,7 +6,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.models.model_function import Named, model_function
+from mbs.assembly.model_function import Named, model_function
 from mbs.models.symbols import Symbols, symbols_of
 from mbs.recursions.newton_euler import Wrench, newton_euler, rotor_and_friction
 from mbs.recursions.velocities import cross

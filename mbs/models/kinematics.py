@@ -6,8 +6,8 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
+from mbs.assembly.model_function import Named, model_function
 from mbs.loops.reduction import reduction
-from mbs.models.model_function import Named, model_function
 from mbs.models.symbols import symbols_of
 from mbs.recursions.jacobian import jacobian as frame_jacobian
 from mbs.recursions.poses import link_poses, relative_pose

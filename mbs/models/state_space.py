@@ -38,7 +38,8 @@ class FullState:
         rhs: `rhs(t, x, p) -> xdot`.
         project: `project(x, p) -> (x, residual)`, one Newton step onto loops and unit
             quaternions, None where there is nothing to keep.
-        observe: `observe(t, x, p) -> a, tau, E, U, residual`, what a result shows beside x.
+        observe: `observe(t, x, p) -> a, tau, E, U, openness`, what a result shows beside x; the
+            last is the largest closure row.
     """
 
     rhs: Function
@@ -82,8 +83,10 @@ def full_state(system: System, effort: Function | None = None) -> FullState:
     a = _outputs(system, ddm, q, v, tau)[0]
     rate = casadi.vertcat(position_rate(system.tree, q, v), a)
     projected, residual = _projected(system, q, v)
+    rows = closure_rows(system, q)
+    openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
     E, U = _outputs(system, energy(system, "tree"), q, v)
-    observed = [a, tau, E, U, residual]
+    observed = [a, tau, E, U, openness]
     keeps = system.is_closed or quaternion_slices(system.tree)
     return FullState(
         rhs=_function("rhs", [t, x, p], [rate]),

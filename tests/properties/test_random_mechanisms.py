@@ -83,7 +83,7 @@ def test_closed_mechanism_assembles_and_its_models_agree(drawn):
     mechanism, guess = drawn
     system = mechanism.assemble(guess=guess)
     q = np.array(system.posture)
-    assert np.abs(np.array(closure(system)(q, []))).max() < 1e-12
+    assert np.abs(np.array(closure(system)(q))).max() < 1e-12
     rng = np.random.default_rng(0)
     v_a, a_a = rng.uniform(-1, 1, (2, len(system.active)))
     tau = mbs.models.inverse_dynamics(system)(q, v_a, a_a)
@@ -103,7 +103,7 @@ def test_loops_stay_closed_along_a_motion(drawn):
         system, 0.5, q0=list(system.posture), step=0.05, tolerance=1e-9, quiet=True
     )
     for row in result.values:
-        residual = np.array(closure(system)(row[: system.nq], []))
+        residual = np.array(closure(system)(row[: system.nq]))
         assert np.abs(residual).max() < 1e-12
     losses = dissipated(system, result)
     total = result["kinetic_energy"] + result["potential_energy"]
@@ -131,5 +131,3 @@ def test_no_text_is_ever_run(text):
         mbs.components.Body("b", mass=text)
     except MbsError:
         pass
-
-

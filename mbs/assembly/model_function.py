@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
-from mbs.assembly import System
+from mbs.assembly.system import System
 from mbs.errors import ModelError
 
 Named = Sequence[tuple[str, SX]]

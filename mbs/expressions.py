@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, NoReturn, TypeVar
 
@@ -33,10 +33,14 @@ _CONSTANTS = {"pi": math.pi, "Pi": math.pi}
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*)"
-    r"|(?P<mark>\*\*|[-+*/^(),]))"
+    r"|(?P<mark>\*\*|[-+*/^(),]))",
+    re.ASCII,
 )
+_NOT_NUMBERS = ("nan", "inf", "infinity")
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "negate": 3, "^": 4}
 _DEEPEST_NESTING = 100
+_LONGEST_CHAIN = 200
+_LONGEST_QUOTE = 80
 
 
 class Expression:
@@ -71,8 +75,14 @@ class Expression:
     def __pow__(self, other: Scalar) -> Expression:
         return _operation("^", self, other)
 
+    def __rpow__(self, other: Scalar) -> Expression:
+        return _operation("^", other, self)
+
     def __neg__(self) -> Expression:
         return _operation("negate", self)
+
+    def __pos__(self) -> Expression:
+        return self
 
     def __str__(self) -> str:
         return _text(self)
@@ -105,10 +115,10 @@ class Parameter(Expression):
 
     def __post_init__(self) -> None:
         match = _TOKEN.fullmatch(self.name) if isinstance(self.name, str) else None
-        if match is None or match["name"] is None or self.name in (*_FUNCTIONS, *_CONSTANTS):
+        if match is None or match["name"] != self.name or _is_reserved(self.name):
             raise ExpressionError(
                 f"parameter {self.name!r}: a name is letters, digits and underscores, not the name"
-                " of a function; choose another name"
+                " of a function or constant; choose another name"
             )
         if self.default is not None:
             object.__setattr__(self, "default", _finite(self.default, f"parameter {self.name}"))
@@ -127,6 +137,16 @@ class Operation(Expression):
 
     operator: str
     arguments: tuple[Expression, ...]
+    depth: int = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        depth = 1 + max(getattr(argument, "depth", 0) for argument in self.arguments)
+        if depth > _LONGEST_CHAIN:
+            raise ExpressionError(
+                f"an expression applies more than {_LONGEST_CHAIN} operations one after the other;"
+                " split it into shorter ones"
+            )
+        object.__setattr__(self, "depth", depth)
 
     __str__ = Expression.__str__
 
@@ -179,7 +199,10 @@ def to_sx(value: Scalar, symbols: Mapping[str, SX]) -> SX:
 
 
 def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float | None:
-    """The number, with `values` or the defaults for its parameters; None if one is unknown."""
+    """The number, with `values` or the defaults for its parameters; None if it is not known.
+
+    It is not known either where the expression has no finite value, such as 1/A with A = 0.
+    """
     known = values or {}
 
     def symbol(parameter: Parameter) -> float:
@@ -187,7 +210,7 @@ def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float 
         return math.nan if given is None else given
 
     result = _fold(expression(value), float, symbol, _apply_float)
-    return None if math.isnan(result) else result
+    return result if math.isfinite(result) else None
 
 
 def _fold(
@@ -211,7 +234,8 @@ def _apply_sx(operator: str, values: list[SX]) -> SX:
 
 def _apply_float(operator: str, values: list[float]) -> float:
     try:
-        result = _arithmetic(operator, [np.float64(v) for v in values])
+        with np.errstate(all="ignore"):
+            result = _arithmetic(operator, [np.float64(v) for v in values])
         return float(result if result is not None else getattr(math, operator)(*values))
     except (ArithmeticError, ValueError):
         return math.nan
@@ -238,8 +262,7 @@ def _arithmetic(operator: str, values: list[Any]) -> Any:
 def _operation(operator: str, *operands: Scalar) -> Expression:
     arguments = tuple(expression(operand) for operand in operands)
     if all(isinstance(argument, Number) for argument in arguments):
-        with np.errstate(all="ignore"):
-            result = _apply_float(operator, [a.value for a in arguments])  # type: ignore[attr-defined]
+        result = _apply_float(operator, [a.value for a in arguments])  # type: ignore[attr-defined]
         if not math.isfinite(result):
             raise ExpressionError(
                 f"{_text(Operation(operator, arguments))!r} is not a finite number; correct it"
@@ -250,13 +273,30 @@ def _operation(operator: str, *operands: Scalar) -> Expression:
 
 def _finite(value: object, where: str) -> float:
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
         if math.isfinite(number):
             return number
     raise ExpressionError(
-        f"{where}: {value!r} is not a finite number; give a number, a Parameter or a text such as"
-        " 'pi/2 + A'"
+        f"{where}: {quoted(value)} is not a finite number; give a number, a Parameter or a text"
+        " such as 'pi/2 + A'"
     )
+
+
+def quoted(value: object) -> str:
+    """The value as Python writes it, on one line, its middle left out when it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of more digits than Python converts
+        text = f"a {type(value).__name__} of more digits than can be read"
+    half = _LONGEST_QUOTE // 2
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:half]}...{text[-half:]}"
+
+
+def _is_reserved(name: str) -> bool:
+    return name in (*_FUNCTIONS, *_CONSTANTS) or name.lower() in _NOT_NUMBERS
 
 
 def _text(value: Expression, outer: int = 0) -> str:
@@ -312,7 +352,7 @@ class _Parser:
 
     def fail(self, reason: str) -> NoReturn:
         raise ExpressionError(
-            f"cannot read {self.text!r}: {reason}; write numbers, symbols, + - * / ^,"
+            f"cannot read {quoted(self.text)}: {reason}; write numbers, symbols, + - * / ^,"
             " sin, cos, tan, sqrt, atan2 and pi"
         )
 
@@ -330,10 +370,13 @@ class _Parser:
         if not self.accept(mark):
             self.fail(f"{mark!r} is missing")
 
-    def sum(self) -> Expression:
+    def deeper(self) -> None:
         self.depth += 1
         if self.depth > _DEEPEST_NESTING:
             self.fail("it is nested too deeply")
+
+    def sum(self) -> Expression:
+        self.deeper()
         value = self.product()
         while mark := self.accept("+", "-"):
             value = _operation(mark, value, self.product())
@@ -355,7 +398,12 @@ class _Parser:
 
     def power(self) -> Expression:
         base = self.atom()
-        return _operation("^", base, self.unary()) if self.accept("^", "**") else base
+        if not self.accept("^", "**"):
+            return base
+        self.deeper()
+        exponent = self.unary()
+        self.depth -= 1
+        return _operation("^", base, exponent)
 
     def atom(self) -> Expression:
         kind, token = self.kind, self.token
@@ -367,7 +415,7 @@ class _Parser:
             return value
         self.advance()
         if kind == "number":
-            return Number(_finite(float(token), repr(self.text)))
+            return Number(_finite(float(token), quoted(token)))
         if kind != "name":
             self.fail(f"unexpected {token!r}")
         return self._named(token)
@@ -378,9 +426,11 @@ class _Parser:
         if not self.accept("("):
             if name in _FUNCTIONS:
                 self.fail(f"{name} needs its arguments in brackets")
+            if _is_reserved(name):
+                self.fail(f"{name} is not a finite number")
             return Parameter(name)
         if name not in _FUNCTIONS:
-            self.fail(f"{name!r} is not a function here")
+            self.fail(f"{quoted(name)} is not a function here")
         arguments = [self.sum()]
         while self.accept(","):
             arguments.append(self.sum())

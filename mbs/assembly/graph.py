@@ -189,7 +189,9 @@ def _evaluator(symbols: Mapping[str, SX], values: Mapping[str, float]) -> _Evalu
 
 def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -> None:
     difference = at(first.matrix - second.matrix)
-    gap, turn = np.abs(difference[:3, 3]).max(), np.abs(difference[:3, :3]).max()
+    gap = float(np.linalg.norm(difference[:3, 3]))
+    chord = float(np.linalg.norm(difference[:3, :3])) / (2 * np.sqrt(2))
+    turn = 2 * np.arcsin(min(1.0, chord))
     if max(gap, turn) > _SAME_PLACE:
         raise AssemblyError(
             f"{port[0]!r} is welded at two places that differ by {gap:.3g} m and {turn:.3g} rad;"

@@ -22,11 +22,14 @@ from mbs.assembly.graph import Edge, Graph, inertia_of
 from mbs.assembly.spanning_tree import Branch, SpanningTree
 from mbs.assembly.tree import Link, Tree
 from mbs.components import Mechanism
-from mbs.components.joints import Freedom, Motion, joint_scalars
+from mbs.components.joints import Freedom, Motion
 from mbs.expressions import to_sx
 from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z
 
 _FLIP = Pose.turned(SX(DM([[1, 0, 0], [0, -1, 0], [0, 0, -1]])))
+Efforts = tuple[SX, SX, SX, SX]
+"""Ia, Fv, Fs and Fs_width of a joint."""
+
 _ALONG_Z = (Motion.REVOLUTE, Motion.PRISMATIC)
 
 
@@ -75,7 +78,7 @@ class _Draft:
     antecedent: int
     motion: Motion
     placement: Khalil
-    efforts: tuple[SX, SX, SX]
+    efforts: Efforts
     fixed_frame: bool = False
     nodes: dict[int, Pose] = field(default_factory=dict)
 
@@ -161,7 +164,17 @@ def _extend(
             placement = _settled(drafts, parent, Khalil.of_pose(here @ aligned))
         suffix = f".{freedom.suffix}" if freedom.suffix else ""
         name = edge.joint.name + suffix
-        drafts.append(_Draft(name, edge.joint.name, parent, freedom.motion, placement, efforts))
+        drafts.append(
+            _Draft(
+                name,
+                edge.joint.name,
+                parent,
+                freedom.motion,
+                placement,
+                efforts,
+                fixed_frame=placement is given,
+            )
+        )
         parent, here, given = len(drafts) - 1, aligned.inverse(), None
     end = Pose.identity() if branch.child < 0 else far.inverse()
     return parent, here @ end
@@ -191,19 +204,34 @@ def _aligned(freedom: Freedom, forward: bool) -> Pose:
     return pose if forward else pose @ _FLIP
 
 
-def _efforts(edge: Edge, symbols: Mapping[str, SX]) -> tuple[SX, SX, SX]:
-    Ia, Fv, Fs = (to_sx(value, symbols) for value in joint_scalars(edge.joint))
-    return Ia, Fv, Fs
+def _efforts(edge: Edge, symbols: Mapping[str, SX]) -> Efforts:
+    joint = edge.joint
+    Ia, Fv, Fs, width = (
+        to_sx(value, symbols) for value in (joint.Ia, joint.Fv, joint.Fs, joint.Fs_width)
+    )
+    return Ia, Fv, Fs, width
 
 
 def _links(drafts: list[_Draft], inertias: list[Inertia]) -> tuple[Link, ...]:
     links, nq, nv = [], 0, 0
     for draft, inertia in zip(drafts, inertias, strict=True):
         motion = draft.motion
-        Ia, Fv, Fs = draft.efforts
+        Ia, Fv, Fs, width = draft.efforts
         q, v = slice(nq, nq + motion.nq), slice(nv, nv + motion.nv)
         links.append(
-            Link(draft.name, draft.antecedent, motion, draft.placement, inertia, Ia, Fv, Fs, q, v)
+            Link(
+                draft.name,
+                draft.antecedent,
+                motion,
+                draft.placement,
+                inertia,
+                Ia,
+                Fv,
+                Fs,
+                width,
+                q,
+                v,
+            )
         )
         nq, nv = q.stop, v.stop
     return tuple(links)

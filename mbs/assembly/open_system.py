@@ -39,13 +39,15 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     parameters = mechanism.parameters()
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
-    keep = {name for joint in mechanism.joints() for name in _owners(joint, guessed)}
+    coupled = [name for c in mechanism.couplings() for name in (c.driven, c.driver)]
+    wanted = (*guessed, *coupled)
+    keep = {name for joint in mechanism.joints() for name in _owners(joint, wanted)}
     spanning = spanning_tree(
         mechanism.name, graph, keep=keep, cut=mechanism.cuts, given_order=mechanism.keep_order
     )
     framed = khalil_frames(mechanism, graph, spanning, symbols)
     joints = {joint.name: joint for joint in mechanism.joints()}
-    in_loops = _looped_joints(framed)
+    in_loops = _looped_joints(framed) | _driven_joints(mechanism)
     moved = [
         (link.motion, link.name, joints[name])
         for link, name in zip(framed.tree.links, framed.joints, strict=True)
@@ -79,6 +81,7 @@ def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
 
 
 def _owners(joint: Joint, guessed: Collection[str]) -> list[str]:
+    """The joint's name, once for each of its coordinates that is named."""
     return [
         joint.name for name in guessed if name == joint.name or name.startswith(f"{joint.name}.")
     ]
@@ -97,6 +100,12 @@ def _loop_joints(framed: Framed, cut: Cut) -> list[str]:
 
 def _looped_joints(framed: Framed) -> set[str]:
     return {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
+
+
+def _driven_joints(mechanism: Mechanism) -> set[str]:
+    """The joints that follow another one through a coupling."""
+    driven = [coupling.driven for coupling in mechanism.couplings()]
+    return {name for joint in mechanism.joints() for name in _owners(joint, driven)}
 
 
 def _loop_rows(mechanism: Mechanism, framed: Framed) -> tuple[LoopRow, ...]:

@@ -57,7 +57,7 @@ def spanning_tree(
         given_order: number links in the order of the joints instead of depth-first.
 
     Raises:
-        AssemblyError: a body cannot be reached from the world.
+        AssemblyError: a body cannot be reached from the world, or only by a joint to be cut.
     """
     chosen = _prim(graph, set(keep), set(cut))
     reached = {0} | {edge.a for edge in chosen} | {edge.b for edge in chosen}
@@ -66,6 +66,12 @@ def spanning_tree(
             raise AssemblyError(
                 f"{name}: no chain of joints leads from the world to {node.name!r};"
                 " connect it, or connect it to the world by a Free joint"
+            )
+    for edge in chosen:
+        if edge.joint.name in cut:
+            raise AssemblyError(
+                f"{name}: joint {edge.joint.name!r} cannot be cut, since nothing else connects what"
+                " it carries to the world; take this cut away"
             )
     cuts = tuple(edge for edge in graph.edges if edge not in chosen)
     branches = _depth_first(graph, chosen)

@@ -23,7 +23,7 @@ from mbs.assembly.tables import (
 )
 from mbs.assembly.tree import Tree
 from mbs.errors import ModelError
-from mbs.expressions import Parameter
+from mbs.expressions import Parameter, quoted
 from mbs.spatial import Pose
 
 
@@ -178,7 +178,7 @@ class System:
         if values is None:
             return start
         if not isinstance(values, Mapping):
-            given = [float(x) for x in DM(values).full().ravel()]
+            given = self._numbers(values, what)
             if len(given) != len(names):
                 raise ModelError(
                     f"{self.name}: the {what} has {len(given)} values, the system has"
@@ -190,8 +190,16 @@ class System:
                 raise ModelError(
                     f"{self.name}: there is no coordinate {name!r}; " + _suggestion(name, names)
                 )
-            start[names.index(name)] = float(value)
+            start[names.index(name)] = self._numbers(value, f"{what} of {name}")[0]
         return start
+
+    def _numbers(self, values: Any, what: str) -> list[float]:
+        try:
+            return [float(x) for x in DM(values).full().ravel()]
+        except (NotImplementedError, TypeError, ValueError):
+            raise ModelError(
+                f"{self.name}: the {what} is {quoted(values)}; give a number for each coordinate"
+            ) from None
 
     def parameter_values(self, values: Mapping[str, float] | None = None) -> list[float]:
         """Parameters p from values by name, the others at their defaults.

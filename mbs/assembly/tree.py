@@ -23,6 +23,7 @@ class Link:
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
         Fv: viscous friction [N m s/rad or N s/m].
         Fs: dry friction [N m or N].
+        Fs_width: velocity over which it changes sign [rad/s or m/s], zero for a step.
         q: where its positions stand in q.
         v: where its velocities stand in v.
     """
@@ -35,6 +36,7 @@ class Link:
     Ia: SX
     Fv: SX
     Fs: SX
+    Fs_width: SX
     q: slice
     v: slice
 

@@ -12,7 +12,7 @@ import numpy as np
 from mbs.components.component import Component, Point
 from mbs.components.placement import Rotation, Symbols
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
+from mbs.expressions import Expression, Number, Scalar, expression, quoted, to_float, to_sx
 from mbs.spatial import Inertia, vector
 from mbs.spatial.inertia import TEN_PARAMETERS
 
@@ -351,10 +351,10 @@ def _given(component: Component, *names: str) -> list[str]:
 
 def _three(values: Any, where: str) -> tuple[Expression, ...]:
     try:
-        x, y, z = values
+        x, y, z = [] if isinstance(values, str) else list(values)
     except (TypeError, ValueError):
         raise DescriptionError(
-            f"{where}: {values!r} has not three values; give (x, y, z)"
+            f"{where}: {quoted(values)} has not three values; give (x, y, z)"
         ) from None
     return tuple(expression(v, f"{where}, {n}") for n, v in zip("xyz", (x, y, z), strict=True))
 
@@ -370,12 +370,19 @@ def _six(values: Any, where: str) -> tuple[Expression, ...]:
         return elements[0], zero, zero, elements[1], zero, elements[2]
     if len(elements) == 6:
         return tuple(elements)
-    if len(elements) == 9 and all(elements[3 * k + m] == elements[3 * m + k] for k, m in _PAIRS):
+    if len(elements) == 9 and all(_equal(elements[a], elements[b]) for a, b in _TWINS):
         return tuple(elements[k] for k in (0, 1, 2, 4, 5, 8))
     raise DescriptionError(
-        f"{where}: {values!r} is not an inertia; give three principal moments,"
+        f"{where}: {quoted(values)} is not an inertia; give three principal moments,"
         " Ixx Ixy Ixz Iyy Iyz Izz, or a symmetric (3, 3) matrix"
     )
 
 
-_PAIRS = ((0, 1), (0, 2), (1, 2))
+_TWINS = ((1, 3), (2, 6), (5, 7))
+
+
+def _equal(a: Expression, b: Expression) -> bool:
+    """Whether two elements of a tensor are the same, up to the rounding of numbers."""
+    if isinstance(a, Number) and isinstance(b, Number):
+        return math.isclose(a.value, b.value, rel_tol=_TOLERANCE, abs_tol=1e-12)
+    return a == b

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mbs.components.component import Component, Point
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, to_float
+from mbs.expressions import Scalar, expression, quoted, to_float
 from mbs.spatial import align_z
 
 _NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -58,7 +58,7 @@ class Freedom:
     suffix: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Joint(Component):
     """What every joint has.
 
@@ -67,7 +67,9 @@ class Joint(Component):
             of an open chain is active, a joint of a loop is passive unless it says otherwise.
         limits: (lower, upper) of its position, or a mapping from the suffix of a coordinate.
         Fv: viscous friction [N m s/rad or N s/m].
-        Fs: dry friction [N m or N].
+        Fs: dry friction [N m or N], which acts as Fs tanh(v / Fs_width).
+        Fs_width: velocity over which dry friction changes sign [rad/s or m/s]; zero for the
+            step Fs sign(v), which identification wants and integrators do not.
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
     """
 
@@ -75,12 +77,17 @@ class Joint(Component):
     limits: Any = None
     Fv: Scalar = 0.0
     Fs: Scalar = 0.0
+    Fs_width: Scalar = 1e-3
     Ia: Scalar = 0.0
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
-        self._normalise("Fv", "Fs", "Ia")
-        for name in ("Fv", "Fs", "Ia"):
+        if self.actuated not in (None, True, False):
+            raise DescriptionError(
+                f"{self.name}: actuated is {self.actuated!r}; give True, False or None"
+            )
+        self._normalise("Fv", "Fs", "Fs_width", "Ia")
+        for name in ("Fv", "Fs", "Fs_width", "Ia"):
             value = to_float(getattr(self, name))
             if value is not None and value < 0:
                 raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
@@ -119,14 +126,14 @@ class Joint(Component):
         items: list[tuple[Any, Any]] = [("" if known == {""} else None, limits)]
         if isinstance(limits, Mapping):
             items = list(limits.items())
-        elif limits == () or isinstance(limits[0], tuple):
+        elif isinstance(limits, tuple) and all(_is_named_interval(item) for item in limits):
             items = list(limits)
         return tuple((suffix, self._interval(suffix, pair, known)) for suffix, pair in items)
 
     def _interval(self, suffix: Any, pair: Any, known: set[str]) -> tuple[float, float]:
         if suffix not in known:
             raise DescriptionError(
-                f"{self.name}: limits {pair!r} name no coordinate of one number; "
+                f"{self.name}: limits {quoted(pair)} name no coordinate of one number; "
                 + (f"give a mapping from {sorted(known)}" if known else "leave them out")
             )
         try:
@@ -135,9 +142,14 @@ class Joint(Component):
             low, high = math.nan, math.nan
         if not low < high:
             raise DescriptionError(
-                f"{self.name}: limits {pair!r} are not (lower, upper); give two numbers in order"
+                f"{self.name}: limits {quoted(pair)} are not (lower, upper); give two numbers in"
+                " order"
             )
         return low, high
+
+
+def _is_named_interval(item: Any) -> bool:
+    return isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,10 +225,17 @@ class Universal(Joint):
     axes: tuple[Any, Any] = ("x", "y")
 
     def __post_init__(self) -> None:
-        first, second = (unit_axis(self.name, axis) for axis in self.axes)
+        try:
+            first, second = self.axes
+        except (TypeError, ValueError):
+            raise DescriptionError(
+                f"{self.name}: axes {quoted(self.axes)} are not two; give two orthogonal axes"
+            ) from None
+        first, second = unit_axis(self.name, first), unit_axis(self.name, second)
         if abs(np.dot(first, second)) > 1e-9:
             raise DescriptionError(
-                f"{self.name}: axes {self.axes!r} are not orthogonal; give two orthogonal axes"
+                f"{self.name}: axes {quoted(self.axes)} are not orthogonal;"
+                " give two orthogonal axes"
             )
         object.__setattr__(self, "axes", (first, second))
         Joint.__post_init__(self)
@@ -286,6 +305,11 @@ class Coupling(Component):
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
+        if isinstance(self.coefficients, str) or not hasattr(self.coefficients, "__iter__"):
+            raise DescriptionError(
+                f"{self.name}: coefficients {quoted(self.coefficients)} are not a sequence;"
+                " give c_0, c_1, ..., such as (0, ratio) for a gear"
+            )
         terms = tuple(expression(c, f"{self.name}, coefficients") for c in self.coefficients)
         object.__setattr__(self, "coefficients", terms)
         if self.driven == self.driver:
@@ -314,10 +338,12 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
     except (TypeError, ValueError):
         values = np.zeros(0)
     if values.shape != (3,) or not np.all(np.isfinite(values)):
-        raise DescriptionError(f"{name}: axis {axis!r} is not a direction; give three numbers")
+        raise DescriptionError(
+            f"{name}: axis {quoted(axis)} is not a direction; give three numbers"
+        )
     length = float(np.linalg.norm(values))
     if length < 1e-9:
-        raise DescriptionError(f"{name}: axis {axis!r} has zero length; give a direction")
+        raise DescriptionError(f"{name}: axis {quoted(axis)} has zero length; give a direction")
     x, y, z = (float(v) for v in values / length)
     return x, y, z
 
@@ -329,8 +355,3 @@ def in_plane(
     R = align_z(np.array(axis))
     u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
     return (u[0], u[1], u[2]), (v[0], v[1], v[2])
-
-
-def joint_scalars(joint: Joint) -> tuple[Expression, Expression, Expression]:
-    """Ia, Fv, Fs of a joint."""
-    return expression(joint.Ia), expression(joint.Fv), expression(joint.Fs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeVar, overload
@@ -10,7 +11,7 @@ from mbs.components.bodies import Mount, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.joints import Coupling, Joint
 from mbs.errors import AssemblyError, DescriptionError
-from mbs.expressions import Parameter, Scalar, parameters_of
+from mbs.expressions import Parameter, Scalar, parameters_of, quoted
 
 if TYPE_CHECKING:
     from mbs.assembly.system import System
@@ -74,6 +75,16 @@ class Mechanism:
         """
         if isinstance(component, Mechanism):
             return self._place(component, name or component.name)
+        if not isinstance(component, Component):
+            raise DescriptionError(
+                f"{self.name}: {quoted(component)} is no component; add a body, a joint, a coupling"
+                " or a mechanism"
+            )
+        if component.name in self.frames:
+            raise DescriptionError(
+                f"{self.name}: {component.name!r} is the name of a frame already; rename the"
+                f" {type(component).__name__}"
+            )
         taken = self.components.get(component.name)
         if taken is not None:
             raise DescriptionError(
@@ -110,7 +121,7 @@ class Mechanism:
             return
         if b is not None:
             raise DescriptionError(
-                f"{self.name}: {joint_or_point!r} stands where a joint belongs;"
+                f"{self.name}: {_what(joint_or_point)} stands where a joint belongs;"
                 " write connect(point, joint, point)"
             )
         self._weld(self._point(a), self._point(joint_or_point))
@@ -126,6 +137,8 @@ class Mechanism:
 
     def cut(self, joint: Joint) -> None:
         """Open the loop that this joint closes here, not where the assembly would choose."""
+        if not isinstance(joint, Joint):
+            raise DescriptionError(f"{self.name}: {_what(joint)} is not a joint; cut a joint")
         if self.components.get(joint.name) is not joint:
             raise DescriptionError(
                 f"{self.name}: joint {joint.name!r} is not connected; connect it before the cut"
@@ -204,7 +217,8 @@ class Mechanism:
             point = point.frame
         if not isinstance(point, Point):
             raise DescriptionError(
-                f"{self.name}: {point!r} is not a point; give a body, body.at(...) or joint.frame_a"
+                f"{self.name}: {_what(point)} is not a point;"
+                " give a body, body.at(...) or joint.frame_a"
             )
         if self.components.get(point.owner.name) is not point.owner:
             raise DescriptionError(
@@ -231,6 +245,15 @@ class Mechanism:
 
     def _place(self, inner: Mechanism, name: str) -> Placed:
         scope = Component(name).name
+        if inner is self:
+            raise DescriptionError(
+                f"{self.name}: a mechanism cannot be added to itself; add it to another one"
+            )
+        if any(inner._used_parameters()) and not _SCOPE.fullmatch(scope):
+            raise DescriptionError(
+                f"{self.name}: {scope!r} cannot stand before the names of parameters; write"
+                " add(mechanism, name=...) with letters, digits and underscores"
+            )
         if any(taken == scope or taken.startswith(f"{scope}.") for taken in self.components):
             raise DescriptionError(f"{self.name}: two components are named {scope!r}; rename one")
         placed: dict[str, Component] = {}
@@ -287,6 +310,16 @@ class Placed:
     def base(self) -> RigidBody:
         """The ground of the inner mechanism, to be connected to something."""
         return self.body("world")
+
+
+_SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
+
+
+def _what(value: object) -> str:
+    """A value in a message: a component by its name."""
+    if isinstance(value, Component):
+        return f"{type(value).__name__} {value.name!r}"
+    return quoted(value)
 
 
 def _moved(point: Point, placed: Mapping[str, Component], scope: str) -> Point:

@@ -13,10 +13,12 @@ import numpy as np
 from casadi import DM, SX
 
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, renamed, to_sx
+from mbs.expressions import Expression, Scalar, expression, quoted, renamed, to_sx
 from mbs.spatial import Khalil, Pose, axis_turn, snapped, vector
 
 Symbols = Mapping[str, SX]
+
+_EXACT = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,9 +139,9 @@ def displacement(
 
 
 def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
-    if len(rotation) == 2 and isinstance(rotation[0], str):
+    if _is_turn(rotation):
         return [_turn(where, *rotation)]
-    if all(len(part) == 2 and isinstance(part[0], str) for part in rotation):
+    if isinstance(rotation, (list, tuple)) and all(map(_is_turn, rotation)):
         return [_turn(where, *part) for part in rotation]
     try:
         R = np.asarray(rotation, dtype=float)
@@ -147,10 +149,17 @@ def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
         R = np.zeros(0)
     if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
         raise DescriptionError(
-            f"{where}: rotation {rotation!r} is not a rotation; give ('z', angle), a sequence of"
-            " such turns, or an orthonormal right-handed (3, 3) matrix"
+            f"{where}: rotation {quoted(rotation)} is not a rotation; give ('z', angle), a sequence"
+            " of such turns, or an orthonormal right-handed (3, 3) matrix"
         )
+    if not np.allclose(R @ R.T, np.eye(3), rtol=0, atol=_EXACT):
+        U, _, V = np.linalg.svd(R)  # digits were cut off: the nearest rotation
+        R = U @ V
     return [Oriented(tuple((float(r[0]), float(r[1]), float(r[2])) for r in R))]
+
+
+def _is_turn(part: Any) -> bool:
+    return isinstance(part, (list, tuple)) and len(part) == 2 and isinstance(part[0], str)
 
 
 def _turn(where: str, axis: str, angle: Scalar) -> Turned:

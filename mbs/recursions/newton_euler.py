@@ -89,13 +89,18 @@ def euler_moment(J: SX, motion: Acceleration) -> SX:
 
 
 def rotor_and_friction(tree: Tree, v: SX, a: SX) -> SX:
-    """(nv, 1) Ia a + Fv v + Fs sign(v) of every joint [N m or N]."""
+    """(nv, 1) Ia a + Fv v + Fs tanh(v / Fs_width) of every joint [N m or N].
+
+    Source: Khalil & Creusot 1997, eq. 20, its sign(v) smoothed over a width so that integrators
+    and optimisers can use the same model; a width of zero gives the sign.
+    """
     return casadi.vertcat(*(_rotor_and_friction(link, v[link.v], a[link.v]) for link in tree.links))
 
 
 def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
     total = zeros(link.motion.nv)
-    for coefficient, rate in ((link.Ia, a), (link.Fv, v), (link.Fs, casadi.sign(v))):
+    step = casadi.sign(v) if link.Fs_width.is_zero() else casadi.tanh(v / link.Fs_width)
+    for coefficient, rate in ((link.Ia, a), (link.Fv, v), (link.Fs, step)):
         if not coefficient.is_zero():
             total = total + coefficient * rate
     return total

@@ -11,10 +11,14 @@ import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly.system import System
+from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
 
 Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""
+
+
+_SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
 
 class ModelFunction(Function):
@@ -28,7 +32,6 @@ class ModelFunction(Function):
     def __init__(self, function: Function, system: System) -> None:
         Function.__init__(self, function)
         self._system = system
-        self._elements = _element_names(system)
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it on numbers or symbols, as a casadi.Function, its inputs checked."""
@@ -42,6 +45,10 @@ class ModelFunction(Function):
                 args = (*args, self._defaults())
         return Function.__call__(self, *args, **kwargs)
 
+    def elements(self, name: str) -> list[tuple[str, str]]:
+        """Name and unit of every element of an input or output; empty where they have none."""
+        return _elements(self._system).get(name, [])
+
     def _defaults(self) -> DM:
         return DM(self._system.parameter_values())
 
@@ -54,8 +61,8 @@ class ModelFunction(Function):
         wanted = self.size_in(names.index(name))
         if rows == wanted[0] or rows == 0 or (rows, columns) == (1, wanted[0]):
             return
-        elements = self._elements.get(name, [])
-        known = f": {', '.join(elements)}" if elements else ""
+        elements = ", ".join(element for element, _ in self.elements(name))
+        known = f": {elements}" if elements else ""
         raise ModelError(
             f"{self.name()}({self._system.name}): {name} has {rows} values, it needs"
             f" {wanted[0]}{known}"
@@ -75,6 +82,7 @@ def model_function(
         build: gives the named inputs and outputs on CasADi symbols. When the system has
             parameters they become the last input p.
     """
+    require_system(system)
 
     def make() -> Function:
         inputs, outputs = build()
@@ -101,12 +109,26 @@ def _default_in(system: System, others: int) -> Mapping[str, list[float]]:
     return {}
 
 
-def _element_names(system: System) -> dict[str, list[str]]:
-    speeds = [speed.name for speed in system.speeds]
-    active = [speeds[k] for k in system.active]
-    return {
-        "q": [coordinate.name for coordinate in system.coordinates],
-        **dict.fromkeys(("v", "a", "tau"), speeds),
-        **dict.fromkeys(("v_a", "a_a", "tau_a"), active),
-        "p": [parameter.name for parameter in system.parameters],
-    }
+def require_system(system: object) -> None:
+    """Refuse what is not a System, such as a mechanism that was not assembled.
+
+    Raises:
+        ModelError: says what to call.
+    """
+    if not isinstance(system, System):
+        name = getattr(system, "name", system)
+        raise ModelError(
+            f"{name}: models are made of a System, not of a {type(system).__name__};"
+            " call assemble() first"
+        )
+
+
+def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
+    q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
+    units = {"v": _SAME_UNIT, "a": ACCELERATION_UNIT, "tau": EFFORT_UNIT}
+    result = {"q": q, "p": [(parameter.name, parameter.unit) for parameter in system.parameters]}
+    for name, unit in units.items():
+        every = [(speed.name, unit[speed.unit]) for speed in system.speeds]
+        result[name] = every
+        result[f"{name}_a"] = [every[k] for k in system.active]
+    return result

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from casadi import CodeGenerator, Function
 
+from mbs.assembly.model_function import ModelFunction
 from mbs.errors import ExportError, ModelError
 
 _PROTOTYPE = """\
@@ -138,11 +139,13 @@ def _header(models: Sequence[Function], name: str) -> str:
 
 def _prototype(model: Function) -> str:
     lines = [
-        f" *  @param[in]  {name}  ({model.size1_in(k)}, {model.size2_in(k)})\n"
+        f" *  @param[in]  {name}  ({model.size1_in(k)}, {model.size2_in(k)})"
+        f"{_elements(model, name)}\n"
         for k, name in enumerate(model.name_in())
     ]
     lines += [
-        f" *  @param[out] {name}  ({model.size1_out(k)}, {model.size2_out(k)})\n"
+        f" *  @param[out] {name}  ({model.size1_out(k)}, {model.size2_out(k)})"
+        f"{_elements(model, model.name_out(k))}\n"
         for k, name in enumerate(_outputs(model))
     ]
     inside, outside = ", ".join(model.name_in()), ", ".join(model.name_out())
@@ -154,6 +157,12 @@ def _prototype(model: Function) -> str:
         parameters=_parameters(model),
         sz_w=max(1, model.sz_w()),
     )
+
+
+def _elements(model: Function, name: str) -> str:
+    """What the elements of an input or output are, where the model knows their names."""
+    known = model.elements(name) if isinstance(model, ModelFunction) else []
+    return ": " + ", ".join(f"{element} [{unit}]" for element, unit in known) if known else ""
 
 
 def _example(models: Sequence[Function], name: str) -> str:

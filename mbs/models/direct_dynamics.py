@@ -7,7 +7,7 @@ import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import Named, model_function
+from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.reduction import independent_rows
 from mbs.loops.velocity import acceleration_bias, velocity_rows
@@ -66,6 +66,7 @@ def direct_dynamics(
     Raises:
         ModelError: some joint moves no inertia, so that its acceleration is not determined.
     """
+    require_system(system)
     if method not in _METHODS:
         raise ModelError(f"{system.name}: method is {method!r}; use one of {', '.join(_METHODS)}")
     in_tree = coordinates == "tree" and system.is_closed

@@ -6,7 +6,7 @@ import casadi
 from casadi import MX, SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import ModelFunction, Named, model_function
+from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.numeric import follow_active
 from mbs.recursions.poses import link_poses, relative_pose
@@ -28,6 +28,7 @@ def transform(system: System, frame: str | int, relative_to: str | int = "base")
     Raises:
         ModelError: there is no such frame.
     """
+    require_system(system)
     target, reference = system.frame(frame), system.frame(relative_to)
 
     def build() -> tuple[Named, Named]:
@@ -69,6 +70,7 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
     Raises:
         ModelError: there is no such frame.
     """
+    require_system(system)
     name = terminal_frame(system) if frame is None else frame
     pose = transform(system, name)
     if system.is_closed:

@@ -6,7 +6,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import Named, model_function
+from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.loops.reduction import reduction
 from mbs.models.symbols import symbols_of
 from mbs.recursions.jacobian import jacobian as frame_jacobian
@@ -35,6 +35,7 @@ def jacobian(
     Raises:
         ModelError: there is no such frame.
     """
+    require_system(system)
     target, axes = system.frame(frame), system.frame(expressed_in)
 
     def build() -> tuple[Named, Named]:

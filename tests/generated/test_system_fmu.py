@@ -130,8 +130,7 @@ def test_folder_that_cannot_be_written(tmp_path):
 def test_quaternion_joint_that_would_be_independent(tmp_path):
     m = Mechanism("rssr")
     crank, rod, rocker = (
-        m.add(Box(n, length=x, width=0.02, mass=1))
-        for n, x in (("a", 0.2), ("b", 0.6), ("c", 0.4))
+        m.add(Box(n, length=x, width=0.02, mass=1)) for n, x in (("a", 0.2), ("b", 0.6), ("c", 0.4))
     )
     m.connect(m.world, Revolute("j1", actuated=True), crank.left)
     m.connect(crank.right, Spherical("s1"), rod.left)

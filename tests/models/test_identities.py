@@ -23,7 +23,9 @@ def test_inertia_is_the_derivative_of_inverse_dynamics(system):
     q, v, a = random_state(system, np.random.default_rng(0))
     idm = mbs.models.inverse_dynamics(system)
     acceleration = SX.sym("a", system.nv)
-    slope = casadi.Function("f", [acceleration], [casadi.jacobian(idm(q, v, acceleration), acceleration)])
+    slope = casadi.Function(
+        "f", [acceleration], [casadi.jacobian(idm(q, v, acceleration), acceleration)]
+    )
     A = np.array(mbs.models.inertia_matrix(system)(q))
     np.testing.assert_allclose(np.array(slope(a)), A, atol=1e-11 * np.abs(A).max())
     np.testing.assert_allclose(A, A.T, atol=1e-12 * np.abs(A).max())
@@ -49,7 +51,9 @@ def lagrange_rate(system, q, v, coordinates="independent", v_tree=None):
 def test_lagrange_form(system):
     q, v, a = random_state(system, np.random.default_rng(2))
     A, B, Q = (np.array(x) for x in mbs.models.lagrange(system)(q, v))
-    friction = np.array([float(link.Fv) for link in system.tree.links for _ in range(link.motion.nv)])
+    friction = np.array(
+        [float(link.Fv) for link in system.tree.links for _ in range(link.motion.nv)]
+    )
     tau = np.array(mbs.models.inverse_dynamics(system)(q, v, a)).ravel()
     np.testing.assert_allclose(
         A @ a + B @ v + Q.ravel() + friction * v, tau, atol=1e-10 * max(1, np.abs(tau).max())
@@ -66,7 +70,9 @@ def test_power_is_the_rate_of_energy(system):
     total = sum(energy(q_s, v_s))
     rate = casadi.jtimes(total, casadi.vertcat(q_s, v_s), casadi.vertcat(system.qdot(q, v), a))
     dE = float(casadi.Function("f", [q_s, v_s], [rate])(q, v))
-    friction = np.array([float(link.Fv) for link in system.tree.links for _ in range(link.motion.nv)])
+    friction = np.array(
+        [float(link.Fv) for link in system.tree.links for _ in range(link.motion.nv)]
+    )
     tau = np.array(mbs.models.inverse_dynamics(system)(q, v, a)).ravel()
     assert v @ (tau - friction * v) == pytest.approx(dE, rel=1e-9, abs=1e-9)
 
@@ -164,7 +170,9 @@ def test_builders_cache(system):
 
 def test_wrong_number_of_values_names_the_coordinates(system):
     idm = mbs.models.inverse_dynamics(system)
-    with pytest.raises(ModelError, match=rf"idm\({system.name}\): q has 1 values, it needs {system.nq}: "):
+    with pytest.raises(
+        ModelError, match=rf"idm\({system.name}\): q has 1 values, it needs {system.nq}: "
+    ):
         idm([0.1], np.zeros(system.nv), np.zeros(system.nv))
 
 

@@ -63,16 +63,12 @@ def planar_loop(seed, links=4, dyads=1):
     turned = 0.0
     for k in range(links):
         body = mechanism.add(random_body(rng, f"bar{k}"))
-        mechanism.connect(
-            before if k == 0 else before.at(lengths[k - 1]), Revolute(f"j{k}"), body
-        )
+        mechanism.connect(before if k == 0 else before.at(lengths[k - 1]), Revolute(f"j{k}"), body)
         guess[f"j{k}"] = float(angles[k] - turned)
         turned = angles[k]
         point = point + lengths[k] * np.array([np.cos(angles[k]), np.sin(angles[k])])
         before = body
-    mechanism.connect(
-        mechanism.world.at(*point, 0.0), Revolute("closing"), before.at(lengths[-1])
-    )
+    mechanism.connect(mechanism.world.at(*point, 0.0), Revolute("closing"), before.at(lengths[-1]))
     return mechanism, guess
 
 

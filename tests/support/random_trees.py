@@ -90,8 +90,10 @@ def _mjcf_joint(joint):
         Motion.FREE: "free",
     }
     for number, freedom in enumerate(joint.freedoms):
-        axis = "" if freedom.motion in (Motion.SPHERICAL, Motion.FREE) else (
-            f'axis="{_text(freedom.axis)}"'
+        axis = (
+            ""
+            if freedom.motion in (Motion.SPHERICAL, Motion.FREE)
+            else (f'axis="{_text(freedom.axis)}"')
         )
         dynamics = "" if freedom.motion is Motion.FREE else f'damping="{Fv!r}" armature="{Ia!r}"'
         lines.append(

@@ -1,0 +1,16 @@
+"""What every error message of mbs has to be."""
+
+import pytest
+
+
+def refused(error, *parts, by):
+    """The call `by` raises `error` with a message of one sentence that holds all the parts."""
+    with pytest.raises(error) as caught:
+        by()
+    message = str(caught.value)
+    for part in parts:
+        assert part in message, message
+    assert "\n" not in message
+    assert not message.endswith(".")
+    assert ". " not in message.replace("..., ", "")
+    return message

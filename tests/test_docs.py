@@ -1,0 +1,60 @@
+"""The pages of docs/ name every component, model and source that there is."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import mbs
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+_SOURCE = re.compile(r"Source:(.*?)(?:\n\s*\n|\"\"\"|\*/)", re.DOTALL)
+_AUTHOR_YEAR = re.compile(
+    r"([A-Z][a-z]+)(?:(?:,| &| and) (?:and )?[A-Z][a-z]+)*,? ((?:19|20)\d\d)\b"
+)
+_ENTRY = re.compile(r"@\w+\{(\w+),\s*author = \{([^,]+),.*?year = \{(\d+)\}", re.DOTALL)
+
+
+def _plain(name: str) -> str:
+    return name.replace(r"{\o}", "o")
+
+
+def test_every_source_in_the_code_is_in_the_bibliography() -> None:
+    text = (DOCS / "references.bib").read_text(encoding="utf-8")
+    known = {(_plain(author), year) for _, author, year in _ENTRY.findall(text)}
+    assert len(known) == text.count("\n@") + 1
+    cited: dict[tuple[str, str], str] = {}
+    for path in (ROOT / "mbs").rglob("*.[pch]*"):
+        if path.suffix in (".py", ".c", ".h"):
+            for source in _SOURCE.findall(path.read_text(encoding="utf-8")):
+                flat = " ".join(source.replace("*", " ").split())
+                cited.update({pair: path.name for pair in _AUTHOR_YEAR.findall(flat)})
+    assert len(cited) > 10
+    assert {pair: where for pair, where in cited.items() if pair not in known} == {}
+
+
+@pytest.mark.parametrize(
+    ("page", "module", "left_out"),
+    [
+        ("components.md", "components", {"Component", "Joint", "Mechanism", "Placed", "Point"}),
+        ("models.md", "models", set()),
+        ("export.md", "export", set()),
+    ],
+)
+def test_page_names_everything(page: str, module: str, left_out: set[str]) -> None:
+    text = (DOCS / page).read_text(encoding="utf-8")
+    names = set(getattr(mbs, module).__all__) - left_out - {"RigidBody"}
+    assert {name for name in names if not re.search(rf"`[\w.]*\b{name}\b", text)} == set()
+
+
+def test_index_links_to_every_page() -> None:
+    text = (DOCS / "index.md").read_text(encoding="utf-8")
+    pages = {page.name for page in DOCS.glob("*.md")} - {"index.md"}
+    assert {page for page in pages if f"]({page})" not in text} == set()
+
+
+def test_version_is_the_same_everywhere() -> None:
+    assert f"## {mbs.__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"version: {mbs.__version__}" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f'version = "{mbs.__version__}"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")

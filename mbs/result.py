@@ -66,6 +66,11 @@ class Result:
         object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
         object.__setattr__(self, "info", MappingProxyType(dict(self.info)))
 
+    def __repr__(self) -> str:
+        rows, columns = self.values.shape
+        span = f", {self.time[0]:g} to {self.time[-1]:g} s" if rows else ""
+        return f"<Result {self.name}: {columns} signals, {rows} rows{span}>"
+
     @classmethod
     def from_structured(
         cls, array: npt.NDArray[Any], units: Mapping[str, str], name: str = ""

@@ -19,7 +19,7 @@ from mbs.assembly.tables import (
     position_coordinates,
     velocity_coordinates,
 )
-from mbs.components import Joint, Mechanism
+from mbs.components import Free, Joint, Mechanism
 from mbs.components.bodies import Mount
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
@@ -88,7 +88,9 @@ def _owners(joint: Joint, guessed: Collection[str]) -> list[str]:
 
 
 def _is_actuated(joint: Joint, in_loops: set[str]) -> bool:
-    return joint.name not in in_loops if joint.actuated is None else joint.actuated
+    if joint.actuated is None:
+        return joint.name not in in_loops and not isinstance(joint, Free)
+    return joint.actuated
 
 
 def _loop_joints(framed: Framed, cut: Cut) -> list[str]:
@@ -149,7 +151,7 @@ def _bodies(mechanism: Mechanism, graph: Graph, framed: Framed) -> tuple[BodyRow
     for body in mechanism.bodies():
         if homes[body.name] >= 0 and not isinstance(body, Mount):
             mass = _mass(mechanism, body.name)
-            rows.append(BodyRow(body.name, homes[body.name], mass))
+            rows.append(BodyRow(body.name, homes[body.name] + 1, mass))
     return tuple(sorted(rows, key=lambda row: row.link))
 
 

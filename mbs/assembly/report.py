@@ -20,7 +20,7 @@ def _tree(system: System) -> list[str]:
         f" {_count(system.nq, 'position')} q and {_count(system.nv, 'velocity')} v."
     ]
     for number, link in enumerate(links, start=1):
-        carried = [row.name for row in system.bodies if row.link == number - 1]
+        carried = [row.name for row in system.bodies if row.link == number]
         before = "the base" if link.antecedent < 0 else f"link {link.antecedent + 1}"
         what = ", ".join(carried) if carried else "a frame without a body"
         lines.append(

@@ -82,6 +82,11 @@ class System:
     closure: Closure | None = None
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        kind = "closed" if self.is_closed else "open"
+        size = f"{len(self.tree.links)} links, nq={self.nq}, nv={self.nv}"
+        return f"<System {self.name}: {kind}, {size}>"
+
     @property
     def nq(self) -> int:
         """Number of positions."""

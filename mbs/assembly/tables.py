@@ -90,7 +90,7 @@ class BodyRow:
 
     Attributes:
         name: of the body.
-        link: number of the link that carries it, -1 for the base.
+        link: number of the link that carries it, from 1.
         mass: [kg], None when a symbol without value is in it.
     """
 

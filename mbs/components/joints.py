@@ -64,7 +64,7 @@ class Joint(Component):
 
     Attributes:
         actuated: whether a motor drives it; None leaves the choice to the assembly: every joint
-            of an open chain is active, a joint of a loop is passive unless it says otherwise.
+            of an open chain is active, a joint of a loop and a Free joint are passive.
         limits: (lower, upper) of its position, or a mapping from the suffix of a coordinate.
         Fv: viscous friction [N m s/rad or N s/m].
         Fs: dry friction [N m or N], which acts as Fs tanh(v / Fs_width).

@@ -162,6 +162,10 @@ class Mechanism:
 
         return assemble(self, {**self.guess, **(guess or {})})
 
+    def __repr__(self) -> str:
+        bodies, joints = len(list(self.bodies())), len(list(self.joints()))
+        return f"<Mechanism {self.name}: {bodies} bodies, {joints} joints>"
+
     def joints(self) -> Iterator[Joint]:
         """Every joint, in the order added."""
         return (c for c in self.components.values() if isinstance(c, Joint))

@@ -64,8 +64,9 @@ def parse_xml(path: str | Path) -> Element:
     Raises:
         DescriptionError: the file is missing or is not XML.
     """
+    text = read_text(path)
     try:
-        return ElementTree.fromstring(read_text(path))
+        return ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
         raise DescriptionError(f"{path}: the file is not XML: {error}; correct it") from None
 

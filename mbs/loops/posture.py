@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.rates import quaternion_slices
-from mbs.errors import LoopError, Unclosable
+from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.closure import closure_rows, facing, labelled_rows
 from mbs.solvers.gauss_newton import Root, gauss_newton
 
@@ -48,17 +48,29 @@ def solve(
         ModelError: a name is unknown.
     """
     names = [system.speeds[k].name for k in system.active]
-    if q_active is None or isinstance(q_active, Mapping):
-        fixed = dict(q_active or {})
-    else:
-        fixed = dict(zip(names, (float(x) for x in q_active), strict=True))
+    fixed = _fixed(system, names, q_active)
     p = system.parameter_values(parameters)
-    held = np.array(system.position({**fixed}))
+    held = np.array(system.position(fixed))
     start = np.array(system.position({**(guess or {}), **fixed}))
     order = [coordinate.name for coordinate in system.coordinates]
     keep = [order.index(name) for name in {**dict.fromkeys(names), **fixed} if name in order]
     start[keep] = held[keep]
     return closed_posture(system, start, keep, p, restarts=_RESTARTS)
+
+
+def _fixed(
+    system: System, names: Sequence[str], values: Mapping[str, float] | Sequence[float] | None
+) -> dict[str, float]:
+    """The given positions by name."""
+    if values is None or isinstance(values, Mapping):
+        return dict(values or {})
+    given = [float(x) for x in np.ravel(values)]
+    if len(given) != len(names):
+        raise ModelError(
+            f"{system.name}: q_active has {len(given)} values, the independent joints are"
+            f" {len(names)}: {', '.join(names)}"
+        )
+    return dict(zip(names, given, strict=True))
 
 
 def closed_posture(

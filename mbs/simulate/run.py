@@ -50,7 +50,7 @@ def run(
         q0: positions at the start by coordinate name [rad or m], the others as in the assembled
             posture; in a closed system the loops are closed with the independent ones as given.
         v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
-            those of independent joints, the others follow.
+            they may be of any joints, and the others follow.
         tau: joint efforts [N m or N]: constants by name, or a function of (t, q, v) made of
             CasADi operations that returns (nv, 1) efforts, or a casadi.Function of (t, q, v).
         parameters: values of symbols, the others at their defaults.
@@ -119,26 +119,42 @@ def _start(
 ) -> tuple[Array, Array]:
     """Positions that close the loops and velocities that fit them."""
     q = np.array(system.position(q0))
-    v = np.array(system.velocity(v0))
     if not system.is_closed:
-        return q, v
+        return q, np.array(system.velocity(v0))
     if isinstance(q0, Mapping) or q0 is None:
         q = solve(system, dict(q0 or {}), parameters=parameters)
     else:
         require_closed(system, q, parameters)
-    return q, _tree_velocity(system, q, v, parameters)
+    return q, _tree_velocity(system, q, v0, parameters)
 
 
 def _tree_velocity(
-    system: System, q: Array, v: Array, parameters: Mapping[str, float] | None
+    system: System, q: Array, v0: Values, parameters: Mapping[str, float] | None
 ) -> Array:
+    """The smallest independent velocities that give the joints named in v0 theirs, and all others.
+
+    Raises:
+        ModelError: no motion of the loops has these velocities.
+    """
+
     def build() -> Function:
         symbols = SX.sym("q", system.nq)
         return Function("G", [symbols, system.p], [reduction(system, symbols).G])
 
     G = np.array(system.cached("G", build)(q, system.parameter_values(parameters)))
-    result: Array = G @ v[list(system.active)]
-    return result
+    wanted = np.array(system.velocity(v0))
+    names = [speed.name for speed in system.speeds]
+    named = v0 is None or isinstance(v0, Mapping)
+    rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
+    v_a = np.linalg.lstsq(G[rows], wanted[rows], rcond=None)[0]
+    v: Array = G @ v_a
+    if not np.allclose(v[rows], wanted[rows], rtol=1e-6, atol=1e-9):
+        told = ", ".join(f"{names[k]} = {wanted[k]:g}" for k in rows)
+        raise ModelError(
+            f"{system.name}: the loops allow no motion with the velocities {told};"
+            " give those of independent joints: " + ", ".join(names[k] for k in system.active)
+        )
+    return v
 
 
 def _result(system: System, state: FullState, times: Array, x: Array, p: Sequence[float]) -> Result:

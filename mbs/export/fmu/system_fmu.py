@@ -97,9 +97,7 @@ def _states(system: System, state: MinimalState, start: list[float]) -> tuple[St
                 name=f"{coordinate.name}.q",
                 unit=coordinate.unit,
                 start=value,
-                min=coordinate.limits[0] if coordinate.limits else None,
-                max=coordinate.limits[1] if coordinate.limits else None,
-                description=f"position of {coordinate.name}",
+                description=f"position of {coordinate.name}{_limits(coordinate)}",
                 derivative_unit=rate,
                 output=True,
             )
@@ -115,6 +113,14 @@ def _states(system: System, state: MinimalState, start: list[float]) -> tuple[St
         for speed in (system.speeds[k] for k in system.active)
     ]
     return (*positions, *velocities)
+
+
+def _limits(coordinate: Coordinate) -> str:
+    """The limits in words: nothing in the model enforces them, so they are no min and max."""
+    if coordinate.limits is None:
+        return ""
+    low, high = coordinate.limits
+    return f", whose joint is limited to {low:g} .. {high:g} {coordinate.unit}"
 
 
 def _rate(coordinate: Coordinate) -> str:

@@ -108,18 +108,26 @@ def grown(inner):
     binary = st.tuples(st.sampled_from("+-*/"), st.tuples(inner, inner))
     power = st.tuples(st.just("^"), st.tuples(inner, inner | st.sampled_from([Number(2.0)])))
     unary = st.tuples(st.sampled_from(["negate", "sin", "cos"]), st.tuples(inner))
-    arcs = st.tuples(st.just("atan2"), st.tuples(inner, inner))
+    right = st.sampled_from([Parameter("A"), Parameter("L2")])  # where no sign of a zero matters
+    arcs = st.tuples(st.just("atan2"), st.tuples(inner, right))
     return (binary | power | unary | arcs).map(lambda parts: Operation(*parts))
+
+
+def read_or_refused(text, where="value"):
+    """The expression and no message, or no expression and the message."""
+    try:
+        return expression(text, where), ""
+    except ExpressionError as refusal:
+        return None, str(refusal)
 
 
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.recursive(leaves, grown, max_leaves=12))
 def test_text_round_trip(value):
     wanted = to_float(value, VALUES)
-    try:
-        back = expression(str(value))
-    except ExpressionError as error:
-        assert "is not a finite number" in str(error)  # constants such as 1/0 are refused
+    back, refusal = read_or_refused(str(value))
+    if back is None:  # constants such as 1/0 are refused
+        assert "is not a finite number" in refusal
         return
     found = to_float(back, VALUES)
     if wanted is None or found is None:
@@ -143,10 +151,9 @@ def test_sx_and_float_agree(value):
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.text(alphabet="AB12.+-*/^(),sincopt e_", max_size=14) | st.text(max_size=10))
 def test_any_text_is_read_or_refused_with_our_error(text):
-    try:
-        value = expression(text, "link")
-    except ExpressionError as error:
-        assert str(error).startswith("link: ")
+    value, refusal = read_or_refused(text, "link")
+    if value is None:
+        assert refusal.startswith("link: ")
     else:
         assert expression(str(value)) is not None
 
@@ -172,7 +179,7 @@ def test_defaults_and_given_values():
 
 
 REFUSED = [
-    ("__import__('os').system('x')", "unexpected \"'\""),
+    ("__import__('os').system('x')", 'unexpected "\'"'),
     ("__import__(os)", "'__import__' is not a function here"),
     ("eval(1)", "'eval' is not a function here"),
     ("exec(A)", "'exec' is not a function here"),
@@ -233,13 +240,29 @@ REFUSED = [
 
 @pytest.mark.parametrize(("text", "reason"), REFUSED, ids=range(len(REFUSED)))
 def test_texts_that_are_refused(text, reason):
-    message = refused(ExpressionError, "arm/j3, d: ", reason, by=lambda: expression(text, "arm/j3, d"))
+    message = refused(
+        ExpressionError, "arm/j3, d: ", reason, by=lambda: expression(text, "arm/j3, d")
+    )
     assert len(message) < 400
 
 
 @pytest.mark.parametrize(
     "value",
-    [None, True, False, math.nan, math.inf, -math.inf, np.nan, [1], (1,), 1j, b"1", 10**400, np.zeros(2)],
+    [
+        None,
+        True,
+        False,
+        math.nan,
+        math.inf,
+        -math.inf,
+        np.nan,
+        [1],
+        (1,),
+        1j,
+        b"1",
+        10**400,
+        np.zeros(2),
+    ],
     ids=repr,
 )
 def test_values_that_are_refused(value):
@@ -261,10 +284,8 @@ def test_long_chains_of_operations_can_still_be_used():
     assert to_float(value, {"A": 2.0}) == 300
     assert number_of_sx(value, {"A": 2.0}) == 300
     assert to_float(str(renamed(value, "x")), {"x.A": 1.0}) == 150
-    built = Parameter("A")
     with pytest.raises(ExpressionError, match="split it into shorter ones"):
-        for _ in range(300):
-            built = built + 1
+        sum([Parameter("A")] * 300)
 
 
 def test_constants_fold():
@@ -275,10 +296,30 @@ def test_constants_fold():
 
 @pytest.mark.parametrize(
     "name",
-    ["", " A", "A ", "A\n", "2A", "a b", "a-b", "a..b", ".a", "é", "sin", "sqrt", "pi", "nan", "Inf", 3, None],
+    [
+        "",
+        " A",
+        "A ",
+        "A\n",
+        "2A",
+        "a b",
+        "a-b",
+        "a..b",
+        ".a",
+        "é",
+        "sin",
+        "sqrt",
+        "pi",
+        "nan",
+        "Inf",
+        3,
+        None,
+    ],
 )
 def test_names_that_are_refused(name):
-    refused(ExpressionError, f"parameter {name!r}: ", "choose another name", by=lambda: Parameter(name))
+    refused(
+        ExpressionError, f"parameter {name!r}: ", "choose another name", by=lambda: Parameter(name)
+    )
 
 
 @pytest.mark.parametrize("name", ["A", "_x", "L2", "arm.L2", "a.b.c_1", "sine", "PI", "lambda"])
@@ -290,13 +331,17 @@ def test_units():
     for unit in UNITS:
         assert Parameter("A", unit=unit).unit == unit
     refused(
-        ExpressionError, "parameter A: unit 'kg m' is unknown; use one of 1, s, rad", by=lambda: Parameter("A", unit="kg m")
+        ExpressionError,
+        "parameter A: unit 'kg m' is unknown; use one of 1, s, rad",
+        by=lambda: Parameter("A", unit="kg m"),
     )
 
 
 @pytest.mark.parametrize("value", ["x", True, math.nan, "1"])
 def test_defaults_are_numbers(value):
-    refused(ExpressionError, "parameter A: ", "is not a finite number", by=lambda: Parameter("A", value))
+    refused(
+        ExpressionError, "parameter A: ", "is not a finite number", by=lambda: Parameter("A", value)
+    )
 
 
 def test_scopes():

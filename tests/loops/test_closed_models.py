@@ -7,7 +7,7 @@ from support.closed_mechanisms import CLOSING, closed_chain, planar_loop
 
 import mbs.models
 from mbs.loops import closure, closure_jacobian, solve
-
+from mbs.loops.reduction import reduction
 
 CASES = [
     *(pytest.param((closed_chain, seed, kind), id=kind) for seed, kind in enumerate(CLOSING)),
@@ -56,7 +56,7 @@ def test_direct_dynamics(closed):
     ddm = mbs.models.direct_dynamics(closed)
     in_tree = mbs.models.direct_dynamics(closed, coordinates="tree")
     active = list(closed.active)
-    G = np.array(closed_G(closed)(q))
+    G = np.array(reduction_function(closed)(q))
     for _ in range(3):
         v_a = rng.uniform(-1, 1, len(active))
         tau_a = rng.uniform(-5, 5, len(active))
@@ -64,7 +64,7 @@ def test_direct_dynamics(closed):
         tau[active] = tau_a
         expected = reference(closed, q, G @ v_a, tau)
         scale = max(1.0, np.abs(expected).max())
-        a, lam = in_tree(q, G @ v_a, tau)
+        a, _ = in_tree(q, G @ v_a, tau)
         np.testing.assert_allclose(np.array(a).ravel(), expected, atol=2e-7 * scale)
         a_a = np.array(ddm(q, v_a, tau_a)).ravel()
         np.testing.assert_allclose(a_a, np.array(a).ravel()[active], atol=1e-9 * scale)
@@ -72,10 +72,8 @@ def test_direct_dynamics(closed):
         np.testing.assert_allclose(back, tau_a, atol=1e-9 * max(1, np.abs(tau_a).max()))
 
 
-def closed_G(system):
+def reduction_function(system):
     q = casadi.SX.sym("q", system.nq)
-    from mbs.loops.reduction import reduction
-
     return casadi.Function("G", [q], [reduction(system, q).G])
 
 

@@ -32,7 +32,12 @@ def slide(axis, distance):
 
 def formula(gamma, b, alpha, d, theta, r):
     return (
-        turn("z", gamma) @ slide("z", b) @ turn("x", alpha) @ slide("x", d) @ turn("z", theta) @ slide("z", r)
+        turn("z", gamma)
+        @ slide("z", b)
+        @ turn("x", alpha)
+        @ slide("x", d)
+        @ turn("z", theta)
+        @ slide("z", r)
     )
 
 
@@ -75,7 +80,9 @@ def test_of_any_pose(seed):
 
 
 @pytest.mark.parametrize("up", [1, -1])
-@pytest.mark.parametrize("p", [(0, 0, 0), (0, 0, 2), (1.5, 0, 0), (-1.5, 0, 3), (0, 2, 1), (0.3, -0.4, 5)])
+@pytest.mark.parametrize(
+    "p", [(0, 0, 0), (0, 0, 2), (1.5, 0, 0), (-1.5, 0, 3), (0, 2, 1), (0.3, -0.4, 5)]
+)
 def test_parallel_axes_have_no_b(up, p):
     R = np.array([[0.6, -0.8 * up, 0], [0.8, 0.6 * up, 0], [0, 0, up]])
     back = Khalil.of_pose(Pose(SX(DM(R)), SX(DM(np.array(p, dtype=float)))))
@@ -91,7 +98,9 @@ def test_parallel_axes_have_no_b(up, p):
 def test_intersecting_axes_have_no_d():
     given_ = frame(0.4, 0.7, 1.1, 0.0, -0.3, 0.0)
     back = Khalil.of_pose(given_.pose())
-    assert [float(x) for x in back.parameters] == pytest.approx([0.4, 0.7, 1.1, 0, -0.3, 0], abs=1e-13)
+    assert [float(x) for x in back.parameters] == pytest.approx(
+        [0.4, 0.7, 1.1, 0, -0.3, 0], abs=1e-13
+    )
     assert back.d.is_zero()
     assert back.r.is_zero()
 
@@ -99,7 +108,9 @@ def test_intersecting_axes_have_no_d():
 @pytest.mark.parametrize("alpha", [np.pi / 2, -np.pi / 2])
 def test_orthogonal_axes_stay_exact(alpha):
     back = Khalil.of_pose(frame(0, 0.2, alpha, 0.5, np.pi / 2, 0.3).pose())
-    assert [float(x) for x in back.parameters] == pytest.approx([0, 0.2, alpha, 0.5, np.pi / 2, 0.3], abs=1e-15)
+    assert [float(x) for x in back.parameters] == pytest.approx(
+        [0, 0.2, alpha, 0.5, np.pi / 2, 0.3], abs=1e-15
+    )
     assert set(np.unique(numbers(back.pose().R))) <= {-1.0, 0.0, 1.0}
 
 
@@ -119,8 +130,13 @@ LAYOUTS = [
     lambda L, h: Pose.moved(casadi.vertcat(0, 0, L)),
     lambda L, h: Pose.moved(casadi.vertcat(L, h, 0)),
     lambda L, h: Pose.moved(casadi.vertcat(L, h, 0.4)),
-    lambda L, h: Pose.moved(casadi.vertcat(L, 0, h)) @ Pose.turned(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]]))),
-    lambda L, h: Pose.moved(casadi.vertcat(L, h, h)) @ Pose.turned(SX(DM([[0, 0, 1], [1, 0, 0], [0, 1, 0]]))),
+    lambda L, h: (
+        Pose.moved(casadi.vertcat(L, 0, h))
+        @ Pose.turned(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
+    ),
+    lambda L, h: (
+        Pose.moved(casadi.vertcat(L, h, h)) @ Pose.turned(SX(DM([[0, 0, 1], [1, 0, 0], [0, 1, 0]])))
+    ),
     lambda L, h: Pose.moved(casadi.vertcat(h, 0.2, -L)) @ frame(0.3, 0, 0.7, 0, 0.1, 0).pose(),
     lambda L, h: frame(0.3, 0, 0.7, 0, 0.1, 0).pose() @ Pose.moved(casadi.vertcat(h, L, -L)),
     lambda L, h: Khalil(SX(0.2), L, h, 2 * L, SX(0.4), h).pose(),

@@ -18,7 +18,7 @@ def number(value, *pairs):
 
 
 def rodrigues(axis, angle):
-    K = np.array(skew(SX(DM(axis))), dtype=object).astype(float)
+    K = DM(skew(SX(DM(axis)))).full()
     return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
 
 
@@ -37,7 +37,9 @@ def test_other_angles_are_not_rounded(angle):
 
 
 @pytest.mark.parametrize("k", range(-5, 6))
-@pytest.mark.parametrize("written", ["q+k", "k+q", "k-q", "q-k", "(q+k/2)+k/2", "k+(q+q)", "k-(q-q2)"])
+@pytest.mark.parametrize(
+    "written", ["q+k", "k+q", "k-q", "q-k", "(q+k/2)+k/2", "k+(q+q)", "k-(q-q2)"]
+)
 def test_quarter_turns_leave_the_constant_out_of_the_graph(k, written):
     q, q2, x, x2 = SX.sym("q"), SX.sym("q2"), 0.37, -0.9
     turn = k * np.pi / 2
@@ -53,8 +55,14 @@ def test_quarter_turns_leave_the_constant_out_of_the_graph(k, written):
     s, c = sin_cos(SX(forms[written](q, q2)))
     angle = forms[written](x, x2)
     f = casadi.Function("f", [q, q2], [s, c])
-    np.testing.assert_allclose(np.array(f(x, x2)).ravel(), [np.sin(angle), np.cos(angle)], atol=1e-15)
-    constants = [f.instruction_constant(n) for n in range(f.n_instructions()) if f.instruction_id(n) == casadi.OP_CONST]
+    np.testing.assert_allclose(
+        np.array(f(x, x2)).ravel(), [np.sin(angle), np.cos(angle)], atol=1e-15
+    )
+    constants = [
+        f.instruction_constant(n)
+        for n in range(f.n_instructions())
+        if f.instruction_id(n) == casadi.OP_CONST
+    ]
     assert all(abs(value) <= 2 for value in constants)
     assert not any(abs(value - abs(turn)) < 1e-9 for value in map(abs, constants) if turn)
 
@@ -69,10 +77,14 @@ def test_turns_against_matrices(axis):
     np.testing.assert_allclose(number(turn.matrix, (q, 0.7)), R, atol=1e-15)
     v = rng.standard_normal(3)
     np.testing.assert_allclose(number(turn.apply(SX(DM(v))), (q, 0.7)).ravel(), R @ v, atol=1e-15)
-    np.testing.assert_allclose(number(turn.apply_inverse(SX(DM(v))), (q, 0.7)).ravel(), R.T @ v, atol=1e-15)
+    np.testing.assert_allclose(
+        number(turn.apply_inverse(SX(DM(v))), (q, 0.7)).ravel(), R.T @ v, atol=1e-15
+    )
     J = rng.standard_normal((3, 3))
     J = J + J.T
-    np.testing.assert_allclose(number(turn.apply_to_tensor(SX(DM(J))), (q, 0.7)), R @ J @ R.T, atol=1e-14)
+    np.testing.assert_allclose(
+        number(turn.apply_to_tensor(SX(DM(J))), (q, 0.7)), R @ J @ R.T, atol=1e-14
+    )
 
 
 def test_matrix_turn_is_the_same_as_its_matrix():
@@ -80,7 +92,9 @@ def test_matrix_turn_is_the_same_as_its_matrix():
     R, v, J = random_rotation(rng), rng.standard_normal(3), np.diag([1.0, 2.0, 3.0])
     turn = MatrixTurn(SX(DM(R)))
     np.testing.assert_allclose(DM(turn.apply(SX(DM(v)))).full().ravel(), R @ v, atol=1e-15)
-    np.testing.assert_allclose(DM(turn.apply_inverse(SX(DM(v)))).full().ravel(), R.T @ v, atol=1e-15)
+    np.testing.assert_allclose(
+        DM(turn.apply_inverse(SX(DM(v)))).full().ravel(), R.T @ v, atol=1e-15
+    )
     np.testing.assert_allclose(DM(turn.apply_to_tensor(SX(DM(J)))).full(), R @ J @ R.T, atol=1e-14)
 
 
@@ -90,7 +104,9 @@ def test_turning_a_tensor_costs_nine_multiplications():
 
     a = [SX.sym(f"a{k}") for k in range(6)]
     J = casadi.vertcat(
-        casadi.horzcat(a[0], a[1], a[2]), casadi.horzcat(a[1], a[3], a[4]), casadi.horzcat(a[2], a[4], a[5])
+        casadi.horzcat(a[0], a[1], a[2]),
+        casadi.horzcat(a[1], a[3], a[4]),
+        casadi.horzcat(a[2], a[4], a[5]),
     )
     f = casadi.Function("f", [s, c, *a], [Turn("z", s, c).apply_to_tensor(J)])
     kinds = [f.instruction_id(n) for n in range(f.n_instructions())]
@@ -98,7 +114,9 @@ def test_turning_a_tensor_costs_nine_multiplications():
     assert kinds.count(casadi.OP_MUL) + kinds.count(casadi.OP_TWICE) <= 10
 
 
-@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)])
+@pytest.mark.parametrize(
+    "axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)]
+)
 def test_align_z_of_a_coordinate_axis_has_only_coordinate_axes(axis):
     R = DM(align_z(np.array(axis, dtype=float))).full()
     assert set(np.unique(R)) <= {-1.0, 0.0, 1.0}
@@ -107,8 +125,12 @@ def test_align_z_of_a_coordinate_axis_has_only_coordinate_axes(axis):
 
 
 def test_align_z_documented_order():
-    np.testing.assert_array_equal(DM(align_z(np.array([1.0, 0, 0]))).full(), np.eye(3)[:, [1, 2, 0]])
-    np.testing.assert_array_equal(DM(align_z(np.array([0, 1.0, 0]))).full(), np.eye(3)[:, [2, 0, 1]])
+    np.testing.assert_array_equal(
+        DM(align_z(np.array([1.0, 0, 0]))).full(), np.eye(3)[:, [1, 2, 0]]
+    )
+    np.testing.assert_array_equal(
+        DM(align_z(np.array([0, 1.0, 0]))).full(), np.eye(3)[:, [2, 0, 1]]
+    )
     np.testing.assert_array_equal(DM(align_z(np.array([0, 0, 1.0]))).full(), np.eye(3))
 
 

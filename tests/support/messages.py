@@ -1,5 +1,7 @@
 """What every error message of mbs has to be."""
 
+import re
+
 import pytest
 
 
@@ -12,5 +14,5 @@ def refused(error, *parts, by):
         assert part in message, message
     assert "\n" not in message
     assert not message.endswith(".")
-    assert ". " not in message.replace("..., ", "")
+    assert not re.search(r"[^.\s\d]\. +[A-Z]", message), message
     return message

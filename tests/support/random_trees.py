@@ -97,7 +97,8 @@ def _mjcf_joint(joint):
         )
         dynamics = "" if freedom.motion is Motion.FREE else f'damping="{Fv!r}" armature="{Ia!r}"'
         lines.append(
-            f'<joint name="{joint.name}_{number}" type="{kinds[freedom.motion]}" {axis} {dynamics}/>'
+            f'<joint name="{joint.name}_{number}" type="{kinds[freedom.motion]}"'
+            f" {axis} {dynamics}/>"
         )
     return "\n".join(lines)
 
@@ -143,13 +144,11 @@ def random_tree(seed, n=4, kinds=KINDS, aligned=False, serial=False):
         bodies.append(body)
         J = [float(str(x)) for x in body.inertia]
         xml.append(
-            (
-                f'<body name="{body.name}" pos="{_text(p)}" quat="{_text(_quaternion(R))}">'
-                f"{_mjcf_joint(joint)}"
-                f'<inertial mass="{float(str(body.mass))!r}"'
-                f' pos="{_text([float(str(c)) for c in body.com])}"'
-                f' fullinertia="{_text([J[0], J[3], J[5], J[1], J[2], J[4]])}"/>'
-            )
+            f'<body name="{body.name}" pos="{_text(p)}" quat="{_text(_quaternion(R))}">'
+            f"{_mjcf_joint(joint)}"
+            f'<inertial mass="{float(str(body.mass))!r}"'
+            f' pos="{_text([float(str(c)) for c in body.com])}"'
+            f' fullinertia="{_text([J[0], J[3], J[5], J[1], J[2], J[4]])}"/>'
         )
         children[parent].append(k + 1)
 

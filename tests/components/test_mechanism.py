@@ -1,0 +1,288 @@
+"""Mechanisms: adding, connecting, nesting, and what they refuse."""
+
+import numpy as np
+import pytest
+from support.messages import refused
+
+import mbs
+import mbs.models
+from mbs.components import Body, Coupling, Fixed, PointMass, Revolute
+from mbs.errors import AssemblyError, DescriptionError
+from mbs.expressions import Parameter
+
+
+@pytest.fixture
+def m():
+    mechanism = mbs.Mechanism("m")
+    body = mechanism.add(Body("b", 1, (0.1, 0, 0), (0.1, 0.1, 0.1)))
+    mechanism.connect(mechanism.world, Revolute("j"), body)
+    return mechanism
+
+
+def body(m):
+    return m.components["b"]
+
+
+@pytest.mark.parametrize(
+    ("call", "parts"),
+    [
+        (
+            lambda m: m.add(Body("b")),
+            ["m: two components are named 'b' (Body and Body)", "rename one"],
+        ),
+        (
+            lambda m: m.add(Revolute("b")),
+            ["m: two components are named 'b' (Body and Revolute)", "rename"],
+        ),
+        (lambda m: m.add("b"), ["m: 'b' is no component", "add a body"]),
+        (lambda m: m.add(None), ["m: None is no component", "add a body"]),
+        (lambda m: m.add(m), ["m: a mechanism cannot be added to itself", "add it to another one"]),
+        (
+            lambda m: m.connect(m.world, Revolute("j"), body(m)),
+            ["two components are named 'j'", "rename one"],
+        ),
+        (
+            lambda m: m.connect(m.world, m.components["j"], body(m)),
+            ["frame_a of joint 'j' is connected twice", "use one joint"],
+        ),
+        (
+            lambda m: m.connect(m.components["j"].frame_b, body(m)),
+            ["frame_b of joint 'j' is connected twice", "use one joint"],
+        ),
+        (
+            lambda m: m.connect(m.world, Revolute("k")),
+            ["m: joint 'k' has nothing on its other side", "write connect"],
+        ),
+        (
+            lambda m: m.connect(m.world, Revolute("k"), "b"),
+            ["m: 'b' is not a point", "give a body"],
+        ),
+        (
+            lambda m: m.connect(None, Revolute("k"), body(m)),
+            ["m: None is not a point", "give a body"],
+        ),
+        (
+            lambda m: m.connect(m.world, Revolute("k"), m.components["j"]),
+            ["m: Revolute 'j' is not a point", "joint.frame_a"],
+        ),
+        (
+            lambda m: m.connect(m.world, body(m), body(m)),
+            ["m: Body 'b' stands where a joint belongs", "write connect"],
+        ),
+        (
+            lambda m: m.connect(m.world, Revolute("k"), Body("c")),
+            ["m: 'c' is connected but is not part", "call add(c) first"],
+        ),
+        (
+            lambda m: m.connect(m.world, Revolute("k"), Body("b")),
+            ["m: 'b' is connected but is not part", "call add(b) first"],
+        ),
+        (
+            lambda m: m.add_frame("b", body(m)),
+            ["m: the frame name 'b' is taken", "choose another name"],
+        ),
+        (
+            lambda m: m.add_frame("base", body(m)),
+            ["m: the frame name 'base' is taken", "choose another name"],
+        ),
+        (
+            lambda m: m.add_frame("my tool", body(m)),
+            ["'my tool': ", "no blanks", "choose another name"],
+        ),
+        (
+            lambda m: m.add_frame("tool", Body("c")),
+            ["m: 'c' is connected but is not part", "call add(c) first"],
+        ),
+        (lambda m: m.cut(Revolute("k")), ["m: joint 'k' is not connected", "connect it before"]),
+        (lambda m: m.cut("j"), ["m: 'j' is not a joint", "cut a joint"]),
+    ],
+)
+def test_refused(m, call, parts):
+    refused(DescriptionError, *parts, by=lambda: call(m))
+
+
+def test_a_frame_name_is_taken_for_frames_and_components(m):
+    m.add_frame("tool", body(m).at(1))
+    refused(
+        DescriptionError,
+        "m: the frame name 'tool' is taken",
+        by=lambda: m.add_frame("tool", body(m)),
+    )
+    refused(
+        DescriptionError,
+        "m: 'tool' is the name of a frame",
+        "rename",
+        by=lambda: m.add(Body("tool")),
+    )
+
+
+def test_names_of_mechanisms_and_parameters():
+    refused(
+        DescriptionError,
+        "'two words'",
+        "choose another name",
+        by=lambda: mbs.Mechanism("two words"),
+    )
+    refused(
+        DescriptionError,
+        "parameter 'two words'",
+        "choose",
+        by=lambda: mbs.Mechanism("m", parameters={"two words": 1}),
+    )
+
+
+def test_a_parameter_has_one_value(m):
+    L = Parameter("L", 1.0)
+    m.connect(body(m).at(L), m.add(PointMass("p", Parameter("L", 2.0))))
+    refused(
+        AssemblyError, "m: parameter L has the values", "1", "2", "give it one", by=m.parameters
+    )
+
+
+def test_a_parameter_is_used():
+    m = mbs.Mechanism("m", parameters={"L": 1.0})
+    m.connect(m.world.at("d"), Revolute("j", Fv="c"), m.add(Body("b", "mass")))
+    refused(
+        AssemblyError, "m: parameter 'L' is used by no component", "mass, c, d", by=m.parameters
+    )
+
+
+def test_values_of_parameters():
+    m = mbs.Mechanism("m", parameters={"L": 0.3})
+    b = m.add(Body("b", Parameter("m", 2.0, "kg")))
+    m.connect(m.world.at("L"), Revolute("j"), b)
+    m.add_frame("tool", b.at("2*L", "h"))
+    assert [(p.name, p.default) for p in m.parameters()] == [("m", 2.0), ("L", 0.3), ("h", None)]
+    assert m.parameters()[0].unit == "kg"
+    late = mbs.Mechanism("m")
+    b = late.add(Body("b", "m"))
+    late.connect(late.world.at(Parameter("m", 5.0)), Revolute("j"), b)
+    assert [(p.name, p.default) for p in late.parameters()] == [("m", 5.0)]
+
+
+def arm(name="arm", **options):
+    inner = mbs.Mechanism(name, **options)
+    upper, fore = (
+        inner.add(Body(n, Parameter("m", 1.5), ("L/2", 0, 0), (0, 0.1, 0.1)))
+        for n in ("upper", "fore")
+    )
+    inner.connect(inner.world, Revolute("shoulder"), upper)
+    inner.connect(upper.at("L"), Revolute("elbow"), fore)
+    inner.add_frame("hand", fore.at("L"))
+    return inner
+
+
+def test_two_of_one_kind():
+    m = mbs.Mechanism("pair", gravity=(0, -9.81, 0))
+    left = m.add(arm(parameters={"L": 0.4}), name="left")
+    right = m.add(arm(parameters={"L": 0.6}), name="right")
+    m.connect(m.world, left.base)
+    m.connect(m.world.at(2, rotation=("z", np.pi / 2)), right.base)
+    m.add(Coupling("gear", "left.elbow", "right.elbow"))
+    system = m.assemble()
+    assert [p.name for p in system.parameters] == ["left.m", "left.L", "right.m", "right.L"]
+    assert system.p_default == [1.5, 0.4, 1.5, 0.6]
+    assert [c.name for c in system.coordinates] == [
+        "left.shoulder",
+        "left.elbow",
+        "right.shoulder",
+        "right.elbow",
+    ]
+    hand = mbs.models.transform(system, "right.hand")
+    T = np.array(hand([0, 0, 0, 0], system.p_default))
+    np.testing.assert_allclose(T[:3, 3], [2, 1.2, 0], atol=1e-15)
+    assert left["elbow"].name == "left.elbow"
+    assert left.body("fore").name == "left.fore"
+    assert right.point("hand").owner.name == "right.fore"
+    assert [row.name for row in system.bodies] == [
+        "left.upper",
+        "left.fore",
+        "right.upper",
+        "right.fore",
+    ]
+
+
+def test_nesting_twice():
+    middle = mbs.Mechanism("middle")
+    middle.connect(middle.world.at(0, 0, 1), middle.add(arm()).base)
+    m = mbs.Mechanism("outer")
+    placed = m.add(middle)
+    m.connect(m.world, placed.base)
+    system = m.assemble()
+    assert [c.name for c in system.coordinates] == ["middle.arm.shoulder", "middle.arm.elbow"]
+    assert [p.name for p in system.parameters] == ["middle.arm.m", "middle.arm.L"]
+    T = np.array(mbs.models.transform(system, "middle.arm.hand")([0, 0], [1, 0.5]))
+    np.testing.assert_allclose(T[:3, 3], [1, 0, 1])
+
+
+def test_nested_cuts_and_guesses():
+    loop = mbs.load("four_bar")
+    loop.cut(loop.components["j2"])
+    loop.guess = {"j3": -1.8}
+    m = mbs.Mechanism("m", gravity=(0, -9.81, 0))
+    placed = m.add(loop, name="loop")
+    m.connect(m.world, placed.base)
+    system = m.assemble()
+    assert [cut.edge.joint.name for cut in system.cuts] == ["loop.j2"]
+    alone = loop.assemble()
+    np.testing.assert_allclose(sorted(system.posture), sorted(alone.posture), atol=1e-9)
+
+
+def test_handles_refuse_unknown_names():
+    m = mbs.Mechanism("m")
+    placed = m.add(arm())
+    refused(
+        DescriptionError,
+        "'arm.wrist' does not exist; the components are",
+        "arm.elbow",
+        by=lambda: placed["wrist"],
+    )
+    refused(
+        DescriptionError,
+        "arm.elbow is a Revolute, not a body; name a body",
+        by=lambda: placed.body("elbow"),
+    )
+    refused(
+        DescriptionError,
+        "'arm.foot' is not a frame; the frames are ['arm.hand']",
+        by=lambda: placed.point("foot"),
+    )
+    refused(
+        DescriptionError, "m: two components are named 'arm'; rename one", by=lambda: m.add(arm())
+    )
+
+
+def test_scopes_of_parameters_are_names():
+    m = mbs.Mechanism("m")
+    refused(
+        DescriptionError,
+        "m: 'my-arm' cannot stand before",
+        "write add(mechanism, name=...)",
+        by=lambda: m.add(arm("my-arm")),
+    )
+    assert m.add(arm("my-arm"), name="my_arm").scope == "my_arm"
+
+
+def test_a_nested_mechanism_is_to_be_connected():
+    m = mbs.Mechanism("m")
+    m.add(arm())
+    refused(
+        AssemblyError,
+        "m: no chain of joints leads from the world to 'arm.",
+        "connect it",
+        by=m.assemble,
+    )
+
+
+def test_welds_keep_the_bodies_apart_in_the_description(m):
+    m.connect(body(m).at(1), m.add(PointMass("load", 2)))
+    m.connect(body(m).at(0, 1), Fixed("glue"), m.add(PointMass("lamp", 3)))
+    system = m.assemble()
+    assert [(row.name, row.link, row.mass) for row in system.bodies] == [
+        ("b", 1, 1.0),
+        ("load", 1, 2.0),
+        ("lamp", 1, 3.0),
+    ]
+    assert float(system.tree.links[0].inertia.m) == 6
+    assert [j.name for j in m.joints()] == ["j", "glue"]
+    assert [b.name for b in m.bodies()] == ["b", "load", "lamp"]

@@ -37,6 +37,8 @@ _TOKEN = re.compile(
     re.ASCII,
 )
 _NOT_NUMBERS = ("nan", "inf", "infinity")
+_ROUNDING = 4e-16
+"""Functions of quarter turns miss -1, 0 and 1 by this much; they are put exactly there."""
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "negate": 3, "^": 4}
 _DEEPEST_NESTING = 100
 _LONGEST_CHAIN = 200
@@ -236,7 +238,11 @@ def _apply_float(operator: str, values: list[float]) -> float:
     try:
         with np.errstate(all="ignore"):
             result = _arithmetic(operator, [np.float64(v) for v in values])
-        return float(result if result is not None else getattr(math, operator)(*values))
+        if result is None:
+            result = getattr(math, operator)(*values)
+            nearest = round(result)
+            result = nearest if abs(result - nearest) < _ROUNDING else result
+        return float(result)
     except (ArithmeticError, ValueError):
         return math.nan
 

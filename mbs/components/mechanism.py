@@ -114,10 +114,11 @@ class Mechanism:
                     f"{self.name}: joint {joint_or_point.name!r} has nothing on its other side;"
                     " write connect(point, joint, point)"
                 )
+            before, after = self._point(a), self._point(b)
             if self.components.get(joint_or_point.name) is not joint_or_point:
                 self.add(joint_or_point)
-            self._weld(self._point(a), joint_or_point.frame_a)
-            self._weld(joint_or_point.frame_b, self._point(b))
+            self._weld(before, joint_or_point.frame_a)
+            self._weld(joint_or_point.frame_b, after)
             return
         if b is not None:
             raise DescriptionError(

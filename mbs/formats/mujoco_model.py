@@ -41,7 +41,7 @@ class MjcfModel:
             component_name(model.joint(j).name) or _joint_name(model, j, bodies)
             for j in range(model.njnt)
         )
-        bodies = tuple(_apart(name, joints, "body") for name in bodies)
+        bodies = tuple(_apart(name, {*joints, "base"}, "body") for name in bodies)
         sites = _names((model.site(k).name for k in range(model.nsite)), "site")
         taken = {*bodies, *joints, "base"}
         return MjcfModel(

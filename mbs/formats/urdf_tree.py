@@ -40,9 +40,11 @@ class UrdfTree:
         return Reader(f"{self.path}: {what}")
 
     def body_name(self, link: str) -> str:
-        """The name of the body of a link; joints keep theirs where both are equal."""
+        """The name of the body of a link; joints, and the base of all models, keep theirs."""
         name = component_name(link)
         taken = {component_name(joint.name) for joint in self.joints if joint.kind != "fixed"}
+        if link != self.root:
+            taken.add("base")
         return f"{name}_link" if name in taken else name
 
 

@@ -27,6 +27,9 @@ _POSTURES = 5
 _TRIES = 25
 _SEED = 20260102
 _REACH = 0.5
+_GAP = 1e-5
+"""Singular values below this part of the largest count as zero: Gauss-Newton ends about the
+square root of its tolerance away from a singular posture, where they are not smaller."""
 
 
 def analysed(system: System, guess: Mapping[str, float]) -> System:
@@ -46,10 +49,11 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
     postures = [posture, *_others(system, posture, p)]
     J = closure_jacobian(system)
     jacobians = [np.array(J(q)) for q in postures]
-    generic = max(rank(matrix) for matrix in jacobians)
-    posture = next(q for q, m in zip(postures, jacobians, strict=True) if rank(m) == generic)
-    regular = [matrix for matrix in jacobians if rank(matrix) == generic]
-    rows = independent_rows(np.hstack(regular), generic)
+    ranks = [rank(matrix, _GAP) for matrix in jacobians]
+    generic = max(ranks)
+    posture = postures[ranks.index(generic)]
+    regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
+    rows = independent_rows(regular, generic)
     active = _independent_velocities(system, regular, system.nv - generic)
     labels = _labels(system)
     count = sum(len(names) for names in labels)
@@ -114,8 +118,8 @@ def _independent_velocities(
             f"{system.name}: {len(motors)} velocities are actuated ({names}) but the mobility is"
             f" {mobility}; actuate {mobility} at most"
         )
-    free = np.hstack([_null_space(J, mobility) for J in jacobians])
-    if motors and rank(free[motors]) < len(motors):
+    free = [_null_space(J, mobility) for J in jacobians]
+    if motors and max(rank(N[motors], _GAP) for N in free) < len(motors):
         raise AssemblyError(
             f"{system.name}: the actuated velocities {names} depend on each other through the"
             " loops; actuate joints that can move independently"

@@ -60,7 +60,7 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     G[passive, :] = W
     if v_a is None:
         return Reduction(G, None)
-    v = casadi.mtimes(G, v_a)
+    v = casadi.densify(casadi.mtimes(G, v_a))
     speed = SX.sym("v", system.nv)
     psi = casadi.substitute(acceleration_bias(system, q, speed, J), speed, v)
     gamma = zeros(system.nv)

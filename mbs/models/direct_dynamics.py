@@ -20,6 +20,7 @@ from mbs.solvers.small_linear import solve_symmetric
 
 _METHODS = ("auto", "composite")
 _SEED = 20260103
+_SINGULAR = 1e-12
 
 
 def inertia_matrix(system: System, coordinates: str = "independent") -> Function:
@@ -95,8 +96,8 @@ def _accelerations(system: System, s: Symbols, tau: SX) -> SX:
 def _tree_accelerations(system: System, s: Symbols, tau: SX) -> tuple[SX, SX]:
     """Accelerations of the tree and efforts of the closure, massless links included.
 
-    K = A + c J'J is regular where A alone is not; then a Schur complement gives the efforts, and
-    one refinement restores the digits that c costs in the accelerations.
+    K = A + c J'J is regular where A alone is not; then a Schur complement gives the efforts, kept
+    finite where rows become dependent, and one refinement restores the digits that this costs.
     """
     A = tree_inertia(system.tree, s.poses)
     H = tree_efforts(system, s, SX.zeros(system.nv))
@@ -106,7 +107,7 @@ def _tree_accelerations(system: System, s: Symbols, tau: SX) -> tuple[SX, SX]:
     K = A + c * casadi.mtimes(J.T, J)
     free = solve_symmetric(K, casadi.horzcat(tau - H - c * casadi.mtimes(J.T, psi), J.T))
     a, Y = free[:, 0], free[:, 1:]
-    S = casadi.mtimes(J, Y)
+    S = casadi.mtimes(J, Y) + _SINGULAR / c * SX.eye(J.shape[0])
     lam = solve_symmetric(S, -psi - casadi.mtimes(J, a))
     a = a + casadi.mtimes(Y, lam)
     correction = solve_symmetric(S, -psi - casadi.mtimes(J, a))

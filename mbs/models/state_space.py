@@ -26,7 +26,7 @@ from mbs.models.geometry import terminal_frame
 from mbs.recursions.poses import link_poses, relative_pose
 from mbs.solvers.small_linear import solve_square, solve_symmetric
 
-_DEPENDENT_ROWS = 1e-12
+_SINGULAR = 1e-12
 _NORM_RATE = 10.0
 
 
@@ -96,20 +96,24 @@ def full_state(system: System, effort: Function | None = None) -> FullState:
 
 
 def _projected(system: System, q: SX, v: SX) -> tuple[SX, SX]:
-    """One Newton step of [q; v] onto the loops, on all rows, and the largest row before it."""
+    """One Newton step of [q; v] onto the loops, and the largest row before it, of all rows.
+
+    The step is made on the independent rows: off the loops a dependent row is almost, not
+    exactly, dependent, and would turn rounding into motion.
+    """
     if not system.is_closed:
         return casadi.vertcat(normalised(system.tree, q), v), SX(0)
     symbols = SX.sym("q", system.nq)
-    rows = closure_rows(system, symbols)
-    phi = rows[[k for k in range(rows.numel()) if casadi.symvar(rows[k])]]
     norms = [casadi.sumsqr(symbols[part]) - 1 for part in quaternion_slices(system.tree)]
+    phi = independent_rows(system, symbols)
     r = casadi.vertcat(phi, *norms)
     J_q = casadi.jacobian(r, symbols)
     J = velocity_rows(system, symbols, phi)
     speed = casadi.mtimes(J, v)
     step_q = casadi.mtimes(J_q.T, _least(J_q, r))
     step_v = casadi.mtimes(J.T, _least(J, speed))
-    residual = casadi.mmax(casadi.fabs(casadi.vertcat(r, speed)))
+    every = casadi.vertcat(closure_rows(system, symbols), *norms, speed)
+    residual = casadi.mmax(casadi.fabs(every))
     step, worst = casadi.substitute(
         [casadi.densify(casadi.vertcat(step_q, step_v)), residual], [symbols], [q]
     )
@@ -117,9 +121,9 @@ def _projected(system: System, q: SX, v: SX) -> tuple[SX, SX]:
 
 
 def _least(J: SX, r: SX) -> SX:
-    """(J J')^-1 r with dependent rows kept harmless."""
+    """(J J')^-1 r, finite where the rows become dependent."""
     S = casadi.mtimes(J, J.T)
-    return solve_symmetric(S + _DEPENDENT_ROWS * SX.eye(S.shape[0]), r)
+    return solve_symmetric(S + _SINGULAR * SX.eye(S.shape[0]), r)
 
 
 def minimal_state(system: System) -> MinimalState:

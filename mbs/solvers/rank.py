@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,30 +12,40 @@ Matrix = NDArray[np.float64]
 RELATIVE_GAP = 1e-8
 """Singular values below this part of the largest count as zero."""
 
+_FLOOR = 1e-12
 
-def rank(matrix: Matrix) -> int:
-    """Number of singular values above `RELATIVE_GAP` times the largest."""
+
+def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
+    """Number of singular values above `gap` times the largest."""
     if matrix.size == 0:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > RELATIVE_GAP * max(values[0], 1e-30)))
+    return int(np.sum(values > gap * max(values[0], 1e-30)))
 
 
-def independent_rows(matrix: Matrix, count: int, first: tuple[int, ...] = ()) -> list[int]:
-    """The `count` rows that span the matrix best, by QR with pivoting, in increasing order.
+def independent_rows(
+    matrices: Sequence[Matrix], count: int, first: tuple[int, ...] = ()
+) -> list[int]:
+    """The `count` rows that stay independent in every one of the matrices, in increasing order.
+
+    Gram-Schmidt with pivoting on all matrices at once: the next row is the one that the rows
+    before it leave longest, by the geometric mean over the matrices, so that a row which
+    depends on them in a single matrix is avoided.
 
     Args:
-        matrix: (m, n).
+        matrices: (m, n) each, the same rows at several postures.
         count: how many rows.
         first: rows to take before all others, in this order.
     """
-    work = np.array(matrix, dtype=float)
+    rest = [np.array(matrix, dtype=float) for matrix in matrices]
     chosen: list[int] = []
     for k in range(count):
-        norms = np.linalg.norm(work, axis=1)
-        norms[chosen] = -1.0
-        pivot = first[k] if k < len(first) else int(np.argmax(norms))
-        direction = work[pivot] / max(norms[pivot], 1e-300)
-        work = work - np.outer(work @ direction, direction)
+        lengths = np.array([np.linalg.norm(matrix, axis=1) for matrix in rest])
+        score = np.mean(np.log(lengths + _FLOOR), axis=0)
+        score[chosen] = -np.inf
+        pivot = first[k] if k < len(first) else int(np.argmax(score))
+        for number, matrix in enumerate(rest):
+            direction = matrix[pivot] / max(float(lengths[number, pivot]), _FLOOR)
+            rest[number] = matrix - np.outer(matrix @ direction, direction)
         chosen.append(pivot)
     return sorted(chosen)

@@ -360,9 +360,6 @@ def test_refused(make, error, parts):
     refused(error, *parts, by=lambda: make().assemble(guess={"j2": 1.0}))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="null spaces of several postures are stacked before their rank is taken"
-)
 def test_motors_that_depend_on_each_other():
     def carried(m):
         arm = m.add(solid("arm"))
@@ -432,15 +429,11 @@ def three_legs():
     return m, {"j0": 1.0, "j1": 1.0, "j2": 1.0, "k0": -1.0}
 
 
-@pytest.mark.xfail(
-    strict=True, reason="ranks are taken at postures that converged onto a singular one"
-)
 def test_a_parallelogram_with_three_legs_moves():
     m, guess = three_legs()
     assert m.assemble(guess=guess).closure.mobility == 1
 
 
-@pytest.mark.xfail(strict=True, reason="a posture 1e-6 away from a singular one counts as regular")
 def test_sr400_leaves_the_singular_posture_of_its_guess():
     system = mbs.load("sr400").assemble(guess={f"q{k}": 0.0 for k in range(1, 9)})
     q = dict(zip(names(system), system.posture, strict=True))

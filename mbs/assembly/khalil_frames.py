@@ -22,7 +22,7 @@ from mbs.assembly.graph import Edge, Graph, inertia_of
 from mbs.assembly.spanning_tree import Branch, SpanningTree
 from mbs.assembly.tree import Link, Tree
 from mbs.components import Mechanism
-from mbs.components.joints import Freedom, Motion
+from mbs.components.motion import Freedom, Motion
 from mbs.expressions import to_sx
 from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z
 

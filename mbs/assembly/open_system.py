@@ -20,7 +20,7 @@ from mbs.assembly.tables import (
     velocity_coordinates,
 )
 from mbs.components import Free, Joint, Mechanism
-from mbs.components.bodies import Mount
+from mbs.components.rigid_body import Mount
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
 from mbs.spatial import Pose

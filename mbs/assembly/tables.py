@@ -9,7 +9,7 @@ from casadi import SX
 
 from mbs.assembly.tree import Tree
 from mbs.components import Joint
-from mbs.components.joints import Motion
+from mbs.components.motion import Motion
 
 _POSITIONS = {
     Motion.REVOLUTE: (("", "revolute", "rad"),),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from casadi import SX
 
-from mbs.components.joints import Motion
+from mbs.components.motion import Motion
 from mbs.spatial import Inertia, Khalil
 
 

@@ -1,17 +1,9 @@
 """What a user composes: bodies, joints, the world, and the mechanism that connects them."""
 
-from mbs.components.bodies import (
-    Body,
-    Box,
-    Cylinder,
-    KhalilBody,
-    PointMass,
-    RigidBody,
-    World,
-)
+from mbs.components.bodies import Body, KhalilBody, PointMass
 from mbs.components.component import Component, Point
+from mbs.components.coupling import Coupling
 from mbs.components.joints import (
-    Coupling,
     Cylindrical,
     Fixed,
     Free,
@@ -22,7 +14,10 @@ from mbs.components.joints import (
     Spherical,
     Universal,
 )
-from mbs.components.mechanism import Mechanism, Placed
+from mbs.components.mechanism import Mechanism
+from mbs.components.placed import Placed
+from mbs.components.rigid_body import RigidBody, World
+from mbs.components.solids import Box, Cylinder
 
 __all__ = [
     "Body",

@@ -9,53 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mbs.components.axes import in_plane, unit_axis
 from mbs.components.component import Component, Point
+from mbs.components.motion import Freedom, Motion
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar, expression, quoted, to_float
-from mbs.spatial import align_z
-
-_NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-class Motion(Enum):
-    """An elementary motion of a frame: about or along its z axis, or free."""
-
-    REVOLUTE = "revolute"
-    PRISMATIC = "prismatic"
-    SPHERICAL = "spherical"
-    FREE = "free"
-
-    @property
-    def nq(self) -> int:
-        """Number of position coordinates."""
-        return {"spherical": 4, "free": 7}.get(self.value, 1)
-
-    @property
-    def nv(self) -> int:
-        """Number of velocities."""
-        return {"spherical": 3, "free": 6}.get(self.value, 1)
-
-
-@dataclass(frozen=True, slots=True)
-class Freedom:
-    """One elementary motion of a joint.
-
-    Attributes:
-        motion: what moves.
-        axis: unit vector of the axis in frame_a at the zero posture (z where none is special).
-        suffix: what distinguishes its coordinates from the others of the same joint.
-    """
-
-    motion: Motion
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    suffix: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -285,73 +248,3 @@ class Fixed(Joint):
     def freedoms(self) -> tuple[Freedom, ...]:
         """None."""
         return ()
-
-
-@dataclass(frozen=True, slots=True)
-class Coupling(Component):
-    """A relation between the positions of two joints: driven = sum of c_k driver^k.
-
-    Gears, mimic joints and joint equalities; one row on the coordinates.
-
-    Attributes:
-        driven: name of the coordinate that follows.
-        driver: name of the coordinate that leads.
-        coefficients: c_0, c_1, ... of the polynomial.
-    """
-
-    driven: str = ""
-    driver: str = ""
-    coefficients: tuple[Scalar, ...] = (0.0, 1.0)
-
-    def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        if isinstance(self.coefficients, str) or not hasattr(self.coefficients, "__iter__"):
-            raise DescriptionError(
-                f"{self.name}: coefficients {quoted(self.coefficients)} are not a sequence;"
-                " give c_0, c_1, ..., such as (0, ratio) for a gear"
-            )
-        terms = tuple(expression(c, f"{self.name}, coefficients") for c in self.coefficients)
-        object.__setattr__(self, "coefficients", terms)
-        if self.driven == self.driver:
-            raise DescriptionError(
-                f"{self.name}: the coordinate {self.driven!r} cannot follow itself; name two"
-            )
-
-    def scoped(self, prefix: str) -> Coupling:
-        """The same relation inside a mechanism that is placed in another one."""
-        inner = Component.scoped(self, prefix)
-        return replace(inner, driven=f"{prefix}.{self.driven}", driver=f"{prefix}.{self.driver}")
-
-
-def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
-    """The unit vector of an axis that a user wrote as a letter or as three numbers."""
-    if isinstance(axis, str):
-        sign, letter = (-1.0, axis[1:]) if axis.startswith("-") else (1.0, axis)
-        if letter not in _NAMED_AXES:
-            raise DescriptionError(
-                f"{name}: axis {axis!r} is unknown; give 'x', 'y', 'z', '-x' .. or three numbers"
-            )
-        x, y, z = _NAMED_AXES[letter]
-        return sign * x, sign * y, sign * z
-    try:
-        values: NDArray[np.float64] = np.array([float(v) for v in axis])
-    except (TypeError, ValueError):
-        values = np.zeros(0)
-    if values.shape != (3,) or not np.all(np.isfinite(values)):
-        raise DescriptionError(
-            f"{name}: axis {quoted(axis)} is not a direction; give three numbers"
-        )
-    length = float(np.linalg.norm(values))
-    if length < 1e-9:
-        raise DescriptionError(f"{name}: axis {quoted(axis)} has zero length; give a direction")
-    x, y, z = (float(v) for v in values / length)
-    return x, y, z
-
-
-def in_plane(
-    axis: tuple[float, float, float],
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Two unit vectors u, v with u x v = axis; x and y for the axis z."""
-    R = align_z(np.array(axis))
-    u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
-    return (u[0], u[1], u[2]), (v[0], v[1], v[2])

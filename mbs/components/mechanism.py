@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar, overload
 
-from mbs.components.bodies import Mount, RigidBody, World
 from mbs.components.component import Component, Point
-from mbs.components.joints import Coupling, Joint
+from mbs.components.coupling import Coupling
+from mbs.components.joints import Joint
+from mbs.components.placed import Placed
+from mbs.components.rigid_body import Mount, RigidBody, World
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of, quoted
 
@@ -278,43 +280,6 @@ class Mechanism:
         for symbol, value in inner.values.items():
             self.values[f"{scope}.{symbol}"] = replace(value, name=f"{scope}.{symbol}")
         return Placed(self, scope)
-
-
-@dataclass(frozen=True, slots=True)
-class Placed:
-    """A mechanism inside another one: `arm["forearm"]` is its component, `arm.base` its ground."""
-
-    outer: Mechanism
-    scope: str
-
-    def __getitem__(self, name: str) -> Component:
-        full = f"{self.scope}.{name}"
-        if full not in self.outer.components:
-            inside = sorted(n for n in self.outer.components if n.startswith(f"{self.scope}."))
-            raise DescriptionError(f"{full!r} does not exist; the components are {inside}")
-        return self.outer.components[full]
-
-    def body(self, name: str) -> RigidBody:
-        """The body of that name."""
-        component = self[name]
-        if not isinstance(component, RigidBody):
-            raise DescriptionError(
-                f"{component.name} is a {type(component).__name__}, not a body; name a body"
-            )
-        return component
-
-    def point(self, name: str) -> Point:
-        """The frame that the inner mechanism gave this name."""
-        full = f"{self.scope}.{name}"
-        if full not in self.outer.frames:
-            inside = sorted(n for n in self.outer.frames if n.startswith(f"{self.scope}."))
-            raise DescriptionError(f"{full!r} is not a frame; the frames are {inside}")
-        return self.outer.frames[full]
-
-    @property
-    def base(self) -> RigidBody:
-        """The ground of the inner mechanism, to be connected to something."""
-        return self.body("world")
 
 
 _SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)

@@ -14,7 +14,7 @@ from casadi import SX, Function
 from mbs.assembly import System, Tree
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.rates import position_rate
-from mbs.components.joints import Motion
+from mbs.components.motion import Motion
 from mbs.errors import ModelError
 from mbs.models.inverse_dynamics import tree_gravity
 from mbs.models.symbols import symbols_of

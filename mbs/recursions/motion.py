@@ -3,7 +3,7 @@
 import casadi
 from casadi import SX
 
-from mbs.components.joints import Motion
+from mbs.components.motion import Motion
 from mbs.spatial import zeros
 
 

@@ -15,7 +15,8 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.components.joints import Motion, in_plane
+from mbs.components.axes import in_plane
+from mbs.components.motion import Motion
 from mbs.errors import DescriptionError
 from mbs.expressions import Parameter
 

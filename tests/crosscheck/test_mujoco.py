@@ -5,7 +5,7 @@ import pytest
 from support.random_trees import ALL_KINDS, KINDS, random_state, random_tree
 
 import mbs.models
-from mbs.components.joints import Motion
+from mbs.components.motion import Motion
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -1,0 +1,36 @@
+"""Numbers that may be symbols: the grammar of every number a user or a file writes.
+
+A scalar is a number, a `Parameter`, or a text such as `"pi/2 + A"`. Texts are parsed here, by a
+grammar of numbers, symbols, `+ - * / ^`, sin, cos, tan, sqrt, atan2 and pi; they are never run.
+
+    sum      := product (("+" | "-") product)*
+    product  := unary (("*" | "/") unary)*
+    unary    := ("+" | "-") unary | power
+    power    := atom (("^" | "**") unary)?
+    atom     := number | symbol | function "(" sum ("," sum)* ")" | "(" sum ")"
+"""
+
+from mbs.expressions.evaluate import parameters_of, renamed, to_float, to_sx
+from mbs.expressions.expression import (
+    Expression,
+    Number,
+    Operation,
+    Parameter,
+    Scalar,
+    expression,
+    quoted,
+)
+
+__all__ = [
+    "Expression",
+    "Number",
+    "Operation",
+    "Parameter",
+    "Scalar",
+    "expression",
+    "parameters_of",
+    "quoted",
+    "renamed",
+    "to_float",
+    "to_sx",
+]

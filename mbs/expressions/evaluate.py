@@ -1,0 +1,73 @@
+"""What an expression is worth, and which parameters are in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+import casadi
+from casadi import SX
+
+from mbs.expressions.arithmetic import apply_float, arithmetic
+from mbs.expressions.expression import Expression, Number, Operation, Parameter, Scalar, expression
+
+T = TypeVar("T")
+
+
+def parameters_of(value: Expression) -> Iterator[Parameter]:
+    """Every parameter in the expression, in the order of the text, repeats included."""
+    if isinstance(value, Parameter):
+        yield value
+    elif isinstance(value, Operation):
+        for argument in value.arguments:
+            yield from parameters_of(argument)
+
+
+def renamed(value: Expression, prefix: str) -> Expression:
+    """The expression with every parameter name put in a scope: L2 becomes prefix.L2."""
+    if isinstance(value, Parameter):
+        return replace(value, name=f"{prefix}.{value.name}")
+    if isinstance(value, Operation):
+        return replace(value, arguments=tuple(renamed(a, prefix) for a in value.arguments))
+    return value
+
+
+def to_sx(value: Scalar, symbols: Mapping[str, SX]) -> SX:
+    """The expression on CasADi symbols, one per parameter name."""
+    return _fold(expression(value), SX, lambda p: symbols[p.name], _apply_sx)
+
+
+def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float | None:
+    """The number, with `values` or the defaults for its parameters; None if it is not known.
+
+    It is not known either where the expression has no finite value, such as 1/A with A = 0.
+    """
+    known = values or {}
+
+    def symbol(parameter: Parameter) -> float:
+        given = known.get(parameter.name, parameter.default)
+        return math.nan if given is None else given
+
+    result = _fold(expression(value), float, symbol, apply_float)
+    return result if math.isfinite(result) else None
+
+
+def _fold(
+    value: Expression,
+    number: Callable[[float], T],
+    symbol: Callable[[Parameter], T],
+    apply: Callable[[str, list[T]], T],
+) -> T:
+    if isinstance(value, Number):
+        return number(value.value)
+    if isinstance(value, Parameter):
+        return symbol(value)
+    assert isinstance(value, Operation)
+    return apply(value.operator, [_fold(a, number, symbol, apply) for a in value.arguments])
+
+
+def _apply_sx(operator: str, values: list[SX]) -> SX:
+    result = arithmetic(operator, values)
+    return SX(getattr(casadi, operator)(*values) if result is None else result)

@@ -1,0 +1,211 @@
+"""Expressions: numbers, symbols with defaults, and operations on them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mbs.errors import ExpressionError
+from mbs.expressions.arithmetic import apply_float
+from mbs.expressions.grammar import TOKEN, is_reserved
+from mbs.units import UNITS
+
+_PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "negate": 3, "^": 4}
+_LONGEST_CHAIN = 200
+_LONGEST_QUOTE = 80
+
+
+class Expression:
+    """A number, a symbol, or an operation on expressions; arithmetic on it gives expressions."""
+
+    __slots__ = ()
+
+    def __add__(self, other: Scalar) -> Expression:
+        return operation("+", self, other)
+
+    def __radd__(self, other: Scalar) -> Expression:
+        return operation("+", other, self)
+
+    def __sub__(self, other: Scalar) -> Expression:
+        return operation("-", self, other)
+
+    def __rsub__(self, other: Scalar) -> Expression:
+        return operation("-", other, self)
+
+    def __mul__(self, other: Scalar) -> Expression:
+        return operation("*", self, other)
+
+    def __rmul__(self, other: Scalar) -> Expression:
+        return operation("*", other, self)
+
+    def __truediv__(self, other: Scalar) -> Expression:
+        return operation("/", self, other)
+
+    def __rtruediv__(self, other: Scalar) -> Expression:
+        return operation("/", other, self)
+
+    def __pow__(self, other: Scalar) -> Expression:
+        return operation("^", self, other)
+
+    def __rpow__(self, other: Scalar) -> Expression:
+        return operation("^", other, self)
+
+    def __neg__(self) -> Expression:
+        return operation("negate", self)
+
+    def __pos__(self) -> Expression:
+        return self
+
+    def __str__(self) -> str:
+        return _text(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Expression):
+    """A number that is known."""
+
+    value: float
+
+    __str__ = Expression.__str__
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Expression):
+    """A symbol that stays in the equations, with the value used when none is given.
+
+    Attributes:
+        name: letters, digits and underscores; a dot separates the names of nested mechanisms.
+        default: its value in `default_in` of the Functions, or None when it has none.
+        unit: a unit of `mbs.units.UNITS`.
+        description: what it means, for tables and FMUs.
+    """
+
+    name: str
+    default: float | None = None
+    unit: str = "1"
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        match = TOKEN.fullmatch(self.name) if isinstance(self.name, str) else None
+        if match is None or match["name"] != self.name or is_reserved(self.name):
+            raise ExpressionError(
+                f"parameter {self.name!r}: a name is letters, digits and underscores, not the name"
+                " of a function or constant; choose another name"
+            )
+        if self.default is not None:
+            object.__setattr__(self, "default", finite(self.default, f"parameter {self.name}"))
+        if self.unit not in UNITS:
+            raise ExpressionError(
+                f"parameter {self.name}: unit {self.unit!r} is unknown; use one of "
+                + ", ".join(UNITS)
+            )
+
+    __str__ = Expression.__str__
+
+
+@dataclass(frozen=True, slots=True)
+class Operation(Expression):
+    """An operator or function applied to expressions."""
+
+    operator: str
+    arguments: tuple[Expression, ...]
+    depth: int = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        depth = 1 + max(getattr(argument, "depth", 0) for argument in self.arguments)
+        if depth > _LONGEST_CHAIN:
+            raise ExpressionError(
+                f"an expression applies more than {_LONGEST_CHAIN} operations one after the other;"
+                " split it into shorter ones"
+            )
+        object.__setattr__(self, "depth", depth)
+
+    __str__ = Expression.__str__
+
+
+Scalar = float | int | str | Expression
+"""What a user may write where a number is wanted."""
+
+
+def expression(value: Scalar, where: str = "value") -> Expression:
+    """The expression that a number, a text or an expression stands for.
+
+    Args:
+        value: the scalar as the user wrote it.
+        where: which field of which component, for the error message.
+
+    Raises:
+        ExpressionError: it is not a finite number and not a text of the grammar.
+    """
+    from mbs.expressions.parser import parse  # it makes expressions: the two need each other
+
+    if isinstance(value, Expression):
+        return value
+    if isinstance(value, str):
+        try:
+            return parse(value)
+        except ExpressionError as error:
+            raise ExpressionError(f"{where}: {error}") from None
+    return Number(finite(value, where))
+
+
+def operation(operator: str, *operands: Scalar) -> Expression:
+    """An operator or function applied, at once where its operands are numbers."""
+    arguments = tuple(expression(operand) for operand in operands)
+    if all(isinstance(argument, Number) for argument in arguments):
+        result = apply_float(operator, [a.value for a in arguments])  # type: ignore[attr-defined]
+        if not math.isfinite(result):
+            raise ExpressionError(
+                f"{_text(Operation(operator, arguments))!r} is not a finite number; correct it"
+            )
+        return Number(result)
+    return Operation(operator, arguments)
+
+
+def finite(value: object, where: str) -> float:
+    """The number, refused when it is not finite."""
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if math.isfinite(number):
+            return number
+    raise ExpressionError(
+        f"{where}: {quoted(value)} is not a finite number; give a number, a Parameter or a text"
+        " such as 'pi/2 + A'"
+    )
+
+
+def quoted(value: object) -> str:
+    """The value as Python writes it, on one line, its middle left out when it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of more digits than Python converts
+        text = f"a {type(value).__name__} of more digits than can be read"
+    half = _LONGEST_QUOTE // 2
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:half]}...{text[-half:]}"
+
+
+def _text(value: Expression, outer: int = 0) -> str:
+    if isinstance(value, Number):
+        text = repr(value.value)
+        text = text.removesuffix(".0")
+        return f"({text})" if value.value < 0 and outer else text
+    if isinstance(value, Parameter):
+        return value.name
+    assert isinstance(value, Operation)
+    level = _PRECEDENCE.get(value.operator)
+    if level is None:
+        return f"{value.operator}({', '.join(_text(a) for a in value.arguments)})"
+    if value.operator == "negate":
+        text = f"-{_text(value.arguments[0], level)}"
+    else:
+        left, right = value.arguments
+        tight = level + (value.operator in "-/")
+        text = (
+            f"{_text(left, level + (value.operator == '^'))}{value.operator}{_text(right, tight)}"
+        )
+    return f"({text})" if level < outer else text

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         native,
         robots,
         simulate,
+        units,
     )
     from mbs.assembly import System
     from mbs.components import Mechanism
@@ -49,6 +50,7 @@ _MODULES = (
     "native",
     "robots",
     "simulate",
+    "units",
 )
 
 __all__ = [
@@ -67,6 +69,7 @@ __all__ = [
     "native",
     "robots",
     "simulate",
+    "units",
 ]
 
 

@@ -3,10 +3,8 @@
 import csv
 import importlib
 import os
-import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -14,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import ExportError, ModelError
+from mbs.files import whole_file
 
 Array = npt.NDArray[np.float64]
 
@@ -132,15 +131,11 @@ class Result:
         Raises:
             ExportError: the file cannot be written.
         """
-        target = Path(path)
         rows = np.column_stack([self.time, self.values]).tolist()
-        try:
-            _write_table(target, ("time", *self.names), rows)
-        except OSError as error:
-            raise ExportError(
-                f"{target} could not be written ({error.strerror or error}); "
-                "give a file in a folder that exists and that you may write"
-            ) from error
+        with whole_file(path) as scratch, scratch.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(("time", *self.names))
+            writer.writerows([repr(v) for v in row] for row in rows)
 
     def to_pandas(self) -> Any:
         """The signals as a pandas DataFrame indexed by time; units in `.attrs["units"]`."""
@@ -195,7 +190,7 @@ class Result:
             axis.legend(loc="upper right", fontsize="small")
         axes[-1].set_xlabel("time [s]")
         if path is not None:
-            _save(figure, Path(path))
+            _save(figure, path)
         return figure
 
     def _index(self, name: str) -> int:
@@ -233,31 +228,10 @@ def _figure(rows: int, *, shown: bool) -> Any:
     return _optional("matplotlib.figure", remedy).Figure(figsize=size, layout="constrained")
 
 
-def _save(figure: Any, target: Path) -> None:
-    try:
-        figure.savefig(target)
-    except (OSError, ValueError) as error:
-        raise ExportError(
-            f"picture {target} could not be written ({error}); "
-            "give a .png, .svg or .pdf file in a folder that you may write"
-        ) from error
-
-
-def _write_table(target: Path, header: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", text=True)
-    try:
-        with os.fdopen(handle, "w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(header)
-            writer.writerows([repr(v) for v in row] for row in rows)
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _save(figure: Any, path: str | os.PathLike[str]) -> None:
+    remedy = "give a .png, .svg or .pdf file in a folder that you may write"
+    with whole_file(path, remedy) as scratch:
+        try:
+            figure.savefig(scratch)
+        except ValueError as error:
+            raise ExportError(f"picture {path} could not be written ({error}); {remedy}") from error

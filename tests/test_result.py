@@ -68,7 +68,7 @@ def test_csv_reads_back_bit_for_bit(result, tmp_path):
 
 
 def test_csv_in_a_missing_folder_leaves_nothing(result, tmp_path):
-    with pytest.raises(ExportError, match="could not be written"):
+    with pytest.raises(ExportError, match="cannot be written"):
         result.to_csv(tmp_path / "no" / "r.csv")
     assert not list(tmp_path.iterdir())
 
@@ -107,8 +107,38 @@ def test_plot_of_some_signals(result, tmp_path):
     assert len(result.plot("force", tmp_path / "r.svg").axes) == 1
     with pytest.raises(ModelError, match="no signal"):
         result.plot(["nothing"], tmp_path / "r.svg")
-    with pytest.raises(ExportError, match="picture"):
+    with pytest.raises(ExportError, match=r"r\.png: the file cannot be written .*; give a \.png"):
         result.plot(path=tmp_path / "no" / "r.png")
+    with pytest.raises(ExportError, match=r"picture .*r\.odd could not be written"):
+        result.plot(path=tmp_path / "r.odd")
+    assert [path.name for path in tmp_path.iterdir()] == ["r.svg"]
+
+
+@pytest.mark.parametrize("write", [Result.to_csv, lambda r, path: r.plot("force", path)])
+def test_a_folder_is_no_file(result, tmp_path, write):
+    for path in (tmp_path, f"{tmp_path}/", f"{tmp_path}/new/"):
+        with pytest.raises(ExportError, match="is a folder; give the name of a file"):
+            write(result, path)
+    with pytest.raises(ExportError, match="3 is not a path"):
+        write(result, 3)
+    assert list(tmp_path.iterdir()) == []
+    assert not list(tmp_path.parent.glob("*.png"))
+
+
+def test_half_a_picture_is_never_left(result, tmp_path, monkeypatch):
+    path = tmp_path / "r.png"
+    path.write_text("old")
+
+    def torn(_figure, target):
+        with open(target, "w") as stream:
+            stream.write("half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", torn)
+    with pytest.raises(ExportError, match="disk full"):
+        result.plot("force", path)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi
 import numpy as np
-from casadi import DM, SX, Function
+from casadi import DM, MX, SX, Function
 
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
@@ -16,7 +15,6 @@ from mbs.errors import ModelError
 
 Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""
-
 
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
@@ -26,7 +24,8 @@ class ModelFunction(Function):
 
     It is called like any Function. The last input p may be left out: its defaults are taken
     (CasADi's own `default_in` holds one number per input, so it cannot keep them). A call with a
-    wrong number of values says so by the names of the coordinates.
+    wrong number of values says so by the names of the coordinates, and numbers in never give a
+    NaN out.
     """
 
     def __init__(self, function: Function, system: System) -> None:
@@ -35,38 +34,97 @@ class ModelFunction(Function):
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it on numbers or symbols, as a casadi.Function, its inputs checked."""
-        names = self.name_in()
-        for name, value in [*zip(names, args, strict=False), *kwargs.items()]:
+        given = self._given(args, kwargs)
+        for name, value in given.items():
             self._check(name, value)
-        if self._system.parameters and "p" not in kwargs:
-            if kwargs or not args:
-                kwargs["p"] = self._defaults()
-            elif len(args) == len(names) - 1:
-                args = (*args, self._defaults())
-        return Function.__call__(self, *args, **kwargs)
+        try:
+            outputs = Function.__call__(self, *map(_matrix, given.values()))
+        except (RuntimeError, NotImplementedError, TypeError, ValueError) as error:
+            raise ModelError(
+                f"{self._title}: CasADi does not take these arguments; give numbers, DM, SX or MX"
+                f" of the shapes {self._shapes()}"
+            ) from error
+        self._require_numbers(outputs)
+        if kwargs:
+            every = outputs if isinstance(outputs, tuple) else (outputs,)
+            return dict(zip(self.name_out(), every, strict=True))
+        return outputs
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds the equations; names and defaults stay with the System."""
+        return Function.deserialize, (self.serialize(),)
+
+    def like(self, function: Function) -> ModelFunction:
+        """Another Function with the inputs of this one, checked and completed in the same way."""
+        return ModelFunction(function, self._system)
+
+    def map(self, *args: Any) -> Function:
+        """The Function over many columns, as `casadi.Function.map`."""
+        return self.like(Function.map(self, *args))
+
+    def expand(self, *args: Any) -> Function:
+        """The Function on scalars alone, as `casadi.Function.expand`."""
+        return self.like(Function.expand(self, *args))
 
     def elements(self, name: str) -> list[tuple[str, str]]:
         """Name and unit of every element of an input or output; empty where they have none."""
         return _elements(self._system).get(name, [])
 
-    def _defaults(self) -> DM:
-        return DM(self._system.parameter_values())
+    @property
+    def _title(self) -> str:
+        return f"{self.name()}({self._system.name})"
+
+    def _given(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
+        """Every input by name, p completed by its defaults."""
+        names = self.name_in()
+        given = dict(zip(names, args, strict=False)) | kwargs
+        if "p" in names and "p" not in given:
+            values = DM(self._system.parameter_values())
+            given["p"] = casadi.repmat(values, 1, self.size2_in("p"))
+        if len(args) > len(names) or set(given) != set(names):
+            wrong = [name for name in kwargs if name not in names]
+            missing = [name for name in names if name not in given]
+            what = (
+                f"there is no input {wrong[0]!r}" if wrong else f"{' and '.join(missing)} missing"
+            )
+            if len(args) > len(names):
+                what = f"{len(args)} arguments were given"
+            raise ModelError(f"{self._title}: {what}; the inputs are {self._shapes()}")
+        return {name: given[name] for name in names}
 
     def _check(self, name: str, value: Any) -> None:
-        names = self.name_in()
-        if name not in names or isinstance(value, (int, float)):
-            return
+        wanted = self.size1_in(name)
         shape = value.shape if hasattr(value, "shape") else np.shape(value)
         rows, columns = (*shape, 1, 1)[:2]
-        wanted = self.size_in(names.index(name))
-        if rows == wanted[0] or rows == 0 or (rows, columns) == (1, wanted[0]):
+        if rows == wanted or (rows, columns) == (1, wanted):
+            return
+        if shape == () and isinstance(value, (int, float)) and value == 0:
             return
         elements = ", ".join(element for element, _ in self.elements(name))
         known = f": {elements}" if elements else ""
+        raise ModelError(f"{self._title}: {name} has {rows} values, it needs {wanted}{known}")
+
+    def _require_numbers(self, outputs: Any) -> None:
+        every = outputs if isinstance(outputs, tuple) else (outputs,)
+        if all(isinstance(o, (SX, MX)) or DM(o).is_regular() for o in every):
+            return
         raise ModelError(
-            f"{self.name()}({self._system.name}): {name} has {rows} values, it needs"
-            f" {wanted[0]}{known}"
+            f"{self._title}: the result is not a number; an input is not finite, no posture closes"
+            " the loops there, or the posture is singular"
         )
+
+    def _shapes(self) -> str:
+        sizes = (f"{name} {self.size_in(name)}" for name in self.name_in())
+        return ", ".join(sizes)
+
+
+def _matrix(value: Any) -> Any:
+    """A list as the matrix that it writes; everything else as it is."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    if any(isinstance(element, (SX, MX, DM)) for element in value):
+        return casadi.vertcat(*value)
+    return DM(np.array(value, dtype=float))
 
 
 def model_function(
@@ -81,6 +139,9 @@ def model_function(
         key: the name of the Function, then whatever tells it from others of the same name.
         build: gives the named inputs and outputs on CasADi symbols. When the system has
             parameters they become the last input p.
+
+    Raises:
+        ModelError: `system` is not a System.
     """
     require_system(system)
 
@@ -93,7 +154,7 @@ def model_function(
             [casadi.densify(value) for _, value in outputs],
             [label for label, _ in named],
             [label for label, _ in outputs],
-            {"cse": True, **_default_in(system, len(inputs))},
+            {"cse": True, "default_in": default_in(system, len(inputs))},
         )
         return ModelFunction(function, system)
 
@@ -101,12 +162,12 @@ def model_function(
     return function
 
 
-def _default_in(system: System, others: int) -> Mapping[str, list[float]]:
-    """CasADi's default of p, where one number can be it."""
+def default_in(system: System, others: int) -> list[float]:
+    """CasADi's own defaults: of p where one number can be it, else NaN, which shows."""
+    if not system.parameters:
+        return [0.0] * others
     values = set(system.p_default)
-    if len(values) == 1 and not any(math.isnan(value) for value in values):
-        return {"default_in": [0.0] * others + [values.pop()]}
-    return {}
+    return [0.0] * others + [values.pop() if len(values) == 1 else float("nan")]
 
 
 def require_system(system: object) -> None:
@@ -125,8 +186,10 @@ def require_system(system: object) -> None:
 
 def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
     q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
+    active = [system.speeds[k].name for k in system.active]
     units = {"v": _SAME_UNIT, "a": ACCELERATION_UNIT, "tau": EFFORT_UNIT}
     result = {"q": q, "p": [(parameter.name, parameter.unit) for parameter in system.parameters]}
+    result["q_a"] = [row for row in q if row[0] in active]
     for name, unit in units.items():
         every = [(speed.name, unit[speed.unit]) for speed in system.speeds]
         result[name] = every

@@ -37,6 +37,9 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         AssemblyError: the components do not form a mechanism.
     """
     parameters = mechanism.parameters()
+    known = {p.name: p.default for p in parameters if p.default is not None}
+    for component in mechanism.components.values():
+        component.check_values(known)
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
     coupled = [name for c in mechanism.couplings() for name in (c.driven, c.driver)]
@@ -46,6 +49,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         mechanism.name, graph, keep=keep, cut=mechanism.cuts, given_order=mechanism.keep_order
     )
     framed = khalil_frames(mechanism, graph, spanning, symbols)
+    _check_placements(framed, symbols, _trial_values(parameters))
     joints = {joint.name: joint for joint in mechanism.joints()}
     in_loops = _looped_joints(framed) | _driven_joints(mechanism)
     moved = [
@@ -54,6 +58,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     ]
     actuated = [_is_actuated(joint, in_loops) for _, _, joint in moved]
     coordinates = position_coordinates(moved, actuated)
+    _check_names(mechanism, coordinates)
     return System(
         name=mechanism.name,
         source=mechanism.source,
@@ -67,6 +72,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         cut_coordinates=_cut_coordinates(framed.cuts),
         bodies=_bodies(mechanism, graph, framed),
         frames=_frames(mechanism, graph, framed, symbols),
+        named_frames=tuple(mechanism.frames),
         loops=_loop_rows(mechanism, framed),
         posture=tuple(zero_position(framed.tree)),
     )
@@ -78,6 +84,34 @@ def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
         p.name: 0.731 + 0.217 * number if p.default is None else p.default
         for number, p in enumerate(parameters)
     }
+
+
+def _check_placements(
+    framed: Framed, symbols: Mapping[str, SX], values: Mapping[str, float]
+) -> None:
+    """Refuse a frame whose Khalil parameters do not exist at the values of its symbols."""
+    p = casadi.vertcat(*symbols.values()) if symbols else SX(0, 1)
+    numbers = [values[name] for name in symbols]
+    for link in reversed(framed.tree.links):
+        placement = casadi.vertcat(*link.placement.parameters)
+        at = casadi.Function("placement", [p], [placement])
+        if not at(numbers).is_regular():
+            used = {symbol.name() for symbol in casadi.symvar(placement)}
+            told = ", ".join(f"{name} = {values[name]:g}" for name in symbols if name in used)
+            raise AssemblyError(
+                f"{link.name}: at {told} its axis is parallel to the one before it, where the"
+                " parameters that place it are not defined; give the symbol another value, or"
+                " a number in its place"
+            )
+
+
+def _check_names(mechanism: Mechanism, coordinates: Sequence[Coordinate]) -> None:
+    names = [coordinate.name for coordinate in coordinates]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise AssemblyError(
+            f"{mechanism.name}: two coordinates are named {twice!r}; rename one of the joints"
+        )
 
 
 def _owners(joint: Joint, guessed: Collection[str]) -> list[str]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Callable, Mapping, Sequence
+import math
+import threading
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import casadi
-from casadi import DM, MX, SX, Function
+from casadi import DM, SX, Function
 
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.rates import position_rate
@@ -23,8 +24,12 @@ from mbs.assembly.tables import (
 )
 from mbs.assembly.tree import Tree
 from mbs.errors import ModelError
-from mbs.expressions import Parameter, quoted
+from mbs.expressions import Parameter
+from mbs.messages import did_you_mean, quoted
 from mbs.spatial import Pose
+
+_BUILDING = threading.RLock()
+"""Two threads that ask for the same model get the same Function."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +65,7 @@ class System:
         cut_coordinates: the coordinates of cut joints, which are not in q.
         bodies: the moving bodies of the description, in the order of external wrenches.
         frames: named frames: link (-1 for the base) and pose in the link's frame.
+        named_frames: those of them that the description named by `add_frame`.
         loops: one row for each loop or coupling.
         posture: a position q that closes the loops, or all zero.
         closure: how the loops constrain velocities; None for an open chain.
@@ -77,6 +83,7 @@ class System:
     cut_coordinates: tuple[Coordinate, ...]
     bodies: tuple[BodyRow, ...]
     frames: Mapping[str, tuple[int, Pose]]
+    named_frames: tuple[str, ...]
     loops: tuple[LoopRow, ...]
     posture: tuple[float, ...]
     closure: Closure | None = None
@@ -138,9 +145,10 @@ class System:
 
     def cached(self, key: Any, build: Callable[[], Any]) -> Any:
         """What `build` made the first time it was asked for under this key."""
-        if key not in self._cache:
-            self._cache[key] = build()
-        return self._cache[key]
+        with _BUILDING:
+            if key not in self._cache:
+                self._cache[key] = build()
+            return self._cache[key]
 
     def frame(self, name: str | int) -> tuple[int, Pose]:
         """A frame by name, or the frame of link number 1, 2, ... (0 is the base).
@@ -157,7 +165,7 @@ class System:
         if name in self.frames:
             return self.frames[name]
         raise ModelError(
-            f"{self.name}: there is no frame {name!r}; " + _suggestion(str(name), list(self.frames))
+            f"{self.name}: there is no frame {name!r}; " + did_you_mean(name, self.frames)
         )
 
     def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
@@ -169,8 +177,12 @@ class System:
         return self._filled(values, self.coordinates, list(self.posture), "position")
 
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-        """Velocities v from values by name, the others zero; likewise for efforts."""
+        """Velocities v from values by name, the others zero; errors as for `position`."""
         return self._filled(values, self.speeds, [0.0] * self.nv, "velocity")
+
+    def effort(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
+        """Joint efforts tau from values by name, the others zero; errors as for `position`."""
+        return self._filled(values, self.speeds, [0.0] * self.nv, "effort")
 
     def _filled(
         self,
@@ -193,21 +205,32 @@ class System:
         for name, value in values.items():
             if name not in names:
                 raise ModelError(
-                    f"{self.name}: there is no coordinate {name!r}; " + _suggestion(name, names)
+                    f"{self.name}: there is no coordinate {name!r}; " + did_you_mean(name, names)
                 )
             start[names.index(name)] = self._numbers(value, f"{what} of {name}")[0]
         return start
 
     def _numbers(self, values: Any, what: str) -> list[float]:
         try:
-            return [float(x) for x in DM(values).full().ravel()]
+            numbers = [float(x) for x in DM(values).full().ravel()]
         except (NotImplementedError, TypeError, ValueError):
+            numbers = [math.nan]
+        if not all(math.isfinite(number) for number in numbers):
             raise ModelError(
-                f"{self.name}: the {what} is {quoted(values)}; give a number for each coordinate"
-            ) from None
+                f"{self.name}: the {what} is {quoted(values)}; give a finite number for each"
+                " coordinate"
+            )
+        return numbers
 
-    def parameter_values(self, values: Mapping[str, float] | None = None) -> list[float]:
+    def parameter_values(
+        self, values: Mapping[str, float] | None = None, needed: Container[str] | None = None
+    ) -> list[float]:
         """Parameters p from values by name, the others at their defaults.
+
+        Args:
+            values: by name.
+            needed: names that must have a value, all of them when left out; the others are NaN
+                where they have none.
 
         Raises:
             ModelError: a name is unknown, or a symbol has no value.
@@ -217,26 +240,19 @@ class System:
         for name in given:
             if name not in names:
                 raise ModelError(
-                    f"{self.name}: there is no parameter {name!r}; " + _suggestion(name, names)
+                    f"{self.name}: there is no parameter {name!r}; " + did_you_mean(name, names)
                 )
         result = []
         for parameter in self.parameters:
             value = given.get(parameter.name, parameter.default)
-            if value is None:
+            if value is None and needed is not None and parameter.name not in needed:
+                value = math.nan
+            elif value is None:
                 raise ModelError(
-                    f"{self.name}: parameter {parameter.name!r} has no value; give it a default or"
-                    " pass it in parameters"
+                    f"{self.name}: parameter {parameter.name!r} has no value; give it one where the"
+                    " mechanism is described, or in the call"
                 )
-            result.append(float(value))
+            else:
+                value = self._numbers(value, f"parameter {parameter.name}")[0]
+            result.append(value)
         return result
-
-
-Matrix = SX | MX | DM
-"""A CasADi matrix of any kind."""
-
-
-def _suggestion(name: str, known: Sequence[str]) -> str:
-    close = difflib.get_close_matches(name, known, n=3)
-    if close:
-        return f"did you mean {' or '.join(close)}?"
-    return f"there are: {', '.join(known)}" if known else "there are none"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.errors import DescriptionError
-from mbs.expressions import quoted
+from mbs.messages import quoted
 from mbs.spatial import align_z
 
 _NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 from mbs.components.placement import KhalilStep, Placement, Rotation, displacement
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, renamed
+from mbs.expressions import Expression, Scalar, expression, renamed, with_values
 
 _NAME = re.compile(r"[^\s.'\"]+(?:\.[^\s.'\"]+)*")
 
@@ -88,11 +88,21 @@ class Component:
 
     def scoped(self: C, prefix: str) -> C:
         """The same component inside a mechanism that is placed in another one."""
-        values: dict[str, Any] = {
-            f.name: _scoped(getattr(self, f.name), prefix) for f in fields(self) if f.init
+        return self._changed(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
+
+    def check_values(self, values: Mapping[str, float]) -> None:
+        """Refuse values of parameters that the component itself would refuse as numbers.
+
+        Raises:
+            DescriptionError: as in the constructor.
+        """
+        self._changed(lambda value: with_values(value, values), self.name)
+
+    def _changed(self: C, change: Callable[[Expression], Expression], name: str) -> C:
+        fresh: dict[str, Any] = {
+            f.name: _mapped(getattr(self, f.name), change) for f in fields(self) if f.init
         }
-        values["name"] = f"{prefix}.{self.name}"
-        return type(self)(**values)
+        return type(self)(**{**fresh, "name": name})
 
 
 def _expressions(value: object) -> Iterator[Expression]:
@@ -103,9 +113,9 @@ def _expressions(value: object) -> Iterator[Expression]:
             yield from _expressions(element)
 
 
-def _scoped(value: Any, prefix: str) -> Any:
+def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
     if isinstance(value, Expression):
-        return renamed(value, prefix)
+        return change(value)
     if isinstance(value, tuple):
-        return tuple(_scoped(element, prefix) for element in value)
+        return tuple(_mapped(element, change) for element in value)
     return value

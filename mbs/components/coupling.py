@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 from mbs.components.component import Component
 from mbs.errors import DescriptionError
-from mbs.expressions import Scalar, expression, quoted
+from mbs.expressions import Scalar, expression
+from mbs.messages import quoted
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Number, Scalar, expression, quoted, to_float
+from mbs.expressions import Expression, Number, Scalar, expression, to_float
+from mbs.messages import quoted
 
 _TOLERANCE = 1e-6
 

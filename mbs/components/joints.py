@@ -18,7 +18,8 @@ from mbs.components.axes import in_plane, unit_axis
 from mbs.components.component import Component, Point
 from mbs.components.motion import Freedom, Motion
 from mbs.errors import DescriptionError
-from mbs.expressions import Scalar, expression, quoted, to_float
+from mbs.expressions import Number, Scalar, expression, to_float
+from mbs.messages import quoted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,8 +80,8 @@ class Joint(Component):
     @property
     def carries_effort(self) -> bool:
         """Whether a motor, friction or a rotor acts on it."""
-        efforts = (to_float(expression(value)) for value in (self.Fv, self.Fs, self.Ia))
-        return bool(self.actuated) or any(value != 0 for value in efforts)
+        efforts = (expression(value) for value in (self.Fv, self.Fs, self.Ia))
+        return bool(self.actuated) or any(effort != Number(0.0) for effort in efforts)
 
     def _limits_by_suffix(self, limits: Any) -> tuple[tuple[str, tuple[float, float]], ...]:
         if limits is None:

@@ -13,7 +13,8 @@ from mbs.components.joints import Joint
 from mbs.components.placed import Placed
 from mbs.components.rigid_body import Mount, RigidBody, World
 from mbs.errors import AssemblyError, DescriptionError
-from mbs.expressions import Parameter, Scalar, parameters_of, quoted
+from mbs.expressions import Parameter, Scalar, parameters_of
+from mbs.messages import quoted
 
 if TYPE_CHECKING:
     from mbs.assembly.system import System
@@ -64,6 +65,8 @@ class Mechanism:
 
     def add(self, component: C | Mechanism, name: str | None = None) -> C | Placed:
         """Add a body, a joint or a whole mechanism, whose names are then scoped by its own.
+
+        A mechanism that is placed in another one moves in the gravity of the outer one.
 
         Args:
             component: what to add.
@@ -277,8 +280,11 @@ class Mechanism:
             self.frames[f"{scope}.{frame}"] = _moved(point, placed, scope)
         self.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
         self.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
+        used = {parameter.name for parameter in self._used_parameters()}
         for symbol, value in inner.values.items():
-            self.values[f"{scope}.{symbol}"] = replace(value, name=f"{scope}.{symbol}")
+            scoped = f"{scope}.{symbol}"
+            if scoped in used:  # the gravity of the inner mechanism has no part here
+                self.values[scoped] = replace(value, name=scoped)
         return Placed(self, scope)
 
 

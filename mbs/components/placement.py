@@ -13,7 +13,8 @@ import numpy as np
 from casadi import DM, SX
 
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, quoted, renamed, to_sx
+from mbs.expressions import Expression, Scalar, expression, renamed, to_sx
+from mbs.messages import quoted
 from mbs.spatial import Khalil, Pose, axis_turn, snapped, vector
 
 Symbols = Mapping[str, SX]

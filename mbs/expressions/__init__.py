@@ -10,7 +10,7 @@ grammar of numbers, symbols, `+ - * / ^`, sin, cos, tan, sqrt, atan2 and pi; the
     atom     := number | symbol | function "(" sum ("," sum)* ")" | "(" sum ")"
 """
 
-from mbs.expressions.evaluate import parameters_of, renamed, to_float, to_sx
+from mbs.expressions.evaluate import parameters_of, renamed, to_float, to_sx, with_values
 from mbs.expressions.expression import (
     Expression,
     Number,
@@ -18,7 +18,6 @@ from mbs.expressions.expression import (
     Parameter,
     Scalar,
     expression,
-    quoted,
 )
 
 __all__ = [
@@ -29,8 +28,8 @@ __all__ = [
     "Scalar",
     "expression",
     "parameters_of",
-    "quoted",
     "renamed",
     "to_float",
     "to_sx",
+    "with_values",
 ]

@@ -11,7 +11,15 @@ import casadi
 from casadi import SX
 
 from mbs.expressions.arithmetic import apply_float, arithmetic
-from mbs.expressions.expression import Expression, Number, Operation, Parameter, Scalar, expression
+from mbs.expressions.expression import (
+    Expression,
+    Number,
+    Operation,
+    Parameter,
+    Scalar,
+    expression,
+    operation,
+)
 
 T = TypeVar("T")
 
@@ -31,6 +39,20 @@ def renamed(value: Expression, prefix: str) -> Expression:
         return replace(value, name=f"{prefix}.{value.name}")
     if isinstance(value, Operation):
         return replace(value, arguments=tuple(renamed(a, prefix) for a in value.arguments))
+    return value
+
+
+def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
+    """The expression with numbers in the place of parameters whose values are known.
+
+    Raises:
+        ExpressionError: it has no finite value there.
+    """
+    if isinstance(value, Parameter):
+        known = values.get(value.name, value.default)
+        return value if known is None else Number(known)
+    if isinstance(value, Operation):
+        return operation(value.operator, *(with_values(a, values) for a in value.arguments))
     return value
 
 

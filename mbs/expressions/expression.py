@@ -10,11 +10,11 @@ import numpy as np
 from mbs.errors import ExpressionError
 from mbs.expressions.arithmetic import apply_float
 from mbs.expressions.grammar import TOKEN, is_reserved
+from mbs.messages import quoted
 from mbs.units import UNITS
 
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "negate": 3, "^": 4}
 _LONGEST_CHAIN = 200
-_LONGEST_QUOTE = 80
 
 
 class Expression:
@@ -177,16 +177,6 @@ def finite(value: object, where: str) -> float:
         f"{where}: {quoted(value)} is not a finite number; give a number, a Parameter or a text"
         " such as 'pi/2 + A'"
     )
-
-
-def quoted(value: object) -> str:
-    """The value as Python writes it, on one line, its middle left out when it is long."""
-    try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # an integer of more digits than Python converts
-        text = f"a {type(value).__name__} of more digits than can be read"
-    half = _LONGEST_QUOTE // 2
-    return text if len(text) <= _LONGEST_QUOTE else f"{text[:half]}...{text[-half:]}"
 
 
 def _text(value: Expression, outer: int = 0) -> str:

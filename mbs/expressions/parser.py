@@ -13,9 +13,9 @@ from mbs.expressions.expression import (
     Parameter,
     finite,
     operation,
-    quoted,
 )
 from mbs.expressions.grammar import CONSTANTS, FUNCTIONS, TOKEN, is_reserved
+from mbs.messages import quoted
 
 _DEEPEST_NESTING = 100
 

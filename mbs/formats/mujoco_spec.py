@@ -30,8 +30,11 @@ def read_mjcf(path: str | Path) -> Mechanism:
     underscores; joints without a name are called after their body. Several joints in a body
     become a chain over bodies without mass. A closing `connect` becomes a spherical joint and a
     `weld` a fixed one, where the loop is then opened; an equality of joints becomes a coupling.
-    When the file has actuators, joints without one are passive. Joint positions are MuJoCo's
-    qpos: `ref` is taken into account.
+    Joint positions are MuJoCo's qpos: `ref` is taken into account.
+
+    Of actuators only the joints that they drive are read, those without one are passive then. The
+    inputs of the models are joint efforts; gear, kp, ctrlrange and the dynamics of an actuator
+    belong to what commands it, and a position or velocity servo to a controller.
 
     Raises:
         DescriptionError: mujoco is not installed, the file is missing or malformed, or it has

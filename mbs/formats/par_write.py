@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from mbs.errors import DescriptionError
-from mbs.expressions import Scalar, expression, parameters_of
-from mbs.formats.files import write_text
-from mbs.formats.par import BASE_EXTRAS, BODY_KEYS, JOINT_EXTRAS, LINK_EXTRAS
-from mbs.formats.rows import BodyRow, FrameRow
-from mbs.formats.table import RobotTable
+from mbs.expressions import Scalar, expression, parameters_of, to_float
+from mbs.files import write_text
+from mbs.formats.par_file import BASE_EXTRAS, BODY_KEYS, JOINT_EXTRAS, LINK_EXTRAS
+from mbs.formats.rows import DRIVE, BodyRow, FrameRow
+from mbs.formats.table import RobotTable, require_table
 
 _GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
 _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
@@ -20,13 +20,17 @@ _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
 def write_par(table: RobotTable, path: str | Path) -> None:
     """Write the table as a .par file.
 
-    The format knows no names of joints and bodies, no limits, and no grouped bodies: they are
-    left out. Values of symbols are written as comments, which `read_par` reads.
+    The format knows no names of joints and bodies, no limits, and no grouped bodies: these are
+    lost, and joint j is q<j> when the file is read again. Values of symbols, `guess` and
+    `Fs_width` are written as comments, which `read_par` reads. The file says of every joint
+    whether a motor drives it: where the table leaves the choice to the assembly, what it chooses.
 
     Raises:
-        DescriptionError: a loop or a symbol cannot be said in this format.
+        DescriptionError: it is not a table, or a loop, a symbol, or the drive of a cut joint
+            cannot be said in this format.
         ExportError: the file cannot be written.
     """
+    require_table(table)
     write_text("\n".join(_lines(table)) + "\n", path)
 
 
@@ -34,17 +38,17 @@ def _lines(table: RobotTable) -> Iterator[str]:
     NF, B = len(table.frames), len(table.loops)
     NL, NJ = NF - 2 * B, NF - B
     _check_loops(table, NL, NJ)
+    _check_drives(table, NL)
     _check_symbols(table)
     yield f"(* Robotname = '{re.sub(r'[^A-Za-z0-9 _-]', '_', table.name)}' *)"
     if table.source:
         yield f"(* Source = '{_one_line(table.source)}' *)"
-    yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
+    yield from _remarks(table, NL)
     yield f"NL = {NL}\nNJ = {NJ}\nNF = {NF}\nType = {_kind(table)}"
     yield "\n(* Geometric parameters *)"
     yield _vector("ant", (row.antecedent for row in table.frames))
     yield _vector("sigma", (row.sigma for row in table.frames))
-    if any(row.actuated is not None for row in table.frames):
-        yield _vector("mu", (int(bool(row.actuated)) for row in table.frames))
+    yield _vector("mu", _motors(table))
     for key in _GEOMETRY:
         yield _vector(key, (_cell(table, key, j, row) for j, row in enumerate(table.frames, 1)))
     yield "\n(* Dynamic parameters and external forces *)"
@@ -59,6 +63,36 @@ def _lines(table: RobotTable) -> Iterator[str]:
     yield _vector("G", (_text(value) for value in table.gravity))
     yield from _extras(table, BASE_EXTRAS)
     yield "\n(* End of definition *)"
+
+
+def _remarks(table: RobotTable, NL: int) -> Iterator[str]:
+    """Comments for what the format has no key for."""
+    numbers = {table.joint_name(j): j for j in range(1, len(table.frames) + 1)}
+    yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
+    yield from (f"(* Guess q{numbers[name]} = {value!r} *)" for name, value in table.guess.items())
+    for row in table.bodies:
+        if row.frame <= NL and to_float(expression(row.Fs_width)) != BodyRow(row.frame).Fs_width:
+            yield f"(* Fs_width {row.frame} = {_text(row.Fs_width)} *)"
+
+
+def _motors(table: RobotTable) -> Iterator[int]:
+    """What the assembly chooses where the table does not say it: no motors inside of loops."""
+    passive = set(table.cut_frames)
+    for loop in table.loops:
+        moving, fixed = (_path(table, frame) for frame in loop.cut)
+        passive |= moving ^ fixed
+    for j, row in enumerate(table.frames, 1):
+        chosen = j not in passive if row.actuated is None else row.actuated
+        yield int(bool(chosen) and row.sigma != 2)
+
+
+def _path(table: RobotTable, frame: int) -> set[int]:
+    """The frames from the base to this one."""
+    path: set[int] = set()
+    while frame:
+        path.add(frame)
+        frame = table.frames[frame - 1].antecedent
+    return path
 
 
 def _kind(table: RobotTable) -> int:
@@ -105,6 +139,16 @@ def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:
             raise DescriptionError(
                 f"{table.name}/loop {k}: a .par file needs the cut [{NL + k}, {NJ + k}], not"
                 f" {list(loop.cut)}; number the frames of loops last"
+            )
+
+
+def _check_drives(table: RobotTable, NL: int) -> None:
+    for row in table.bodies:
+        given = [name for name in DRIVE if to_float(expression(getattr(row, name))) != 0]
+        if row.frame > NL and given:
+            raise DescriptionError(
+                f"{table.name}/body {row.frame}: a .par file has no {given[0]} of a cut joint; cut"
+                " the loop at another joint, or write TOML"
             )
 
 

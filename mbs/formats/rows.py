@@ -10,7 +10,10 @@ from mbs.spatial.inertia import TEN_PARAMETERS
 GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
 """The six parameters of a frame, in the order in which the displacements are made."""
 
-INERTIAL = (*TEN_PARAMETERS, "Ia", "Fv", "Fs")
+DRIVE = ("Ia", "Fv", "Fs")
+"""Rotor inertia and friction of the joint of a body row, zero where there are none."""
+
+BODY_SCALARS = (*TEN_PARAMETERS, *DRIVE, "Fs_width")
 """The scalars of a body row."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
@@ -63,6 +66,7 @@ class BodyRow:
         M: mass [kg].
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
         Fv, Fs: viscous [N m s/rad or N s/m] and dry friction [N m or N].
+        Fs_width: velocity over which dry friction changes sign [rad/s or m/s], 0 for a step.
         name: of the body, link<j> when empty.
         grouped: the values are base parameters, which need not belong to a single body.
     """
@@ -81,6 +85,7 @@ class BodyRow:
     Ia: Scalar = 0.0
     Fv: Scalar = 0.0
     Fs: Scalar = 0.0
+    Fs_width: Scalar = 1e-3
     name: str = ""
     grouped: bool = False
 

@@ -10,10 +10,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, parameters_of, to_float
-from mbs.formats.files import did_you_mean
-from mbs.formats.rows import GEOMETRY, INERTIAL, LOOP_JOINTS, BodyRow, FrameRow, LoopRow
+from mbs.formats.rows import (
+    BODY_SCALARS,
+    DRIVE,
+    GEOMETRY,
+    LOOP_JOINTS,
+    BodyRow,
+    FrameRow,
+    LoopRow,
+)
+from mbs.messages import did_you_mean, quoted
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 
@@ -29,7 +39,8 @@ class RobotTable:
         gravity: gravity acceleration in the base frame [m/s^2].
         parameters: values of the symbols in the rows.
         source: where the data come from.
-        guess: joint positions near which the loops are closed, by joint name [rad or m].
+        guess: joint positions near which the loops are closed, by the names of joints that
+            `joint_name` gives [rad or m].
         extras: what a file says beyond the mechanism, as texts, kept for writing it again.
 
     Raises:
@@ -55,22 +66,40 @@ class RobotTable:
             _checked_frame(f"{self.name}/frame {j}", j, row) for j, row in enumerate(self.frames, 1)
         )
         bodies = tuple(
-            _with_scalars(f"{self.name}/body {b.frame}", b, INERTIAL) for b in self.bodies
+            _with_scalars(f"{self.name}/body {b.frame}", b, BODY_SCALARS) for b in self.bodies
         )
         gravity = _gravity(self.name, self.gravity)
         values = _values(self.name, self.parameters, (frames, bodies, gravity))
         object.__setattr__(self, "frames", tuple(_bare(row, GEOMETRY) for row in frames))
-        object.__setattr__(self, "bodies", tuple(_bare(row, INERTIAL) for row in bodies))
+        object.__setattr__(self, "loops", tuple(map(_plain_cut, self.loops)))
+        object.__setattr__(self, "bodies", tuple(_bare(row, BODY_SCALARS) for row in bodies))
         object.__setattr__(self, "gravity", tuple(expression(str(g)) for g in gravity))
         object.__setattr__(self, "parameters", values)
-        object.__setattr__(self, "guess", _guess(self.name, self.guess))
         _check_bodies(self)
         _check_loops(self)
+        object.__setattr__(self, "guess", _guess(self))
 
     @property
     def cut_frames(self) -> frozenset[int]:
         """Numbers of the frames on either side of the cut joints."""
         return frozenset(frame for loop in self.loops for frame in loop.cut)
+
+    def joint_name(self, j: int) -> str:
+        """The name of the joint of frame j."""
+        return self.frames[j - 1].name or f"q{j}"
+
+
+def require_table(table: object) -> None:
+    """Refuse what is not a table of frames.
+
+    Raises:
+        DescriptionError: it is a mechanism, a system, or something else.
+    """
+    if not isinstance(table, RobotTable):
+        raise DescriptionError(
+            f"table of frames {quoted(table)}: it is a {type(table).__name__}; give a RobotTable,"
+            " which from_dict, read_toml and read_par make"
+        )
 
 
 Row = TypeVar("Row", FrameRow, BodyRow)
@@ -84,7 +113,15 @@ def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
 def _bare(row: Row, names: tuple[str, ...]) -> Row:
     """The row with symbols that are names only: their values are kept in the table."""
     values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
+    if isinstance(row, BodyRow) and _is_int(row.frame):
+        values["frame"] = int(row.frame)
     return replace(row, **values)
+
+
+def _plain_cut(loop: LoopRow) -> LoopRow:
+    """The row with the numbers of the cut as Python writes them."""
+    cut: Any = tuple(int(k) if _is_int(k) else k for k in loop.cut)
+    return replace(loop, cut=cut)
 
 
 def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
@@ -103,13 +140,15 @@ def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
     row = _with_scalars(where, row, GEOMETRY)
     return replace(
         row,
+        antecedent=int(row.antecedent),
+        sigma=int(row.sigma),
         actuated=None if row.sigma == 2 else row.actuated,
         limits=None if row.limits is None else _limits(where, row.limits),
     )
 
 
 def _limits(where: str, limits: Any) -> tuple[float, float]:
-    pair = list(limits) if isinstance(limits, (list, tuple)) else []
+    pair = list(limits) if isinstance(limits, (list, tuple, np.ndarray)) else []
     values = [to_float(expression(value, f"{where}, limits")) for value in pair]
     numbers = [value for value in values if value is not None]
     if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
@@ -120,7 +159,7 @@ def _limits(where: str, limits: Any) -> tuple[float, float]:
 
 
 def _gravity(name: str, gravity: Any) -> tuple[Expression, ...]:
-    if not isinstance(gravity, (list, tuple)) or len(gravity) != 3:
+    if not isinstance(gravity, (list, tuple, np.ndarray)) or len(gravity) != 3:
         raise DescriptionError(f"{name}: gravity {gravity!r} has not three values; give [x, y, z]")
     return tuple(expression(g, f"{name}, gravity") for g in gravity)
 
@@ -147,12 +186,18 @@ def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float
     return values
 
 
-def _guess(name: str, given: Mapping[str, float]) -> dict[str, float]:
+def _guess(table: RobotTable) -> dict[str, float]:
+    where = f"{table.name}, guess"
+    known = [table.joint_name(j) for j in range(1, len(table.frames) + 1) if _has_joint(table, j)]
     values: dict[str, float] = {}
-    for joint, value in given.items():
-        number = None if isinstance(value, bool) else to_float(expression(value, f"{name}, guess"))
+    for joint, value in table.guess.items():
+        if joint.partition(".")[0] not in known:
+            raise DescriptionError(
+                f"{where}: there is no joint {joint!r}; {did_you_mean(joint, known)}"
+            )
+        number = None if isinstance(value, bool) else to_float(expression(value, where))
         if number is None:
-            raise DescriptionError(f"{name}: guess of {joint} is {value!r}; give a number")
+            raise DescriptionError(f"{where} of {joint} is {value!r}; give a number")
         values[joint] = number
     return values
 
@@ -162,7 +207,7 @@ def _scalars(rows: Any) -> Iterator[Expression]:
     for row in frames:
         yield from (getattr(row, key) for key in GEOMETRY)
     for row in bodies:
-        yield from (getattr(row, key) for key in INERTIAL)
+        yield from (getattr(row, key) for key in BODY_SCALARS)
     yield from gravity
 
 
@@ -175,7 +220,7 @@ def _check_bodies(table: RobotTable) -> None:
         if body.frame in seen:
             raise DescriptionError(f"{where}: two bodies are on this frame; give their sum once")
         seen.add(body.frame)
-        if table.frames[body.frame - 1].sigma == 2 and _nonzero(body, ("Ia", "Fv", "Fs")):
+        if table.frames[body.frame - 1].sigma == 2 and _nonzero(body, DRIVE):
             raise DescriptionError(
                 f"{where}: the frame is fixed but Ia, Fv or Fs is given; set them to zero"
             )
@@ -198,7 +243,7 @@ def _check_loops(table: RobotTable) -> None:
                 " place the frame on a link"
             )
     for body in table.bodies:
-        inert = TEN_PARAMETERS if _is_moving(table, body.frame) else INERTIAL
+        inert = (*TEN_PARAMETERS, *(() if _is_moving(table, body.frame) else DRIVE))
         if body.frame in table.cut_frames and _nonzero(body, inert):
             raise DescriptionError(
                 f"{table.name}/body {body.frame}: the frame belongs to a cut joint, which has no"
@@ -207,7 +252,12 @@ def _check_loops(table: RobotTable) -> None:
 
 
 def _is_moving(table: RobotTable, frame: int) -> bool:
+    """Whether the frame carries the variable of a cut joint."""
     return any(loop.cut[0] == frame for loop in table.loops)
+
+
+def _has_joint(table: RobotTable, frame: int) -> bool:
+    return table.frames[frame - 1].sigma != 2 or _is_moving(table, frame)
 
 
 def _check_loop(where: str, loop: LoopRow, frames: tuple[FrameRow, ...]) -> None:
@@ -236,4 +286,4 @@ def _nonzero(body: BodyRow, names: tuple[str, ...]) -> bool:
 
 
 def _is_int(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)

@@ -21,7 +21,7 @@ from mbs.errors import DescriptionError
 from mbs.expressions import expression, to_float
 from mbs.formats.files import component_name
 from mbs.formats.rows import BodyRow, FrameRow, LoopRow
-from mbs.formats.table import RobotTable
+from mbs.formats.table import RobotTable, require_table
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 _MOVING = (Revolute, Prismatic)
@@ -47,6 +47,7 @@ def to_mechanism(table: RobotTable) -> Mechanism:
     Raises:
         DescriptionError: a body is impossible, two names are equal, or the base moves.
     """
+    require_table(table)
     _check_base(table)
     mechanism = Mechanism(
         component_name(table.name),
@@ -67,7 +68,7 @@ def to_mechanism(table: RobotTable) -> Mechanism:
         if frame.sigma == 2:
             mechanism.connect(point, links[j])
         else:
-            joint = _MOVING[frame.sigma](**_joint(j, frame, row, _actuated(table, frame)))
+            joint = _MOVING[frame.sigma](**_joint(table, j, row, _actuated(table, frame)))
             mechanism.connect(point, joint, links[j])
     for loop in table.loops:
         _close(mechanism, table, loop, links, rows.get(loop.cut[0], BodyRow(loop.cut[0])))
@@ -82,7 +83,7 @@ def _close(
     row: BodyRow,
 ) -> None:
     moving, fixed = (table.frames[k - 1] for k in loop.cut)
-    scalars = _joint(loop.cut[0], moving, row, bool(moving.actuated))
+    scalars = _joint(table, loop.cut[0], row, bool(moving.actuated))
     joint = _CLOSING[loop.joint](**scalars)
     mechanism.connect(
         links[moving.antecedent].at_khalil(**moving.geometry),
@@ -96,14 +97,15 @@ def _actuated(table: RobotTable, frame: FrameRow) -> bool | None:
     return True if frame.actuated is None and not table.loops else frame.actuated
 
 
-def _joint(j: int, frame: FrameRow, row: BodyRow, actuated: bool | None) -> dict[str, Any]:
+def _joint(table: RobotTable, j: int, row: BodyRow, actuated: bool | None) -> dict[str, Any]:
     return {
-        "name": frame.name or f"q{j}",
+        "name": table.joint_name(j),
         "actuated": actuated,
-        "limits": frame.limits,
+        "limits": table.frames[j - 1].limits,
         "Ia": row.Ia,
         "Fv": row.Fv,
         "Fs": row.Fs,
+        "Fs_width": row.Fs_width,
     }
 
 

@@ -12,13 +12,15 @@ from typing import Any
 
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar
-from mbs.formats.files import did_you_mean, read_text, write_text
-from mbs.formats.rows import GEOMETRY, INERTIAL, JOINTS, BodyRow, FrameRow, LoopRow
-from mbs.formats.table import RobotTable
+from mbs.files import write_text
+from mbs.formats.files import read_text
+from mbs.formats.rows import BODY_SCALARS, GEOMETRY, JOINTS, BodyRow, FrameRow, LoopRow
+from mbs.formats.table import RobotTable, require_table
+from mbs.messages import did_you_mean
 
 _TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "guess", "extras")
 _FRAME = ("antecedent", "joint", "sigma", "actuated", "mu", *GEOMETRY, "limits", "name")
-_BODY = ("frame", *INERTIAL, "name", "grouped")
+_BODY = ("frame", *BODY_SCALARS, "name", "grouped")
 _LOOP = ("cut", "joint")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -66,13 +68,19 @@ def write_toml(table: RobotTable, path: str | Path) -> None:
     """Write the table as a TOML file that `read_toml` reads as an equal table.
 
     Raises:
+        DescriptionError: it is not a table.
         ExportError: the file cannot be written.
     """
     write_text("\n".join(_lines(to_dict(table))) + "\n", path)
 
 
 def to_dict(table: RobotTable) -> dict[str, Any]:
-    """The dict of the TOML schema that describes the table; zeros are left out."""
+    """The dict of the TOML schema that describes the table; defaults are left out.
+
+    Raises:
+        DescriptionError: it is not a table.
+    """
+    require_table(table)
     data: dict[str, Any] = {"name": table.name}
     if table.source:
         data["source"] = table.source
@@ -80,7 +88,7 @@ def to_dict(table: RobotTable) -> dict[str, Any]:
     if table.parameters:
         data["parameters"] = dict(table.parameters)
     data["frame"] = [_frame_dict(row) for row in table.frames]
-    data["body"] = [_without_zeros(row, INERTIAL, ("frame",), _BODY[-2:]) for row in table.bodies]
+    data["body"] = [_body_dict(row) for row in table.bodies]
     data["loop"] = [{"cut": list(loop.cut), "joint": loop.joint} for loop in table.loops]
     if table.guess:
         data["guess"] = dict(table.guess)
@@ -140,7 +148,7 @@ def _body(row: Mapping[str, Any], where: str) -> BodyRow:
         frame=row["frame"],
         name=_text(row, "name", where),
         grouped=grouped,
-        **{key: row[key] for key in INERTIAL if key in row},
+        **{key: row[key] for key in BODY_SCALARS if key in row},
     )
 
 
@@ -189,7 +197,7 @@ def _frame_dict(row: FrameRow) -> dict[str, Any]:
     data: dict[str, Any] = {"antecedent": row.antecedent, "joint": JOINTS[row.sigma]}
     if row.actuated is not None:
         data["actuated"] = row.actuated
-    data.update(_without_zeros(row, GEOMETRY, (), ()))
+    data.update(_without_defaults(row, GEOMETRY))
     if row.limits is not None:
         data["limits"] = list(row.limits)
     if row.name:
@@ -197,18 +205,19 @@ def _frame_dict(row: FrameRow) -> dict[str, Any]:
     return data
 
 
-def _without_zeros(
-    row: FrameRow | BodyRow,
-    scalars: tuple[str, ...],
-    always: tuple[str, ...],
-    if_set: Iterable[str],
-) -> dict[str, Any]:
-    known = {f.name for f in fields(row)}
-    data: dict[str, Any] = {key: getattr(row, key) for key in always}
-    data.update({key: _plain(getattr(row, key)) for key in scalars if key in known})
-    data = {key: value for key, value in data.items() if key in always or value != 0}
-    data.update({key: getattr(row, key) for key in if_set if getattr(row, key)})
+def _body_dict(row: BodyRow) -> dict[str, Any]:
+    data: dict[str, Any] = {"frame": row.frame, **_without_defaults(row, BODY_SCALARS)}
+    if row.name:
+        data["name"] = row.name
+    if row.grouped:
+        data["grouped"] = True
     return data
+
+
+def _without_defaults(row: FrameRow | BodyRow, scalars: Iterable[str]) -> dict[str, Any]:
+    defaults = {field.name: field.default for field in fields(row)}
+    values = {key: _plain(getattr(row, key)) for key in scalars}
+    return {key: value for key, value in values.items() if value != defaults[key]}
 
 
 def _plain(value: Scalar) -> float | str:

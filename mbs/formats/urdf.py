@@ -2,6 +2,8 @@
 
 Only what moves is read: links, inertials, joints, limits, friction and mimics. Visuals and
 collisions, and the meshes that they name, are not looked at.
+
+The reader is our own, without MuJoCo's: see "URDF without MuJoCo" in docs/decisions.md.
 """
 
 from __future__ import annotations
@@ -22,9 +24,10 @@ from mbs.components import (
     Revolute,
 )
 from mbs.errors import DescriptionError
-from mbs.formats.files import component_name, did_you_mean, read_text
+from mbs.formats.files import component_name, read_text
 from mbs.formats.urdf_tree import JointElement, UrdfTree, read_tree
 from mbs.formats.urdf_values import Inertial, Reader, origin_of, read_inertial
+from mbs.messages import did_you_mean
 
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _ONE_AXIS = {"revolute": Revolute, "continuous": Revolute, "prismatic": Prismatic}

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from mbs.errors import DescriptionError
-from mbs.formats.files import component_name, did_you_mean
+from mbs.formats.files import component_name
 from mbs.formats.urdf_values import Reader
+from mbs.messages import did_you_mean
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,15 +10,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from casadi import SX
+from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import Closure, LoopRow, System
 from mbs.errors import AssemblyError, Unclosable
-from mbs.loops.closure import closure as closure_function
-from mbs.loops.closure import labelled_rows
+from mbs.loops.closing import Closing, closure_parameters
+from mbs.loops.closure import closure_rows, labelled_rows
 from mbs.loops.posture import closed_posture
-from mbs.loops.velocity import closure_jacobian
+from mbs.loops.velocity import velocity_rows
 from mbs.solvers.rank import independent_rows, rank
 
 Matrix = NDArray[np.float64]
@@ -44,11 +44,11 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
         Unclosable: no posture closes the loops.
         AssemblyError: the motors do not fit the mobility.
     """
-    p = system.parameter_values()
+    p = closure_parameters(system)
     posture = _assembled(system, guess, p)
     postures = [posture, *_others(system, posture, p)]
-    J = closure_jacobian(system)
-    jacobians = [np.array(J(q)) for q in postures]
+    J = _jacobian(system)
+    jacobians = [np.array(J(q, p)) for q in postures]
     ranks = [rank(matrix, _GAP) for matrix in jacobians]
     generic = max(ranks)
     posture = postures[ranks.index(generic)]
@@ -62,7 +62,7 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
         active=tuple(active),
         passive=tuple(k for k in range(system.nv) if k not in active),
         gruebler=system.nv - count,
-        residual=_residual(system, posture),
+        residual=float(np.max(np.abs(Closing(system, p).rows(posture)[0]))),
     )
     return replace(
         system,
@@ -73,31 +73,30 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
     )
 
 
-def _assembled(system: System, guess: Mapping[str, float], p: Sequence[float]) -> Matrix:
+def _assembled(system: System, guess: Mapping[str, float], p: Matrix) -> Matrix:
     """A closed posture near the guess: first with the motors held, then with everything free."""
     known = {name: value for name, value in guess.items() if name in _names(system)}
     start = np.array(system.position(known))
-    motors = [k for k, c in enumerate(system.coordinates) if c.actuated]
+    motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
     try:
-        return closed_posture(system, start, motors, p, restarts=10)
+        return closed_posture(Closing(system, p, motors), start, restarts=10)
     except Unclosable:
-        return closed_posture(system, start, (), p)
+        return closed_posture(Closing(system, p), start)
 
 
 def _names(system: System) -> list[str]:
     return [coordinate.name for coordinate in system.coordinates]
 
 
-def _others(system: System, posture: Matrix, p: Sequence[float]) -> list[Matrix]:
+def _others(system: System, posture: Matrix, p: Matrix) -> list[Matrix]:
     """Further closed postures around the assembled one."""
     rng = np.random.default_rng(_SEED)
     found: list[Matrix] = []
     for _ in range(_TRIES):
         start = posture + rng.uniform(-_REACH, _REACH, posture.shape)
-        try:
-            found.append(closed_posture(system, start, (), p, restarts=0))
-        except Unclosable:
-            continue
+        closed = Closing(system, p).nearest(start)
+        if closed.is_closed:
+            found.append(closed.q)
         if len(found) == _POSTURES:
             break
     return found
@@ -147,5 +146,7 @@ def _with_rows(
     return tuple(result)
 
 
-def _residual(system: System, q: Matrix) -> float:
-    return float(np.max(np.abs(np.array(closure_function(system)(q))), initial=0.0))
+def _jacobian(system: System) -> Function:
+    """`J(q, p)`, every row."""
+    q = SX.sym("q", system.nq)
+    return Function("J", [q, system.p], [velocity_rows(system, q, closure_rows(system, q))])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -11,6 +10,7 @@ from mbs.assembly.open_system import open_system
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError
 from mbs.loops.analysis import analysed
+from mbs.messages import did_you_mean
 
 
 def assemble(mechanism: Mechanism, guess: Mapping[str, float]) -> System:
@@ -37,8 +37,7 @@ def _check_guess(system: System, guess: Mapping[str, float]) -> None:
     known = [c.name for c in (*system.coordinates, *system.cut_coordinates)]
     for name in guess:
         if name not in known:
-            close = difflib.get_close_matches(name, known, n=3) or known
             raise AssemblyError(
                 f"{system.name}: the guess names {name!r}, which is no coordinate;"
-                f" did you mean {' or '.join(close)}?"
+                f" {did_you_mean(name, known)}"
             )

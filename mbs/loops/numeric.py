@@ -4,38 +4,76 @@ import casadi
 from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
+from mbs.errors import ModelError
+from mbs.loops.closing import closure_parameters
+from mbs.loops.closure import closure_rows, facing
 from mbs.loops.reduction import independent_rows
+
+_STAGES = 32
+_OPEN = 1e-9
 
 
 def follow_active(system: System) -> Function:
-    """``follow(q_a, p) -> q``: Newton's method from the assembled posture.
+    """``follow(q_a, p) -> q``: the posture reached from the assembled one along a straight line.
 
-    It is differentiable (implicit function theorem) and stays in the basin of the assembled
-    posture; a posture that is not reached is an error of the call. For systems without
-    quaternion joints, where positions and velocities have the same numbers.
+    The independent positions, and the parameters from their defaults, are moved in small equal
+    stages, each closed by Newton's method from the one before: the branch of the assembled
+    posture is kept, and the Function is differentiable (implicit function theorem). Where the
+    line leaves what the mechanism can reach, q is NaN.
 
     Returns:
         Function of q_a (m, 1) and p (np, 1); q (nq, 1).
+
+    Raises:
+        ModelError: the loops contain quaternion joints, whose positions do not match velocities.
     """
 
     def build() -> Function:
         assert system.closure is not None
+        if system.nq != system.nv:
+            raise ModelError(
+                f"{system.name}: the loops contain a quaternion joint, so positions cannot be"
+                " followed by those of independent joints; use a posture of mbs.loops.solve"
+            )
         active, passive = list(system.closure.active), list(system.closure.passive)
-        q = SX.sym("q", system.nq)
-        z, q_a = SX.sym("z", len(passive)), SX.sym("q_a", len(active))
-        merged = SX.zeros(system.nq)
-        merged[passive], merged[active] = z, q_a
-        residual = casadi.substitute(independent_rows(system, q), q, merged)
-        equations = Function("phi", [z, q_a, system.p], [residual])
-        newton = casadi.rootfinder(
-            "newton", "fast_newton", equations, {"abstol": 1e-13, "max_iter": 100}
-        )
-        y, p = MX.sym("q_a", len(active)), MX.sym("p", system.p.numel())
-        solved = newton(DM([system.posture[k] for k in passive]), y, p)
-        order = [*passive, *active]
-        rows = casadi.vertcat(solved, y)
-        q_all = rows[[order.index(k) for k in range(system.nq)]]
-        return Function("follow", [y, p], [q_all], ["q_a", "p"], ["q"])
+        newton = _newton(system, active, passive)
+        q_a, p = MX.sym("q_a", len(active)), MX.sym("p", system.p.numel())
+        q_start = DM([system.posture[k] for k in active])
+        p_start = DM(closure_parameters(system))
+        z = MX(DM([system.posture[k] for k in passive]))
+        for stage in range(1, _STAGES + 1):
+            part = stage / _STAGES
+            z = newton(z, q_start + part * (q_a - q_start), p_start + part * (p - p_start))
+        q = _merged(system, active, passive)(z, q_a)
+        closed = _closed(system)(q, p)
+        return Function("follow", [q_a, p], [casadi.if_else(closed, q, DM.nan(system.nq))])
 
     function: Function = system.cached("follow", build)
     return function
+
+
+def _merged(system: System, active: list[int], passive: list[int]) -> Function:
+    z, q_a = SX.sym("z", len(passive)), SX.sym("q_a", len(active))
+    q = SX.zeros(system.nq)
+    q[passive], q[active] = z, q_a
+    return Function("merged", [z, q_a], [q])
+
+
+def _newton(system: System, active: list[int], passive: list[int]) -> Function:
+    q, z, q_a = (
+        SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
+    )
+    merged = _merged(system, active, passive)(z, q_a)
+    residual = casadi.substitute(independent_rows(system, q), q, merged)
+    equations = Function("phi", [z, q_a, system.p], [residual])
+    options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}
+    return casadi.rootfinder("newton", "fast_newton", equations, options)
+
+
+def _closed(system: System) -> Function:
+    """1 where every row is closed and no axis is opposed, else 0; NaN counts as open."""
+    q = SX.sym("q", system.nq)
+    openness = casadi.sum1(casadi.fabs(closure_rows(system, q)))  # a maximum would drop NaN
+    cosines = facing(system, q)
+    faces = casadi.mmin(cosines) > 0 if cosines.numel() else SX(1)
+    return Function("closed", [q, system.p], [casadi.logic_and(openness < _OPEN, faces)])

@@ -116,6 +116,8 @@ def _tree_accelerations(system: System, s: Symbols, tau: SX) -> tuple[SX, SX]:
 
 def _penalty(system: System) -> float:
     """A constant that makes c J'J as large as A at the assembled posture."""
+    if any(p.default is None for p in system.parameters):
+        return 1.0
     A = np.array(inertia_matrix(system, "tree")(list(system.posture)))
     return float(max(np.trace(A), 1e-6)) / system.nv
 
@@ -132,7 +134,9 @@ def _require_inertia(system: System) -> None:
         if not system.is_closed:
             posture = posture + rng.uniform(-1.0, 1.0, posture.shape)
         A = np.array(inertia(posture))
-        if rank(A / max(np.abs(A).max(), 1e-30)) < len(A):
+        size = 1 / np.sqrt(np.maximum(np.diag(A), 1e-30))
+        A = A * np.outer(size, size)
+        if rank(A) < len(A):
             k = int(np.argmax(np.abs(np.linalg.svd(A)[2][-1])))
             name = system.speeds[system.active[k]].name
             raise ModelError(

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import casadi
-from casadi import MX, SX, Function
+from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
-from mbs.errors import ModelError
+from mbs.assembly.model_function import (
+    ModelFunction,
+    Named,
+    default_in,
+    model_function,
+    require_system,
+)
 from mbs.loops.numeric import follow_active
 from mbs.recursions.poses import link_poses, relative_pose
 
@@ -44,9 +49,8 @@ def terminal_frame(system: System) -> str | int:
 
     It is the frame named "tool", else the only frame that was given a name, else the last link.
     """
-    bodies = {row.name for row in system.bodies} | {"base", "world"}
-    named = [name for name in system.frames if name not in bodies]
-    if "tool" in system.frames:
+    named = system.named_frames
+    if "tool" in named:
         return "tool"
     return named[0] if len(named) == 1 else len(system.tree.links)
 
@@ -55,8 +59,8 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
     """``dgm(q) -> T``: the pose of the terminal frame seen from the base.
 
     For a closed system the input is q_a, the positions of the independent joints; the others
-    follow by Newton's method from the assembled posture, and a posture that cannot be reached is
-    an error of the call.
+    follow from the assembled posture in small steps, so that its branch is kept. Where that
+    leads nowhere T is NaN, and a call with numbers is refused.
 
     Source: Khalil & Creusot 1997, section 3.1.
 
@@ -72,16 +76,14 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
     """
     require_system(system)
     name = terminal_frame(system) if frame is None else frame
-    pose = transform(system, name)
     if system.is_closed:
-        return _closed_geometry(system, name, pose)
+        return _closed_geometry(system, name, transform(system, name))
+    target, base = system.frame(name), system.frame("base")
 
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        placed = relative_pose(
-            system.tree, link_poses(system.tree, q), system.frame("base"), system.frame(name)
-        )
-        return [("q", q)], [("T", placed.matrix)]
+        pose = relative_pose(system.tree, link_poses(system.tree, q), base, target)
+        return [("q", q)], [("T", pose.matrix)]
 
     return model_function(system, ("dgm", name), build)
 
@@ -92,15 +94,12 @@ def _closed_geometry(system: System, name: str | int, pose: Function) -> Functio
         inputs = [MX.sym("q_a", len(system.active))]
         if system.parameters:
             inputs.append(MX.sym("p", len(system.parameters)))
-        q = follow(inputs[0], inputs[1] if system.parameters else [])
+        q = follow(inputs[0], inputs[1] if system.parameters else DM(0, 1))
         T = Function.__call__(pose, q, *inputs[1:])
         names = ["q_a", "p"][: len(inputs)]
-        return ModelFunction(Function("dgm", inputs, [casadi.densify(T)], names, ["T"]), system)
+        options = {"default_in": default_in(system, 1)}
+        function = Function("dgm", inputs, [casadi.densify(T)], names, ["T"], options)
+        return ModelFunction(function, system)
 
-    if len(system.coordinates) != len(system.speeds):
-        raise ModelError(
-            f"{system.name}: the closed geometry of a loop with quaternion joints is not available;"
-            " use transform with a posture of mbs.loops.solve"
-        )
     function: Function = system.cached(("dgm", name), make)
     return function

@@ -17,7 +17,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.rates import normalised, position_rate, quaternion_slices
 from mbs.errors import ModelError
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure import closure_rows, facing
 from mbs.loops.reduction import independent_rows, reduction
 from mbs.loops.velocity import velocity_rows
 from mbs.models.direct_dynamics import direct_dynamics
@@ -143,11 +143,12 @@ def minimal_state(system: System) -> MinimalState:
     u = SX.sym("u", len(driven))
     q = SX.zeros(system.nq)
     q[list(positions)], q[list(dependents)] = x[: len(positions)], z
+    unit = normalised(tree, q) if not system.is_closed else q
     v_a = x[len(positions) :]
     tau = SX.zeros(len(system.active))
     for column, k in enumerate(driven):
         tau[system.active.index(k)] = u[column]
-    (a,) = _outputs(system, direct_dynamics(system), q, v_a, tau)
+    (a,) = _outputs(system, direct_dynamics(system), unit, v_a, tau)
     symbols, speeds = SX.sym("q", system.nq), SX.sym("v", len(system.active))
     rate, rest = (v_a, SX(0, 1))
     if system.is_closed:
@@ -164,7 +165,7 @@ def minimal_state(system: System) -> MinimalState:
         for part in quaternion_slices(tree):
             rate[part] += _NORM_RATE * (1 - casadi.sumsqr(q[part])) * q[part]
     T = relative_pose(
-        tree, link_poses(tree, q), system.frame("base"), system.frame(terminal_frame(system))
+        tree, link_poses(tree, unit), system.frame("base"), system.frame(terminal_frame(system))
     )
     pose = casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
     outputs = [casadi.vertcat(rate, a), casadi.vertcat(a, rest, pose)]
@@ -197,7 +198,9 @@ def _closure_step(system: System, q: SX, x: SX, z: SX) -> Function:
     every = casadi.vertcat(closure_rows(system, symbols), *norms)
     kept, every = casadi.substitute([kept, every], [symbols], [q])
     z_next = z - solve_square(casadi.jacobian(kept, z), kept)
-    residual = casadi.mmax(casadi.fabs(every))
+    cosines = casadi.substitute(facing(system, symbols), symbols, q)
+    opposed = casadi.mmin(cosines) <= 0 if cosines.numel() else SX(0)
+    residual = casadi.mmax(casadi.fabs(casadi.vertcat(every, opposed)))
     return _function("closure", [x, z, system.p], [z_next, residual])
 
 

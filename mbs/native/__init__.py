@@ -2,7 +2,7 @@
 
 from mbs.native.cache import cached_library
 from mbs.native.compiled import c_source, compiled
-from mbs.native.compiler import Compiler, compile_library, find_compiler
+from mbs.native.compiler import Compiler, compile_library, compiler_found, find_compiler
 
 __all__ = [
     "Compiler",
@@ -10,5 +10,6 @@ __all__ = [
     "cached_library",
     "compile_library",
     "compiled",
+    "compiler_found",
     "find_compiler",
 ]

@@ -1,13 +1,17 @@
 """A Function as machine code, equal to the interpreted one to the last bit."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import casadi
 
-from mbs.errors import CompilerError
+from mbs.errors import ModelError
+from mbs.messages import quoted
 from mbs.native.cache import cached_library
-from mbs.native.compiler import find_compiler, flags_for
+from mbs.native.compiler import compiler_found, flags_for
 
 
-def compiled(function: casadi.Function, *, derivatives: bool = True) -> casadi.Function:
+def compiled(function: casadi.Function, *, derivatives: int = 1) -> casadi.Function:
     """The same Function backed by a cached shared library.
 
     Without a compiler, or when the Function holds a node that CasADi cannot write as C, the
@@ -15,40 +19,101 @@ def compiled(function: casadi.Function, *, derivatives: bool = True) -> casadi.F
 
     Args:
         function: any Function without free symbols.
-        derivatives: compile its Jacobian, forward and reverse derivatives too, so that the
-            answer can be differentiated once.
+        derivatives: how often the answer can be differentiated: 0, 1 (Jacobians, forward and
+            reverse products) or 2 (Hessians too, for about five times the code). Beyond it
+            CasADi refuses to differentiate.
 
     Returns:
-        a Function with the same name, inputs, outputs and default inputs.
+        a Function with the same name, inputs, outputs and default inputs; of a model, with its
+        checks and its parameter defaults too.
+
+    Raises:
+        ModelError: it is no Function, it has free symbols, or `derivatives` is not 0, 1 or 2.
+        CompilerError: CC names no compiler, or the compiler refused the code.
     """
-    try:
-        find_compiler()
-    except CompilerError:
+    require_function(function)
+    _check_order(derivatives)
+    if not compiler_found():
         return function
     source = c_source(function, derivatives=derivatives)
-    if "#error" in source:
+    if unwritten(source):
         return function
     library = cached_library({"function.c": source}, flags_for(source))
-    return casadi.external(function.name(), str(library))
+    external = casadi.external(function.name(), str(library))
+    like: Any = getattr(function, "like", None)
+    return external if like is None else like(external)
 
 
-def c_source(function: casadi.Function, *, derivatives: bool = False) -> str:
+def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
     """C text of a Function, with the derivative functions that an external Function looks for.
 
     Args:
         function: any Function without free symbols.
-        derivatives: add `jac_`, `fwd1_` and `adj1_` of it.
+        derivatives: 0; 1 to add `jac_`, `fwd1_` and `adj1_` of it; 2 to add those of `fwd1_` and
+            `adj1_` too, from which CasADi makes Hessians.
 
     Returns:
         one C file.
+
+    Raises:
+        ModelError: it is no Function, or it has free symbols.
     """
-    generator = casadi.CodeGenerator(f"{function.name()}_code")
-    generator.add(function)
+    require_function(function)
+    _check_order(derivatives)
+    functions = [function]
     if derivatives:
-        for derivative in _derivatives(function):
-            generator.add(derivative)
+        first = _derivatives(function)
+        functions += first
+        if derivatives == 2:
+            functions += [d for f in first[1:] for d in _derivatives(f)]
+    return generated(functions)
+
+
+def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
+    """C text of Functions with different names; see `unwritten`.
+
+    Args:
+        functions: what to write.
+        options: of `casadi.CodeGenerator`.
+    """
+    generator = casadi.CodeGenerator("generated", options)
+    for function in functions:
+        generator.add(function)
     return str(generator.dump())
 
 
-def _derivatives(function: casadi.Function) -> tuple[casadi.Function, ...]:
-    return (function.jacobian(), function.forward(1), function.reverse(1))
+def unwritten(source: str) -> str:
+    """What CasADi could not write of generated C, as the end of a message; empty when nothing."""
+    if "#error" not in source:
+        return ""
+    reason = source[source.index("#error") + 6 :].splitlines()[0].strip()
+    return (
+        f"CasADi cannot write it as C ({reason}); replace integrators and rootfinders by Newton"
+        " steps"
+    )
+
+
+def require_function(function: object) -> None:
+    """Refuse what is not a Function of numbers.
+
+    Raises:
+        ModelError: says what to give.
+    """
+    if not isinstance(function, casadi.Function) or function.is_null():
+        what = "an empty Function" if isinstance(function, casadi.Function) else quoted(function)
+        raise ModelError(
+            f"{what} is not a Function; give a casadi.Function, such as"
+            " mbs.models.inverse_dynamics(system)"
+        )
+    if function.has_free():
+        free = ", ".join(str(symbol) for symbol in function.get_free())
+        raise ModelError(f"{function.name()}: symbols {free} are free; make them inputs")
+
+
+def _check_order(derivatives: object) -> None:
+    if derivatives not in (0, 1, 2):
+        raise ModelError(f"derivatives is {quoted(derivatives)}; use 0, 1 or 2")
+
+
+def _derivatives(function: casadi.Function) -> list[casadi.Function]:
+    return [function.jacobian(), function.forward(1), function.reverse(1)]

@@ -48,10 +48,28 @@ def find_compiler() -> Compiler:
     return _find(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
 
+def compiler_found() -> bool:
+    """Whether this computer has a C compiler.
+
+    Returns:
+        False when CC is not set and none is installed.
+
+    Raises:
+        CompilerError: the compiler that CC names does not start.
+    """
+    try:
+        find_compiler()
+    except CompilerError:
+        if os.environ.get("CC", "").strip():
+            raise
+        return False
+    return True
+
+
 @functools.lru_cache(maxsize=8)
 def _find(wanted: str, path: str) -> Compiler:
     if wanted.strip():
-        compiler = _probe(tuple(shlex.split(wanted, posix=os.name != "nt")), path)
+        compiler = _probe(_words(wanted), path)
         if compiler is None:
             raise CompilerError(
                 f"environment variable CC is {wanted!r} and does not start; set it to a C compiler "
@@ -68,6 +86,13 @@ def _find(wanted: str, path: str) -> Compiler:
     raise CompilerError(
         'no C compiler was found; install gcc or clang, or run pip install "mbs[cross]"'
     )
+
+
+def _words(command: str) -> tuple[str, ...]:
+    try:
+        return tuple(shlex.split(command, posix=os.name != "nt"))
+    except ValueError:  # a quote is open
+        return (command,)
 
 
 def _probe(command: tuple[str, ...], path: str) -> Compiler | None:

@@ -9,6 +9,7 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Link, Tree
+from mbs.components.motion import Motion
 from mbs.recursions.motion import effort
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, cross, link_accelerations
@@ -99,8 +100,20 @@ def rotor_and_friction(tree: Tree, v: SX, a: SX) -> SX:
 
 def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
     total = zeros(link.motion.nv)
-    step = casadi.sign(v) if link.Fs_width.is_zero() else casadi.tanh(v / link.Fs_width)
+    if link.motion is Motion.FREE:  # the velocity is in the turning frame
+        a = a + casadi.vertcat(cross(v[3:6], v[0:3]), zeros())
+    step = _smooth_sign(v, link.Fs_width)
     for coefficient, rate in ((link.Ia, a), (link.Fv, v), (link.Fs, step)):
         if not coefficient.is_zero():
             total = total + coefficient * rate
     return total
+
+
+def _smooth_sign(v: SX, width: SX) -> SX:
+    """tanh(v / width), and sign(v) for a width of zero."""
+    if width.is_zero():
+        return casadi.sign(v)
+    if width.is_constant():
+        return casadi.tanh(v / width)
+    vanishes = width == 0
+    return casadi.if_else(vanishes, casadi.sign(v), casadi.tanh(v / (width + vanishes)))

@@ -11,7 +11,7 @@ from mbs.components import Mechanism
 from mbs.errors import DescriptionError
 from mbs.expressions import Parameter
 from mbs.formats import from_dict, read_mjcf, read_par, read_toml, read_urdf, to_mechanism
-from mbs.formats.files import did_you_mean
+from mbs.messages import did_you_mean
 from mbs.robots.cart_pole import cart_pole
 from mbs.robots.five_bar import five_bar
 from mbs.robots.four_bar import four_bar

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
-import casadi
 import numpy as np
-from casadi import DM, SX, Function
+from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
+from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
 from mbs.loops.posture import require_closed, solve
 from mbs.loops.reduction import reduction
 from mbs.models.state_space import FullState, full_state
 from mbs.result import Result
+from mbs.simulate.arguments import count_steps, positive
+from mbs.simulate.effort import Effort, effort_function
 from mbs.simulate.progress import progress
 from mbs.solvers import integrate
 
 Values = Mapping[str, float] | Sequence[float] | None
-Effort = Mapping[str, float] | Sequence[float] | Function | Callable[[Any, Any, Any], Any] | None
 Array = NDArray[np.float64]
 
 _SCALARS = (("kinetic_energy", "J"), ("potential_energy", "J"), ("closure_residual", "1"))
@@ -41,8 +41,9 @@ def run(
 ) -> Result:
     """The motion of a system from given positions and velocities under given joint efforts.
 
-    Dormand and Prince's method with error control; after every step positions and velocities are
-    projected onto all closure rows, so that loops do not drift.
+    Dormand and Prince's method with error control. After every step positions and velocities are
+    projected onto the independent closure rows, so that loops do not drift; the step is accepted
+    when all closure rows hold.
 
     Args:
         system: open or closed.
@@ -51,8 +52,8 @@ def run(
             posture; in a closed system the loops are closed with the independent ones as given.
         v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
             they may be of any joints, and the others follow.
-        tau: joint efforts [N m or N]: constants by name, or a function of (t, q, v) made of
-            CasADi operations that returns (nv, 1) efforts, or a casadi.Function of (t, q, v).
+        tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
+            of CasADi operations that returns (nv, 1) efforts, or a casadi.Function of (t, q, v).
         parameters: values of symbols, the others at their defaults.
         step: time between the rows of the result [s]; it does not change the accuracy.
         tolerance: relative and absolute tolerance of the error of one integration step.
@@ -63,18 +64,20 @@ def run(
         `kinetic_energy`, `potential_energy`, `closure_residual`.
 
     Raises:
-        ModelError: a name is unknown, or an argument has the wrong size.
+        ModelError: `system` is no System, a name is unknown or has no motor, or an argument has the
+            wrong type or size.
+        CompilerError: the compiler that CC names does not start.
         Unclosable: the loops cannot be closed at these positions.
         SolverError: the integration cannot go on; the message says when and why.
     """
-    if not (duration > 0 and step > 0):
-        raise ModelError(
-            f"{system.name}: duration is {duration} s and step is {step} s; give positive times"
-        )
+    require_system(system)
+    duration = positive(duration, "duration [s]", system.name)
+    tolerance = positive(tolerance, "tolerance", system.name)
+    steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
     p = system.parameter_values(parameters)
-    state = full_state(system, _effort(system, tau))
+    state = full_state(system, effort_function(system, tau))
     x0 = np.concatenate(_start(system, q0, v0, parameters))
-    times = np.linspace(0.0, duration, max(1, round(duration / step)) + 1)
+    times = np.linspace(0.0, duration, steps + 1)
     with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
         x = integrate(
             state.rhs,
@@ -87,31 +90,6 @@ def run(
             progress=reached,
         )
     return _result(system, state, times, x, p)
-
-
-def _effort(system: System, tau: Effort) -> Function | None:
-    """`effort(t, q, v, p) -> tau`, whatever form the user gave it in."""
-    if tau is None:
-        return None
-    t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
-    values = _traced(system, tau, t, q, v) if callable(tau) else SX(DM(system.velocity(tau)))
-    if values.numel() != system.nv:
-        names = ", ".join(speed.name for speed in system.speeds)
-        raise ModelError(
-            f"{system.name}: tau has {values.numel()} values, the system has {system.nv}: {names}"
-        )
-    return Function("effort", [t, q, v, system.p], [casadi.densify(values)])
-
-
-def _traced(system: System, tau: Callable[[Any, Any, Any], Any], t: SX, q: SX, v: SX) -> SX:
-    try:
-        values = tau(t, q, v)
-        return SX(casadi.vertcat(*values)) if isinstance(values, (list, tuple)) else SX(values)
-    except Exception as error:
-        raise ModelError(
-            f"{system.name}: tau(t, q, v) could not be traced with CasADi symbols ({error});"
-            " build it from CasADi operations, such as casadi.sin and casadi.if_else"
-        ) from error
 
 
 def _start(

@@ -4,6 +4,7 @@ import ctypes
 import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ import casadi
 import numpy as np
 import numpy.typing as npt
 
-from mbs.errors import CompilerError, ModelError, SolverError
-from mbs.native import cached_library, find_compiler
+from mbs.errors import ModelError, SolverError
+from mbs.messages import quoted
+from mbs.native import cached_library, compiler_found
+from mbs.native.compiled import generated, unwritten
 from mbs.native.compiler import flags_for
 from mbs.solvers.dopri5 import Dopri5, Failure, failed
 
@@ -64,15 +67,40 @@ def integrate(
     Raises:
         ModelError: an argument does not fit the functions.
         SolverError: the integration cannot go on; the message says when and why.
+        CompilerError: the compiler that CC names does not start.
     """
     f, g = _dense(rhs, project)
     x, t, parameters = _checked(f, x0, times, p, rtol, atol)
-    if compiled and _compilable():
-        return _run_compiled(f, g, x, t, parameters, rtol, atol, progress)
-    return _run_python(f, g, x, t, parameters, rtol, atol, progress)
+    problem = Problem(f, g, x, t, parameters, rtol, atol)
+    library = _library(f, g) if compiled and compiler_found() else None
+    if library is None:
+        return _run_python(problem, progress)
+    return _run_compiled(library, problem, progress)
 
 
-@functools.lru_cache(maxsize=64)
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """An integration, its arguments checked.
+
+    Attributes:
+        rhs: `mbs_rhs(t, x, p) -> xdot`, dense.
+        project: `mbs_project(x, p) -> (x, residual)`, dense; None without constraints.
+        x0: (nx,) state at the first time.
+        times: (m,) s, increasing.
+        p: (np,) parameters.
+        rtol: relative tolerance of the error of one step.
+        atol: absolute tolerance of the error of one step.
+    """
+
+    rhs: casadi.Function
+    project: casadi.Function | None
+    x0: Array
+    times: Array
+    p: Array
+    rtol: float
+    atol: float
+
+
 def _dense(
     rhs: casadi.Function, project: casadi.Function | None
 ) -> tuple[casadi.Function, casadi.Function | None]:
@@ -105,9 +133,7 @@ def _checked(
     atol: float,
 ) -> tuple[Array, Array, Array]:
     n, n_p = f.numel_in(1), f.numel_in(2)
-    x = np.array(x0, dtype=float).reshape(-1)
-    t = np.ascontiguousarray(times, dtype=float).reshape(-1)
-    parameters = np.array([] if p is None else p, dtype=float).reshape(-1)
+    x, t, parameters = (_numbers(v) for v in (x0, times, [] if p is None else p))
     if len(x) != n or len(parameters) != n_p:
         raise ModelError(
             f"integrate: {len(x)} initial states and {len(parameters)} parameters were given; "
@@ -117,35 +143,23 @@ def _checked(
         raise ModelError("integrate: a state, a time or a parameter is not finite; give numbers")
     if len(t) == 0 or np.any(np.diff(t) < 0):
         raise ModelError("integrate: times must be one or more, in increasing order")
-    if not (rtol > 0 and atol > 0):
-        raise ModelError(f"integrate: tolerances {rtol} and {atol} must be positive")
+    if not all(isinstance(value, (int, float)) and 0 < value < np.inf for value in [rtol, atol]):
+        raise ModelError(f"integrate: tolerances {rtol!r} and {atol!r} must be positive numbers")
     return x, t, parameters
 
 
-def _compilable() -> bool:
+def _numbers(values: npt.ArrayLike) -> Array:
     try:
-        find_compiler()
-    except CompilerError:
-        return False
-    return True
+        return np.array(values, dtype=float).reshape(-1)
+    except (TypeError, ValueError):
+        raise ModelError(f"integrate: {quoted(values)} are not numbers; give real ones") from None
 
 
-def _run_compiled(
-    f: casadi.Function,
-    g: casadi.Function | None,
-    x: Array,
-    times: Array,
-    p: Array,
-    rtol: float,
-    atol: float,
-    progress: Progress | None,
-) -> Array:
-    library = _library(f, g)
-    if library is None:
-        return _run_python(f, g, x, times, p, rtol, atol, progress)
+def _run_compiled(library: ctypes.CDLL, problem: Problem, progress: Progress | None) -> Array:
+    x, times = problem.x0.copy(), problem.times
     table = np.empty((len(times), len(x)))
     done = ctypes.c_longlong(0)
-    with _opened(library, x, p, rtol, atol, float(times[0])) as driver:
+    with _opened(library, problem) as driver:
         status = library.mbs_begin(driver, _pointer(x))
         while status <= 1 and done.value < len(times):
             status = library.mbs_table(
@@ -164,27 +178,20 @@ def _run_compiled(
     return table
 
 
-def _run_python(
-    f: casadi.Function,
-    g: casadi.Function | None,
-    x: Array,
-    times: Array,
-    p: Array,
-    rtol: float,
-    atol: float,
-    progress: Progress | None,
-) -> Array:
-    def slope(t: float, state: Array) -> Array:
-        return np.asarray(f(t, state, p).full()[:, 0])
+def _run_python(problem: Problem, progress: Progress | None) -> Array:
+    p, times = problem.p, problem.times
 
-    project = None if g is None else functools.partial(_onto, g, p)
+    def slope(t: float, state: Array) -> Array:
+        return np.asarray(problem.rhs(t, state, p).full()[:, 0])
+
+    project = None if problem.project is None else functools.partial(_onto, problem.project, p)
     start = float(times[0])
     try:
-        state = x if project is None else project(start, x)
+        state = problem.x0 if project is None else project(start, problem.x0)
     except Failure as failure:
         raise failed(start, 0.0, str(failure)) from failure
-    solver = Dopri5(slope, project, start, state, rtol, atol)
-    table = np.empty((len(times), len(x)))
+    solver = Dopri5(slope, project, start, state, problem.rtol, problem.atol)
+    table = np.empty((len(times), len(state)))
     row = 0
     while row < len(times):
         row = solver.table(times, row, table, _CHUNK_PYTHON)
@@ -208,15 +215,10 @@ def _onto(project: casadi.Function, p: Array, _t: float, x: Array) -> Array:
     raise Failure("projection")
 
 
-@functools.lru_cache(maxsize=64)
 def _library(f: casadi.Function, g: casadi.Function | None) -> ctypes.CDLL | None:
     """The compiled driver of these functions; None when CasADi can only interpret them."""
-    generator = casadi.CodeGenerator("system")
-    generator.add(f)
-    if g is not None:
-        generator.add(g)
-    source = str(generator.dump())
-    if "#error" in source:
+    source = generated([f] if g is None else [f, g])
+    if unwritten(source):
         return None
     flags = (*flags_for(source), *(() if g is None else ("-DMBS_PROJECT",)))
     return _load(cached_library({"system.c": source, **_runtime()}, flags))
@@ -250,12 +252,11 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 @contextmanager
-def _opened(
-    library: ctypes.CDLL, x: Array, p: Array, rtol: float, atol: float, t: float
-) -> Iterator[ctypes.c_void_p]:
-    driver = library.mbs_open(len(x), len(p), _pointer(p), rtol, atol, t)
+def _opened(library: ctypes.CDLL, problem: Problem) -> Iterator[ctypes.c_void_p]:
+    n, p, start = len(problem.x0), problem.p, float(problem.times[0])
+    driver = library.mbs_open(n, len(p), _pointer(p), problem.rtol, problem.atol, start)
     if not driver:
-        raise SolverError(f"no memory is left to integrate {len(x)} states; close other programs")
+        raise SolverError(f"no memory is left to integrate {n} states; close other programs")
     try:
         yield driver
     finally:

@@ -312,3 +312,14 @@ def test_missing_mujoco_is_said(xml, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(DescriptionError, match=r'install "mbs\[import\]"'):
         read_mjcf(xml(TREE))
+
+
+def test_of_a_servo_only_the_driven_joint_is_read(xml):
+    text = """<mujoco><worldbody><body><joint name="a" armature=".1"/><geom size=".1"/>
+      <body><joint name="b" damping="2"/><geom size=".1"/></body></body></worldbody>
+    <actuator><position joint="a" kp="50" kv="3" gear="7" ctrlrange="-1 1"/></actuator></mujoco>"""
+    joints = {joint.name: joint for joint in read_mjcf(xml(text)).joints()}
+    assert [joint.actuated for joint in joints.values()] == [True, False]
+    assert to_float(joints["a"].Ia) == 0.1
+    assert to_float(joints["a"].Fv) == 0
+    assert to_float(joints["b"].Fv) == 2

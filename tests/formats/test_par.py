@@ -1,8 +1,9 @@
 import pytest
 
+import mbs
 from mbs.errors import DescriptionError
 from mbs.expressions import expression
-from mbs.formats import from_dict, read_par, to_mechanism, write_par
+from mbs.formats import from_dict, read_par, to_dict, to_mechanism, write_par
 from mbs.robots import catalogue
 
 SR400 = """\
@@ -138,6 +139,33 @@ BAD = {
     "shared": (("RL1,r2", "0,th1"), "frames 1 and 2 have the same joint variable th1"),
     "dependent": (("RL1,", "2*th1,"), "r of frame 1 depends on th1, the joint variable of frame 1"),
     "no ant": (("ant = {0,1}", ""), "ant is missing"),
+    "NF": (("NJ = 2", "NJ = 2\nNF = 3"), "robot.par:4: NF is 3 with NL = 2 and NJ = 2; give 2 NJ"),
+    "misspelt": (
+        ("r = {", "Alpa = {0,0}\nr = {"),
+        "robot.par:7: key 'Alpa' is unknown; did you mean 'Alpha'",
+    ),
+    "case": (
+        ("r = {", "THETA = {0,0}\nr = {"),
+        "robot.par:7: key 'THETA' is unknown; did you mean 'Theta'",
+    ),
+    "value": (
+        ("NL =", "(* Value RL1 = 2*x *)\nNL ="),
+        "robot.par:2: Value RL1 is '2*x'; give a number",
+    ),
+    "value text": (
+        ("NL =", "(* Value RL1 = 1- *)\nNL ="),
+        "robot.par:2: Value RL1: cannot read '1-'",
+    ),
+    "value twice": (
+        ("NL =", "(* Value RL1 = 1 *)\n(* Value RL1 = 2 *)\nNL ="),
+        "robot.par:3: Value RL1 was given on line 2; give it once",
+    ),
+    "guess": (("NL =", "(* Guess q1 = a *)\nNL ="), "robot.par:2: Guess q1 is 'a'; give a number"),
+    "no joint": (
+        ("NL =", "(* Guess q7 = 1 *)\nNL ="),
+        "small, guess: there is no joint 'q7'; use one of q1, q2",
+    ),
+    "width": (("NL =", "(* Fs_width 3 = 1 *)\nNL ="), "robot.par:2: Fs_width 3: there is no such"),
 }
 
 
@@ -174,3 +202,80 @@ def test_what_the_format_cannot_say(tmp_path):
     with pytest.raises(DescriptionError, match="parameter th1 has the name of a joint variable"):
         write_par(from_dict(data), tmp_path / "x.par")
     assert list(tmp_path.iterdir()) == []
+    data = {"name": "x", "frame": LOOP_FRAMES, "loop": [{"cut": [4, 5]}]}
+    for drive in ("Ia", "Fv", "Fs"):
+        table = from_dict({**data, "body": [{"frame": 4, drive: "Fs4"}]})
+        with pytest.raises(
+            DescriptionError, match=f"x/body 4: a .par file has no {drive} of a cut"
+        ):
+            write_par(table, tmp_path / "x.par")
+    assert list(tmp_path.iterdir()) == []
+
+
+LOOP_FRAMES = [
+    {"antecedent": 0, "actuated": True, "name": "crank"},
+    {"antecedent": 1, "d": 1, "name": "coupler"},
+    {"antecedent": 2, "d": 1},
+    {"antecedent": 3, "d": 2},
+    {"antecedent": 0, "joint": "fixed", "d": 1},
+]
+
+
+def motors(table):
+    return [row.actuated for row in table.frames]
+
+
+def test_value_is_an_expression(par):
+    text = SMALL.replace("NL =", "(* Value RL1 = 1-2*pi/pi *)\nNL =")
+    assert read_par(par(text)).parameters == {"RL1": -1.0}
+
+
+def test_unheard_keys_are_ignored(par):
+    text = SMALL.replace("NL =", "Unheard = {1}\nQ = 3\nColour = {1,2}\nNL =")
+    assert read_par(par(text)) == read_par(par(SMALL, "robot2.par"))
+
+
+def test_motors_are_written_as_the_assembly_chooses_them(tmp_path):
+    open_chain = from_dict({"name": "x", "frame": [{"antecedent": 0}, {"antecedent": 1, "mu": 0}]})
+    write_par(open_chain, tmp_path / "x.par")
+    assert motors(read_par(tmp_path / "x.par")) == [True, False]
+    branch = {"antecedent": 0, "alpha": 1}  # frame 1, outside of the loop
+    on_loop = [
+        {**row, "antecedent": row["antecedent"] and row["antecedent"] + 1} for row in LOOP_FRAMES
+    ]
+    table = from_dict({"name": "x", "frame": [branch, *on_loop], "loop": [{"cut": [5, 6]}]})
+    write_par(table, tmp_path / "x.par")
+    again = read_par(tmp_path / "x.par")
+    assert motors(again) == [True, True, False, False, False, None]
+    systems = [to_mechanism(t).assemble() for t in (table, again)]
+    chosen, written = ([c.actuated for c in system.coordinates] for system in systems)
+    assert written == chosen
+
+
+def test_guess_and_width_survive_as_comments(tmp_path):
+    data = {
+        "name": "x",
+        "frame": LOOP_FRAMES,
+        "loop": [{"cut": [4, 5]}],
+        "body": [
+            {"frame": 1, "M": 1, "Fs": 2, "Fs_width": 0},
+            {"frame": 2, "Fs": 2, "Fs_width": "w"},
+            {"frame": 3, "Fs": 2},
+        ],
+        "guess": {"crank": 1.5, "coupler": -0.5, "q3": 1e-9},
+        "parameters": {"w": 0.01},
+    }
+    table = from_dict(data)
+    write_par(table, tmp_path / "x.par")
+    again = read_par(tmp_path / "x.par")
+    assert again.guess == {"q1": 1.5, "q2": -0.5, "q3": 1e-9}
+    assert again.parameters == {"w": 0.01}
+    assert [str(row.Fs_width) for row in again.bodies] == ["0", "w", "0.001"]
+
+
+@pytest.mark.parametrize("write", [lambda x: write_par(x, "x.par"), to_dict, to_mechanism])
+def test_other_things_than_tables_are_refused(write):
+    m = mbs.load("planar_2r")
+    for thing, kind in ((m, "Mechanism"), (m.assemble(), "System"), (None, "NoneType")):
+        with pytest.raises(DescriptionError, match=f"it is a {kind}; give a RobotTable"):
+            write(thing)

@@ -1,13 +1,24 @@
 import copy
 import math
 
+import numpy as np
 import pytest
 
 from mbs import Parameter
 from mbs.components import KhalilBody, Prismatic, Revolute, Spherical
 from mbs.errors import DescriptionError, ExportError
-from mbs.expressions import to_float
-from mbs.formats import from_dict, read_toml, to_dict, to_mechanism, write_toml
+from mbs.expressions import expression, to_float
+from mbs.formats import (
+    BodyRow,
+    from_dict,
+    read_mjcf,
+    read_par,
+    read_toml,
+    read_urdf,
+    to_dict,
+    to_mechanism,
+    write_toml,
+)
 
 ARM = {
     "name": "arm",
@@ -116,7 +127,7 @@ def test_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(ExportError, match="cannot be written"):
         write_toml(from_dict(ARM), tmp_path / "missing" / "robot.toml")
     with monkeypatch.context() as patched:
-        patched.setattr("pathlib.Path.replace", _fail)
+        patched.setattr("os.replace", _fail)
         with pytest.raises(ExportError):
             write_toml(from_dict(ARM), path)
     assert path.read_text() == "old"
@@ -159,6 +170,11 @@ BAD = {
     "no_frame": (dict(body__1__frame=9), "body 9: there is no such frame; use 1 to 4"),
     "frame_table": (dict(frame={"antecedent": 0}), "give a list of tables [[frame]]"),
     "no_frames": (dict(frame=[]), "there is no frame"),
+    "guess": (
+        dict(guess={"q3": 1}),
+        "arm, guess: there is no joint 'q3'; use one of q1, q2, wrist",
+    ),
+    "guess text": (dict(guess={"q2": "A"}), "arm, guess of q2 is 'A'; give a number"),
     "grouped": (dict(body__0__grouped=1), "grouped is 1; give true or false"),
     "extras": (dict(extras={"FX": [0]}), "not a list of texts"),
 }
@@ -200,6 +216,7 @@ def test_bad_loop_is_refused(case):
 BAD_BODIES = {
     "negative mass": (dict(body__1__M=-2), "hand: mass is -2 kg"),
     "triangle": (dict(body__1__ZZ=3), "hand: the principal moments"),
+    "negative width": (dict(body__0__Fs_width=-1), "q1: Fs_width is -1"),
     "negative friction": (dict(body__0__Fv=-1), "q1: Fv is -1"),
     "same joint name": (dict(frame__3__name="q1"), "two components are named 'q1'"),
     "joint as body": (dict(frame__3__name="link1"), "two components are named 'link1'"),
@@ -228,3 +245,43 @@ def test_missing_and_broken_files(tmp_path):
         read_toml(path)
     with pytest.raises(DescriptionError, match="give a dict"):
         from_dict([])
+
+
+@pytest.mark.parametrize("read", [read_toml, read_par, read_urdf, read_mjcf])
+@pytest.mark.parametrize("path", [None, 3.5, "a\0b"])
+def test_what_is_no_path_is_said(read, path):
+    with pytest.raises(DescriptionError, match="it is not a path; give the path"):
+        read(path)
+
+
+def test_numbers_of_numpy_are_taken(tmp_path):
+    data = changed(
+        {**ARM, "loop": []},
+        frame__1__antecedent=np.int64(1),
+        frame__2__sigma=np.int8(2),
+        frame__0__limits=np.array([-2.8, math.pi]),
+        frame__1__mu=np.bool_(False),
+        body__0__frame=np.uint8(1),
+        gravity=np.array([0, 0, -9.81]),
+        parameters={"RL4": np.float64(0.45)},
+    )
+    table = from_dict(data)
+    assert table == from_dict(ARM)
+    write_toml(table, tmp_path / "arm.toml")
+    assert read_toml(tmp_path / "arm.toml") == table
+    loop = from_dict(changed(LOOP, loop=[{"cut": [np.int64(4), np.int32(5)]}]))
+    assert loop == from_dict(LOOP)
+    assert type(loop.loops[0].cut[0]) is int
+
+
+def test_width_of_dry_friction():
+    default = Revolute("q").Fs_width
+    assert expression(BodyRow(1).Fs_width) == default
+    table = from_dict(changed(ARM, body__0__Fs_width=0, body__1__Fs_width="w"))
+    widths = [row.get("Fs_width") for row in to_dict(table)["body"]]
+    assert widths == [0, "w"]
+    assert "Fs_width" not in to_dict(from_dict(ARM))["body"][0]
+    joints = to_mechanism(table).components
+    assert to_float(joints["q1"].Fs_width) == 0
+    assert joints["wrist"].Fs_width == expression("w")
+    assert joints["q2"].Fs_width == default

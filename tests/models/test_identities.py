@@ -177,5 +177,5 @@ def test_wrong_number_of_values_names_the_coordinates(system):
 
 
 def test_unknown_frame_is_refused(system):
-    with pytest.raises(ModelError, match="did you mean body1"):
+    with pytest.raises(ModelError, match="did you mean 'body1'"):
         mbs.models.transform(system, "bdy1")

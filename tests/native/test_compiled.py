@@ -2,7 +2,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from mbs.errors import CompilerError
+import mbs
+import mbs.models
+from mbs.errors import CompilerError, ModelError
 from mbs.native import compiled
 
 
@@ -52,12 +54,72 @@ def test_it_maps():
 
 
 def test_without_a_compiler_the_function_itself_comes_back(monkeypatch):
-    def none():
-        raise CompilerError("none")
-
-    monkeypatch.setitem(compiled.__globals__, "find_compiler", none)
+    monkeypatch.setitem(compiled.__globals__, "compiler_found", lambda: False)
     f = example()
     assert compiled(f) is f
+
+
+def test_a_compiler_that_does_not_start_is_an_error(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(CompilerError, match="CC is 'no-such-compiler' and does not start"):
+        compiled(example())
+
+
+def test_a_model_keeps_its_checks_and_defaults():
+    system = mbs.load("puma560").assemble()
+    model = mbs.models.inverse_dynamics(system)
+    fast = compiled(model)
+    q = np.linspace(0.1, 0.6, 6)
+    assert np.array_equal(np.array(fast(q, q, q)), np.array(model(q, q, q)))
+    with pytest.raises(ModelError, match="q has 2 values, it needs 6"):
+        fast([1, 2], q, q)
+    m = mbs.Mechanism("m", gravity=(0, 0, -9.81))
+    body = m.add(mbs.components.Body("b", mass=mbs.Parameter("mass", 2.0)))
+    m.connect(m.world, mbs.components.Prismatic("j", axis="z"), body)
+    lift = compiled(mbs.models.inverse_dynamics(m.assemble()))
+    assert float(lift(0, 0, 0)) == pytest.approx(19.62)
+    assert float(lift(0, 0, 0, 1)) == pytest.approx(9.81)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_derivatives_of_an_order(order):
+    f, g = example(), compiled(example(), derivatives=order)
+    x = ca.MX.sym("x", 3)
+
+    def derivative(h, k):
+        y = ca.sumsqr(h(x, 2.0)[0])
+        return [lambda: y, lambda: ca.jacobian(y, x), lambda: ca.hessian(y, x)[0]][k]()
+
+    for k in range(order + 1):
+        a, b = (ca.Function("d", [x], [derivative(h, k)])([0.3, 1.0, 2.0]).full() for h in (f, g))
+        assert a == pytest.approx(b, rel=1e-14)
+
+
+def test_second_derivatives_must_be_asked_for(capfd):
+    x = ca.MX.sym("x", 3)
+    y = ca.sumsqr(compiled(example())(x, 2.0)[0])
+    with pytest.raises(RuntimeError):
+        ca.Function("h", [x], [ca.hessian(y, x)[0]])
+    capfd.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("function", "options", "message"),
+    [
+        (None, {}, "None is not a Function; give a casadi.Function"),
+        ("idm", {}, "'idm' is not a Function"),
+        (ca.Function(), {}, "an empty Function is not a Function"),
+        (example(), {"derivatives": 3}, "derivatives is 3; use 0, 1 or 2"),
+        (
+            ca.Function("f", [], [ca.SX.sym("loose")], {"allow_free": True}),
+            {},
+            "f: symbols loose are free; make them inputs",
+        ),
+    ],
+)
+def test_what_is_refused(function, options, message):
+    with pytest.raises(ModelError, match=message):
+        compiled(function, **options)
 
 
 def test_what_casadi_cannot_write_stays_interpreted(capfd):

@@ -4,7 +4,7 @@ from importlib import resources
 import pytest
 
 from mbs.errors import CompilerError
-from mbs.native import compile_library, find_compiler
+from mbs.native import compile_library, compiler_found, find_compiler
 from mbs.native.compiler import FLAGS, flags_for
 
 
@@ -23,6 +23,18 @@ def test_cc_that_does_not_start(monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(CompilerError, match="CC is 'no-such-compiler' and does not start"):
         find_compiler()
+
+
+def test_only_a_missing_compiler_is_no_error(monkeypatch, tmp_path):
+    assert compiler_found()
+    for wanted in ("no-such-compiler", "'open"):
+        monkeypatch.setenv("CC", wanted)
+        with pytest.raises(CompilerError, match="does not start"):
+            compiler_found()
+    monkeypatch.setenv("CC", "")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    assert not compiler_found()
 
 
 def test_no_compiler_says_what_to_install(monkeypatch, tmp_path):

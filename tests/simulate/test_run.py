@@ -9,6 +9,8 @@ import mbs.simulate.run
 from mbs.components import Body, Box, Free, Mechanism, PointMass, Prismatic, Revolute, Spherical
 from mbs.errors import LoopError, ModelError, Unclosable
 
+LOOSE = casadi.SX.sym("loose")
+
 
 def pendulum(**joint):
     m = Mechanism("pendulum", gravity=(0, -9.81, 0), parameters={"L": 0.7})
@@ -143,15 +145,9 @@ def test_massless_link_in_a_loop_gives_numbers():
 
 
 def test_without_a_compiler_the_same_numbers(monkeypatch):
-    from mbs.errors import CompilerError
-
     system = mbs.load("four_bar").assemble()
     compiled = mbs.simulate.run(system, 0.5, tolerance=1e-9)
-
-    def missing():
-        raise CompilerError("no C compiler")
-
-    monkeypatch.setitem(mbs.solvers.integrate.__globals__, "find_compiler", missing)
+    monkeypatch.setitem(mbs.solvers.integrate.__globals__, "compiler_found", lambda: False)
     fresh = mbs.load("four_bar").assemble()
     python = mbs.simulate.run(fresh, 0.5, tolerance=1e-9)
     np.testing.assert_allclose(python.values, compiled.values, rtol=1e-9, atol=1e-9)
@@ -160,25 +156,65 @@ def test_without_a_compiler_the_same_numbers(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (dict(q0={"jj": 1.0}), "there is no coordinate 'jj'; did you mean j?"),
+        (dict(q0={"jj": 1.0}), "there is no coordinate 'jj'; did you mean 'j'?"),
         (dict(v0=[1.0, 2.0]), "the velocity has 2 values, the system has 1: j"),
-        (dict(parameters={"LL": 1.0}), "there is no parameter 'LL'; did you mean L?"),
+        (dict(parameters={"LL": 1.0}), "there is no parameter 'LL'; did you mean 'L'?"),
         (dict(tau=lambda t, q, v: [q, q]), "tau has 2 values, the system has 1: j"),
         (dict(tau=lambda t, q, v: np.sin(q.full())), "build it from CasADi operations"),
-        (dict(step=0.0), "give positive times"),
+        (dict(step=0.0), "step [s] is 0.0; give a finite positive number"),
+        (dict(step=1e-12), "1 s in steps of 1e-12 s are more than 10000000 rows"),
+        (dict(step=1e-320), "give a longer step"),
+        (dict(step=None), "step [s] is None; give"),
+        (dict(duration="1"), "duration [s] is '1'; give"),
+        (dict(duration=np.inf), "duration [s] is inf; give"),
+        (dict(duration=True), "duration [s] is True; give"),
+        (dict(tolerance=np.nan), "tolerance is nan; give"),
+        (dict(tolerance=-1), "tolerance is -1; give"),
+        (dict(tau=[1.0, 2.0]), "the effort has 2 values, the system has 1: j"),
+        (dict(tau={"jj": 1.0}), "there is no coordinate 'jj'; did you mean 'j'?"),
+        (dict(tau={"j": np.nan}), "the effort of j is nan; give a finite number"),
+        (dict(tau="abc"), "the effort is 'abc'"),
+        (dict(tau=lambda t, q: q), "tau does not take three arguments; give a function of"),
+        (dict(tau=lambda t, q, v: None), "tau(t, q, v) returns None; return 1 efforts"),
+        (dict(tau=lambda t, q, v: "1"), "tau(t, q, v) returns '1'; return 1 efforts"),
+        (dict(tau=lambda t, q, v: np.nan), "tau(t, q, v) returns nan; return 1 efforts"),
+        (dict(tau=lambda t, q, v: [LOOSE]), "tau(t, q, v) holds the symbols loose"),
+        (dict(tau=lambda t, q, v: casadi.sin("x")), "(an operation of CasADi was given what it"),
+        (
+            dict(tau=casadi.Function("f", [LOOSE], [LOOSE])),
+            "tau has inputs of sizes [1] and 1 outputs; give a Function of (t, q, v)",
+        ),
     ],
 )
 def test_bad_arguments(arguments, message):
     with pytest.raises(ModelError) as error:
-        mbs.simulate.run(pendulum(), 1.0, **arguments)
-    assert message in str(error.value)
+        mbs.simulate.run(pendulum(), **{"duration": 1.0, **arguments})
+    text = str(error.value)
+    assert message in text
+    assert text.startswith("pendulum: ")
+    assert "\n" not in text
+    assert len(text) < 400
+
+
+def test_a_joint_without_motor_takes_no_constant():
+    system = pendulum(actuated=False)
+    with pytest.raises(ModelError, match=r"tau names 'j', which has no motor; make .*actuated=True"):
+        mbs.simulate.run(system, 1.0, tau={"j": 1.0})
+    result = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: np.array([2.0]))
+    assert np.array_equal(result["j.tau"], np.full(11, 2.0))
+
+
+@pytest.mark.parametrize("wrong", [None, "four_bar", Mechanism("m")])
+def test_only_systems_move(wrong):
+    with pytest.raises(ModelError, match="call assemble"):
+        mbs.simulate.run(wrong, 1.0)
 
 
 def test_posture_that_does_not_close():
     system = mbs.load("four_bar").assemble()
     with pytest.raises(LoopError, match=r"leaves the loops open by .*; use mbs.loops.solve"):
         mbs.simulate.run(system, 1.0, q0=[0.0, 0.0, 0.0])
-    with pytest.raises(Unclosable, match=r"cannot be closed with j1 = 0, j2 = 3; .* open by"):
+    with pytest.raises(Unclosable, match=r"j1 = 0, j2 = 3 cannot be reached .* give a guess"):
         mbs.loops.solve(system, {"j1": 0.0, "j2": 3.0})
 
 

@@ -1,3 +1,6 @@
+import gc
+import weakref
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -176,12 +179,33 @@ def test_an_interrupt_in_progress_stops(compiled):
 
 
 def test_no_compiler_falls_back(monkeypatch):
-    def none():
-        raise CompilerError("none")
-
     expected = integrate(PENDULUM, [1, 0], [0, 1], p=1, compiled=False)
-    monkeypatch.setitem(integrate.__globals__, "find_compiler", none)
+    monkeypatch.setitem(integrate.__globals__, "compiler_found", lambda: False)
     assert np.array_equal(integrate(PENDULUM, [1, 0], [0, 1], p=1), expected)
+
+
+def test_a_compiler_that_does_not_start_is_an_error(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(CompilerError, match="CC is 'no-such-compiler' and does not start"):
+        integrate(PENDULUM, [1, 0], [0, 1], p=1)
+    integrate(PENDULUM, [1, 0], [0, 1], p=1, compiled=False)
+
+
+def test_functions_are_not_kept_alive():
+    def one():
+        f = ca.Function("f", [T, X], [-X])
+        integrate(f, [1, 0], [0, 1])
+        return weakref.ref(f)
+
+    refs = [one() for _ in range(3)]
+    gc.collect()
+    assert [ref() for ref in refs] == [None] * 3
+
+
+def test_the_initial_state_is_not_changed():
+    x0 = np.array([1.0, 0.0])
+    integrate(PENDULUM, x0, [0.0, 1.0], p=9.81)
+    assert np.array_equal(x0, [1.0, 0.0])
 
 
 def test_sparse_outputs_and_interpreted_nodes(capfd):
@@ -204,6 +228,9 @@ def test_sparse_outputs_and_interpreted_nodes(capfd):
         ({"times": [1.0, 0.0]}, "increasing order"),
         ({"times": []}, "one or more"),
         ({"rtol": 0.0}, "must be positive"),
+        ({"atol": np.inf}, "must be positive"),
+        ({"rtol": "small"}, "tolerances 'small' and 1e-08 must be positive numbers"),
+        ({"x0": "ab"}, "'ab' are not numbers"),
         ({"rhs": ca.Function("f", [X], [X])}, r"rhs\(t, x, p\) -> xdot"),
         ({"rhs": ca.Function("f", [T, X, P], [X[0]])}, "1 slopes for 2 states"),
         ({"project": ca.Function("g", [X], [X])}, r"project\(x, p\) -> \(x, residual\)"),

@@ -1,0 +1,112 @@
+"""Postures are followed along their branch, or looked for near a guess."""
+
+import casadi
+import numpy as np
+import pytest
+
+import mbs
+import mbs.models
+from mbs.components import Body, Box, Mechanism, Revolute
+from mbs.errors import ModelError, Unclosable
+from mbs.loops import closure, solve
+
+
+def four_bar():
+    return mbs.load("four_bar").assemble()
+
+
+def elbow(q, a=0.4, b=1.0, c=0.9, ground=0.8):
+    """Which side of the line from the crank's end to the rocker's pivot the coupler is on."""
+    end = a * np.array([np.cos(q[0]), np.sin(q[0])])
+    coupler = b * np.array([np.cos(q[0] + q[1]), np.sin(q[0] + q[1])])
+    across = np.array([ground, 0]) - end
+    return np.sign(across[0] * coupler[1] - across[1] * coupler[0])
+
+
+@pytest.mark.parametrize("angle", np.linspace(-6.2, 6.2, 25))
+def test_a_full_turn_stays_on_the_branch(angle):
+    system = four_bar()
+    q = solve(system, {"j1": angle})
+    assert q[0] == angle
+    assert np.abs(np.array(closure(system)(q))).max() < 1e-12
+    assert elbow(q) == elbow(system.posture)
+    assert np.abs(q[1:]).max() < 8
+    T = np.array(mbs.models.direct_geometry(system, "b")(angle))
+    np.testing.assert_allclose(T, np.array(mbs.models.transform(system, "b")(q)), atol=1e-9)
+
+
+def test_a_guess_chooses_the_other_branch():
+    system = four_bar()
+    q = solve(system, {"j1": 0.3}, guess={"j2": -1.7, "j4": -1.8})
+    assert elbow(q) == -elbow(system.posture)
+    assert np.abs(np.array(closure(system)(q))).max() < 1e-12
+
+
+def test_positions_of_dependent_joints():
+    q = solve(four_bar(), {"j4": 1.5})
+    assert q[2] == 1.5
+    with pytest.raises(Unclosable, match=r"j4 = 1\.1 cannot be reached .* ends near j4 = 1\.2"):
+        solve(four_bar(), {"j4": 1.1})
+
+
+def test_values_that_are_no_positions():
+    system = four_bar()
+    with pytest.raises(ModelError, match="the position of j1 is nan; give a finite number"):
+        solve(system, {"j1": np.nan})
+    with pytest.raises(ModelError, match="q_active has 2 values, the independent joints are 1: j1"):
+        solve(system, [0.3, 0.4])
+    with pytest.raises(ModelError, match="the position of j2 is nan"):
+        mbs.load("four_bar").assemble(guess={"j2": np.nan})
+
+
+def test_parameters_move_the_posture():
+    m = Mechanism("rocker", gravity=(0, -9.81, 0), parameters={"L": 0.9, "rho": 2700})
+    a, b, c = (
+        m.add(Box(n, length=x, width=0.05, density="rho"))
+        for n, x in (("a", 0.4), ("b", 1.0), ("c", "L"))
+    )
+    m.connect(m.world, Revolute("j1", actuated=True), a.left)
+    m.connect(a.right, Revolute("j2"), b.left)
+    m.connect(b.right, Revolute("j3"), c.right)
+    m.connect(m.world.at(0.8), Revolute("j4"), c.left)
+    system = m.assemble(guess={"j2": 1.0})
+    for length in (0.8, 1.1):
+        q = solve(system, {"j1": 0.5}, parameters={"L": length})
+        assert np.abs(np.array(closure(system)(q, [2700, length]))).max() < 1e-12
+        assert elbow(q, c=length) == elbow(system.posture)
+
+
+def test_a_symbol_that_is_not_in_the_loop_needs_no_value():
+    m = Mechanism("light", gravity=(0, -9.81, 0))
+    a, b, c = (m.add(Body(n, mass=f"m_{n}", inertia=(0, 0, "J"))) for n in "abc")
+    m.connect(m.world, Revolute("j1", actuated=True), a)
+    m.connect(a.at(0.4), Revolute("j2"), b)
+    m.connect(b.at(1.0), Revolute("j3"), c.at(0.9))
+    m.connect(m.world.at(0.8), Revolute("j4"), c)
+    system = m.assemble(guess={"j2": 1.0})
+    q = solve(system, {"j1": 0.4})
+    idm = mbs.models.inverse_dynamics(system)
+    assert np.isfinite(float(idm(q, 1.0, 1.0, [1.0, 0.1, 2.0, 3.0])))
+    with pytest.raises(ModelError, match="parameter 'm_a' has no value; give it one"):
+        idm(q, 1.0, 1.0)
+
+
+def test_closed_geometry_is_differentiable_and_refuses_what_it_cannot_reach():
+    system = four_bar()
+    dgm = mbs.models.direct_geometry(system, "c")
+    x = casadi.MX.sym("x")
+    slope = casadi.Function("slope", [x], [casadi.jacobian(dgm(x), x)])
+    h = 1e-6
+    difference = (np.array(dgm(0.7 + h)) - np.array(dgm(0.7 - h))) / (2 * h)
+    np.testing.assert_allclose(np.array(slope(0.7)).ravel(), difference.ravel(order="F"), atol=1e-7)
+    with pytest.raises(ModelError, match=r"dgm\(four_bar\): the result is not a number"):
+        dgm(np.nan)
+    m = Mechanism("rockers")
+    a, b, c = (m.add(Box(n, length=x, mass=1)) for n, x in (("a", 0.6), ("b", 0.3), ("c", 0.7)))
+    m.connect(m.world, Revolute("j1", actuated=True), a.left)
+    m.connect(a.right, Revolute("j2"), b.left)
+    m.connect(b.right, Revolute("j3"), c.right)
+    m.connect(m.world.at(0.8), Revolute("j4"), c.left)
+    rockers = m.assemble(guess={"j1": 1.2, "j2": -1.0})
+    with pytest.raises(ModelError, match=r"dgm\(rockers\): the result is not a number"):
+        mbs.models.direct_geometry(rockers)([3.0])

@@ -25,10 +25,15 @@ def test_permissions_are_those_of_any_file(tmp_path):
 def test_an_interrupted_block_leaves_the_old_file(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with pytest.raises(KeyboardInterrupt), whole_file(path) as scratch:
-        scratch.write_text("new")
-        assert scratch.suffix == ".txt"
-        raise KeyboardInterrupt
+
+    def interrupted():
+        with whole_file(path) as scratch:
+            scratch.write_text("new")
+            assert scratch.suffix == ".txt"
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -249,8 +249,8 @@ class System:
                 value = math.nan
             elif value is None:
                 raise ModelError(
-                    f"{self.name}: parameter {parameter.name!r} has no value; give it one where the"
-                    " mechanism is described, or in the call"
+                    f"{self.name}: parameter {parameter.name!r} has no value; give it a default"
+                    " where the mechanism is described, or a value in the call"
                 )
             else:
                 value = self._numbers(value, f"parameter {parameter.name}")[0]

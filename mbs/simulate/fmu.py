@@ -1,28 +1,26 @@
 """Simulation of an FMU, ours or anyone's, by fmpy."""
 
-import difflib
 import logging
 import os
-import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from mbs.errors import ModelError, SolverError
+from mbs.messages import quoted
 from mbs.result import Result
+from mbs.simulate.arguments import count_steps, positive
+from mbs.simulate.callbacks import callback_errors
 from mbs.simulate.progress import progress
+from mbs.simulate.signals import REAL, Signal, check_names, input_table, start_values
 
-Array = npt.NDArray[np.float64]
-Signal = float | Callable[[float], float] | tuple[npt.ArrayLike, npt.ArrayLike]
 Interface = Literal["CoSimulation", "ModelExchange"]
 
 _LOG = logging.getLogger(__name__)
-_REAL = ("Real", "Float64")
+_SOLVERS = ("CVode", "Euler")
 _STEPS = 500
 
 
@@ -66,28 +64,49 @@ def fmu(
     """
     import fmpy
 
+    file = _path(path)
+    for what, values in (("inputs", inputs), ("parameters", parameters), ("start", start)):
+        if not isinstance(values, Mapping | None):
+            raise ModelError(f"{what} is {quoted(values)}; give a dict of names to values")
     with tempfile.TemporaryDirectory(prefix="mbs-fmu-", ignore_cleanup_errors=True) as folder:
-        _extract(Path(path), folder)
-        description = _described(folder, Path(path))
+        _extract(file, folder)
+        description = _described(folder, file)
+        where = f"FMU {description.modelName}"
         _check_kind(description, kind)
-        begin, end = _span(description, duration)
-        interval = _interval(description, end - begin, step)
+        begin, end = _span(description, duration, where)
+        interval = _interval(description, end - begin, step, where)
+        starts = start_values(description, parameters or {}, start or {})
         options: dict[str, Any] = {
             "validate": False,
             "start_time": begin,
             "stop_time": end,
             "output_interval": interval,
-            "relative_tolerance": tolerance,
-            "solver": solver,
+            "relative_tolerance": positive(tolerance, "tolerance", where),
+            "solver": _solver(solver, where),
             "fmi_type": kind,
-            "start_values": _start_values(description, parameters or {}, start or {}),
-            "input": _input_table(description, inputs or {}, begin, end, interval),
+            "start_values": starts,
+            "input": input_table(description, inputs or {}, starts, (begin, end), interval),
             "output": _recorded(description, record),
             "model_description": description,
         }
         answer = _simulated(fmpy.simulate_fmu, folder, options, quiet=quiet)
         _check_finite(answer, description.modelName)
         return Result.from_structured(answer, _units(description), description.modelName)
+
+
+def _path(path: object) -> Path:
+    if not isinstance(path, (str, os.PathLike)):
+        raise ModelError(
+            f"{quoted(path)} is not the path of an FMU; write one by mbs.export.fmu, or simulate a"
+            " System by mbs.simulate.run"
+        )
+    return Path(path).resolve()
+
+
+def _solver(solver: object, where: str) -> str:
+    if solver not in _SOLVERS:
+        raise ModelError(f"{where}: solver is {quoted(solver)}; use {' or '.join(_SOLVERS)}")
+    return str(solver)
 
 
 def _extract(path: Path, folder: str) -> None:
@@ -121,113 +140,33 @@ def _check_kind(description: Any, kind: str) -> None:
         raise ModelError(f"FMU {description.modelName}: kind is {kind!r}; use {names}")
 
 
-def _span(description: Any, duration: float | None) -> tuple[float, float]:
+def _span(description: Any, duration: float | None, where: str) -> tuple[float, float]:
     experiment = description.defaultExperiment
     begin = float(getattr(experiment, "startTime", None) or 0.0)
     stop = getattr(experiment, "stopTime", None)
-    proposed = begin + 1.0 if stop is None else float(stop)
-    end = proposed if duration is None else begin + duration
-    if not (end > begin and np.isfinite(end)):
-        raise ModelError(f"duration {duration} s must be positive")
-    return begin, end
+    if duration is None:
+        duration = 1.0 if stop is None else float(stop) - begin
+    return begin, begin + positive(duration, "duration [s]", where)
 
 
-def _interval(description: Any, duration: float, step: float | None) -> float:
+def _interval(description: Any, duration: float, step: float | None, where: str) -> float:
     proposed = getattr(description.defaultExperiment, "stepSize", None)
     if step is None:
         step = float(proposed) if proposed else duration / _STEPS
-    if not (step > 0 and np.isfinite(step)):
-        raise ModelError(f"step {step} s must be positive")
-    return min(step, duration)
-
-
-def _start_values(
-    description: Any, parameters: Mapping[str, float], start: Mapping[str, float]
-) -> dict[str, float]:
-    known = {v.name: v for v in description.modelVariables}
-    fixed = {n for n, v in known.items() if v.causality == "parameter"}
-    _check_names("parameters", parameters, fixed, known)
-    _check_names("start", start, {n for n, v in known.items() if _settable(v)} - fixed, known)
-    values = {**start, **parameters}
-    for name, value in values.items():
-        if not np.isfinite(value):
-            raise ModelError(f"{name} = {value}: use a finite number")
-    return values
-
-
-def _settable(variable: Any) -> bool:
-    """Whether fmpy passes a start value on; what it does not pass on it drops without a word."""
-    if variable.variability == "constant" or variable.causality == "independent":
-        return False
-    return variable.causality == "input" or variable.initial in ("exact", "approx")
-
-
-def _check_names(what: str, given: Iterable[str], allowed: set[str], known: Iterable[str]) -> None:
-    everything = set(known)
-    for name in given:
-        if name in allowed:
-            continue
-        close = difflib.get_close_matches(name, sorted(allowed), n=3, cutoff=0.5)
-        hint = f"did you mean {' or '.join(close)}?" if close else _listed(sorted(allowed))
-        why = "cannot be set" if name in everything else "does not exist"
-        raise ModelError(f"{what}: variable {name!r} {why} here; {hint}")
-
-
-def _listed(names: Sequence[str]) -> str:
-    if not names:
-        return "the FMU has none"
-    more = f" and {len(names) - 10} more" if len(names) > 10 else ""
-    return f"use {', '.join(names[:10])}{more}"
-
-
-def _input_table(
-    description: Any, inputs: Mapping[str, Signal], begin: float, end: float, interval: float
-) -> Any:
-    """Inputs as one structured array, sampled wherever one of them has a point."""
-    if not inputs:
-        return None
-    known = {v.name: v for v in description.modelVariables}
-    allowed = {n for n, v in known.items() if v.causality == "input" and v.type in _REAL}
-    _check_names("inputs", inputs, allowed, known)
-    grid = np.array([begin, end])
-    for name, signal in inputs.items():
-        grid = np.union1d(grid, _points(name, signal, begin, end, interval))
-    table = np.empty(len(grid), dtype=[("time", float), *((name, float) for name in inputs)])
-    table["time"] = grid
-    for name, signal in inputs.items():
-        table[name] = _sampled(signal, grid)
-        if not np.isfinite(table[name]).all():
-            raise ModelError(f"input {name} has a value that is not finite; use numbers")
-    return table
-
-
-def _points(name: str, signal: Signal, begin: float, end: float, interval: float) -> Array:
-    if callable(signal):
-        return np.linspace(begin, end, max(2, round((end - begin) / interval) + 1))
-    if isinstance(signal, tuple):
-        times, values = np.asarray(signal[0], dtype=float), np.asarray(signal[1], dtype=float)
-        if times.ndim != 1 or times.shape != values.shape or np.any(np.diff(times) <= 0):
-            raise ModelError(f"input {name}: give as many values as increasing times")
-        return times
-    return np.array([begin, end])
-
-
-def _sampled(signal: Signal, grid: Array) -> Array:
-    if callable(signal):
-        return np.array([signal(float(t)) for t in grid])
-    if isinstance(signal, tuple):
-        times, values = np.asarray(signal[0], dtype=float), np.asarray(signal[1], dtype=float)
-        return np.asarray(np.interp(grid, times, values))
-    return np.full(len(grid), float(signal))
+    interval = min(positive(step, "step [s]", where), duration)
+    count_steps(duration, interval, where)
+    return interval
 
 
 def _recorded(description: Any, record: Sequence[str] | None) -> list[str]:
     variables = [
-        v for v in description.modelVariables if v.type in _REAL and v.causality != "independent"
+        v for v in description.modelVariables if v.type in REAL and v.causality != "independent"
     ]
     if record is not None:
+        if isinstance(record, str) or not isinstance(record, Iterable):
+            raise ModelError(f"record is {quoted(record)}; give a list of names")
         names = {v.name for v in variables}
-        _check_names("record", record, names, names)
+        check_names("record", record, names, names)
         return list(record)
     states = {v.derivative.name for v in variables if v.derivative is not None}
     kept = [v for v in variables if v.causality in ("input", "output") or v.name in states]
@@ -253,7 +192,7 @@ def _simulated(
             return True
 
         try:
-            with _callback_errors() as lost:
+            with callback_errors() as lost:
                 answer = simulate(folder, logger=listen, step_finished=advance, **options)
             if lost:
                 raise lost[0]
@@ -261,25 +200,6 @@ def _simulated(
             said = "; ".join(dict.fromkeys(messages[-2:])) or str(error)
             raise SolverError(f"FMU {name} stopped: {said}") from error
     return answer
-
-
-@contextmanager
-def _callback_errors() -> Iterator[list[BaseException]]:
-    """Errors raised where fmpy's solver calls back: Python drops them and the solver goes on."""
-    lost: list[BaseException] = []
-    before = sys.unraisablehook
-
-    def keep(event: "sys.UnraisableHookArgs") -> None:
-        if isinstance(event.exc_value, Exception) and "fmi" in type(event.exc_value).__module__:
-            lost.append(event.exc_value)
-        else:
-            before(event)
-
-    sys.unraisablehook = keep
-    try:
-        yield lost
-    finally:
-        sys.unraisablehook = before
 
 
 def _check_finite(answer: Any, name: str) -> None:

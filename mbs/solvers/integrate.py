@@ -133,7 +133,7 @@ def _checked(
     atol: float,
 ) -> tuple[Array, Array, Array]:
     n, n_p = f.numel_in(1), f.numel_in(2)
-    x, t, parameters = (_numbers(v) for v in (x0, times, [] if p is None else p))
+    x, t, parameters = _numbers(x0), _numbers(times), _numbers([] if p is None else p)
     if len(x) != n or len(parameters) != n_p:
         raise ModelError(
             f"integrate: {len(x)} initial states and {len(parameters)} parameters were given; "

@@ -103,7 +103,7 @@ def test_scoping_keeps_everything():
         ({"Fs": 0.1}, True),
         ({"Ia": 0.1}, True),
         ({"Ia": "J"}, True),
-        ({"Ia": Parameter("J", 0.0)}, False),
+        ({"Ia": Parameter("J", 0.0)}, True),
         ({"actuated": False, "Fv": 1}, True),
     ],
 )

@@ -1,7 +1,12 @@
+import dataclasses
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import casadi as ca
 import numpy as np
 import pytest
 
+import mbs
 from mbs.errors import ModelError, SolverError
 from mbs.simulate.fmu import fmu
 from mbs.solvers import integrate
@@ -84,10 +89,13 @@ def test_an_input_that_varies(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"start": {"ss": 1.0}}, "start: variable 'ss' does not exist here; did you mean s"),
-        ({"start": {"force": 1.0}}, "start: variable 'force' cannot be set here; use push, s, v"),
+        ({"start": {"ss": 1.0}}, "start: variable 'ss' does not exist here; did you mean 's'"),
+        (
+            {"start": {"force": 1.0}},
+            "start: variable 'force' cannot be set here; use one of push, s, v",
+        ),
         ({"start": {"mass": 1.0}}, "start: variable 'mass' cannot be set here"),
-        ({"parameters": {"stifness": 1.0}}, "did you mean stiffness?"),
+        ({"parameters": {"stifness": 1.0}}, "did you mean 'stiffness'?"),
         ({"parameters": {"s": 1.0}}, "parameters: variable 's' cannot be set here"),
         ({"parameters": {"mass": float("nan")}}, "mass = nan: use a finite number"),
         ({"inputs": {"pusch": 1.0}}, "inputs: variable 'pusch' does not exist here"),
@@ -95,8 +103,21 @@ def test_an_input_that_varies(path):
         ({"inputs": {"push": float("inf")}}, "not finite"),
         ({"record": ["nothing"]}, "record: variable 'nothing' does not exist here"),
         ({"kind": "CS"}, "kind is 'CS'; use CoSimulation or ModelExchange"),
-        ({"duration": -1.0}, "must be positive"),
-        ({"step": 0.0}, "must be positive"),
+        ({"duration": -1.0}, r"duration \[s\] is -1.0; give a finite positive number"),
+        ({"duration": "2"}, r"duration \[s\] is '2'; give a finite positive number"),
+        ({"step": 0.0}, r"step \[s\] is 0.0; give a finite positive number"),
+        ({"step": 1e-12}, "more than 10000000 rows; give a longer step"),
+        ({"tolerance": None}, "tolerance is None; give"),
+        ({"solver": "Ode"}, "solver is 'Ode'; use CVode or Euler"),
+        ({"record": "s"}, "record is 's'; give a list of names"),
+        ({"record": 3}, "record is 3; give a list of names"),
+        ({"start": {"s": "x"}}, "s = 'x': use a finite number"),
+        ({"start": ["s"]}, r"start is \['s'\]; give a dict of names to values"),
+        ({"inputs": 3.0}, "inputs is 3.0; give a dict of names to values"),
+        ({"inputs": {"push": "strong"}}, "input push = 'strong': use a finite number"),
+        ({"inputs": {"push": (1, 2, 3)}}, r"input push is \(1, 2, 3\); give a number, a function"),
+        ({"inputs": {"push": lambda t: None}}, "input push: no number at time 0 s"),
+        ({"inputs": {"push": lambda: 1.0}}, "give a function of time that returns one"),
     ],
 )
 def test_what_does_not_fit_is_refused(path, arguments, message):
@@ -116,6 +137,48 @@ def test_a_failure_on_the_way_is_not_lost(path, kind, capfd):
     with pytest.raises(SolverError, match=r"FMU spring stopped: .*not finite"):
         fmu(path, **options)
     capfd.readouterr()
+
+
+def test_runs_in_threads_keep_their_errors_apart(path, capfd):
+    def run(reach):
+        try:
+            return fmu(path, parameters={"reach": reach}, kind="ModelExchange", start={"s": -1.0})
+        except SolverError as error:
+            return str(error)
+
+    before = sys.unraisablehook
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(run, [100.0, 0.5] * 4))
+    assert [isinstance(answer, str) for answer in answers] == [False, True] * 4
+    assert sys.unraisablehook is before
+    capfd.readouterr()
+
+
+def test_inputs_that_are_not_given_keep_their_start_and_nothing_is_printed(tmp_path, capfd):
+    description = pytest.importorskip("mbs.export.fmu.description")
+    pack = pytest.importorskip("mbs.export.fmu.pack")
+    model = spring()
+    t, z, x, u, p = (ca.SX.sym(n, k) for n, k in (("t", 1), ("z", 0), ("x", 2), ("u", 2), ("p", 3)))
+    pull = description.Variable(name="pull", unit="N", start=4.0)
+    rhs = ca.Function("f", [t, x, z, u, p], [ca.vertcat(x[1], ca.sum1(u) - 4 * x[0]), u[1]])
+    model = dataclasses.replace(model, inputs=(*model.inputs, pull), rhs=rhs)
+    two = pack.write_fmu(model, tmp_path / "two.fmu")
+    for start, force in (({}, 4.0), ({"pull": 3.0}, 3.0)):
+        result = fmu(two, inputs={"push": 1.0}, start=start, quiet=True)
+        assert np.array_equal(result["force"], np.full(len(result), force))
+    out = capfd.readouterr()
+    assert (out.out, out.err) == ("", "")
+
+
+def test_the_path_is_the_one_of_now(path, tmp_path, monkeypatch):
+    monkeypatch.chdir(path.parent)
+    assert len(fmu("spring.fmu", 0.1, step=0.05)) == 3
+
+
+@pytest.mark.parametrize("wrong", [None, 3, mbs.Mechanism("m")])
+def test_what_is_no_path(wrong):
+    with pytest.raises(ModelError, match="is not the path of an FMU; write one by mbs.export.fmu"):
+        fmu(wrong)
 
 
 def test_files_that_are_no_fmu(tmp_path):

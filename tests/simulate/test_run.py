@@ -198,7 +198,7 @@ def test_bad_arguments(arguments, message):
 
 def test_a_joint_without_motor_takes_no_constant():
     system = pendulum(actuated=False)
-    with pytest.raises(ModelError, match=r"tau names 'j', which has no motor; make .*actuated=True"):
+    with pytest.raises(ModelError, match="tau names 'j', which has no motor"):
         mbs.simulate.run(system, 1.0, tau={"j": 1.0})
     result = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: np.array([2.0]))
     assert np.array_equal(result["j.tau"], np.full(11, 2.0))

@@ -5,8 +5,7 @@
     │   └── ExpressionError   a text is not a number or an expression of symbols
     ├── AssemblyError         the components do not form a mechanism
     ├── LoopError             a closed loop has no usable posture
-    │   ├── Unclosable        no posture closes the loop
-    │   └── SingularPosture   the closure loses rank at this posture
+    │   └── Unclosable        no posture closes the loop
     ├── ModelError            a model was asked for that the system does not have
     ├── SolverError           a numerical method could not go on
     ├── CompilerError         no compiler, or the compiler refused the code
@@ -38,10 +37,6 @@ class LoopError(MbsError):
 
 class Unclosable(LoopError):
     """No posture closes the loops of the mechanism."""
-
-
-class SingularPosture(LoopError):
-    """The closure equations lose rank at this posture."""
 
 
 class ModelError(MbsError, ValueError):

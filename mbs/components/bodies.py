@@ -9,7 +9,7 @@ import numpy as np
 
 from mbs.components.component import Component
 from mbs.components.inertia_rules import check_mass, check_tensor, six_of, tensor_matrix, three
-from mbs.components.placement import Symbols
+from mbs.components.placement import SymbolTable
 from mbs.components.rigid_body import RigidBody
 from mbs.expressions import Number, Scalar, to_float, to_sx
 from mbs.spatial import Inertia, vector
@@ -42,7 +42,7 @@ class Body(RigidBody):
         check_mass(self.name, self.mass)
         check_tensor(self.name, self.inertia)
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the origin of the reference frame."""
         com = vector(to_sx(value, symbols) for value in self.com)
         tensor = Inertia.from_parameters(
@@ -96,7 +96,7 @@ class KhalilBody(RigidBody):
             scale=float(max(abs(np.array(numbers[:6])))),
         )
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the origin of the reference frame."""
         return Inertia.from_parameters(
             vector(to_sx(getattr(self, name), symbols) for name in TEN_PARAMETERS)
@@ -118,7 +118,7 @@ class PointMass(RigidBody):
         self._normalise("mass")
         check_mass(self.name, self.mass)
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the reference frame: only a mass."""
         zero = Inertia.zero()
         return Inertia(zero.J, zero.ms, to_sx(self.mass, symbols))

@@ -17,7 +17,8 @@ from mbs.expressions import Expression, Scalar, expression, renamed, to_sx
 from mbs.messages import quoted
 from mbs.spatial import Khalil, Pose, axis_turn, snapped, vector
 
-Symbols = Mapping[str, SX]
+SymbolTable = Mapping[str, SX]
+"""The CasADi symbol of every parameter, by name."""
 
 _EXACT = 1e-13
 
@@ -30,7 +31,7 @@ class Translation:
     y: Expression
     z: Expression
 
-    def pose(self, symbols: Symbols) -> Pose:
+    def pose(self, symbols: SymbolTable) -> Pose:
         """The displaced frame seen from the one before."""
         return Pose.moved(vector(to_sx(value, symbols) for value in (self.x, self.y, self.z)))
 
@@ -42,7 +43,7 @@ class Turned:
     axis: str
     angle: Expression
 
-    def pose(self, symbols: Symbols) -> Pose:
+    def pose(self, symbols: SymbolTable) -> Pose:
         """The turned frame seen from the one before."""
         return Pose.turned(axis_turn(self.axis, to_sx(self.angle, symbols)).matrix)
 
@@ -53,7 +54,7 @@ class Oriented:
 
     rows: tuple[tuple[float, float, float], ...]
 
-    def pose(self, symbols: Symbols) -> Pose:
+    def pose(self, symbols: SymbolTable) -> Pose:
         """The turned frame seen from the one before."""
         return Pose.turned(snapped(SX(DM(np.array(self.rows)))))
 
@@ -69,11 +70,11 @@ class KhalilStep:
     theta: Expression
     r: Expression
 
-    def khalil(self, symbols: Symbols) -> Khalil:
+    def khalil(self, symbols: SymbolTable) -> Khalil:
         """The parameters on CasADi symbols."""
         return Khalil(*(to_sx(getattr(self, f.name), symbols) for f in fields(self)))
 
-    def pose(self, symbols: Symbols) -> Pose:
+    def pose(self, symbols: SymbolTable) -> Pose:
         """Frame j seen from its antecedent."""
         return self.khalil(symbols).pose()
 
@@ -87,7 +88,7 @@ class Placement:
 
     steps: tuple[Step, ...] = ()
 
-    def pose(self, symbols: Symbols) -> Pose:
+    def pose(self, symbols: SymbolTable) -> Pose:
         """The placed frame seen from where the chain starts."""
         pose = Pose.identity()
         for step in self.steps:

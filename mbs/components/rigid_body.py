@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mbs.components.component import Component, Point
 from mbs.components.inertia_rules import three
-from mbs.components.placement import Rotation, Symbols
+from mbs.components.placement import Rotation, SymbolTable
 from mbs.expressions import Scalar
 from mbs.spatial import Inertia
 
@@ -30,7 +30,7 @@ class RigidBody(Component):
         """The frame with these Khalil parameters gamma, b, alpha, d, theta, r."""
         return self.frame.at_khalil(**parameters)
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the origin of the reference frame, on CasADi symbols."""
         raise NotImplementedError
 
@@ -50,7 +50,7 @@ class World(RigidBody):
         Component.__post_init__(self)
         object.__setattr__(self, "gravity", three(self.gravity, f"{self.name}, gravity"))
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """The ground does not move: no inertia."""
         return Inertia.zero()
 
@@ -59,6 +59,6 @@ class World(RigidBody):
 class Mount(RigidBody):
     """A frame without mass: the ground of a nested mechanism, to be connected to something."""
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """No inertia."""
         return Inertia.zero()

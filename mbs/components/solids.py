@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mbs.components.component import Component, Point
 from mbs.components.inertia_rules import check_mass
-from mbs.components.placement import Symbols
+from mbs.components.placement import SymbolTable
 from mbs.components.rigid_body import RigidBody
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -57,7 +57,7 @@ class _Bar(RigidBody):
         return expression(density) * volume if density is not None else Number(0.0)
 
     def _solid_inertia(
-        self, symbols: Symbols, mass: Expression, radii: list[Expression]
+        self, symbols: SymbolTable, mass: Expression, radii: list[Expression]
     ) -> Inertia:
         com = vector([to_sx(expression(self.length) / 2, symbols), 0, 0])
         Ixx, Iyy, Izz = (to_sx(mass * radius, symbols) for radius in radii)
@@ -94,7 +94,7 @@ class Box(_Bar):
         volume = expression(self.length) * self.width * expression(self.height or 0)
         return self._mass(self.mass, self.density, volume)
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the left end."""
         l2, w2, h2 = (expression(side or 0) ** 2 for side in (self.length, self.width, self.height))
         radii = [(w2 + h2) / 12, (l2 + h2) / 12, (l2 + w2) / 12]
@@ -135,7 +135,7 @@ class Cylinder(_Bar):
         area = (expression(self.radius) ** 2 - expression(self.inner_radius) ** 2) * math.pi
         return self._mass(self.mass, self.density, area * self.length)
 
-    def inertial(self, symbols: Symbols) -> Inertia:
+    def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the left end."""
         squares = expression(self.radius) ** 2 + expression(self.inner_radius) ** 2
         across = squares / 4 + expression(self.length) ** 2 / 12

@@ -23,7 +23,7 @@ from mbs.formats.par_file import (
     ParFile,
 )
 from mbs.formats.par_variable import split_variable
-from mbs.formats.rows import DRIVE, BodyRow, FrameRow, LoopRow
+from mbs.formats.rows import DRIVE, CutRow, FrameRow, InertiaRow
 from mbs.formats.table import RobotTable
 
 
@@ -141,14 +141,14 @@ def _check_variables(file: ParFile, rows: tuple[FrameRow, ...], taken: Mapping[s
                     )
 
 
-def _bodies(file: ParFile, NL: int, frames: tuple[FrameRow, ...]) -> tuple[BodyRow, ...]:
+def _bodies(file: ParFile, NL: int, frames: tuple[FrameRow, ...]) -> tuple[InertiaRow, ...]:
     widths = _widths(file, NL)
     rows = []
     for j in range(1, NL + 1):
         values = _body(file, j, NL, fixed=frames[j - 1].sigma == 2)
         if j in widths:
             values["Fs_width"] = widths[j]
-        rows.append(BodyRow(frame=j, **values))
+        rows.append(InertiaRow(frame=j, **values))
     return tuple(rows)
 
 
@@ -172,9 +172,9 @@ def _widths(file: ParFile, NL: int) -> dict[int, Expression]:
     return widths
 
 
-def _loop(moving: int, fixed: int, frames: tuple[FrameRow, ...]) -> LoopRow:
+def _loop(moving: int, fixed: int, frames: tuple[FrameRow, ...]) -> CutRow:
     prismatic = frames[moving - 1].sigma == 1
-    return LoopRow((moving, fixed), "prismatic" if prismatic else "revolute")
+    return CutRow((moving, fixed), "prismatic" if prismatic else "revolute")
 
 
 def _gravity(file: ParFile) -> tuple[Expression, ...]:

@@ -10,7 +10,7 @@ from mbs.errors import DescriptionError
 from mbs.expressions import Scalar, expression, parameters_of, to_float
 from mbs.files import write_text
 from mbs.formats.par_file import BASE_EXTRAS, BODY_KEYS, JOINT_EXTRAS, LINK_EXTRAS
-from mbs.formats.rows import DRIVE, BodyRow, FrameRow
+from mbs.formats.rows import DRIVE, FrameRow, InertiaRow
 from mbs.formats.table import RobotTable, require_table
 
 _GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
@@ -54,7 +54,7 @@ def _lines(table: RobotTable) -> Iterator[str]:
     yield "\n(* Dynamic parameters and external forces *)"
     bodies = {body.frame: body for body in table.bodies}
     for key, name in BODY_KEYS.items():
-        rows = (bodies.get(j, BodyRow(j)) for j in range(1, NL + 1))
+        rows = (bodies.get(j, InertiaRow(j)) for j in range(1, NL + 1))
         yield _vector(key, (_text(getattr(row, name)) for row in rows))
     yield from _extras(table, LINK_EXTRAS)
     yield "\n(* Joint parameters *)"
@@ -71,7 +71,7 @@ def _remarks(table: RobotTable, NL: int) -> Iterator[str]:
     yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
     yield from (f"(* Guess q{numbers[name]} = {value!r} *)" for name, value in table.guess.items())
     for row in table.bodies:
-        if row.frame <= NL and to_float(expression(row.Fs_width)) != BodyRow(row.frame).Fs_width:
+        if row.frame <= NL and to_float(expression(row.Fs_width)) != InertiaRow(row.frame).Fs_width:
             yield f"(* Fs_width {row.frame} = {_text(row.Fs_width)} *)"
 
 

@@ -56,7 +56,7 @@ class FrameRow:
 
 
 @dataclass(frozen=True, slots=True)
-class BodyRow:
+class InertiaRow:
     """The body fixed on frame j and the drive of joint j.
 
     Attributes:
@@ -91,7 +91,7 @@ class BodyRow:
 
 
 @dataclass(frozen=True, slots=True)
-class LoopRow:
+class CutRow:
     """A loop that is opened at a joint, which then has a frame on either side.
 
     Attributes:

@@ -19,9 +19,9 @@ from mbs.formats.rows import (
     DRIVE,
     GEOMETRY,
     LOOP_JOINTS,
-    BodyRow,
+    CutRow,
     FrameRow,
-    LoopRow,
+    InertiaRow,
 )
 from mbs.messages import did_you_mean, quoted
 from mbs.spatial.inertia import TEN_PARAMETERS
@@ -49,8 +49,8 @@ class RobotTable:
 
     name: str
     frames: tuple[FrameRow, ...]
-    bodies: tuple[BodyRow, ...] = ()
-    loops: tuple[LoopRow, ...] = ()
+    bodies: tuple[InertiaRow, ...] = ()
+    loops: tuple[CutRow, ...] = ()
     gravity: tuple[Scalar, ...] = (0.0, 0.0, -9.81)
     parameters: Mapping[str, float] = field(default_factory=dict)
     source: str = ""
@@ -102,7 +102,7 @@ def require_table(table: object) -> None:
         )
 
 
-Row = TypeVar("Row", FrameRow, BodyRow)
+Row = TypeVar("Row", FrameRow, InertiaRow)
 
 
 def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
@@ -113,12 +113,12 @@ def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
 def _bare(row: Row, names: tuple[str, ...]) -> Row:
     """The row with symbols that are names only: their values are kept in the table."""
     values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
-    if isinstance(row, BodyRow) and _is_int(row.frame):
+    if isinstance(row, InertiaRow) and _is_int(row.frame):
         values["frame"] = int(row.frame)
     return replace(row, **values)
 
 
-def _plain_cut(loop: LoopRow) -> LoopRow:
+def _plain_cut(loop: CutRow) -> CutRow:
     """The row with the numbers of the cut as Python writes them."""
     cut: Any = tuple(int(k) if _is_int(k) else k for k in loop.cut)
     return replace(loop, cut=cut)
@@ -260,7 +260,7 @@ def _has_joint(table: RobotTable, frame: int) -> bool:
     return table.frames[frame - 1].sigma != 2 or _is_moving(table, frame)
 
 
-def _check_loop(where: str, loop: LoopRow, frames: tuple[FrameRow, ...]) -> None:
+def _check_loop(where: str, loop: CutRow, frames: tuple[FrameRow, ...]) -> None:
     if loop.joint not in LOOP_JOINTS:
         raise DescriptionError(
             f"{where}: joint {loop.joint!r} is unknown;"
@@ -281,7 +281,7 @@ def _check_loop(where: str, loop: LoopRow, frames: tuple[FrameRow, ...]) -> None
         )
 
 
-def _nonzero(body: BodyRow, names: tuple[str, ...]) -> bool:
+def _nonzero(body: InertiaRow, names: tuple[str, ...]) -> bool:
     return any(to_float(getattr(body, name)) != 0 for name in names)
 
 

@@ -20,7 +20,7 @@ from mbs.components import (
 from mbs.errors import DescriptionError
 from mbs.expressions import expression, to_float
 from mbs.formats.files import component_name
-from mbs.formats.rows import BodyRow, FrameRow, LoopRow
+from mbs.formats.rows import CutRow, FrameRow, InertiaRow
 from mbs.formats.table import RobotTable, require_table
 from mbs.spatial.inertia import TEN_PARAMETERS
 
@@ -62,7 +62,7 @@ def to_mechanism(table: RobotTable) -> Mechanism:
     for j, frame in enumerate(table.frames, 1):
         if j in table.cut_frames:
             continue
-        row = rows.get(j, BodyRow(j))
+        row = rows.get(j, InertiaRow(j))
         links[j] = mechanism.add(_body(j, row))
         point = links[frame.antecedent].at_khalil(**frame.geometry)
         if frame.sigma == 2:
@@ -71,16 +71,16 @@ def to_mechanism(table: RobotTable) -> Mechanism:
             joint = _MOVING[frame.sigma](**_joint(table, j, row, _actuated(table, frame)))
             mechanism.connect(point, joint, links[j])
     for loop in table.loops:
-        _close(mechanism, table, loop, links, rows.get(loop.cut[0], BodyRow(loop.cut[0])))
+        _close(mechanism, table, loop, links, rows.get(loop.cut[0], InertiaRow(loop.cut[0])))
     return mechanism
 
 
 def _close(
     mechanism: Mechanism,
     table: RobotTable,
-    loop: LoopRow,
+    loop: CutRow,
     links: dict[int, RigidBody],
-    row: BodyRow,
+    row: InertiaRow,
 ) -> None:
     moving, fixed = (table.frames[k - 1] for k in loop.cut)
     scalars = _joint(table, loop.cut[0], row, bool(moving.actuated))
@@ -97,7 +97,7 @@ def _actuated(table: RobotTable, frame: FrameRow) -> bool | None:
     return True if frame.actuated is None and not table.loops else frame.actuated
 
 
-def _joint(table: RobotTable, j: int, row: BodyRow, actuated: bool | None) -> dict[str, Any]:
+def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) -> dict[str, Any]:
     return {
         "name": table.joint_name(j),
         "actuated": actuated,
@@ -109,7 +109,7 @@ def _joint(table: RobotTable, j: int, row: BodyRow, actuated: bool | None) -> di
     }
 
 
-def _body(j: int, row: BodyRow) -> KhalilBody:
+def _body(j: int, row: InertiaRow) -> KhalilBody:
     ten: dict[str, Any] = {name: getattr(row, name) for name in TEN_PARAMETERS}
     return KhalilBody(row.name or f"link{j}", grouped=row.grouped, **ten)
 

@@ -14,7 +14,7 @@ from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar
 from mbs.files import write_text
 from mbs.formats.files import read_text
-from mbs.formats.rows import BODY_SCALARS, GEOMETRY, JOINTS, BodyRow, FrameRow, LoopRow
+from mbs.formats.rows import BODY_SCALARS, GEOMETRY, JOINTS, CutRow, FrameRow, InertiaRow
 from mbs.formats.table import RobotTable, require_table
 from mbs.messages import did_you_mean
 
@@ -137,14 +137,14 @@ def _actuated(row: Mapping[str, Any], where: str) -> bool | None:
     return bool(given[0]) if given else None
 
 
-def _body(row: Mapping[str, Any], where: str) -> BodyRow:
+def _body(row: Mapping[str, Any], where: str) -> InertiaRow:
     _check_keys(row, _BODY, where)
     if "frame" not in row:
         raise DescriptionError(f"{where}: the frame is missing; give the number of its frame")
     grouped = row.get("grouped", False)
     if not isinstance(grouped, bool):
         raise DescriptionError(f"{where}: grouped is {grouped!r}; give true or false")
-    return BodyRow(
+    return InertiaRow(
         frame=row["frame"],
         name=_text(row, "name", where),
         grouped=grouped,
@@ -152,12 +152,12 @@ def _body(row: Mapping[str, Any], where: str) -> BodyRow:
     )
 
 
-def _loop(row: Mapping[str, Any], where: str) -> LoopRow:
+def _loop(row: Mapping[str, Any], where: str) -> CutRow:
     _check_keys(row, _LOOP, where)
     cut = row.get("cut")
     if not isinstance(cut, (list, tuple)) or len(cut) != 2:
         raise DescriptionError(f"{where}: cut is {cut!r}; give the two frames [k, k+B]")
-    return LoopRow((cut[0], cut[1]), row.get("joint", "revolute"))
+    return CutRow((cut[0], cut[1]), row.get("joint", "revolute"))
 
 
 def _rows(data: Mapping[str, Any], key: str, name: str) -> Iterable[tuple[Mapping[str, Any], str]]:
@@ -205,7 +205,7 @@ def _frame_dict(row: FrameRow) -> dict[str, Any]:
     return data
 
 
-def _body_dict(row: BodyRow) -> dict[str, Any]:
+def _body_dict(row: InertiaRow) -> dict[str, Any]:
     data: dict[str, Any] = {"frame": row.frame, **_without_defaults(row, BODY_SCALARS)}
     if row.name:
         data["name"] = row.name
@@ -214,7 +214,7 @@ def _body_dict(row: BodyRow) -> dict[str, Any]:
     return data
 
 
-def _without_defaults(row: FrameRow | BodyRow, scalars: Iterable[str]) -> dict[str, Any]:
+def _without_defaults(row: FrameRow | InertiaRow, scalars: Iterable[str]) -> dict[str, Any]:
     defaults = {field.name: field.default for field in fields(row)}
     values = {key: _plain(getattr(row, key)) for key in scalars}
     return {key: value for key, value in values.items() if value != defaults[key]}

@@ -7,7 +7,7 @@ from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.loops.closing import closure_parameters
 from mbs.loops.closure import closure_rows, facing
-from mbs.loops.reduction import independent_rows
+from mbs.loops.reduction import independent_closure
 
 _STAGES = 32
 _OPEN = 1e-9
@@ -64,7 +64,7 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
         SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
     )
     merged = _merged(system, active, passive)(z, q_a)
-    residual = casadi.substitute(independent_rows(system, q), q, merged)
+    residual = casadi.substitute(independent_closure(system, q), q, merged)
     equations = Function("phi", [z, q_a, system.p], [residual])
     options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}
     return casadi.rootfinder("newton", "fast_newton", equations, options)

@@ -31,7 +31,7 @@ class Reduction:
     gamma: SX | None
 
 
-def independent_rows(system: System, q: SX) -> SX:
+def independent_closure(system: System, q: SX) -> SX:
     """(r, 1) the closure rows that the analysis kept, at the symbols q."""
     if system.closure is None:
         raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
@@ -48,7 +48,7 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
         v_a: (m, 1) independent velocities, or None when gamma is not wanted.
     """
     closure = system.closure
-    phi = independent_rows(system, q)
+    phi = independent_closure(system, q)
     assert closure is not None
     active, passive = list(closure.active), list(closure.passive)
     J = velocity_rows(system, q, phi)

@@ -9,10 +9,10 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.reduction import independent_rows
+from mbs.loops.reduction import independent_closure
 from mbs.loops.velocity import acceleration_bias, velocity_rows
 from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.symbols import Symbols, symbols_of
+from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
 from mbs.solvers.rank import rank
@@ -85,7 +85,7 @@ def direct_dynamics(
     return model_function(system, ("ddm", coordinates), build)
 
 
-def _accelerations(system: System, s: Symbols, tau: SX) -> SX:
+def _accelerations(system: System, s: ModelSymbols, tau: SX) -> SX:
     A = tree_inertia(system.tree, s.poses)
     H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size))))
     if s.reduction is None:
@@ -93,7 +93,7 @@ def _accelerations(system: System, s: Symbols, tau: SX) -> SX:
     return solve_tree(s.reduced_matrix(A), tau - H, list(range(-1, s.size - 1)))
 
 
-def _tree_accelerations(system: System, s: Symbols, tau: SX) -> tuple[SX, SX]:
+def _tree_accelerations(system: System, s: ModelSymbols, tau: SX) -> tuple[SX, SX]:
     """Accelerations of the tree and efforts of the closure, massless links included.
 
     K = A + c J'J is regular where A alone is not; then a Schur complement gives the efforts, kept
@@ -101,7 +101,7 @@ def _tree_accelerations(system: System, s: Symbols, tau: SX) -> tuple[SX, SX]:
     """
     A = tree_inertia(system.tree, s.poses)
     H = tree_efforts(system, s, SX.zeros(system.nv))
-    J = velocity_rows(system, s.q, independent_rows(system, s.q))
+    J = velocity_rows(system, s.q, independent_closure(system, s.q))
     psi = acceleration_bias(system, s.q, s.v, J)
     c = _penalty(system)
     K = A + c * casadi.mtimes(J.T, J)

@@ -7,9 +7,9 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.models.symbols import Symbols, symbols_of
+from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.recursions.newton_euler import Wrench, newton_euler, rotor_and_friction
-from mbs.recursions.velocities import cross
+from mbs.spatial import cross
 
 
 def inverse_dynamics(
@@ -90,7 +90,7 @@ def gravity_effort(system: System, coordinates: str = "independent") -> Function
 
 
 def tree_efforts(
-    system: System, s: Symbols, a: SX, external: dict[int, Wrench] | None = None
+    system: System, s: ModelSymbols, a: SX, external: dict[int, Wrench] | None = None
 ) -> SX:
     """(nv, 1) efforts of the tree, friction and rotors included, for accelerations a (nv, 1)."""
     tree = system.tree
@@ -98,7 +98,7 @@ def tree_efforts(
     return tau + rotor_and_friction(tree, s.v_tree, a)
 
 
-def tree_gravity(system: System, s: Symbols) -> SX:
+def tree_gravity(system: System, s: ModelSymbols) -> SX:
     """(nv, 1) efforts of the tree that hold it still."""
     rest = SX.zeros(system.nv)
     return newton_euler(system.tree, s.poses, rest, rest, system.tree.gravity)

@@ -8,7 +8,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.loops.reduction import reduction
-from mbs.models.symbols import symbols_of
+from mbs.models.symbols import check_coordinates
 from mbs.recursions.jacobian import jacobian as frame_jacobian
 from mbs.recursions.poses import link_poses, relative_pose
 
@@ -36,6 +36,7 @@ def jacobian(
         ModelError: there is no such frame.
     """
     require_system(system)
+    check_coordinates(system, coordinates)
     target, axes = system.frame(frame), system.frame(expressed_in)
 
     def build() -> tuple[Named, Named]:
@@ -48,5 +49,4 @@ def jacobian(
             J = casadi.mtimes(J, reduction(system, q).G)
         return [("q", q)], [("J", J)]
 
-    symbols_of(system, coordinates)
     return model_function(system, ("jacobian", frame, expressed_in, coordinates), build)

@@ -18,7 +18,7 @@ from mbs.assembly import System
 from mbs.assembly.rates import normalised, position_rate, quaternion_slices
 from mbs.errors import ModelError
 from mbs.loops.closure import closure_rows, facing
-from mbs.loops.reduction import independent_rows, reduction
+from mbs.loops.reduction import independent_closure, reduction
 from mbs.loops.velocity import velocity_rows
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.energy import energy
@@ -105,7 +105,7 @@ def _projected(system: System, q: SX, v: SX) -> tuple[SX, SX]:
         return casadi.vertcat(normalised(system.tree, q), v), SX(0)
     symbols = SX.sym("q", system.nq)
     norms = [casadi.sumsqr(symbols[part]) - 1 for part in quaternion_slices(system.tree)]
-    phi = independent_rows(system, symbols)
+    phi = independent_closure(system, symbols)
     r = casadi.vertcat(phi, *norms)
     J_q = casadi.jacobian(r, symbols)
     J = velocity_rows(system, symbols, phi)
@@ -194,7 +194,7 @@ def _active_positions(system: System) -> tuple[int, ...]:
 def _closure_step(system: System, q: SX, x: SX, z: SX) -> Function:
     symbols = SX.sym("q", system.nq)
     norms = [casadi.sumsqr(symbols[part]) - 1 for part in quaternion_slices(system.tree)]
-    kept = casadi.vertcat(independent_rows(system, symbols), *norms)
+    kept = casadi.vertcat(independent_closure(system, symbols), *norms)
     every = casadi.vertcat(closure_rows(system, symbols), *norms)
     kept, every = casadi.substitute([kept, every], [symbols], [q])
     z_next = z - solve_square(casadi.jacobian(kept, z), kept)

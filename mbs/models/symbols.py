@@ -16,7 +16,7 @@ COORDINATES = ("independent", "tree")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Symbols:
+class ModelSymbols:
     """Positions and velocities of a system, and how the tree follows the independent joints.
 
     Attributes:
@@ -64,7 +64,19 @@ class Symbols:
         return label, SX.sym(label, self.size)
 
 
-def symbols_of(system: System, coordinates: str = "independent") -> Symbols:
+def check_coordinates(system: System, coordinates: str) -> None:
+    """Refuse a word that names no coordinates.
+
+    Raises:
+        ModelError: says which words there are.
+    """
+    if coordinates not in COORDINATES:
+        raise ModelError(
+            f"{system.name}: coordinates is {coordinates!r}; use 'independent' or 'tree'"
+        )
+
+
+def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols:
     """Fresh symbols of a system.
 
     Args:
@@ -74,15 +86,12 @@ def symbols_of(system: System, coordinates: str = "independent") -> Symbols:
     Raises:
         ModelError: another word was given.
     """
-    if coordinates not in COORDINATES:
-        raise ModelError(
-            f"{system.name}: coordinates is {coordinates!r}; use 'independent' or 'tree'"
-        )
+    check_coordinates(system, coordinates)
     q = SX.sym("q", system.nq)
     poses = link_poses(system.tree, q)
     if not system.is_closed or coordinates == "tree":
         v = SX.sym("v", system.nv)
-        return Symbols(q, v, v, "", None, poses)
+        return ModelSymbols(q, v, v, "", None, poses)
     v = SX.sym("v_a", len(system.active))
     reduced = reduction(system, q, v)
-    return Symbols(q, v, casadi.mtimes(reduced.G, v), "_a", reduced, poses)
+    return ModelSymbols(q, v, casadi.mtimes(reduced.G, v), "_a", reduced, poses)

@@ -12,8 +12,7 @@ from mbs.assembly.tree import Tree
 from mbs.recursions.motion import effort, unit_motions
 from mbs.recursions.newton_euler import moved_wrench
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.velocities import cross
-from mbs.spatial import Inertia, zeros
+from mbs.spatial import Inertia, cross, zeros
 
 
 def composite_inertias(tree: Tree, poses: list[LinkPose]) -> list[Inertia]:

@@ -8,7 +8,8 @@ from casadi import SX
 
 from mbs.assembly.tree import Tree
 from mbs.recursions.poses import LinkPose, base_poses
-from mbs.recursions.velocities import cross, link_velocities
+from mbs.recursions.velocities import link_velocities
+from mbs.spatial import cross
 
 
 def kinetic_energy(tree: Tree, poses: list[LinkPose], v: SX) -> SX:

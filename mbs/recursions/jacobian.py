@@ -9,8 +9,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.recursions.motion import unit_motions
 from mbs.recursions.poses import LinkPose, base_poses
-from mbs.recursions.velocities import cross
-from mbs.spatial import Pose, zeros
+from mbs.spatial import Pose, cross, zeros
 
 
 def jacobian(tree: Tree, poses: list[LinkPose], frame: tuple[int, Pose]) -> SX:

@@ -12,8 +12,8 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
 from mbs.recursions.motion import effort
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.velocities import Acceleration, cross, link_accelerations
-from mbs.spatial import Inertia, is_zero, zeros
+from mbs.recursions.velocities import Acceleration, link_accelerations
+from mbs.spatial import Inertia, cross, is_zero, zeros
 
 Wrench = tuple[SX, SX]
 """Force (3, 1) and moment (3, 1) about the origin of a frame, in that frame [N, N m]."""

@@ -13,7 +13,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.recursions.motion import relative_motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import is_zero, zeros
+from mbs.spatial import cross, is_zero, zeros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,13 +27,6 @@ class Velocity:
 
     V: SX
     w: SX
-
-
-def cross(a: SX, b: SX) -> SX:
-    """Vector product of a and b, (3, 1), scalar by scalar so that zeros fold."""
-    return casadi.vertcat(
-        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    )
 
 
 def link_velocities(tree: Tree, poses: list[LinkPose], v: SX) -> list[Velocity]:

@@ -3,6 +3,7 @@
 import logging
 import os
 import tempfile
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -22,6 +23,7 @@ Interface = Literal["CoSimulation", "ModelExchange"]
 _LOG = logging.getLogger(__name__)
 _SOLVERS = ("CVode", "Euler")
 _STEPS = 500
+_OK = 0  # status of messages that are no complaint, in every version of FMI
 
 
 def fmu(
@@ -84,6 +86,7 @@ def fmu(
             "relative_tolerance": positive(tolerance, "tolerance", where),
             "solver": _solver(solver, where),
             "fmi_type": kind,
+            "debug_logging": description.generationTool == "mbs",  # it says why, others say all
             "start_values": starts,
             "input": input_table(description, inputs or {}, starts, (begin, end), interval),
             "output": _recorded(description, record),
@@ -176,13 +179,14 @@ def _recorded(description: Any, record: Sequence[str] | None) -> list[str]:
 def _simulated(
     simulate: Callable[..., Any], folder: str, options: dict[str, Any], *, quiet: bool
 ) -> Any:
-    messages: list[str] = []
+    messages: deque[str] = deque(maxlen=2)
 
     def listen(*arguments: Any) -> None:
-        text = arguments[-1]
+        status, text = arguments[-3], arguments[-1]
         message = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
         _LOG.debug(message)
-        messages.append(message)
+        if status != _OK:
+            messages.append(message)
 
     name = options["model_description"].modelName
     with progress(name, options["start_time"], options["stop_time"], quiet=quiet) as reach:
@@ -197,7 +201,7 @@ def _simulated(
             if lost:
                 raise lost[0]
         except Exception as error:
-            said = "; ".join(dict.fromkeys(messages[-2:])) or str(error)
+            said = "; ".join(dict.fromkeys(messages)) or str(error)
             raise SolverError(f"FMU {name} stopped: {said}") from error
     return answer
 

@@ -10,12 +10,9 @@ from mbs.spatial.khalil import Khalil
 from mbs.spatial.pose import Pose
 from mbs.spatial.quaternion import quaternion_rate, quaternion_rotation
 from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, align_z, axis_turn
-from mbs.spatial.vectors import X_AXIS, Y_AXIS, Z_AXIS, is_zero, skew, snapped, vector, zeros
+from mbs.spatial.vectors import cross, is_zero, skew, snapped, vector, zeros
 
 __all__ = [
-    "X_AXIS",
-    "Y_AXIS",
-    "Z_AXIS",
     "Inertia",
     "Khalil",
     "MatrixTurn",
@@ -24,6 +21,7 @@ __all__ = [
     "Turn",
     "align_z",
     "axis_turn",
+    "cross",
     "is_zero",
     "quaternion_rate",
     "quaternion_rotation",

@@ -13,9 +13,6 @@ from mbs.spatial.vectors import is_zero, skew, zeros
 TEN_PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Names of the inertial parameters, in the order of Khalil & Kleinfinger 1986."""
 
-TEN_UNITS = ("kg.m2",) * 6 + ("kg.m",) * 3 + ("kg",)
-"""Their units."""
-
 
 @dataclass(frozen=True, slots=True)
 class Inertia:
@@ -78,10 +75,6 @@ class Inertia:
             return Inertia(J, ms, self.m)
         first = ms + self.m * p
         return Inertia(J + _displacement(p, ms + first), first, self.m)
-
-    def is_massless(self) -> bool:
-        """Whether all ten parameters are the constant zero."""
-        return is_zero(self.parameters)
 
 
 def _displacement(p: SX, h: SX) -> SX:

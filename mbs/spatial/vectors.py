@@ -3,11 +3,7 @@
 from collections.abc import Iterable
 
 import casadi
-from casadi import DM, SX
-
-X_AXIS = SX(DM([1, 0, 0]))
-Y_AXIS = SX(DM([0, 1, 0]))
-Z_AXIS = SX(DM([0, 0, 1]))
+from casadi import SX
 
 _SNAP = 1e-12
 
@@ -27,6 +23,13 @@ def skew(a: SX) -> SX:
     x, y, z = a[0], a[1], a[2]
     return casadi.vertcat(
         casadi.horzcat(0, -z, y), casadi.horzcat(z, 0, -x), casadi.horzcat(-y, x, 0)
+    )
+
+
+def cross(a: SX, b: SX) -> SX:
+    """Vector product of a and b, (3, 1), scalar by scalar so that zeros fold."""
+    return casadi.vertcat(
+        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     )
 
 

@@ -9,7 +9,7 @@ from mbs.components import KhalilBody, Prismatic, Revolute, Spherical
 from mbs.errors import DescriptionError, ExportError
 from mbs.expressions import expression, to_float
 from mbs.formats import (
-    BodyRow,
+    InertiaRow,
     from_dict,
     read_mjcf,
     read_par,
@@ -276,7 +276,7 @@ def test_numbers_of_numpy_are_taken(tmp_path):
 
 def test_width_of_dry_friction():
     default = Revolute("q").Fs_width
-    assert expression(BodyRow(1).Fs_width) == default
+    assert expression(InertiaRow(1).Fs_width) == default
     table = from_dict(changed(ARM, body__0__Fs_width=0, body__1__Fs_width="w"))
     widths = [row.get("Fs_width") for row in to_dict(table)["body"]]
     assert widths == [0, "w"]

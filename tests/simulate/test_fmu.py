@@ -100,7 +100,8 @@ def test_an_input_that_varies(path):
         ({"parameters": {"mass": float("nan")}}, "mass = nan: use a finite number"),
         ({"inputs": {"pusch": 1.0}}, "inputs: variable 'pusch' does not exist here"),
         ({"inputs": {"push": ([0, 1], [0])}}, "as many values as increasing times"),
-        ({"inputs": {"push": float("inf")}}, "not finite"),
+        ({"inputs": {"push": float("inf")}}, "push = inf: use a finite number"),
+        ({"inputs": {"push": lambda t: np.inf}}, "input push has a value that is not finite"),
         ({"record": ["nothing"]}, "record: variable 'nothing' does not exist here"),
         ({"kind": "CS"}, "kind is 'CS'; use CoSimulation or ModelExchange"),
         ({"duration": -1.0}, r"duration \[s\] is -1.0; give a finite positive number"),
@@ -177,7 +178,7 @@ def test_the_path_is_the_one_of_now(path, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wrong", [None, 3, mbs.Mechanism("m")])
 def test_what_is_no_path(wrong):
-    with pytest.raises(ModelError, match="is not the path of an FMU; write one by mbs.export.fmu"):
+    with pytest.raises(ModelError, match="is not the path of an FMU; write one"):
         fmu(wrong)
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import html
+import io
 import os
 import platform
 import sys
@@ -15,6 +16,7 @@ from mbs.errors import ExportError
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.tables import header, source
 from mbs.export.fmu.xml import model_description
+from mbs.files import path_of, write_bytes
 from mbs.native.cache import cached_library
 from mbs.native.compiler import LIBRARY_SUFFIX, flags_for
 
@@ -65,51 +67,45 @@ def write_fmu(model: FmuModel, path: str | os.PathLike[str]) -> Path:
         ExportError: the file cannot be written, or a function cannot be written as C.
         CompilerError: there is no C compiler.
     """
-    target = Path(path)
+    target = path_of(path)
     _check_target(target)
-    texts = fmu_sources(model)
-    flags = (*flags_for(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
+    code = source(model)
+    unnamed = model_description(model, "", SOURCES)
+    guid = _guid(unnamed, code)
+    texts = {"model.c": code, "model.h": header(model, guid), **_fixed_sources()}
+    flags = (*flags_for(code), "-fvisibility=hidden", "-std=gnu99")
     library = cached_library(texts, flags)
     binary = f"binaries/{_platform()}/{model.identifier}{LIBRARY_SUFFIX}"
-    guid = _guid(model)
     files: dict[str, bytes] = {
-        "modelDescription.xml": model_description(model, guid, SOURCES).encode(),
+        "modelDescription.xml": unnamed.replace('guid=""', f'guid="{guid}"', 1).encode(),
         "documentation/index.html": _documentation(model).encode(),
         binary: library.read_bytes(),
         **{f"sources/{name}": text.encode() for name, text in texts.items()},
     }
-    _write(target, files)
+    write_bytes(_zipped(files), target)
     return target
 
 
-def fmu_sources(model: FmuModel) -> dict[str, str]:
-    """Every C file of the FMU; they compile by themselves.
-
-    Args:
-        model: what the FMU is.
-
-    Returns:
-        file name to text.
-    """
+def _fixed_sources() -> dict[str, str]:
+    """The C files that every FMU shares: name to text."""
     c = resources.files("mbs.export.fmu") / "c"
     runtime = resources.files("mbs.native") / "runtime"
     fmi = resources.files("fmpy") / "c-code"
-    texts = {"model.c": source(model), "model.h": header(model, _guid(model))}
-    for folder, names in (
+    folders = (
         (c, (*_CORE, *_CORE_HEADERS)),
         (runtime, (*_RUNTIME, *_RUNTIME_HEADERS)),
         (fmi, _FMI_HEADERS),
-    ):
-        texts |= {name: (folder / name).read_text(encoding="utf-8") for name in names}
-    return texts
+    )
+    return {
+        name: (folder / name).read_text(encoding="utf-8")
+        for folder, names in folders
+        for name in names
+    }
 
 
-def _guid(model: FmuModel) -> str:
+def _guid(description: str, code: str) -> str:
     """An identity made of what the FMU says and computes, so that equal models share it."""
-    digest = hashlib.sha256()
-    for text in (model_description(model, "", SOURCES), source(model)):
-        digest.update(text.encode())
-    h = digest.hexdigest()
+    h = hashlib.sha256((description + code).encode()).hexdigest()
     return "{" + "-".join((h[:8], h[8:12], h[12:16], h[16:20], h[20:32])) + "}"
 
 
@@ -146,20 +142,12 @@ def _check_target(target: Path) -> None:
         ) from error
 
 
-def _write(target: Path, files: Mapping[str, bytes]) -> None:
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
-            for file in sorted(files):
-                info = zipfile.ZipInfo(file, _EPOCH)
-                info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr = 0o644 << 16
-                archive.writestr(info, files[file])
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except OSError as error:
-        Path(name).unlink(missing_ok=True)
-        raise ExportError(f"{target} could not be written ({error.strerror})") from error
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+def _zipped(files: Mapping[str, bytes]) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for file in sorted(files):
+            info = zipfile.ZipInfo(file, _EPOCH)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, files[file])
+    return stream.getvalue()

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from mbs.assembly import System
+from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, Coordinate
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, State, Variable
@@ -48,11 +49,11 @@ def fmu(
         ModelError: a parameter has no value, or the system has no minimal state.
         CompilerError: there is no C compiler.
     """
+    require_system(system)
     if fmi != "2.0":
         raise ExportError(f"{system.name}: FMI version {fmi!r} is not written; use fmi='2.0'")
     model = fmu_model(system, stop_time=stop_time, step_size=step_size, tolerance=tolerance)
-    write_fmu(model, path)
-    return Path(path)
+    return write_fmu(model, path)
 
 
 def fmu_model(

@@ -7,6 +7,9 @@ import casadi
 
 from mbs.errors import ExportError
 from mbs.export.fmu.description import FmuModel, Variable
+from mbs.native.compiled import generated, unwritten
+
+_NAMES = ("mbs_rhs", "mbs_tangent", "mbs_closure", "mbs_sensitivity")
 
 _HEADER = """\
 /* Sizes and tables of the model, generated together with modelDescription.xml. */
@@ -43,7 +46,7 @@ def header(model: FmuModel, guid: str) -> str:
     Returns:
         its text.
     """
-    names = [f.name() for f in functions(model)]
+    names = _NAMES if model.closure is not None else _NAMES[:2]
     return _HEADER.format(
         guid=_quoted(guid),
         tolerance=repr(float(model.tolerance)),
@@ -68,16 +71,9 @@ def source(model: FmuModel) -> str:
     Raises:
         ExportError: a function holds a node that CasADi cannot write as C.
     """
-    generator = casadi.CodeGenerator("model_functions")
-    for function in functions(model):
-        generator.add(function)
-    code = str(generator.dump())
-    if "#error" in code:
-        reason = code[code.index("#error") :].splitlines()[0]
-        raise ExportError(
-            f"FMU {model.name}: CasADi cannot write it as C ({reason}); "
-            "replace integrators and rootfinders by Newton steps"
-        )
+    code = generated(functions(model))
+    if problem := unwritten(code):
+        raise ExportError(f"FMU {model.name}: {problem}")
     variables = [entry.variable for entry in model.entries]
     low = (-math.inf if v.min is None else v.min for v in variables)
     high = (math.inf if v.max is None else v.max for v in variables)

@@ -39,7 +39,7 @@ typedef struct {
     int mode, cosimulation;
     int stale;   /* the calculated values do not belong to the others any more */
     int closed;  /* a posture that closes the loops is known */
-    int guessed; /* the host gave guesses of the dependent coordinates */
+    int guessed; /* the host gave guesses of the dependent coordinates, other than the start */
     double time, tolerance;
     double values[N_VALUES + 1];
     double guess[NZ + 1];

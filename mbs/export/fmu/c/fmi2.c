@@ -10,10 +10,11 @@ typedef struct {
     core *model;
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
+    int discards; /* messages of discarded calls are wanted; those of errors always are */
 } face;
 
 static const char *const CATEGORIES[] = {"logAll", "logStatusDiscard", "logStatusError"};
-enum { N_CATEGORIES = sizeof CATEGORIES / sizeof *CATEGORIES };
+enum { LOG_ALL, LOG_DISCARD, LOG_ERROR, N_CATEGORIES };
 
 #define MODEL(c) (((face *)(c))->model)
 #define NEED(c) \
@@ -27,6 +28,7 @@ static fmi2Status as_fmi(core_status status) {
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
     const char *category = status == CORE_DISCARD ? "logStatusDiscard" : "logStatusError";
+    if (status == CORE_DISCARD && !f->discards) return;
     if (f->logger) f->logger(f->environment, name, as_fmi(status), category, "%s", message);
 }
 
@@ -45,7 +47,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean logging) {
     face *f;
-    (void)resources, (void)visible, (void)logging;
+    (void)resources, (void)visible;
     if (!name || !*name) return no_instance(functions, "?", "the instance has no name");
     if (!guid || strcmp(guid, MODEL_GUID))
         return no_instance(functions, name, "the GUID is not the one of this model: the model "
@@ -58,6 +60,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         f->logger = functions->logger;
         f->environment = functions->componentEnvironment;
     }
+    f->discards = logging != fmi2False;
     f->model = core_new(name, type == fmi2CoSimulation, forward_log, f);
     if (!f->model) {
         free(f);
@@ -72,18 +75,23 @@ void fmi2FreeInstance(fmi2Component c) {
     free(c);
 }
 
+static int is_category(const fmi2String categories[], size_t i, int k) {
+    return categories && categories[i] && !strcmp(categories[i], CATEGORIES[k]);
+}
+
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
                                const fmi2String categories[]) {
     size_t i;
-    int k;
+    int discards = n == 0;
     NEED(c);
-    (void)on;
     for (i = 0; i < n; i++) {
-        int found = 0;
-        for (k = 0; k < N_CATEGORIES && categories && categories[i]; k++)
-            found = found || !strcmp(categories[i], CATEGORIES[k]);
-        if (!found) return as_fmi(core_refuse(MODEL(c), "log category %u is unknown", (unsigned)i));
+        int k = 0;
+        while (k < N_CATEGORIES && !is_category(categories, i, k)) k++;
+        if (k == N_CATEGORIES)
+            return as_fmi(core_refuse(MODEL(c), "log category %u is unknown", (unsigned)i));
+        discards = discards || k != LOG_ERROR;
     }
+    ((face *)c)->discards = on && discards;
     return fmi2OK;
 }
 

@@ -1,6 +1,7 @@
 /* Saved states: copies of the memory of an instance. */
 #include "internal.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -46,16 +47,57 @@ core_status core_serialize(core *c, const core_state *state, char *bytes, size_t
     return CORE_OK;
 }
 
+static int all_finite(const double *v, int n) {
+    int i;
+    for (i = 0; i < n; i++)
+        if (!isfinite(v[i])) return 0;
+    return 1;
+}
+
+static int is_flag(int value) { return value == 0 || value == 1; }
+
+/* The mode is one that such an instance can be in. */
+static int possible_mode(const core_memory *m) {
+    switch (m->mode) {
+        case INSTANTIATED: case INITIALIZATION: case TERMINATED: return 1;
+        case EVENT: case CONTINUOUS: return !m->cosimulation;
+        case STEP: return m->cosimulation;
+        default: return 0;
+    }
+}
+
+static int parameters_in_bounds(const double *v) {
+    int i;
+    for (i = PARAMETERS; i < DEPENDENTS; i++)
+        if (v[i] < MODEL_MIN[i] || v[i] > MODEL_MAX[i]) return 0;
+    return 1;
+}
+
+/* 1 when this could have been saved: bytes that come from outside may hold anything. */
+static int sane(const core_memory *m) {
+    const double *v = m->values;
+    int i;
+    if (!possible_mode(m) || !is_flag(m->stale) || !is_flag(m->closed) || !is_flag(m->guessed))
+        return 0;
+    if (!isfinite(m->time) || !isfinite(m->tolerance) || !(m->tolerance > 0.0)) return 0;
+    if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU) || !all_finite(v + PARAMETERS, NP)) return 0;
+    if (!parameters_in_bounds(v)) return 0;
+    if (!m->stale && !all_finite(v, N_VALUES)) return 0;
+    if (!all_finite(m->guess, NZ) || !all_finite(m->posture_x, NX) || !all_finite(m->posture_z, NZ)) return 0;
+    for (i = 0; i < DOPRI5_MEMORY(0); i++)
+        if (isnan(m->solver[i])) return 0;
+    return 1;
+}
+
 core_status core_deserialize(core *c, const char *bytes, size_t size, core_state **state) {
     core_state *s = NULL;
     if (bytes && state && size == sizeof *s && (s = malloc(sizeof *s)) != NULL) {
         memcpy(s, bytes, sizeof *s);
-        if (ours(c, s)) {
+        if (ours(c, s) && sane(&s->m)) {
             *state = s;
             return CORE_OK;
         }
         free(s);
-        return CORE_ERROR;
     }
     return core_refuse(c, "%s: the bytes are not a state of this model", c->name);
 }

@@ -64,6 +64,17 @@ static void changed(core *c) {
         dopri5_restart(&c->solver);
 }
 
+/* A guess equal to the start value in the model description says nothing: many hosts write all. */
+static void set_guess(core *c, unsigned ref, double value) {
+    int i;
+    if (c->m.guess[ref - DEPENDENTS] == value) return;
+    c->m.guess[ref - DEPENDENTS] = value;
+    c->m.guessed = 0;
+    for (i = 0; i < NZ; i++)
+        if (c->m.guess[i] != MODEL_START[DEPENDENTS + i]) c->m.guessed = 1;
+    changed(c);
+}
+
 core_status core_set(core *c, const unsigned *ref, size_t n, const double *values) {
     size_t i;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
@@ -71,9 +82,7 @@ core_status core_set(core *c, const unsigned *ref, size_t n, const double *value
         if (settable_value(c, ref[i], values[i])) return CORE_ERROR;
     for (i = 0; i < n; i++) {
         if (ref[i] >= DEPENDENTS) {
-            c->m.guess[ref[i] - DEPENDENTS] = values[i];
-            c->m.guessed = 1;
-            changed(c);
+            set_guess(c, ref[i], values[i]);
         } else if (c->m.values[ref[i]] != values[i]) {
             c->m.values[ref[i]] = values[i];
             changed(c);

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from mbs.errors import ExportError
@@ -73,3 +73,26 @@ def write_text(text: str, path: PathLike) -> None:
         ExportError: the file cannot be written.
     """
     write_bytes(text.encode("utf-8"), path)
+
+
+def write_texts(files: Mapping[str, str], folder: PathLike) -> None:
+    """Write files of UTF-8 into a folder, made when it is not there; all of them or none.
+
+    Args:
+        files: name to text.
+        folder: where.
+
+    Raises:
+        ExportError: the folder cannot be written.
+    """
+    target, remedy = path_of(folder), "choose a folder that can be written"
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(
+            f"folder {target} cannot be made ({error.strerror or error}); {remedy}"
+        ) from error
+    with contextlib.ExitStack() as stack:
+        for name, text in files.items():
+            scratch = stack.enter_context(whole_file(target / name, remedy))
+            scratch.write_bytes(text.encode("utf-8"))

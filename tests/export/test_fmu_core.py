@@ -1,5 +1,6 @@
 import ctypes
 import dataclasses
+import struct
 import subprocess
 import threading
 import zipfile
@@ -10,7 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi2 import FMU2Model, FMU2Slave, defaultCallbacks, fmi2CallbackLoggerTYPE
 from fmpy.validation import validate_fmu
 from fmu_models import pendulum, slider_crank
 
@@ -116,6 +117,20 @@ def test_fmpy_finds_nothing_to_complain_about(fmu):
 def test_equal_models_give_equal_files(fmu, tmp_path):
     name = fmu.path.stem
     assert write_fmu(MODELS[name](), tmp_path / "again.fmu").read_bytes() == fmu.path.read_bytes()
+
+
+def test_code_and_description_are_generated_once(tmp_path, monkeypatch):
+    calls = []
+    for name in ("source", "model_description"):
+        original = write_fmu.__globals__[name]
+
+        def counted(*arguments, name=name, original=original):
+            calls.append(name)
+            return original(*arguments)
+
+        monkeypatch.setitem(write_fmu.__globals__, name, counted)
+    write_fmu(pendulum(), tmp_path / "once.fmu")
+    assert sorted(calls) == ["model_description", "source"]
 
 
 def test_what_is_inside(swing):
@@ -343,6 +358,69 @@ def test_saved_states_continue_bit_for_bit(fmu):
         each.freeInstance()
 
 
+def test_bytes_that_are_no_state_are_refused(fmu):
+    instance = fmu.open(FMU2Slave)
+    fmu.step(instance, 3)
+    state = instance.getFMUstate()
+    blob = instance.serializeFMUstate(state)
+    values = fmu.get(instance, *[v.name for v in fmu.description.modelVariables][:2])
+    at = len(blob.split(values.tobytes())[0])  # after the flags, time and tolerance come the values
+    flags, time, tolerance = at - 40, at - 16, at - 8
+    assert struct.unpack_from("=5i", blob, flags) == (16, 1, 0, 1, 0)
+    assert struct.unpack_from("=2d", blob, time)[0] == pytest.approx(0.03)
+    parameter = at + 8 * next(
+        v.valueReference for v in fmu.description.modelVariables if v.causality == "parameter"
+    )
+    wrong = [(flags, "=i", x) for x in (0, 3, 4, 8, 64, -1)]
+    wrong += [(flags + 4 * k, "=i", 2) for k in (2, 3, 4)]
+    wrong += [(time, "=d", np.nan), (tolerance, "=d", np.inf), (tolerance, "=d", 0.0)]
+    wrong += [(at, "=d", np.nan), (parameter, "=d", -1.0)]
+    wrong += [(len(blob) - 8 * k - 8, "=d", np.nan) for k in range(3, 7)]
+    for place, form, value in wrong:
+        torn = bytearray(blob)
+        struct.pack_into(form, torn, place, value)
+        with pytest.raises(FMICallException):
+            instance.deSerializeFMUstate(bytes(torn))
+    instance.freeFMUstate(instance.deSerializeFMUstate(blob))
+    instance.freeFMUstate(state)
+    instance.freeInstance()
+
+
+@pytest.mark.parametrize(
+    ("on", "categories", "discards"),
+    [
+        (False, [], 0),
+        (True, [], 1),
+        (True, ["logStatusDiscard"], 1),
+        (True, ["logAll"], 1),
+        (True, ["logStatusError"], 0),
+        (False, ["logAll"], 0),
+    ],
+)
+def test_messages_follow_debug_logging(crank, monkeypatch, on, categories, discards):
+    said = []
+    listen = fmi2CallbackLoggerTYPE(lambda *a: said.append(a[3]))
+    monkeypatch.setattr(defaultCallbacks, "logger", listen)
+    instance = crank.open(FMU2Model, start={"rod.length": 0.05})
+    slopes = (ctypes.c_double * 2)()
+
+    def silent(expected):
+        said.clear()
+        instance.setContinuousStates((ctypes.c_double * 2)(np.pi / 2, 0.0), 2)
+        refused(instance.getDerivatives, slopes, 2)
+        refused(instance.getReal, [10**6])
+        assert said.count(b"logStatusDiscard") == expected
+        assert said.count(b"logStatusError") == 1
+
+    silent(0)
+    texts = (ctypes.c_char_p * len(categories))(*[c.encode() for c in categories])
+    instance.fmi2SetDebugLogging(instance.component, int(on), len(categories), texts)
+    silent(discards)
+    refused(instance.fmi2SetDebugLogging, instance.component, 1, 1, (ctypes.c_char_p * 1)(b"x"))
+    silent(discards)
+    instance.freeInstance()
+
+
 def test_reset_repeats_bit_for_bit(fmu):
     instance = fmu.open(FMU2Slave)
     first = fmu.step(instance, 20)
@@ -407,6 +485,18 @@ def test_a_far_state_follows_the_branch(crank):
         expected = 0.1 * np.cos(q) + np.sqrt(0.3**2 - (0.1 * np.sin(q)) ** 2)
         assert crank.get(instance, "slider.s")[0] == pytest.approx(expected, abs=1e-12)
     instance.freeInstance()
+
+
+def test_start_values_written_again_do_not_choose_another_branch(crank):
+    start = {"crank.q": 2.8, "rod.length": 0.11}
+    plain = crank.open(FMU2Slave, upto="initialization", start=start)
+    expected = crank.get(plain, "rod.angle", "slider.s")
+    again = {"rod.angle": 0.0, "slider.s": 0.4}  # as modelDescription.xml has them
+    for values in ({**start, **again}, {**start, "slider.s": -0.2, **again}):
+        instance = crank.open(FMU2Slave, upto="initialization", start=values)
+        assert np.array_equal(crank.get(instance, "rod.angle", "slider.s"), expected)
+        instance.freeInstance()
+    plain.freeInstance()
 
 
 # ---- refusals ----

@@ -80,10 +80,12 @@ static int sane(const core_memory *m) {
     if (!possible_mode(m) || !is_flag(m->stale) || !is_flag(m->closed) || !is_flag(m->guessed))
         return 0;
     if (!isfinite(m->time) || !isfinite(m->tolerance) || !(m->tolerance > 0.0)) return 0;
-    if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU) || !all_finite(v + PARAMETERS, NP)) return 0;
+    if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU)) return 0;
+    if (!all_finite(v + PARAMETERS, NP)) return 0;
     if (!parameters_in_bounds(v)) return 0;
     if (!m->stale && !all_finite(v, N_VALUES)) return 0;
-    if (!all_finite(m->guess, NZ) || !all_finite(m->posture_x, NX) || !all_finite(m->posture_z, NZ)) return 0;
+    if (!all_finite(m->guess, NZ) || !all_finite(m->posture_z, NZ)) return 0;
+    if (!all_finite(m->posture_x, NX)) return 0;
     for (i = 0; i < DOPRI5_MEMORY(0); i++)
         if (isnan(m->solver[i])) return 0;
     return 1;

@@ -15,6 +15,7 @@ from mbs.messages import quoted
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.callbacks import callback_errors
+from mbs.simulate.messages import heard, instance
 from mbs.simulate.progress import progress
 from mbs.simulate.signals import REAL, Signal, check_names, input_table, start_values
 
@@ -86,7 +87,6 @@ def fmu(
             "relative_tolerance": positive(tolerance, "tolerance", where),
             "solver": _solver(solver, where),
             "fmi_type": kind,
-            "debug_logging": description.generationTool == "mbs",  # it says why, others say all
             "start_values": starts,
             "input": input_table(description, inputs or {}, starts, (begin, end), interval),
             "output": _recorded(description, record),
@@ -181,9 +181,7 @@ def _simulated(
 ) -> Any:
     messages: deque[str] = deque(maxlen=2)
 
-    def listen(*arguments: Any) -> None:
-        status, text = arguments[-3], arguments[-1]
-        message = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
+    def listen(status: int, message: str) -> None:
         _LOG.debug(message)
         if status != _OK:
             messages.append(message)
@@ -196,14 +194,22 @@ def _simulated(
             return True
 
         try:
-            with callback_errors() as lost:
-                answer = simulate(folder, logger=listen, step_finished=advance, **options)
+            with heard(listen), callback_errors() as lost:
+                answer = _run(simulate, folder, options | {"step_finished": advance})
             if lost:
                 raise lost[0]
         except Exception as error:
             said = "; ".join(dict.fromkeys(messages)) or str(error)
             raise SolverError(f"FMU {name} stopped: {said}") from error
     return answer
+
+
+def _run(simulate: Callable[..., Any], folder: str, options: dict[str, Any]) -> Any:
+    description = options["model_description"]
+    if description.fmiVersion != "2.0":
+        return simulate(folder, **options)
+    with instance(description, folder, options["fmi_type"]) as fmu:
+        return simulate(folder, fmu_instance=fmu, **options)
 
 
 def _check_finite(answer: Any, name: str) -> None:

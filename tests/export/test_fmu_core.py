@@ -11,7 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, FMU2Slave, defaultCallbacks, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.validation import validate_fmu
 from fmu_models import pendulum, slider_crank
 
@@ -33,14 +33,14 @@ class Fmu:
         self.description = fmpy.read_model_description(self.folder)
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
 
-    def open(self, kind, upto="run", start=None, tolerance=None, guid=None):
+    def open(self, kind, upto="run", start=None, tolerance=None, guid=None, callbacks=None):
         instance = kind(
             guid=guid or self.description.guid,
             unzipDirectory=self.folder,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName="instance",
         )
-        instance.instantiate()
+        instance.instantiate(callbacks=callbacks)
         self.prepare(instance, upto, start, tolerance)
         return instance
 
@@ -397,11 +397,10 @@ def test_bytes_that_are_no_state_are_refused(fmu):
         (False, ["logAll"], 0),
     ],
 )
-def test_messages_follow_debug_logging(crank, monkeypatch, on, categories, discards):
+def test_messages_follow_debug_logging(crank, on, categories, discards):
     said = []
-    listen = fmi2CallbackLoggerTYPE(lambda *a: said.append(a[3]))
-    monkeypatch.setattr(defaultCallbacks, "logger", listen)
-    instance = crank.open(FMU2Model, start={"rod.length": 0.05})
+    own = fmi2CallbackFunctions(logger=fmi2CallbackLoggerTYPE(lambda *a: said.append(a[3])))
+    instance = crank.open(FMU2Model, start={"rod.length": 0.05}, callbacks=own)
     slopes = (ctypes.c_double * 2)()
 
     def silent(expected):

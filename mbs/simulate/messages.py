@@ -1,0 +1,89 @@
+"""Messages of FMUs, each brought to the simulation of the thread that it comes from.
+
+fmpy keeps one logger for the whole process in a C library and never asks whether the Python
+function behind it still lives. So there is one function here that lives as long as the process.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any
+
+Listener = Callable[[int, str], None]
+"""Called with the status and the text of a message."""
+
+_LISTENERS: dict[int, Listener] = {}  # by thread
+_LOCK = threading.Lock()
+
+
+@contextmanager
+def heard(listener: Listener) -> Iterator[None]:
+    """While it lasts, messages of FMUs that this thread runs go to `listener`."""
+    thread = threading.get_ident()
+    with _LOCK:
+        before = _LISTENERS.get(thread)
+        _LISTENERS[thread] = listener
+    try:
+        yield
+    finally:
+        with _LOCK:
+            if before is None:
+                del _LISTENERS[thread]
+            else:
+                _LISTENERS[thread] = before
+
+
+@contextmanager
+def instance(description: Any, folder: str, kind: str) -> Iterator[Any]:
+    """An instance of an FMI 2.0 FMU whose messages are heard; it is freed at the end.
+
+    Args:
+        description: its model description.
+        folder: where it was unpacked.
+        kind: "CoSimulation" or "ModelExchange".
+    """
+    from fmpy import fmi2
+
+    interface = description.coSimulation if kind == "CoSimulation" else description.modelExchange
+    made = fmi2.FMU2Slave if kind == "CoSimulation" else fmi2.FMU2Model
+    fmu = made(
+        guid=description.guid,
+        modelIdentifier=interface.modelIdentifier,
+        unzipDirectory=folder,
+        instanceName=description.modelName,
+    )
+    says_why = description.generationTool == "mbs"  # others, asked to log, say everything
+    fmu.instantiate(callbacks=_callbacks(), loggingOn=says_why)
+    try:
+        yield fmu
+    finally:
+        fmu.freeInstance()
+
+
+@lru_cache(maxsize=1)
+def _callbacks() -> Any:
+    """The C functions that every instance is given; made once, never freed."""
+    from fmpy import fmi2
+    from fmpy.logging import addLoggerProxy
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(_log)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    with _LOCK:
+        addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
+
+
+def _log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+    from fmpy import fmi2
+
+    listener = _LISTENERS.get(threading.get_ident())
+    if listener is None:
+        fmi2.printLogMessage(environment, name, status, category, message)
+    else:
+        listener(status, message.decode("utf-8", "replace"))

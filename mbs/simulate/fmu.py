@@ -15,7 +15,7 @@ from mbs.messages import quoted
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.callbacks import callback_errors
-from mbs.simulate.messages import heard, instance
+from mbs.simulate.fmu_instance import heard, instance
 from mbs.simulate.progress import progress
 from mbs.simulate.signals import REAL, Signal, check_names, input_table, start_values
 

@@ -14,7 +14,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
 from mbs.loops.posture import require_closed, solve
 from mbs.loops.reduction import reduction
-from mbs.models.state_space import FullState, full_state
+from mbs.models.full_state import FullState, full_state
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.effort import Effort, effort_function

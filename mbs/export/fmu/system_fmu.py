@@ -12,7 +12,7 @@ from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, State, Variable
 from mbs.export.fmu.pack import write_fmu
 from mbs.models.geometry import terminal_frame
-from mbs.models.state_space import MinimalState, consistent_start, minimal_state
+from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
 
 
 def fmu(

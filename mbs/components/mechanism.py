@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar, overload
 from mbs.components.component import Component, Point
 from mbs.components.coupling import Coupling
 from mbs.components.joints import Joint
-from mbs.components.placed import Placed
+from mbs.components.placed import Placed, moved
 from mbs.components.rigid_body import Mount, RigidBody, World
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
@@ -274,10 +274,10 @@ class Mechanism:
             else:
                 placed[component.name] = self.add(component.scoped(scope))
         self.connections.extend(
-            (_moved(a, placed, scope), _moved(b, placed, scope)) for a, b in inner.connections
+            (moved(a, placed, scope), moved(b, placed, scope)) for a, b in inner.connections
         )
         for frame, point in inner.frames.items():
-            self.frames[f"{scope}.{frame}"] = _moved(point, placed, scope)
+            self.frames[f"{scope}.{frame}"] = moved(point, placed, scope)
         self.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
         self.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
         used = {parameter.name for parameter in self._used_parameters()}
@@ -296,8 +296,3 @@ def _what(value: object) -> str:
     if isinstance(value, Component):
         return f"{type(value).__name__} {value.name!r}"
     return quoted(value)
-
-
-def _moved(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
-    owner = placed[point.owner.name]
-    return replace(point, owner=owner, placement=point.placement.scoped(scope))

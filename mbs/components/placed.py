@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mbs.components.component import Component, Point
@@ -48,3 +49,9 @@ class Placed:
     def base(self) -> RigidBody:
         """The ground of the inner mechanism, to be connected to something."""
         return self.body("world")
+
+
+def moved(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
+    """A point of the inner mechanism on the component that was placed for its owner."""
+    owner = placed[point.owner.name]
+    return replace(point, owner=owner, placement=point.placement.scoped(scope))

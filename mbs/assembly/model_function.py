@@ -54,6 +54,10 @@ class ModelFunction(Function):
         """A pickle holds the equations; names and defaults stay with the System."""
         return Function.deserialize, (self.serialize(),)
 
+    def __deepcopy__(self, dummy: Any = None) -> ModelFunction:
+        """Itself: a Function never changes."""
+        return self
+
     def like(self, function: Function) -> ModelFunction:
         """Another Function with the inputs of this one, checked and completed in the same way."""
         return ModelFunction(function, self._system)

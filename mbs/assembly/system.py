@@ -207,7 +207,7 @@ class System:
                 raise ModelError(
                     f"{self.name}: there is no coordinate {name!r}; " + did_you_mean(name, names)
                 )
-            start[names.index(name)] = self._numbers(value, f"{what} of {name}")[0]
+            start[names.index(name)] = self._number(value, f"{what} of {name}")
         return start
 
     def _numbers(self, values: Any, what: str) -> list[float]:
@@ -221,6 +221,12 @@ class System:
                 " coordinate"
             )
         return numbers
+
+    def _number(self, value: Any, what: str) -> float:
+        numbers = self._numbers(value, what)
+        if len(numbers) != 1:
+            raise ModelError(f"{self.name}: the {what} has {len(numbers)} values; give one number")
+        return numbers[0]
 
     def parameter_values(
         self, values: Mapping[str, float] | None = None, needed: Container[str] | None = None
@@ -236,6 +242,10 @@ class System:
             ModelError: a name is unknown, or a symbol has no value.
         """
         names = [parameter.name for parameter in self.parameters]
+        if values is not None and not isinstance(values, Mapping):
+            raise ModelError(
+                f"{self.name}: the parameters are {quoted(values)}; give a dict of names to values"
+            )
         given = dict(values or {})
         for name in given:
             if name not in names:
@@ -253,6 +263,6 @@ class System:
                     " where the mechanism is described, or a value in the call"
                 )
             else:
-                value = self._numbers(value, f"parameter {parameter.name}")[0]
+                value = self._number(value, f"parameter {parameter.name}")
             result.append(value)
         return result

@@ -163,9 +163,12 @@ class Mechanism:
             AssemblyError: the components do not form a mechanism.
             Unclosable: no posture closes the loops.
         """
-        # The one call upwards: the description offers its assembly under the name users expect.
-        from mbs.loops.assemble import assemble
+        from mbs.loops.assemble import assemble  # the one call upwards, see docs/decisions.md
 
+        if not isinstance(guess, Mapping | None):
+            raise DescriptionError(
+                f"{self.name}: guess is {quoted(guess)}; give a dict of names to positions"
+            )
         return assemble(self, {**self.guess, **(guess or {})})
 
     def __repr__(self) -> str:

@@ -100,7 +100,7 @@ def check_function_names(names: Sequence[str], where: str) -> None:
 
 
 def parameter_names(names: Iterable[str], taken: Iterable[str]) -> list[str]:
-    """Names of parameters in C, each the given one where it is free, else with underscores.
+    """Names of parameters in C, each the given one where it is free and an identifier.
 
     Args:
         names: wanted.
@@ -109,6 +109,8 @@ def parameter_names(names: Iterable[str], taken: Iterable[str]) -> list[str]:
     used = set(taken)
     free = []
     for name in names:
+        if not name[:1].isalpha():
+            name = f"x_{name}"
         while name in used or name in _RESERVED:
             name += "_"
         used.add(name)

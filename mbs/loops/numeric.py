@@ -9,7 +9,9 @@ from mbs.loops.closing import closure_parameters
 from mbs.loops.closure import closure_rows, facing
 from mbs.loops.reduction import independent_closure
 
-_STAGES = 32
+_STAGES = 128
+_LARGEST_MOVE = 0.3
+"""Of a dependent position in one stage, from where its slope led [rad or m]."""
 _OPEN = 1e-9
 
 
@@ -17,7 +19,7 @@ def follow_active(system: System) -> Function:
     """``follow(q_a, p) -> q``: the posture reached from the assembled one along a straight line.
 
     The independent positions, and the parameters from their defaults, are moved in small equal
-    stages, each closed by Newton's method from the one before: the branch of the assembled
+    stages, each closed by Newton's method from where the slope led: the branch of the assembled
     posture is kept, and the Function is differentiable (implicit function theorem). Where the
     line leaves what the mechanism can reach, q is NaN.
 
@@ -36,17 +38,21 @@ def follow_active(system: System) -> Function:
                 " followed by those of independent joints; use a posture of mbs.loops.solve"
             )
         active, passive = list(system.closure.active), list(system.closure.passive)
-        newton = _newton(system, active, passive)
         q_a, p = MX.sym("q_a", len(active)), MX.sym("p", system.p.numel())
         q_start = DM([system.posture[k] for k in active])
         p_start = DM(closure_parameters(system))
-        z = MX(DM([system.posture[k] for k in passive]))
-        for stage in range(1, _STAGES + 1):
-            part = stage / _STAGES
-            z = newton(z, q_start + part * (q_a - q_start), p_start + part * (p - p_start))
+        stage = _stage(system, active, passive)
+        z = before = MX(DM([system.posture[k] for k in passive]))
+        good: MX = MX(1)
+        for number in range(1, _STAGES + 1):
+            part = number / _STAGES
+            q_k, p_k = q_start + part * (q_a - q_start), p_start + part * (p - p_start)
+            led = 2 * z - before
+            before = z
+            z, closed = stage(led, q_k, p_k)
+            good = good * closed
         q = _merged(system, active, passive)(z, q_a)
-        closed = _closed(system)(q, p)
-        return Function("follow", [q_a, p], [casadi.if_else(closed, q, DM.nan(system.nq))])
+        return Function("follow", [q_a, p], [casadi.if_else(good, q, DM.nan(system.nq))])
 
     function: Function = system.cached("follow", build)
     return function
@@ -68,6 +74,17 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
     equations = Function("phi", [z, q_a, system.p], [residual])
     options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}
     return casadi.rootfinder("newton", "fast_newton", equations, options)
+
+
+def _stage(system: System, active: list[int], passive: list[int]) -> Function:
+    """``stage(led, q_a, p) -> z, good``: closed by Newton's method from the prediction."""
+    led, q_a = MX.sym("led", len(passive)), MX.sym("q_a", len(active))
+    p = MX.sym("p", system.p.numel())
+    z = _newton(system, active, passive)(led, q_a, p)
+    q = _merged(system, active, passive)(z, q_a)
+    near = casadi.norm_inf(z - led) < _LARGEST_MOVE
+    good = casadi.logic_and(_closed(system)(q, p), near)
+    return Function("stage", [led, q_a, p], [z, good])
 
 
 def _closed(system: System) -> Function:

@@ -7,9 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.model_function import require_system
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.closing import Closed, Closing, Vector, closure_parameters
 from mbs.loops.continuation import followed_posture
+from mbs.messages import quoted
 
 _RESTARTS = 60
 _SEED = 20260101
@@ -43,6 +45,11 @@ def solve(
         Unclosable: no posture was found; the message says by how much the loops stay open.
         ModelError: a name is unknown, or a value is not finite.
     """
+    require_system(system)
+    if not isinstance(guess, Mapping | None):
+        raise ModelError(
+            f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
+        )
     names = [system.speeds[k].name for k in system.active]
     fixed = _fixed(system, names, q_active)
     p = closure_parameters(system, parameters)
@@ -63,7 +70,12 @@ def _fixed(
     """The given positions by name."""
     if values is None or isinstance(values, Mapping):
         return dict(values or {})
-    given = [float(x) for x in np.ravel(values)]
+    try:
+        given = [float(x) for x in values]
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"{system.name}: q_active is {quoted(values)}; give numbers for {', '.join(names)}"
+        ) from None
     if len(given) != len(names):
         raise ModelError(
             f"{system.name}: q_active has {len(given)} values, the independent joints are"

@@ -94,9 +94,10 @@ def _active_positions(system: System) -> tuple[int, ...]:
 
 def _steadied_rate(system: System, q: SX, v: SX) -> SX:
     """The rate of the positions, quaternions drawn back to unit length."""
-    rate = position_rate(system.tree, q, v)
+    raw = position_rate(system.tree, q, v)
+    rate = position_rate(system.tree, normalised(system.tree, q), v)
     for part in quaternion_slices(system.tree):
-        rate[part] += _NORM_RATE * (1 - casadi.sumsqr(q[part])) * q[part]
+        rate[part] = raw[part] + _NORM_RATE * (1 - casadi.sumsqr(q[part])) * q[part]
     return rate
 
 

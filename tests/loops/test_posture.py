@@ -110,3 +110,32 @@ def test_closed_geometry_is_differentiable_and_refuses_what_it_cannot_reach():
     rockers = m.assemble(guess={"j1": 1.2, "j2": -1.0})
     with pytest.raises(ModelError, match=r"dgm\(rockers\): the result is not a number"):
         mbs.models.direct_geometry(rockers)([3.0])
+
+
+@pytest.mark.parametrize("q7", [-2.0, 1.97, 3.1])
+def test_a_parallelogram_goes_straight_through_its_flat_posture(q7):
+    """At the flat posture two branches meet; the one that continues is taken."""
+    system = mbs.load("sr400").assemble()
+    q = solve(system, {"q7": q7})
+    assert q[2] == pytest.approx(np.pi / 2 - q[1] + q7, abs=1e-9)
+    assert q[7] == pytest.approx(q[1] - q7, abs=1e-9)
+    active = [
+        q[[c.name for c in system.coordinates].index(system.speeds[k].name)] for k in system.active
+    ]
+    T = np.array(mbs.models.direct_geometry(system)(active))
+    np.testing.assert_allclose(T, np.array(mbs.models.transform(system, 6)(q)), atol=1e-9)
+
+
+def test_values_of_wrong_kinds():
+    system = four_bar()
+    for call, message in (
+        (lambda: solve(system, "a"), "q_active is 'a'; give numbers for j1"),
+        (lambda: solve(system, None, guess=3), "guess is 3; give a dict"),
+        (lambda: solve(system, None, parameters=[1]), "the parameters are .*; give a dict"),
+        (lambda: solve(system, {"j1": [1.0, 2.0]}), "the position of j1 has 2 values; give one"),
+        (lambda: solve(None), "call assemble"),
+    ):
+        with pytest.raises(ModelError, match=message):
+            call()
+    with pytest.raises(Unclosable, match="give one less than 400 away"):
+        solve(system, {"j1": 1e8})

@@ -285,8 +285,7 @@ class Mechanism:
         self.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
         used = {parameter.name for parameter in self._used_parameters()}
         for symbol, value in inner.values.items():
-            scoped = f"{scope}.{symbol}"
-            if scoped in used:  # the gravity of the inner mechanism has no part here
+            if (scoped := f"{scope}.{symbol}") in used:  # not what only its gravity used
                 self.values[scoped] = replace(value, name=scoped)
         return Placed(self, scope)
 

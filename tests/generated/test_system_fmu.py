@@ -10,7 +10,7 @@ from mbs.components import Body, Box, Free, Mechanism, Prismatic, Revolute, Sphe
 from mbs.errors import ExportError, ModelError
 
 KINDS = ("CoSimulation", "ModelExchange")
-TOLERANCE = 1e-11
+TOLERANCE = 1e-12
 
 
 def puma():

@@ -10,7 +10,7 @@ from mbs.loops.closing import Closing, Vector, closure_parameters
 
 _LARGEST_STEP = 0.2
 """Of a held position in one step [rad or m]."""
-_LARGEST_MOVE = 0.3
+LARGEST_MOVE = 0.3
 """Of any other position from where its slope led; more may be another branch [rad or m]."""
 _LONGEST_LINE = 400.0
 """Of a held position, in all [rad or m]."""
@@ -51,7 +51,7 @@ def followed_posture(system: System, target: Vector, held: tuple[int, ...], p: V
         trial[free] += (to - done) * slope
         closing = Closing(system, p if to == 1.0 else p_start + to * (p - p_start), held)
         found = closing.nearest(trial)
-        if found.is_closed and np.max(np.abs(found.q - trial), initial=0.0) < _LARGEST_MOVE:
+        if found.is_closed and np.max(np.abs(found.q - trial), initial=0.0) < LARGEST_MOVE:
             slope = (found.q[free] - q[free]) / (to - done)
             q, done, part = found.q, to, min(2 * part, largest)
         else:

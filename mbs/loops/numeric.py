@@ -7,11 +7,10 @@ from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.loops.closing import closure_parameters
 from mbs.loops.closure import closure_rows, facing
+from mbs.loops.continuation import LARGEST_MOVE
 from mbs.loops.reduction import independent_closure
 
 _STAGES = 128
-_LARGEST_MOVE = 0.3
-"""Of a dependent position in one stage, from where its slope led [rad or m]."""
 _OPEN = 1e-9
 
 
@@ -82,7 +81,7 @@ def _stage(system: System, active: list[int], passive: list[int]) -> Function:
     p = MX.sym("p", system.p.numel())
     z = _newton(system, active, passive)(led, q_a, p)
     q = _merged(system, active, passive)(z, q_a)
-    near = casadi.norm_inf(z - led) < _LARGEST_MOVE
+    near = casadi.norm_inf(z - led) < LARGEST_MOVE
     good = casadi.logic_and(_closed(system)(q, p), near)
     return Function("stage", [led, q_a, p], [z, good])
 

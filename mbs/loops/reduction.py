@@ -8,9 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi
-from casadi import SX
+from casadi import SX, Function
 
 from mbs.assembly import System
+from mbs.assembly.model_function import Named, model_function
 from mbs.errors import ModelError
 from mbs.loops.closure import closure_rows
 from mbs.loops.velocity import acceleration_bias, velocity_rows
@@ -29,6 +30,23 @@ class Reduction:
 
     G: SX
     gamma: SX | None
+
+
+def reduction_matrix(system: System) -> Function:
+    """``reduction_matrix(q) -> G``: velocities of the tree from the independent ones, v = G v_a.
+
+    Returns:
+        Function of q (nq, 1) that closes the loops; G (nv, m).
+
+    Raises:
+        ModelError: the system is an open chain.
+    """
+
+    def build() -> tuple[Named, Named]:
+        q = SX.sym("q", system.nq)
+        return [("q", q)], [("G", reduction(system, q).G)]
+
+    return model_function(system, ("reduction_matrix",), build)
 
 
 def independent_closure(system: System, q: SX) -> SX:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
@@ -13,7 +12,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
 from mbs.loops.posture import require_closed, solve
-from mbs.loops.reduction import reduction
+from mbs.loops.reduction import reduction_matrix
 from mbs.models.full_state import FullState, full_state
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
@@ -114,12 +113,8 @@ def _tree_velocity(
     Raises:
         ModelError: no motion of the loops has these velocities.
     """
-
-    def build() -> Function:
-        symbols = SX.sym("q", system.nq)
-        return Function("G", [symbols, system.p], [reduction(system, symbols).G])
-
-    G = np.array(system.cached("G", build)(q, system.parameter_values(parameters)))
+    p = [system.parameter_values(parameters)] if system.parameters else []
+    G = np.array(reduction_matrix(system)(q, *p))
     wanted = np.array(system.velocity(v0))
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)

@@ -142,18 +142,11 @@ def test_lagrange_of_a_closed_system(closing):
 
 def closed_friction(system, q, v_a):
     with_friction = np.array(mbs.models.bias(system)(q, v_a)).ravel()
-    G = jacobian_of_reduction(system)(q)
+    G = mbs.loops.reduction_matrix(system)(q)
     v = np.array(G @ v_a).ravel()
     friction = np.array([float(link.Fv) for link in system.tree.links]) * v
     assert with_friction.shape == v_a.shape
     return np.array(G).T @ friction
-
-
-def jacobian_of_reduction(system):
-    from mbs.loops.reduction import reduction
-
-    q = SX.sym("q", system.nq)
-    return casadi.Function("G", [q], [reduction(system, q).G])
 
 
 def test_functions_can_be_mapped_expanded_and_differentiated_twice(system):

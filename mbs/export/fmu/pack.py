@@ -40,7 +40,8 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # equal models give equal files
 _PAGE = """\
 <!DOCTYPE html>
 <html lang="en">
-<head><meta charset="utf-8"><style>p {{ white-space: pre-wrap }}</style><title>{title}</title></head>
+<head><meta charset="utf-8"><title>{title}</title>
+<style>p {{ white-space: pre-wrap }}</style></head>
 <body>
 <h1>{title}</h1>
 {paragraphs}

@@ -1,0 +1,120 @@
+"""How many operations a Function takes, in the convention of the literature.
+
+Source: the convention of Khalil & Kleinfinger 1987: multiplications and additions are counted,
+signs are not, and what depends on constant parameters alone is done once and counted apart.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import casadi
+from casadi import Function
+
+from mbs.operations.graph import Graph, graph_of
+
+_MUL = {casadi.OP_MUL, casadi.OP_SQ}
+_ADD = {casadi.OP_ADD, casadi.OP_SUB, casadi.OP_TWICE}
+_DIV = {casadi.OP_DIV, casadi.OP_INV}
+_TRIG = {
+    *(casadi.OP_SIN, casadi.OP_COS, casadi.OP_TAN),
+    *(casadi.OP_ASIN, casadi.OP_ACOS, casadi.OP_ATAN, casadi.OP_ATAN2),
+}
+_KINDS = ("mul", "add", "div", "sqrt", "trig", "other")
+_FREE = {casadi.OP_INPUT, casadi.OP_CONST, casadi.OP_NEG, casadi.OP_ASSIGN}
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """Numbers of operations.
+
+    Attributes:
+        mul: multiplications, squares among them.
+        add: additions and subtractions; 2 x is x + x.
+        div: divisions.
+        sqrt: square roots.
+        trig: sines, cosines and other functions of angles, one each.
+        other: what remains, such as tanh, powers, comparisons.
+        parameter_only: operations on constants and parameters alone, done once and in none of
+            the numbers above.
+    """
+
+    mul: int = 0
+    add: int = 0
+    div: int = 0
+    sqrt: int = 0
+    trig: int = 0
+    other: int = 0
+    parameter_only: Count | None = field(default=None, compare=False)
+
+    @property
+    def total(self) -> int:
+        """All operations, each counted once."""
+        return self.mul + self.add + self.div + self.sqrt + self.trig + self.other
+
+    def __str__(self) -> str:
+        """Multiplications (divisions among them) / additions, as tables give them."""
+        return f"{self.mul + self.div}/{self.add}"
+
+
+def count(function: Function, parameters: Iterable[str] = ("p",)) -> Count:
+    """The operations of a Function; nodes that no output needs are not counted.
+
+    A product by -1 or 1 costs nothing and a product by 2 is an addition, as when one writes by
+    hand.
+
+    Args:
+        function: made of scalar operations, or a Function that can be expanded to them.
+        parameters: names of inputs that do not change from call to call; names that the
+            Function does not have are ignored.
+
+    Returns:
+        the numbers; `str` of them is the "multiplications/additions" of the literature.
+
+    Raises:
+        ModelError: the Function has no scalar operations.
+    """
+    return count_graph(graph_of(function), parameters)
+
+
+def count_graph(graph: Graph, parameters: Iterable[str] = ("p",)) -> Count:
+    """The operations of a graph; see `count`."""
+    alive, fixed = graph.live(), graph.fixed_by(parameters)
+    changing: Counter[str] = Counter()
+    once: Counter[str] = Counter()
+    for number in range(len(graph.nodes)):
+        kind = _kind(graph, number)
+        if alive[number] and kind:
+            tally = once if fixed[number] else changing
+            tally[kind] += 1
+    return replace(_numbers(changing), parameter_only=_numbers(once))
+
+
+def _numbers(tally: Counter[str]) -> Count:
+    return Count(*(tally[kind] for kind in _KINDS))
+
+
+def _kind(graph: Graph, number: int) -> str:
+    """The attribute of Count that an operation adds to; empty when it is free."""
+    op = graph.nodes[number].op
+    if op in _FREE:
+        return ""
+    if op in _MUL:
+        return _kind_of_product(graph, number)
+    if op in _ADD:
+        return "add"
+    if op in _DIV:
+        return "div"
+    if op == casadi.OP_SQRT:
+        return "sqrt"
+    return "trig" if op in _TRIG else "other"
+
+
+def _kind_of_product(graph: Graph, number: int) -> str:
+    operands = (graph.nodes[operand] for operand in graph.operands(number))
+    factor = {abs(node.value) for node in operands if node.op == casadi.OP_CONST}
+    if factor == {1.0}:
+        return ""
+    return "add" if factor == {2.0} else "mul"

@@ -93,7 +93,7 @@ def count_graph(graph: Graph, parameters: Iterable[str] = ("p",)) -> Count:
 
 
 def _numbers(tally: Counter[str]) -> Count:
-    return Count(*(tally[kind] for kind in _KINDS))
+    return Count(**{kind: tally[kind] for kind in _KINDS}, parameter_only=None)
 
 
 def _kind(graph: Graph, number: int) -> str:

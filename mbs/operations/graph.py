@@ -128,7 +128,7 @@ def graph_of(function: Function) -> Graph:
 def function_of(graph: Graph) -> Function:
     """The Function that computes a graph, nodes that no output needs left out."""
     symbols = [SX.sym(port.name, port.sparsity) for port in graph.inputs]
-    elements = [[SX(element) for element in symbol.nonzeros()] for symbol in symbols]
+    elements = [[SX(s.nz[k]) for k in range(s.nnz())] for s in symbols]
     alive = graph.live()
     values = [SX(0)] * len(graph.nodes)
     for number, node in enumerate(graph.nodes):

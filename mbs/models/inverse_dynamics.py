@@ -8,6 +8,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.models.symbols import ModelSymbols, symbols_of
+from mbs.recursions.accelerations import resting_base
 from mbs.recursions.newton_euler import Wrench, newton_euler, rotor_and_friction
 from mbs.spatial import cross
 
@@ -94,14 +95,15 @@ def tree_efforts(
 ) -> SX:
     """(nv, 1) efforts of the tree, friction and rotors included, for accelerations a (nv, 1)."""
     tree = system.tree
-    tau = newton_euler(tree, s.poses, s.v_tree, a, tree.gravity, external)
+    tau = newton_euler(tree, s.poses, s.v_tree, a, resting_base(tree.gravity), external).efforts
     return tau + rotor_and_friction(tree, s.v_tree, a)
 
 
 def tree_gravity(system: System, s: ModelSymbols) -> SX:
     """(nv, 1) efforts of the tree that hold it still."""
     rest = SX.zeros(system.nv)
-    return newton_euler(system.tree, s.poses, rest, rest, system.tree.gravity)
+    base = resting_base(system.tree.gravity)
+    return newton_euler(system.tree, s.poses, rest, rest, base).efforts
 
 
 def external_wrenches(system: System, wrenches: SX) -> dict[int, Wrench]:

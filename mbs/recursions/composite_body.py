@@ -10,52 +10,65 @@ from casadi import SX
 
 from mbs.assembly.tree import Tree
 from mbs.recursions.motion import effort, unit_motions
-from mbs.recursions.newton_euler import moved_wrench
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Inertia, cross, zeros
-
-
-def composite_inertias(tree: Tree, poses: list[LinkPose]) -> list[Inertia]:
-    """For each link, the inertia of it and of everything it carries, about and in its frame."""
-    composite = [link.inertia for link in tree.links]
-    for j in reversed(range(len(tree.links))):
-        i = tree.links[j].antecedent
-        if i >= 0:
-            composite[i] = composite[i] + composite[j].seen_from(poses[j], poses[j].p)
-    return composite
+from mbs.recursions.regrouping import regrouped
+from mbs.recursions.sliding import slid
+from mbs.spatial import Displacement, Inertia, cross, zeros
 
 
 def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
-    """(nv, nv) symmetric inertia matrix A(q), rotors included [kg m^2, kg m, kg]."""
-    composite = composite_inertias(tree, poses)
+    """(nv, nv) symmetric inertia matrix A(q), rotors included [kg m^2, kg m, kg].
+
+    The composite body of link j is seen from the seat of its joint, where its momentum for a unit
+    velocity can be read off, and from there as a part of link i.
+    """
+    poses, bodies = slid(tree, poses, [link.inertia for link in tree.links])
+    composite = regrouped(tree, poses, bodies)
     A = zeros(tree.nv, tree.nv)
-    for j, link in enumerate(tree.links):
+    for j in reversed(range(len(tree.links))):
+        link, pose = tree.links[j], poses[j]
+        steps, body = pose.seat, composite[j]
+        if link.motion.nv == 1:
+            body = pose.motion[0].body(body)
+        else:
+            steps = pose.steps
         for column, (linear, angular) in enumerate(unit_motions(link.motion)):
-            f, m = _momentum(composite[j], linear, angular)
-            _fill_column(A, tree, poses, j, link.v.start + column, f, m)
+            f, m = _momentum(body, linear, angular)
+            A[link.v, link.v.start + column] = effort(link.motion, f, m)
+            _fill_ancestors(A, tree, poses, j, column, _through(steps, f, m))
         for k in range(link.v.start, link.v.stop):
             A[k, k] += link.Ia
+        if link.antecedent >= 0:
+            for step in reversed(steps):
+                body = step.body(body)
+            composite[link.antecedent] += body
     return A
 
 
-def _fill_column(
-    A: SX, tree: Tree, poses: list[LinkPose], j: int, column: int, f: SX, m: SX
+def _through(steps: tuple[Displacement, ...], f: SX, m: SX) -> tuple[SX, SX]:
+    for step in reversed(steps):
+        f, m = step.wrench(f, m)
+    return f, m
+
+
+def _fill_ancestors(
+    A: SX, tree: Tree, poses: list[LinkPose], j: int, column: int, wrench: tuple[SX, SX]
 ) -> None:
-    """The efforts at link j and its ancestors of a wrench on link j, in a column and its row."""
-    own = tree.links[j]
-    A[own.v, column] = effort(own.motion, f, m)
-    while tree.links[j].antecedent >= 0:
-        f, m = moved_wrench(poses[j], f, m)
-        j = tree.links[j].antecedent
-        link = tree.links[j]
-        entries = effort(link.motion, f, m)
-        A[link.v, column] = entries
-        A[column, link.v] = entries.T
+    """The efforts at the ancestors of link j of a wrench on its antecedent, in column and row."""
+    k = tree.links[j].v.start + column
+    i = tree.links[j].antecedent
+    while i >= 0:
+        link = tree.links[i]
+        entries = effort(link.motion, *wrench)
+        A[link.v, k] = entries
+        A[k, link.v] = entries.T
+        wrench = poses[i].wrench(*wrench)
+        i = link.antecedent
 
 
-def _momentum(inertia: Inertia, linear: SX, angular: SX) -> tuple[SX, SX]:
+def _momentum(body: Inertia, linear: SX, angular: SX) -> tuple[SX, SX]:
     """Linear and angular momentum about the origin, of a velocity in the same frame."""
     return (
-        inertia.m * linear + cross(angular, inertia.ms),
-        casadi.mtimes(inertia.J, angular) + cross(inertia.ms, linear),
+        body.m * linear + cross(angular, body.ms),
+        casadi.mtimes(body.J, angular) + cross(body.ms, linear),
     )

@@ -5,18 +5,40 @@ Source: Khalil & Kleinfinger 1987; Khalil & Creusot 1997, eq. 15-20.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
+from mbs.recursions.accelerations import Acceleration, link_accelerations
 from mbs.recursions.motion import effort
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.velocities import Acceleration, link_accelerations
-from mbs.spatial import Inertia, cross, is_zero, zeros
+from mbs.recursions.regrouping import regrouped
+from mbs.recursions.rotation_rate import moment_of_rotation
+from mbs.recursions.sliding import slid
+from mbs.spatial import PseudoInertia, cross, is_zero, zeros
 
 Wrench = tuple[SX, SX]
 """Force (3, 1) and moment (3, 1) about the origin of a frame, in that frame [N, N m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dynamics:
+    """Everything that the recursions of Newton and Euler compute.
+
+    Attributes:
+        motions: of the links, each in its frame.
+        own: the wrench that moves each body, in its frame.
+        wrenches: the wrench that each joint transmits, in the frame of its link.
+        efforts: (nv, 1) its part along the motion [N m or N].
+    """
+
+    motions: list[Acceleration]
+    own: list[Wrench]
+    wrenches: list[Wrench]
+    efforts: SX
 
 
 def newton_euler(
@@ -24,69 +46,47 @@ def newton_euler(
     poses: list[LinkPose],
     v: SX,
     a: SX,
-    gravity: SX,
+    base: Acceleration,
     external: dict[int, Wrench] | None = None,
-) -> SX:
-    """Joint efforts that produce the joint accelerations a, without friction and rotors.
+) -> Dynamics:
+    """The wrenches that produce the joint accelerations a, without friction and rotors.
 
-    Accelerations run from the base to the leaves, wrenches from the leaves to the base.
+    Accelerations run from the base to the leaves, wrenches from the leaves to the base, with the
+    inertial parameters regrouped.
 
     Args:
         tree: the links.
         poses: each with respect to its antecedent.
         v: (nv, 1) joint velocities.
         a: (nv, 1) joint accelerations.
-        gravity: (3, 1) gravity acceleration in the base frame [m/s^2].
+        base: motion of the base; see `resting_base`.
         external: for some links the wrench that they exert on their environment.
-
-    Returns:
-        (nv, 1) efforts along the motions [N m or N].
     """
-    motions = link_accelerations(tree, poses, v, a, gravity)
-    wrenches = [
-        inertial_wrench(link.inertia, motion)
-        for link, motion in zip(tree.links, motions, strict=True)
-    ]
-    for j, (f_e, m_e) in (external or {}).items():
-        f, m = wrenches[j]
-        wrenches[j] = f + f_e, m + m_e
-    efforts: list[SX] = [SX(0)] * len(tree.links)
+    bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
+    if not external:
+        poses, bodies = slid(tree, poses, bodies, base_rests=is_zero(base.w))
+    bodies = regrouped(tree, poses, bodies)
+    motions = link_accelerations(tree, poses, v, a, base)
+    own = [inertial_wrench(body, motion) for body, motion in zip(bodies, motions, strict=True)]
+    wrenches = list(own)
+    for j, wrench in (external or {}).items():
+        wrenches[j] = _sum(wrenches[j], wrench)
     for j in reversed(range(len(tree.links))):
-        link, (f, m) = tree.links[j], wrenches[j]
-        efforts[j] = effort(link.motion, f, m)
-        if link.antecedent >= 0:
-            f_i, m_i = wrenches[link.antecedent]
-            f, m = moved_wrench(poses[j], f, m)
-            wrenches[link.antecedent] = f_i + f, m_i + m
-    return casadi.vertcat(*efforts)
+        i = tree.links[j].antecedent
+        if i >= 0:
+            wrenches[i] = _sum(wrenches[i], poses[j].wrench(*wrenches[j]))
+    efforts = (effort(link.motion, f, m) for link, (f, m) in zip(tree.links, wrenches, strict=True))
+    return Dynamics(motions, own, wrenches, casadi.vertcat(*efforts))
 
 
-def moved_wrench(pose: LinkPose, f: SX, m: SX) -> Wrench:
-    """A wrench of frame j about the origin of its antecedent i and in its axes."""
-    f_i = pose.apply(f)
-    m_i = pose.apply(m)
-    return f_i, m_i if is_zero(pose.p) else m_i + cross(pose.p, f_i)
+def _sum(a: Wrench, b: Wrench) -> Wrench:
+    return a[0] + b[0], a[1] + b[1]
 
 
-def inertial_wrench(inertia: Inertia, motion: Acceleration) -> Wrench:
-    """The wrench that moves a body: F = m vd + U ms, M = J wd + w x J w + ms x vd."""
-    f = inertia.m * motion.vd + casadi.mtimes(motion.U, inertia.ms)
-    m = euler_moment(inertia.J, motion) + cross(inertia.ms, motion.vd)
-    return f, m
-
-
-def euler_moment(J: SX, motion: Acceleration) -> SX:
-    """J wd + w x (J w), (3, 1), on the entries of U: fifteen multiplications instead of 24.
-
-    The first row is XX wd1 - XY U31 + XZ U21 + YZ (w2^2 - w3^2) + (ZZ - YY) w2 w3.
-    """
-    w, wd, U = motion.w, motion.wd, motion.U
-    rows = []
-    for k in range(3):
-        m, n = (k + 1) % 3, (k + 2) % 3
-        row = J[k, k] * wd[k] - J[k, m] * U[n, k] + J[k, n] * U[m, k]
-        rows.append(row + J[m, n] * (U[m, m] - U[n, n]) + (J[n, n] - J[m, m]) * (w[m] * w[n]))
-    return casadi.vertcat(*rows)
+def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:
+    """The wrench that moves a body: F = m vd + U ms, M = its moment of U + ms x vd."""
+    f = body.m * motion.vd + casadi.mtimes(motion.rate.U, body.ms)
+    return f, moment_of_rotation(body.S, motion.rate) + cross(body.ms, motion.vd)
 
 
 def rotor_and_friction(tree: Tree, v: SX, a: SX) -> SX:

@@ -13,63 +13,119 @@ from casadi import SX
 from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
 from mbs.spatial import (
+    Displacement,
+    FreeDisplacement,
     MatrixTurn,
     Pose,
     Rotation,
+    Screw,
     axis_turn,
     quaternion_rotation,
+    zeros,
 )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkPose:
-    """Frame j seen from its antecedent i, as turns that are cheap to apply.
+    """Frame j seen from its antecedent i, as displacements that are cheap to apply.
 
     Attributes:
-        turns: from frame i towards frame j.
-        p: (3, 1) origin of j in frame i [m].
+        seat: from frame i to the seat of joint j, a frame fixed on link i whose z axis is the
+            axis of the joint.
+        motion: from the seat to frame j: the turn and slide of the joint.
+        run: numbers of the revolute joints with parallel axes, one after the other, that end
+            with this joint; the joint alone when its antecedent's axis is another.
+        spin: the turn by the sum of the angles of the run.
     """
 
-    turns: tuple[Rotation, ...]
-    p: SX
+    seat: tuple[Displacement, ...]
+    motion: tuple[Displacement, ...]
+    run: tuple[int, ...]
+    spin: Rotation
+
+    @property
+    def steps(self) -> tuple[Displacement, ...]:
+        """From frame i to frame j."""
+        return self.seat + self.motion
+
+    @property
+    def foot(self) -> SX:
+        """(3, 1) origin of the seat in frame i [m]."""
+        return _origin(self.seat)
+
+    @property
+    def p(self) -> SX:
+        """(3, 1) origin of frame j in frame i [m]."""
+        return _origin(self.steps)
 
     @property
     def matrix(self) -> SX:
         """(3, 3) orientation of j in i."""
         R = Pose.identity().R
-        for turn in self.turns:
-            R = casadi.mtimes(R, turn.matrix)
+        for step in self.steps:
+            R = casadi.mtimes(R, step.turn.matrix)
         return R
+
+    def at_seat(self, vector: SX) -> SX:
+        """A vector of frame i in the seat of the joint."""
+        for step in self.seat:
+            vector = step.turn.apply_inverse(vector)
+        return vector
 
     def apply(self, vector: SX) -> SX:
         """A vector of frame j in frame i."""
-        for turn in reversed(self.turns):
-            vector = turn.apply(vector)
+        for step in reversed(self.steps):
+            vector = step.turn.apply(vector)
         return vector
 
     def apply_inverse(self, vector: SX) -> SX:
         """A vector of frame i in frame j."""
-        for turn in self.turns:
-            vector = turn.apply_inverse(vector)
+        for step in self.steps:
+            vector = step.turn.apply_inverse(vector)
         return vector
 
-    def apply_to_tensor(self, tensor: SX) -> SX:
-        """A symmetric tensor of frame j in frame i."""
-        for turn in reversed(self.turns):
-            tensor = turn.apply_to_tensor(tensor)
-        return tensor
+    def wrench(self, f: SX, m: SX) -> tuple[SX, SX]:
+        """Force and moment about the origin of j, in j, about the origin of i and in its axes."""
+        for step in reversed(self.steps):
+            f, m = step.wrench(f, m)
+        return f, m
 
     def after(self, pose: Pose) -> Pose:
         """Frame j seen from the frame in which frame i has this pose."""
         rows = pose.R.T
-        for turn in self.turns:
-            rows = casadi.horzcat(*(turn.apply_inverse(rows[:, k]) for k in range(3)))
+        for step in self.steps:
+            rows = casadi.horzcat(*(step.turn.apply_inverse(rows[:, k]) for k in range(3)))
         return Pose(rows.T, pose.p + casadi.mtimes(pose.R, self.p))
+
+
+def _origin(steps: tuple[Displacement, ...]) -> SX:
+    p = zeros()
+    for step in reversed(steps):
+        p = step.point(p)
+    return p
 
 
 def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
     """Every link frame seen from its antecedent at the positions q, (nq, 1)."""
-    return [_link_pose(link, q[link.q]) for link in tree.links]
+    poses: list[LinkPose] = []
+    angles: list[SX] = []
+    for j, link in enumerate(tree.links):
+        i, at = link.antecedent, link.placement
+        seat = _moving(Screw.about("z", at.gamma, at.b), Screw.about("x", at.alpha, at.d))
+        angle = at.theta + q[link.q] if link.motion is Motion.REVOLUTE else at.theta
+        run: tuple[int, ...] = (j,)
+        if link.motion is Motion.REVOLUTE and i >= 0 and _continues(tree.links[i], seat):
+            run, angle = (*poses[i].run, j), angles[i] + angle
+        angles.append(angle)
+        seat, motion = _joint(link, seat, q[link.q])
+        spin = axis_turn("z", angle) if len(run) > 1 else motion[0].turn
+        poses.append(LinkPose(seat, motion, run, spin))
+    return poses
+
+
+def _continues(before: Link, seat: tuple[Screw, ...]) -> bool:
+    """Whether a revolute joint on this seat has the axis direction of the one before."""
+    return before.motion is Motion.REVOLUTE and all(step.turn.c.is_one() for step in seat)
 
 
 def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
@@ -108,25 +164,23 @@ def relative_pose(
     return to_b if to_a.is_identity() else to_a.inverse() @ to_b
 
 
-def _link_pose(link: Link, q: SX) -> LinkPose:
-    placement = link.placement
+def _joint(
+    link: Link, seat: tuple[Screw, ...], q: SX
+) -> tuple[tuple[Screw, ...], tuple[Displacement, ...]]:
+    """The seat of a joint and the displacement from it to the frame of the link."""
+    at = link.placement
     match link.motion:
         case Motion.REVOLUTE:
-            placement = placement.turned(q)
+            return seat, (Screw.about("z", at.theta + q, at.r),)
         case Motion.PRISMATIC:
-            placement = placement.slid(q)
-    turns: list[Rotation] = [
-        axis_turn(axis, angle)
-        for axis, angle in (
-            ("z", placement.gamma),
-            ("x", placement.alpha),
-            ("z", placement.theta),
-        )
-        if not angle.is_zero()
-    ]
-    p = placement.position()
-    if link.motion is Motion.FREE:
-        p = p + LinkPose(tuple(turns), p).apply(q[0:3])
-    if link.motion in (Motion.SPHERICAL, Motion.FREE):
-        turns.append(MatrixTurn(quaternion_rotation(q[link.motion.nq - 4 :])))
-    return LinkPose(tuple(turns), p)
+            return seat, (Screw.about("z", at.theta, at.r + q),)
+    free = FreeDisplacement(
+        MatrixTurn(quaternion_rotation(q[link.motion.nq - 4 :])),
+        q[0:3] if link.motion is Motion.FREE else zeros(),
+    )
+    return seat + _moving(Screw.about("z", at.theta, at.r)), (free,)
+
+
+def _moving(*steps: Screw) -> tuple[Screw, ...]:
+    """The steps that move anything."""
+    return tuple(step for step in steps if not (step.turn.c.is_one() and step.t.is_zero()))

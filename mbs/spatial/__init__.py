@@ -8,20 +8,28 @@ from mbs.spatial.angles import sin_cos
 from mbs.spatial.inertia import Inertia
 from mbs.spatial.khalil import Khalil
 from mbs.spatial.pose import Pose
+from mbs.spatial.pseudo_inertia import PseudoInertia
 from mbs.spatial.quaternion import quaternion_rate, quaternion_rotation
 from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, align_z, axis_turn
-from mbs.spatial.vectors import cross, is_zero, skew, snapped, vector, zeros
+from mbs.spatial.screw import Body, Displacement, FreeDisplacement, Screw
+from mbs.spatial.vectors import cross, elements, is_zero, skew, snapped, vector, zeros
 
 __all__ = [
+    "Body",
+    "Displacement",
+    "FreeDisplacement",
     "Inertia",
     "Khalil",
     "MatrixTurn",
     "Pose",
+    "PseudoInertia",
     "Rotation",
+    "Screw",
     "Turn",
     "align_z",
     "axis_turn",
     "cross",
+    "elements",
     "is_zero",
     "quaternion_rate",
     "quaternion_rotation",

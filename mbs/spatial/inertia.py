@@ -8,7 +8,7 @@ import casadi
 from casadi import SX
 
 from mbs.spatial.rotation import Rotation
-from mbs.spatial.vectors import is_zero, skew, zeros
+from mbs.spatial.vectors import skew, zeros
 
 TEN_PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Names of the inertial parameters, in the order of Khalil & Kleinfinger 1986."""
@@ -70,22 +70,47 @@ class Inertia:
             R: rotation of the present frame j seen from i.
             p: (3, 1) origin of j in i [m].
         """
-        ms, J = R.apply(self.ms), R.apply_to_tensor(self.J)
-        if is_zero(p):
-            return Inertia(J, ms, self.m)
-        first = ms + self.m * p
-        return Inertia(J + _displacement(p, ms + first), first, self.m)
+        moved = self.turned(R)
+        for axis in range(3):
+            moved = moved.slid(axis, p[axis])
+        return moved
 
+    def turned(self, R: Rotation) -> Inertia:
+        """The same body about the same point in the axes of frame i."""
+        return Inertia(R.apply_to_tensor(self.J), R.apply(self.ms), self.m)
 
-def _displacement(p: SX, h: SX) -> SX:
-    """The tensor that a displacement p adds, (3, 3), with h = 2 ms + m p in the same axes.
+    def slid(self, axis: int, t: SX) -> Inertia:
+        """The body displaced by t [m] along a coordinate axis.
 
-    J_i = J_j - (p^ ms^ + its transpose) + m p^ p^' = J_j + (p . h) 1 - (p h' + h p') / 2.
-    """
-    x, y, z = p[0] * h[0], p[1] * h[1], p[2] * h[2]
-    xy = -0.5 * (p[0] * h[1] + p[1] * h[0])
-    xz = -0.5 * (p[0] * h[2] + p[2] * h[0])
-    yz = -0.5 * (p[1] * h[2] + p[2] * h[1])
-    return casadi.vertcat(
-        casadi.horzcat(y + z, xy, xz), casadi.horzcat(xy, x + z, yz), casadi.horzcat(xz, yz, x + y)
-    )
+        Three products: with h = ms + m t, J changes by t (ms + h) across the axis.
+        """
+        if t.is_zero():
+            return self
+        J, ms = SX(self.J), SX(self.ms)
+        ms[axis] += self.m * t
+        across = t * (self.ms[axis] + ms[axis])
+        for k in ((axis + 1) % 3, (axis + 2) % 3):
+            J[k, k] += across
+            J[axis, k] -= t * self.ms[k]
+            J[k, axis] = J[axis, k]
+        return Inertia(J, ms, self.m)
+
+    def along_axis(self) -> tuple[Inertia, Inertia]:
+        """Two bodies that make this one: YY, MZ and M are zero in the first.
+
+        The second is mass on the z axis: no turn about it can be felt.
+        """
+        J, on_axis = SX(self.J), zeros(3, 3)
+        on_axis[0, 0] = on_axis[1, 1] = self.J[1, 1]
+        J[0, 0], J[1, 1] = self.J[0, 0] - self.J[1, 1], 0
+        ms, height = SX(self.ms), zeros()
+        height[2], ms[2] = self.ms[2], 0
+        return Inertia(J, ms, SX(0)), Inertia(on_axis, height, self.m)
+
+    def rotational(self) -> tuple[Inertia, Inertia]:
+        """Two bodies that make this one: the first has no J, the second J alone."""
+        return Inertia(zeros(3, 3), self.ms, self.m), Inertia(self.J, zeros(), SX(0))
+
+    def massive(self) -> tuple[Inertia, Inertia]:
+        """Two bodies that make this one: the first has no mass, the second M alone."""
+        return Inertia(self.J, self.ms, SX(0)), Inertia(zeros(3, 3), zeros(), self.m)

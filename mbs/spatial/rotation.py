@@ -78,7 +78,7 @@ class Turn:
         m = 3 - k - h
         s, c = self.s, self.c
         a, b, e = tensor[k, k], tensor[k, h], tensor[h, h]
-        w = c * (a - e) - 2 * s * b
+        w = c * (a - e) - s * (2 * b)
         turned = SX(tensor)
         turned[k, k], turned[h, h] = e + c * w, a - c * w
         turned[k, h] = turned[h, k] = b + s * w

@@ -1,0 +1,87 @@
+"""Frames slid along the axes of their joints to where distances vanish.
+
+The origin of the frame of a revolute link may stand anywhere on its axis. Three places save
+operations: the foot of the axis when it is at rest, because no force on it does any work and
+gravity alone accelerates it; the foot of the axis of a last link; the height of the link behind
+it when that one turns about a parallel axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from casadi import SX
+
+from mbs.assembly.tree import Tree
+from mbs.components.motion import Motion
+from mbs.recursions.poses import LinkPose
+from mbs.spatial import Body, Screw
+
+
+def slid(
+    tree: Tree, poses: list[LinkPose], bodies: list[Body], *, base_rests: bool = True
+) -> tuple[list[LinkPose], list[Body]]:
+    """The same tree with other frames of revolute links.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        bodies: of the links, about and in their frames.
+        base_rests: whether the base has no motion.
+    """
+    rise = _rises(tree, poses, base_rests)
+    moved = [_between(tree, poses, rise, j) for j in range(len(poses))]
+    return moved, [body.slid(2, -rise[j]) for j, body in enumerate(bodies)]
+
+
+def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
+    """How far each frame moves up its axis [m]."""
+    resting = _resting(tree, poses) if base_rests else set()
+    rise = [SX(0)] * len(poses)
+    for j in reversed(range(len(poses))):
+        if tree.links[j].motion is not Motion.REVOLUTE:
+            continue
+        behind = [k for k, link in enumerate(tree.links) if link.antecedent == j]
+        if not behind or (len(behind) == 1 and j in resting):
+            rise[j] = -_height(poses[j])
+        elif len(behind) == 1 and len(poses[behind[0]].run) > 1:
+            k = behind[0]
+            rise[j] = poses[k].foot[2] + _height(poses[k]) + rise[k]
+    return rise
+
+
+def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
+    """Links whose axis has its foot at rest."""
+    found: set[int] = set()
+    for j, link in enumerate(tree.links):
+        i = link.antecedent
+        if i < 0:
+            if link.motion is Motion.REVOLUTE:
+                found.add(j)
+        elif i in found and poses[j].foot[0].is_zero() and poses[j].foot[1].is_zero():
+            on_axis_of_base = tree.links[i].antecedent < 0
+            if on_axis_of_base or (poses[j].foot[2].is_zero() and _height(poses[i]).is_zero()):
+                found.add(j)
+    return found
+
+
+def _height(pose: LinkPose) -> SX:
+    """Distance r of the frame from the foot of its axis."""
+    screw = pose.motion[0]
+    assert isinstance(screw, Screw)
+    return screw.t
+
+
+def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:
+    """The pose of link j when its frame and that of its antecedent are moved."""
+    pose, i = poses[j], tree.links[j].antecedent
+    b = -rise[i] if i >= 0 else SX(0)
+    screw = pose.motion[0]
+    if isinstance(screw, Screw):
+        r = screw.t + rise[j]
+        if len(pose.run) > 1:
+            b, r = b + r, SX(0)
+        pose = replace(pose, motion=(replace(screw, t=r),))
+    if b.is_zero():
+        return pose
+    return replace(pose, seat=(Screw.about("z", SX(0), b), *pose.seat))

@@ -28,9 +28,26 @@ class ModelFunction(Function):
     NaN out.
     """
 
-    def __init__(self, function: Function, system: System) -> None:
+    def __init__(
+        self, function: Function, system: System, annotate: Callable[[], Function] | None = None
+    ) -> None:
         Function.__init__(self, function)
         self._system = system
+        self._annotate = annotate
+
+    @property
+    def system(self) -> System:
+        """The mechanism whose model it is."""
+        return self._system
+
+    def annotated(self) -> Function:
+        """The same Function with further outputs: the intermediate quantities that have a name.
+
+        Returns:
+            Function of the same inputs; after its own outputs come scalars such as W32, the third
+            element of the angular velocity of link 2. Names are those of docs/notation.md.
+        """
+        return Function(self) if self._annotate is None else self._annotate()
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it on numbers or symbols, as a casadi.Function, its inputs checked."""
@@ -134,15 +151,16 @@ def _matrix(value: Any) -> Any:
 def model_function(
     system: System,
     key: tuple[Any, ...],
-    build: Callable[[], tuple[Named, Named]],
+    build: Callable[[], tuple[Named, Named] | tuple[Named, Named, Named]],
 ) -> Function:
     """The model of a system under this key, built the first time it is asked for.
 
     Args:
         system: whose model it is; its cache keeps the Function.
         key: the name of the Function, then whatever tells it from others of the same name.
-        build: gives the named inputs and outputs on CasADi symbols. When the system has
-            parameters they become the last input p.
+        build: gives the named inputs and outputs on CasADi symbols and, where there are any, the
+            named scalars between them. When the system has parameters they become the last
+            input p.
 
     Raises:
         ModelError: `system` is not a System.
@@ -150,17 +168,17 @@ def model_function(
     require_system(system)
 
     def make() -> Function:
-        inputs, outputs = build()
-        named = [*inputs, *([("p", system.p)] if system.parameters else [])]
-        function = Function(
-            str(key[0]),
-            [symbol for _, symbol in named],
-            [casadi.densify(value) for _, value in outputs],
-            [label for label, _ in named],
-            [label for label, _ in outputs],
-            {"cse": True, "default_in": default_in(system, len(inputs))},
-        )
-        return ModelFunction(function, system)
+        inputs, outputs, *between = build()
+        every = [*inputs, *([("p", system.p)] if system.parameters else [])]
+        options: dict[str, Any] = {"cse": True, "default_in": default_in(system, len(inputs))}
+
+        def function(results: Named) -> Function:
+            values = [casadi.densify(value) for _, value in results]
+            names = [name for name, _ in every], [name for name, _ in results]
+            return Function(str(key[0]), [x for _, x in every], values, *names, options)
+
+        annotate = (lambda: function([*outputs, *between[0]])) if between else None
+        return ModelFunction(function(outputs), system, annotate)
 
     function: Function = system.cached(key, make)
     return function

@@ -1,0 +1,70 @@
+"""C: a function of pointers to numbers, matrices column by column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from sympy.printing.c import C99CodePrinter
+
+from mbs.export.c_names import comment, parameter_names
+from mbs.export.languages.language import Language, sections, value_text, wrapped
+from mbs.export.languages.printers import printer_of
+from mbs.export.languages.unit import Argument, Unit
+
+_CHOICE = "({0}) ? {1} : {2}"
+_FORMS = {
+    "step": "(double)(({0} > 0) - ({0} < 0))",
+    "Abs": "fabs({0})",
+    **{name: f"{name}({{0}}, {{1}})" for name in ("fmod", "copysign", "fmin", "fmax", "hypot")},
+    **{"floor_": "floor({0})", "ceil_": "ceil({0})", "log1p": "log1p({0})", "expm1": "expm1({0})"},
+}
+
+
+class C(Language):
+    """C99."""
+
+    title = "C"
+    scalars_by_name = False
+    squares_as_products = True
+
+    def printer(self) -> Any:
+        """A printer of sympy."""
+        return printer_of(C99CodePrinter, self.title, repr, _FORMS, "pow({0}, {1})")
+
+    def is_reserved(self, name: str) -> bool:
+        """Whether C, its library or C++ uses the name."""
+        return parameter_names([name], ["k"]) != [name]
+
+    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+        """The text of a function, line by line."""
+        yield "/*"
+        for text in unit.header:
+            indent = " " * (len(text) - len(text.lstrip()))
+            yield f" * {indent}{comment(text)}".rstrip()
+        yield from (" */", "#include <math.h>", "")
+        arguments = [f"const double *{argument.name}" for argument in unit.inputs]
+        arguments += [f"double *{argument.name}" for argument in unit.outputs]
+        yield from wrapped(f"void {unit.name}({', '.join(arguments) or 'void'})")
+        yield "{"
+        yield from (f"    const double {load};" for load in self.loads(unit))
+        for title, lines in sections(unit):
+            if title:
+                yield f"\n    /* {title} */"
+            for line in lines:
+                yield from wrapped(
+                    f"const double {line.name} = {value_text(line, printer, _CHOICE)};", "    "
+                )
+        yield from self._stores(unit, printer)
+        yield "}"
+
+    def _stores(self, unit: Unit, printer: Any) -> Iterator[str]:
+        for out in unit.outputs:
+            yield ""
+            if unit.has_zeros(out):
+                yield f"    for (int k = 0; k < {out.size}; ++k) {out.name}[k] = 0.0;"
+            yield from (f"    {store};" for store in self.stores(unit, out, printer))
+
+    def place(self, argument: Argument, row: int, column: int) -> str:
+        """An element of an input or output in the text."""
+        return f"{argument.name}[{row + argument.rows * column}]"

@@ -1,0 +1,112 @@
+"""Fortran 90: a subroutine, free form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from sympy.printing.fortran import FCodePrinter
+
+from mbs.export.languages.branches import branches
+from mbs.export.languages.language import Language, commented, sections, wrapped
+from mbs.export.languages.printers import printer_of
+from mbs.export.languages.unit import Argument, Unit
+
+_COLUMNS, _CONTINUED = 100, " &"
+_NAMES_A_LINE = 8
+_BRANCHES = "if ({0}) then", "else", "end if"
+_SAME = "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log erf"
+_FORMS = {
+    **{name: f"{name}({{0}})" for name in _SAME.split()},
+    **{"atan2": "atan2({0}, {1})", "Abs": "abs({0})", "hypot": "hypot({0}, {1})"},
+    **{"fmod": "mod({0}, {1})", "copysign": "sign({0}, {1})"},
+    **{"fmin": "min({0}, {1})", "fmax": "max({0}, {1})"},
+    "step": "merge(0.0d0, sign(1.0d0, {0}), {0} == 0.0d0)",
+    "floor_": "(aint({0}) - merge(1.0d0, 0.0d0, {0} < aint({0})))",
+    "ceil_": "(aint({0}) + merge(1.0d0, 0.0d0, {0} > aint({0})))",
+    "log1p": "log(1.0d0 + {0})",
+    "expm1": "(exp({0}) - 1.0d0)",
+}
+_WORDS = """
+abs aint asin acos atan sinh cosh tanh asinh acosh atanh exp log erf atan2 hypot mod sign min max
+merge sin cos tan sqrt
+allocatable allocate assign assignment block call case character common complex contains continue
+cycle data deallocate default do double else elseif elsewhere end endif enddo endfile entry
+equivalence exit external file forall format function goto if implicit in inout integer intent
+interface intrinsic kind len logical module namelist none nullify only operator optional out
+parameter pause pointer precision print private procedure program public pure read real recursive
+result return rewind save select sequence stop subroutine target then to type use where while write
+"""
+
+
+class Fortran(Language):
+    """Fortran 90; hyperbolic inverses, erf and hypot are of 2008."""
+
+    title = "Fortran"
+    reserved = frozenset(_WORDS.split())
+    folds_case = True
+    longest_name = 31
+
+    def printer(self) -> Any:
+        """A printer of sympy."""
+        signs = {"Unequality": "/="}
+        return printer_of(FCodePrinter, self.title, _number, _FORMS, "{0}**{1}", signs)
+
+    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+        """The text of a function, line by line."""
+        yield from commented(unit.header, "!")
+        arguments = [*unit.inputs, *unit.outputs]
+        names = ", ".join(argument.name for argument in arguments)
+        yield from _title(unit.name, names)
+        yield "  implicit none"
+        for intent, some in (("in", unit.inputs), ("out", unit.outputs)):
+            for argument in some:
+                declared = f"double precision, intent({intent}) :: {_declared(argument)}"
+                yield from _statement(declared)
+        yield from _declarations(unit.locals)
+        yield ""
+        for load in self.loads(unit):
+            yield from _statement(load)
+        for title, lines in sections(unit):
+            if title:
+                yield f"\n  ! {title}"
+            for line in lines:
+                yield from branches(line, printer, _BRANCHES, _statement)
+        yield from self._stores(unit, printer)
+        yield f"end subroutine {unit.name}"
+
+    def _stores(self, unit: Unit, printer: Any) -> Iterator[str]:
+        for out in unit.outputs:
+            yield ""
+            if unit.has_zeros(out):
+                yield f"  {out.name} = 0.0d0"
+            for store in self.stores(unit, out, printer):
+                yield from _statement(store)
+
+
+def _number(value: float) -> str:
+    text = repr(value)
+    return text.replace("e", "d") if "e" in text else f"{text}d0"
+
+
+def _statement(text: str, indent: str = "  ") -> list[str]:
+    return wrapped(text, indent, _CONTINUED, _COLUMNS)
+
+
+def _title(name: str, arguments: str) -> list[str]:
+    line = f"subroutine {name}({arguments})"
+    if len(line) <= _COLUMNS:
+        return [line]
+    return [f"subroutine {name}(&", *_statement(f"{arguments})", "    ")]
+
+
+def _declared(argument: Argument) -> str:
+    if argument.scalar:
+        return argument.name
+    shape = f"{argument.rows}" if argument.is_vector else f"{argument.rows},{argument.columns}"
+    return f"{argument.name}({shape})"
+
+
+def _declarations(names: Sequence[str]) -> Iterator[str]:
+    for k in range(0, len(names), _NAMES_A_LINE):
+        yield from _statement(f"double precision :: {', '.join(names[k : k + _NAMES_A_LINE])}")

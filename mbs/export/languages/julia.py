@@ -1,0 +1,86 @@
+"""Julia: a function of vectors that returns arrays; any kind of number goes through it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from sympy.printing.julia import JuliaCodePrinter
+
+from mbs.export.languages.language import (
+    Language,
+    commented,
+    grid_texts,
+    sections,
+    value_text,
+    wrapped,
+)
+from mbs.export.languages.printers import printer_of
+from mbs.export.languages.unit import Argument, Unit
+
+_CHOICE = "({0}) ? {1} : {2}"
+_FORMS = {
+    "atan2": "atan({0}, {1})",
+    "step": "sign({0})",
+    "floor_": "floor({0})",
+    "ceil_": "ceil({0})",
+    "fmod": "rem({0}, {1})",
+    "copysign": "copysign({0}, {1})",
+    "fmin": "min({0}, {1})",
+    "fmax": "max({0}, {1})",
+    "hypot": "hypot({0}, {1})",
+    "log1p": "log1p({0})",
+    "expm1": "expm1({0})",
+    "erf": "",
+}
+_WORDS = """
+sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt abs sign floor ceil rem
+copysign min max hypot log1p expm1 pi im NaN Inf
+baremodule begin break catch const continue do else elseif end export false finally for function
+global if import let local macro module quote return struct true try using while
+abstract mutable primitive type where in isa outer
+"""
+
+
+class Julia(Language):
+    """Julia 1."""
+
+    title = "Julia"
+    reserved = frozenset(_WORDS.split())
+    brackets = "[", "]"
+
+    def printer(self) -> Any:
+        """A printer of sympy."""
+        return printer_of(JuliaCodePrinter, self.title, repr, _FORMS, "{0}^{1}")
+
+    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+        """The text of a function, line by line."""
+        yield from commented(unit.header, "#")
+        arguments = ", ".join(argument.name for argument in unit.inputs)
+        yield from wrapped(f"function {unit.name}({arguments})")
+        yield from (f"    {load}" for load in self.loads(unit))
+        for title, lines in sections(unit):
+            if title:
+                yield f"\n    # {title}"
+            for line in lines:
+                yield from wrapped(f"{line.name} = {value_text(line, printer, _CHOICE)}", "    ")
+        yield ""
+        for out in unit.outputs:
+            yield from _output(unit, out, printer)
+        yield f"    return {', '.join(argument.name for argument in unit.outputs)}"
+        yield "end"
+
+
+def _output(unit: Unit, out: Argument, printer: Any) -> Iterator[str]:
+    grid = grid_texts(unit, out, printer, "0.0")
+    if not out.size:
+        yield f"    {out.name} = zeros({out.rows}, {out.columns})"
+    elif out.scalar:
+        if grid[0][0] != out.name:
+            yield f"    {out.name} = {grid[0][0]}"
+    elif out.is_vector:
+        yield from wrapped(f"{out.name} = [{', '.join(row[0] for row in grid)}]", "    ")
+    else:
+        yield f"    {out.name} = ["
+        yield from (f"        {' '.join(row)}" for row in grid)
+        yield "    ]"

@@ -1,0 +1,129 @@
+"""LaTeX: a document with one equation a line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from sympy.printing.latex import LatexPrinter
+
+from mbs.export.languages.language import Language, commented, plain_number, sections
+from mbs.export.languages.unit import Line, Unit
+
+_ACCENTS = {"QP": r"\dot{q}", "QDP": r"\ddot{q}", "GAM": r"\Gamma"}
+_FORMS = {
+    "step": r"\operatorname{sgn}\left(%s\right)",
+    "floor_": r"\left\lfloor %s\right\rfloor",
+    "ceil_": r"\left\lceil %s\right\rceil",
+    "fmod": r"\operatorname{fmod}\left(%s, %s\right)",
+    "copysign": r"\left|%s\right| \operatorname{sgn}\left(%s\right)",
+    "fmin": r"\min\left(%s, %s\right)",
+    "fmax": r"\max\left(%s, %s\right)",
+    "hypot": r"\operatorname{hypot}\left(%s, %s\right)",
+    "log1p": r"\log\left(1 + %s\right)",
+    "expm1": r"\left(e^{%s} - 1\right)",
+    "atan2": r"\operatorname{atan2}\left(%s, %s\right)",
+}
+_LONGEST = 150
+_DEEPER, _SHALLOWER = ("{", r"\left"), ("}", r"\right")
+
+
+class _Printer(LatexPrinter):  # type: ignore[misc]
+    """A printer of sympy that keeps numbers and knows the names of mechanics."""
+
+    def text(self, expr: Any) -> str:
+        return str(self._print(expr))
+
+    def _print(self, expr: Any, **kwargs: Any) -> Any:
+        form = _FORMS.get(type(expr).__name__)
+        if form is None:
+            return super()._print(expr, **kwargs)
+        return form % tuple(self._print(arg) for arg in expr.args)
+
+    def _print_Symbol(self, expr: Any, style: str = "plain") -> str:
+        return symbol_text(expr.name)
+
+    def _print_Float(self, expr: Any) -> str:
+        mantissa, _, exponent = plain_number(float(expr)).partition("e")
+        return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+class Latex(Language):
+    """LaTeX with amsmath."""
+
+    title = "LaTeX"
+
+    def printer(self) -> Any:
+        """A printer of sympy."""
+        return _Printer({"order": "none", "mul_symbol": r" \, ", "fold_short_frac": False})
+
+    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+        """The text of a function, line by line."""
+        yield from commented(unit.header, "%")
+        yield from (r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks")
+        yield r"\begin{document}"
+        names = {line.name for line in (*unit.fixed, *unit.changing)}
+        for title, lines in sections(unit):
+            if title:
+                yield f"\n{title}"
+            if lines:
+                yield from _aligned(rf"{_left(line.name)}{_value(line, printer)}" for line in lines)
+        rest = [store for store in unit.stores if store.label not in names]
+        if rest:
+            yield "\nThe outputs."
+            yield from _aligned(_left(s.label) + printer.text(s.value) for s in rest)
+        yield r"\end{document}"
+
+
+def symbol_text(name: str) -> str:
+    """A name as people write it: QP2 is the rate of q2, S23 has the index 23."""
+    rate = re.fullmatch(r"(QP|QDP|GAM)(\w+)", name)
+    if rate:
+        return f"{_ACCENTS[rate[1]]}_{{{_escaped(rate[2])}}}"
+    indexed = re.fullmatch(r"([A-Za-z]+)(\d\w*)", name)
+    if indexed:
+        return f"{_letters(indexed[1])}_{{{_escaped(indexed[2])}}}"
+    return _letters(name)
+
+
+def _letters(name: str) -> str:
+    return name if len(name) == 1 else rf"\mathit{{{_escaped(name)}}}"
+
+
+def _escaped(name: str) -> str:
+    return name.replace("_", r"\_")
+
+
+def _left(name: str) -> str:
+    return f"{symbol_text(name)} &= "
+
+
+def _aligned(equations: Iterator[str]) -> Iterator[str]:
+    yield r"\begin{align*}"
+    yield " \\\\\n".join("\n".join(_broken(equation)) for equation in equations)
+    yield r"\end{align*}"
+
+
+def _value(line: Line, printer: Any) -> str:
+    value = printer.text(line.value)
+    if line.condition is None:
+        return str(value)
+    condition, other = printer.text(line.condition), printer.text(line.otherwise)
+    return (
+        rf"\begin{{cases}} {value} & \text{{if }} {condition} \\"
+        rf" {other} & \text{{otherwise}} \end{{cases}}"
+    )
+
+
+def _broken(equation: str) -> Iterator[str]:
+    """An equation on several lines, broken before signs that no bracket encloses."""
+    line, depth = "", 0
+    for piece in re.split(r"(?= [+-] )", equation):
+        if len(line) + len(piece) > _LONGEST and line and depth == 0:
+            yield line + r" \\"
+            line = r"&\quad{}"
+        line += piece
+        depth += sum(piece.count(mark) for mark in _DEEPER)
+        depth -= sum(piece.count(mark) for mark in _SHALLOWER)
+    yield line

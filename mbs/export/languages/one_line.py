@@ -1,0 +1,32 @@
+"""A scalar as one expression, in the grammar that descriptions of mechanisms are written in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi
+from sympy.printing.pycode import PythonCodePrinter
+
+from mbs.export.languages.language import plain_number
+from mbs.export.languages.plan import Plan, arranged
+from mbs.export.languages.printers import printer_of
+from mbs.export.languages.symbolic import Writer
+from mbs.operations.graph import Graph
+
+_FORMS = {
+    **{name: f"{name}({{0}})" for name in ("sin", "cos", "tan", "sqrt")},
+    "atan2": "atan2({0}, {1})",
+}
+
+
+def one_line(graph: Graph, names: Sequence[str]) -> str:
+    """The only result of a graph; names are those of the elements of its only input."""
+    graph, _ = arranged(graph)
+    inputs = {
+        number: names[node.args[1]]
+        for number, node in enumerate(graph.nodes)
+        if node.op == casadi.OP_INPUT
+    }
+    writer = Writer(Plan(graph, (), (), {}), inputs, False)
+    printer = printer_of(PythonCodePrinter, "the grammar", plain_number, _FORMS, "{0}^{1}")
+    return str(printer.text(writer.value(graph.results[0][0])))

@@ -1,0 +1,95 @@
+"""Python: a function of arrays; arrays with more axes are many states at once."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Iterator
+from typing import Any
+
+from sympy.printing.pycode import PythonCodePrinter
+
+from mbs.export.languages.language import Language, plain_number, sections, value_text, wrapped
+from mbs.export.languages.printers import printer_of
+from mbs.export.languages.unit import Unit
+
+_NUMPY = {
+    **{name: name for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},
+    **{f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh")},
+    **{"Abs": "abs", "step": "sign", "floor_": "floor", "ceil_": "ceil"},
+    **{"log1p": "log1p", "expm1": "expm1"},
+}
+_OF_TWO = {
+    **{"atan2": "arctan2", "fmod": "fmod", "copysign": "copysign", "hypot": "hypot"},
+    **{"fmin": "minimum", "fmax": "maximum"},
+}
+_JOINS = {"And": " & ", "Or": " | "}
+_CHOICE = "np.where({0}, {1}, {2})"
+_FORMS = {
+    **{name: f"np.{function}({{0}})" for name, function in _NUMPY.items()},
+    **{name: f"np.{function}({{0}}, {{1}})" for name, function in _OF_TWO.items()},
+    "erf": "np.vectorize(math.erf, [float])({0})",
+}
+_WORDS = (*keyword.kwlist, "np", "math", "float", "shape")
+
+
+class Python(Language):
+    """Python 3 with numpy."""
+
+    title = "Python"
+    reserved = frozenset(_WORDS)
+    brackets = "[", "]"
+    first = 0
+
+    def printer(self) -> Any:
+        """A printer of sympy."""
+        return printer_of(
+            PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
+        )
+
+    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+        """The text of a function, line by line."""
+        body = list(self._body(unit, printer))
+        if any("math." in line for line in body):
+            yield "import math"
+            yield ""
+        yield from ("import numpy as np", "", "")
+        arguments = ", ".join(argument.name for argument in unit.inputs)
+        yield from wrapped(f"def {unit.name}({arguments}):")
+        header = [line.replace("\\", "/").replace('"""', "'''") for line in unit.header]
+        yield f'    """{header[0]}'
+        yield from (f"    {line}".rstrip() for line in header[1:])
+        yield '    """'
+        yield from body
+
+    def _body(self, unit: Unit, printer: Any) -> Iterator[str]:
+        shapes = []
+        for argument in unit.inputs:
+            yield f"    {argument.name} = np.asarray({argument.name}, dtype=float)"
+            axes = 0 if argument.scalar else 1 if argument.is_vector else 2
+            shapes.append(f"{argument.name}.shape" + (f"[{axes}:]" if axes else ""))
+        yield from _statement("shape", f"np.broadcast_shapes({', '.join(shapes)})")
+        yield from (f"    {load}" for load in self.loads(unit))
+        for title, lines in sections(unit):
+            if title:
+                yield f"\n    # {title}"
+            for line in lines:
+                yield from _statement(line.name, value_text(line, printer, _CHOICE))
+        for out in unit.outputs:
+            yield ""
+            yield from self._output(unit, out, printer)
+        yield f"    return {', '.join(argument.name for argument in unit.outputs)}"
+
+    def _output(self, unit: Unit, out: Any, printer: Any) -> Iterator[str]:
+        if not out.scalar:
+            sizes = f"{out.rows}" if out.is_vector else f"{out.rows}, {out.columns}"
+            yield f"    {out.name} = np.zeros(({sizes}, *shape))"
+        elif unit.has_zeros(out):
+            yield f"    {out.name} = np.zeros(shape)"
+        yield from (f"    {store}" for store in self.stores(unit, out, printer))
+
+
+def _statement(name: str, value: str) -> list[str]:
+    lines = wrapped(f"{name} = {value}", "    ")
+    if len(lines) == 1:
+        return lines
+    return [f"    {name} = (", *wrapped(value, "        "), "    )"]

@@ -1,0 +1,74 @@
+"""Rust: a function of slices, matrices column by column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from sympy.printing.rust import RustCodePrinter
+
+from mbs.export.languages.language import Language, commented, sections, value_text, wrapped
+from mbs.export.languages.printers import printer_of
+from mbs.export.languages.unit import Argument, Unit
+
+_METHODS = {
+    **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
+    **{name: name for name in ("sinh", "cosh", "tanh", "asinh", "acosh", "atanh")},
+    **{"exp": "exp", "log": "ln", "Abs": "abs", "sqrt": "sqrt"},
+    **{"floor_": "floor", "ceil_": "ceil", "log1p": "ln_1p", "expm1": "exp_m1"},
+}
+_OF_TWO = {"atan2": "atan2", "copysign": "copysign", "hypot": "hypot", "fmin": "min", "fmax": "max"}
+_CHOICE = "if {0} {{ {1} }} else {{ {2} }}"
+_FORMS = {
+    **{name: f"{{0}}.{method}()" for name, method in _METHODS.items()},
+    **{name: f"f64::{method}({{0}}, {{1}})" for name, method in _OF_TWO.items()},
+    "fmod": "({0} % {1})",
+    "powi": "{0}.powi({1})",
+    "step": "(if {0} > 0.0 {{ 1.0_f64 }} else if {0} < 0.0 {{ -1.0 }} else {{ 0.0 }})",
+    "erf": "",
+}
+_WORDS = """
+as async await break const continue crate dyn else enum extern false fn for gen if impl in let loop
+match mod move mut pub ref return self Self static struct super trait true type unsafe use where
+while abstract become box do final macro override priv try typeof union unsized virtual yield f64
+"""
+_LINTS = "non_snake_case, unused_variables, unused_parens, clippy::all"
+
+
+class Rust(Language):
+    """Rust 2018 and later."""
+
+    title = "Rust"
+    reserved = frozenset(_WORDS.split())
+    scalars_by_name = False
+    squares_as_products = True
+
+    def printer(self) -> Any:
+        """A printer of sympy."""
+        return printer_of(RustCodePrinter, self.title, repr, _FORMS, "f64::powf({0}, {1})")
+
+    def place(self, argument: Argument, row: int, column: int) -> str:
+        """An element of an input or output in the text."""
+        return f"{argument.name}[{row + argument.rows * column}]"
+
+    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+        """The text of a function, line by line."""
+        yield from commented(unit.header, "///")
+        arguments = [f"{argument.name}: &[f64]" for argument in unit.inputs]
+        arguments += [f"{argument.name}: &mut [f64]" for argument in unit.outputs]
+        yield f"#[allow({_LINTS})]"
+        yield from wrapped(f"pub fn {unit.name}({', '.join(arguments)}) {{")
+        yield from (f"    let {load};" for load in self.loads(unit))
+        for title, lines in sections(unit):
+            if title:
+                yield f"\n    // {title}"
+            for line in lines:
+                yield from wrapped(
+                    f"let {line.name}: f64 = {value_text(line, printer, _CHOICE)};", "    "
+                )
+        for out in unit.outputs:
+            yield ""
+            if unit.has_zeros(out):
+                yield f"    {out.name}[..{out.size}].fill(0.0);"
+            yield from (f"    {store};" for store in self.stores(unit, out, printer))
+        yield "}"

@@ -27,7 +27,7 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.recursions.poses import LinkPose, link_poses, relative_pose
+from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, align_z
 
 Rows = list[tuple[str, SX]]
@@ -57,8 +57,7 @@ def closure_rows(system: System, q: SX) -> SX:
 
 def labelled_rows(system: System, q: SX) -> list[tuple[str, Rows]]:
     """For each loop and coupling its name and its rows."""
-    poses = link_poses(system.tree, q)
-    cuts = [(cut.edge.joint.name, _cut_rows(system, poses, cut)) for cut in system.cuts]
+    cuts = [(cut.edge.joint.name, _cut_rows(system, q, cut)) for cut in system.cuts]
     couplings = []
     for coupling in system.couplings:
         x = q[coupling.driver]
@@ -75,10 +74,9 @@ def facing(system: System, q: SX) -> SX:
     The rows of a joint with an axis are zero for opposed axes as well; a posture is only right
     when these are positive.
     """
-    poses = link_poses(system.tree, q)
     cosines: list[SX] = []
     for cut in system.cuts:
-        pose = _between(system, poses, cut)
+        pose = _between(system, q, cut)
         joint = cut.edge.joint
         axis = getattr(joint, "axis", None)
         if cut.welded or isinstance(joint, (Fixed, Prismatic)):
@@ -89,14 +87,14 @@ def facing(system: System, q: SX) -> SX:
     return casadi.vertcat(*cosines) if cosines else SX(0, 1)
 
 
-def _between(system: System, poses: list[LinkPose], cut: Cut) -> Pose:
+def _between(system: System, q: SX, cut: Cut) -> Pose:
     """Frame_b of a cut joint seen from its frame_a."""
     a, b = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
-    return relative_pose(system.tree, poses, a, b)
+    return relative_pose(system.tree, q, a, b)
 
 
-def _cut_rows(system: System, poses: list[LinkPose], cut: Cut) -> Rows:
-    pose = _between(system, poses, cut)
+def _cut_rows(system: System, q: SX, cut: Cut) -> Rows:
+    pose = _between(system, q, cut)
     joint = cut.edge.joint
     if cut.welded:
         return [*_position(pose, "xyz"), *_orientation(pose)]

@@ -1,21 +1,39 @@
 """Model builders: a System in, a casadi.Function with named inputs and outputs out."""
 
+from mbs.models.derivatives import (
+    direct_dynamics_derivatives,
+    inverse_dynamics_derivatives,
+)
 from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
 from mbs.models.energy import energy
 from mbs.models.geometry import direct_geometry, transform
+from mbs.models.implicit_jacobian import with_implicit_jacobian
 from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
+from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, jacobian_determinant
 from mbs.models.kinematics import jacobian
 from mbs.models.lagrange import lagrange
+from mbs.models.link_motion import jacobian_dot_velocity, link_accelerations, link_velocities
+from mbs.models.singularities import singularities
 
 __all__ = [
     "bias",
     "direct_dynamics",
+    "direct_dynamics_derivatives",
     "direct_geometry",
     "energy",
     "gravity_effort",
     "inertia_matrix",
     "inverse_dynamics",
+    "inverse_dynamics_derivatives",
+    "inverse_jacobian",
+    "inverse_kinematics",
     "jacobian",
+    "jacobian_determinant",
+    "jacobian_dot_velocity",
     "lagrange",
+    "link_accelerations",
+    "link_velocities",
+    "singularities",
     "transform",
+    "with_implicit_jacobian",
 ]

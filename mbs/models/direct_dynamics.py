@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi
 import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.rates import normalised
 from mbs.errors import ModelError
 from mbs.loops.reduction import independent_closure
 from mbs.loops.velocity import acceleration_bias, velocity_rows
+from mbs.messages import quoted
 from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.symbols import ModelSymbols, symbols_of
+from mbs.models.moving_base import base_under_gravity
+from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
+from mbs.operations import count
+from mbs.recursions.accelerations import Acceleration
+from mbs.recursions.articulated_body import articulated_accelerations, inertia_pivots
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
+from mbs.recursions.joint_efforts import joint_efforts
+from mbs.recursions.poses import link_poses
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
 from mbs.solvers.rank import rank
 from mbs.solvers.small_linear import solve_symmetric
 
-_METHODS = ("auto", "composite")
+_METHODS = ("auto", "articulated", "composite")
+_ARTICULATED = 260  # operations that articulated bodies take at most for one more velocity
 _SEED = 20260103
 _SINGULAR = 1e-12
+_VANISHING = 1e-12
 
 
 def inertia_matrix(system: System, coordinates: str = "independent") -> Function:
@@ -45,62 +57,129 @@ def inertia_matrix(system: System, coordinates: str = "independent") -> Function
 
 
 def direct_dynamics(
-    system: System, method: str = "auto", coordinates: str = "independent"
+    system: System,
+    method: str = "auto",
+    coordinates: str = "independent",
+    *,
+    moving_base: bool = False,
 ) -> Function:
     """``ddm(q, v, tau) -> a``: the accelerations that the joint efforts produce.
 
-    Open chains: A a = tau - H with the composite-body inertia matrix, factorised without filling
-    the zeros that branches leave. Closed systems: the same in the independent joints,
-    ddm(q, v_a, tau_a) -> a_a, or with `coordinates="tree"` ddm(q, v, tau) -> a, lam, where lam
-    are the efforts of the independent closure rows (A a + H = tau + J' lam).
+    Open chains: by articulated bodies, linear in the number of links, or from A a = tau - H with
+    the composite-body inertia matrix, factorised without filling the zeros that branches leave.
+    Closed systems: the latter in the independent joints, ddm(q, v_a, tau_a) -> a_a, or with
+    `coordinates="tree"` ddm(q, v, tau) -> a, lam, where lam are the efforts of the independent
+    closure rows (A a + H = tau + J' lam).
 
-    Source: Khalil & Creusot 1997, eq. 24; Featherstone 2008, section 6.5.
+    Source: Featherstone 1983; Featherstone 2008, section 6.5; Khalil & Creusot 1997, eq. 24 and
+    section 5.4.
 
     Args:
         system: open or closed; q must close the loops.
-        method: "composite", or "auto" for the cheapest there is.
+        method: "articulated" for open chains, "composite", or "auto" for the one that takes
+            fewer operations.
         coordinates: of a closed system, "independent" or "tree".
+        moving_base: add the inputs v_0 (6), velocity [V; w] of the base, a_0 (6), accelerations
+            [vd; wd] of its origin and angular, both in its own axes, and R_0 (3, 3), orientation
+            of the base in the frame in which gravity is given.
 
     Returns:
-        Function of q (nq, 1), v and tau (m, 1); a (m, 1) [rad/s^2 or m/s^2].
+        Function of q (nq, 1), v and tau (m, 1), v_0, a_0, R_0; a (m, 1) [rad/s^2 or m/s^2].
 
     Raises:
-        ModelError: some joint moves no inertia, so that its acceleration is not determined.
+        ModelError: some joint moves no inertia, so that its acceleration is not determined; or
+            the method is unknown, or is for open chains and the system has loops.
     """
     require_system(system)
+    check_coordinates(system, coordinates)
+    _check_method(system, method)
+    _require_inertia(system)
+
+    def model(method: str) -> Function:
+        return _model(system, method, moving_base, coordinates)
+
+    if method != "auto":
+        return model(method)
+    key = ("cheapest ddm", moving_base, coordinates)
+    cheapest: Function = system.cached(key, lambda: _cheapest(system, model))
+    return cheapest
+
+
+def _check_method(system: System, method: str) -> None:
     if method not in _METHODS:
-        raise ModelError(f"{system.name}: method is {method!r}; use one of {', '.join(_METHODS)}")
+        raise ModelError(
+            f"{system.name}: method is {quoted(method)}; use one of {', '.join(_METHODS)}"
+        )
+    if method == "articulated" and system.is_closed:
+        raise ModelError(
+            f"{system.name}: method 'articulated' is for open chains and this system has loops;"
+            " use 'composite' or 'auto'"
+        )
+
+
+def _cheapest(system: System, model: Callable[[str], Function]) -> Function:
+    if system.is_closed:
+        return model("composite")
+    articulated = model("articulated")
+    if not _composite_may_win(system):
+        return articulated
+    return min(model("composite"), articulated, key=_cost)
+
+
+def _composite_may_win(system: System) -> bool:
+    """Whether factorising A and solving alone take less than articulated bodies can take."""
+    depths: list[int] = []
+    for before in velocity_antecedents(system.tree):
+        depths.append(depths[before] + 1 if before >= 0 else 0)
+    return sum(d * (d + 1) + 4 * d for d in depths) < _ARTICULATED * system.nv
+
+
+def _cost(function: Function) -> int:
+    """Operations, with a division as two."""
+    taken = count(function)
+    return taken.mul + taken.add + 2 * taken.div
+
+
+def _model(system: System, method: str, moving_base: bool, coordinates: str) -> Function:
     in_tree = coordinates == "tree" and system.is_closed
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         name, tau = s.input("tau")
-        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, tau)]
+        base, motion = base_under_gravity(system.tree.gravity, moving_base)
+        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, tau), *motion]
         if in_tree:
-            a, lam = _tree_accelerations(system, s, tau)
+            a, lam = _tree_accelerations(system, s, tau, base)
             return inputs, [("a", a), ("lam", lam)]
-        return inputs, [("a" + s.suffix, _accelerations(system, s, tau))]
+        accelerations = _articulated if method == "articulated" else _composite
+        return inputs, [("a" + s.suffix, accelerations(system, s, tau, base))]
 
-    _require_inertia(system)
-    return model_function(system, ("ddm", coordinates), build)
+    return model_function(system, ("ddm", method, moving_base, coordinates), build)
 
 
-def _accelerations(system: System, s: ModelSymbols, tau: SX) -> SX:
+def _articulated(system: System, s: ModelSymbols, tau: SX, base: Acceleration) -> SX:
+    joints = joint_efforts(system.tree, s.q, s.v, SX.zeros(system.nv))
+    return articulated_accelerations(system.tree, s.poses, s.v, tau - joints, base)
+
+
+def _composite(system: System, s: ModelSymbols, tau: SX, base: Acceleration) -> SX:
     A = tree_inertia(system.tree, s.poses)
-    H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size))))
+    H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), base))
     if s.reduction is None:
         return solve_tree(A, tau - H, velocity_antecedents(system.tree))
     return solve_tree(s.reduced_matrix(A), tau - H, list(range(-1, s.size - 1)))
 
 
-def _tree_accelerations(system: System, s: ModelSymbols, tau: SX) -> tuple[SX, SX]:
+def _tree_accelerations(
+    system: System, s: ModelSymbols, tau: SX, base: Acceleration
+) -> tuple[SX, SX]:
     """Accelerations of the tree and efforts of the closure, massless links included.
 
     K = A + c J'J is regular where A alone is not; then a Schur complement gives the efforts, kept
     finite where rows become dependent, and one refinement restores the digits that this costs.
     """
     A = tree_inertia(system.tree, s.poses)
-    H = tree_efforts(system, s, SX.zeros(system.nv))
+    H = tree_efforts(system, s, SX.zeros(system.nv), base)
     J = velocity_rows(system, s.q, independent_closure(system, s.q))
     psi = acceleration_bias(system, s.q, s.v, J)
     c = _penalty(system)
@@ -128,17 +207,9 @@ def _require_inertia(system: System) -> None:
     def check() -> bool:
         if any(p.default is None for p in system.parameters):
             return True
-        rng = np.random.default_rng(_SEED)
-        inertia = inertia_matrix(system)
-        posture = np.array(system.posture)
-        if not system.is_closed:
-            posture = posture + rng.uniform(-1.0, 1.0, posture.shape)
-        A = np.array(inertia(posture))
-        size = 1 / np.sqrt(np.maximum(np.diag(A), 1e-30))
-        A = A * np.outer(size, size)
-        if rank(A) < len(A):
-            k = int(np.argmax(np.abs(np.linalg.svd(A)[2][-1])))
-            name = system.speeds[system.active[k]].name
+        loose = _loose_in_loops(system) if system.is_closed else _loose_in_tree(system)
+        if loose is not None:
+            name = system.speeds[system.active[loose]].name
             raise ModelError(
                 f"{system.name}: {name} can move without moving any inertia, so its acceleration"
                 " is not determined; give mass to what it carries, or a rotor inertia Ia"
@@ -146,3 +217,24 @@ def _require_inertia(system: System) -> None:
         return True
 
     system.cached("has inertia", check)
+
+
+def _loose_in_tree(system: System) -> int | None:
+    """A velocity of an open chain that moves no inertia when those behind it are free."""
+    q = SX.sym("q", system.nq)
+    poses = link_poses(system.tree, normalised(system.tree, q))
+    both = casadi.horzcat(*inertia_pivots(system.tree, poses))
+    pivots = Function("pivots", [q, system.p], [both], {"cse": True})
+    rng = np.random.default_rng(_SEED)
+    posture = np.array(system.posture) + rng.uniform(-1.0, 1.0, system.nq)
+    free, locked = np.array(pivots(posture, system.p_default)).T
+    moves = free > _VANISHING * np.maximum(locked, 1e-30)
+    return None if moves.all() else int(np.max(np.flatnonzero(~moves)))
+
+
+def _loose_in_loops(system: System) -> int | None:
+    """An independent velocity of a closed system that moves no inertia."""
+    A = np.array(inertia_matrix(system)(list(system.posture)))
+    size = 1 / np.sqrt(np.maximum(np.diag(A), 1e-30))
+    A = A * np.outer(size, size)
+    return None if rank(A) == len(A) else int(np.argmax(np.abs(np.linalg.svd(A)[2][-1])))

@@ -14,7 +14,7 @@ from mbs.assembly.model_function import (
     require_system,
 )
 from mbs.loops.numeric import follow_active
-from mbs.recursions.poses import link_poses, relative_pose
+from mbs.recursions.route import cheapest_pose
 
 
 def transform(system: System, frame: str | int, relative_to: str | int = "base") -> Function:
@@ -38,7 +38,7 @@ def transform(system: System, frame: str | int, relative_to: str | int = "base")
 
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        pose = relative_pose(system.tree, link_poses(system.tree, q), reference, target)
+        pose = cheapest_pose(system.tree, q, system.p, reference, target)
         return [("q", q)], [("T", pose.matrix)]
 
     return model_function(system, ("transform", frame, relative_to), build)
@@ -82,7 +82,7 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
 
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        pose = relative_pose(system.tree, link_poses(system.tree, q), base, target)
+        pose = cheapest_pose(system.tree, q, system.p, base, target)
         return [("q", q)], [("T", pose.matrix)]
 
     return model_function(system, ("dgm", name), build)

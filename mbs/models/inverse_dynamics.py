@@ -10,20 +10,22 @@ from mbs.assembly.model_function import Named, model_function
 from mbs.models.moving_base import base_under_gravity
 from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.recursions.accelerations import Acceleration, resting_base
+from mbs.recursions.joint_efforts import joint_efforts, spring_effort
 from mbs.recursions.names import newton_euler_names
-from mbs.recursions.newton_euler import Dynamics, Wrench, newton_euler, rotor_and_friction
+from mbs.recursions.newton_euler import Dynamics, Wrench, newton_euler
 from mbs.spatial import cross
 
 
 def inverse_dynamics(
     system: System,
     f_ext: bool = False,
-    moving_base: bool = False,
     coordinates: str = "independent",
+    *,
+    moving_base: bool = False,
 ) -> Function:
     """``idm(q, v, a) -> tau``: the joint efforts that produce the accelerations a.
 
-    Rotor inertia, viscous and dry friction of the joints are included.
+    Rotors, viscous and dry friction and springs of the joints are included.
 
     Source: Khalil & Kleinfinger 1987; Khalil & Creusot 1997, eq. 15-20 and 22.
 
@@ -31,10 +33,10 @@ def inverse_dynamics(
         system: open or closed; q must close the loops.
         f_ext: add an input f_ext (6, bodies): for each row of `system.bodies` the wrench
             [force; moment] that the body exerts on its environment, in the body's frame.
+        coordinates: of a closed system, "independent" for idm(q, v_a, a_a) -> tau_a, or "tree".
         moving_base: add the inputs v_0 (6), velocity [V; w] of the base, a_0 (6), accelerations
             [vd; wd] of its origin and angular, both in its own axes, and R_0 (3, 3), orientation
             of the base in the frame in which gravity is given.
-        coordinates: of a closed system, "independent" for idm(q, v_a, a_a) -> tau_a, or "tree".
 
     Returns:
         Function of q (nq, 1), v and a (m, 1), f_ext, v_0, a_0, R_0; tau (m, 1) [N m or N].
@@ -56,17 +58,19 @@ def inverse_dynamics(
     return model_function(system, ("idm", f_ext, moving_base, coordinates), build)
 
 
-def bias(system: System, moving_base: bool = False, coordinates: str = "independent") -> Function:
+def bias(
+    system: System, coordinates: str = "independent", *, moving_base: bool = False
+) -> Function:
     """``bias(q, v) -> H``: the efforts at zero acceleration, so that tau = A a + H.
 
-    Coriolis, centrifugal and gravity efforts and the friction of the joints.
+    Coriolis, centrifugal and gravity efforts, friction and springs of the joints.
 
     Source: Khalil & Creusot 1997, eq. 25 and section 5.3.1.
 
     Args:
         system: open or closed; q must close the loops.
-        moving_base: as for `inverse_dynamics`; the acceleration of the base is part of H.
         coordinates: as for `inverse_dynamics`.
+        moving_base: as for `inverse_dynamics`; the acceleration of the base is part of H.
 
     Returns:
         Function of q (nq, 1), v (m, 1), v_0, a_0, R_0; H (m, 1) [N m or N].
@@ -85,17 +89,17 @@ def bias(system: System, moving_base: bool = False, coordinates: str = "independ
 
 
 def gravity_effort(
-    system: System, moving_base: bool = False, coordinates: str = "independent"
+    system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """``gravity(q) -> Q``: the efforts that hold the mechanism still.
+    """``gravity(q) -> Q``: the efforts that hold the mechanism still, against springs too.
 
     Source: Khalil & Creusot 1997, eq. 23.
 
     Args:
         system: open or closed; q must close the loops.
+        coordinates: as for `inverse_dynamics`.
         moving_base: add the input R_0 (3, 3), orientation of the base in the frame in which
             gravity is given.
-        coordinates: as for `inverse_dynamics`.
 
     Returns:
         Function of q (nq, 1) and R_0; Q (m, 1) [N m or N].
@@ -125,21 +129,22 @@ def tree_dynamics(
 
 
 def with_joints(system: System, s: ModelSymbols, dynamics: Dynamics, a: SX) -> SX:
-    """(nv, 1) efforts with the friction and rotors of the joints."""
-    return dynamics.efforts + rotor_and_friction(system.tree, s.v_tree, a)
+    """(nv, 1) efforts with the drives, friction and springs of the joints."""
+    return dynamics.efforts + joint_efforts(system.tree, s.q, s.v_tree, a)
 
 
 def tree_efforts(system: System, s: ModelSymbols, a: SX, base: Acceleration | None = None) -> SX:
-    """(nv, 1) efforts of the tree, friction and rotors included, for accelerations a (nv, 1)."""
+    """(nv, 1) efforts of the tree, those of its joints included, for accelerations a (nv, 1)."""
     resting = resting_base(system.tree.gravity)
     return with_joints(system, s, tree_dynamics(system, s, a, base or resting), a)
 
 
 def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> SX:
-    """(nv, 1) efforts of the tree that hold it still."""
+    """(nv, 1) efforts of the tree that hold it still, against gravity and springs."""
     rest = SX.zeros(system.nv)
     base = resting_base(system.tree.gravity if gravity is None else gravity)
-    return newton_euler(system.tree, s.poses, rest, rest, base).efforts
+    efforts = newton_euler(system.tree, s.poses, rest, rest, base).efforts
+    return efforts + spring_effort(system.tree, s.q)
 
 
 def external_wrenches(system: System, wrenches: SX) -> dict[int, Wrench]:

@@ -19,7 +19,7 @@ from mbs.loops.reduction import independent_closure, reduction
 from mbs.models.composition import dense_function, outputs_of
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.geometry import terminal_frame
-from mbs.recursions.poses import link_poses, relative_pose
+from mbs.recursions.route import relative_pose
 from mbs.solvers.small_linear import solve_square
 
 _NORM_RATE = 10.0
@@ -117,7 +117,7 @@ def _dependent_motion(system: System, q: SX, v_a: SX, a_a: SX) -> list[SX]:
 def _terminal_pose(system: System, q: SX) -> SX:
     """(12, 1) origin, and orientation by rows, of the terminal frame in the base."""
     base, tool = system.frame("base"), system.frame(terminal_frame(system))
-    T = relative_pose(system.tree, link_poses(system.tree, q), base, tool)
+    T = relative_pose(system.tree, q, base, tool)
     return casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
 
 

@@ -9,9 +9,11 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
+from mbs.components.motion import Motion
 from mbs.recursions.motion import effort, unit_motions
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
+from mbs.recursions.rotors import momentum_on
 from mbs.recursions.sliding import slid
 from mbs.spatial import Displacement, Inertia, cross, zeros
 
@@ -34,15 +36,26 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
             steps = pose.steps
         for column, (linear, angular) in enumerate(unit_motions(link.motion)):
             f, m = _momentum(body, linear, angular)
+            spin = _at_seat(pose, link.motion, momentum_on(link, j))
+            m = m + spin
             A[link.v, link.v.start + column] = effort(link.motion, f, m)
-            _fill_ancestors(A, tree, poses, j, column, _through(steps, f, m))
+            f_i, m_i = _through(steps, f, m)
+            m_i = m_i + momentum_on(link, link.antecedent)
+            _fill_ancestors(A, tree, poses, j, column, (f_i, m_i))
         for k in range(link.v.start, link.v.stop):
             A[k, k] += link.Ia
+        if link.rotor is not None:
+            A[link.v, link.v] += link.rotor.seen_at_joint + effort(link.motion, zeros(), spin)
         if link.antecedent >= 0:
             for step in reversed(steps):
                 body = step.body(body)
             composite[link.antecedent] += body
     return A
+
+
+def _at_seat(pose: LinkPose, motion: Motion, vector: SX) -> SX:
+    """A vector of the link in the frame in which the momentum of its joint is written."""
+    return pose.motion[0].turn.apply(vector) if motion.nv == 1 else vector
 
 
 def _through(steps: tuple[Displacement, ...], f: SX, m: SX) -> tuple[SX, SX]:

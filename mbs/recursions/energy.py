@@ -8,14 +8,16 @@ from casadi import SX
 
 from mbs.assembly.tree import Tree
 from mbs.recursions.poses import LinkPose, base_poses
+from mbs.recursions.rotors import rotor_energy
 from mbs.recursions.velocities import link_velocities
 from mbs.spatial import cross
 
 
 def kinetic_energy(tree: Tree, poses: list[LinkPose], v: SX) -> SX:
     """Kinetic energy of links and rotors [J]."""
-    total = SX(0)
-    for link, motion in zip(tree.links, link_velocities(tree, poses, v), strict=True):
+    motions = link_velocities(tree, poses, v)
+    total = rotor_energy(tree, v, [motion.w for motion in motions])
+    for link, motion in zip(tree.links, motions, strict=True):
         V, w, body = motion.V, motion.w, link.inertia
         total += 0.5 * (
             casadi.dot(w, casadi.mtimes(body.J, w))

@@ -10,15 +10,16 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.assembly.tree import Link, Tree
-from mbs.components.motion import Motion
+from mbs.assembly.tree import Tree
 from mbs.recursions.accelerations import Acceleration, link_accelerations
+from mbs.recursions.first_effort import moment_of_run, runs_behind
 from mbs.recursions.motion import effort
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
 from mbs.recursions.rotation_rate import moment_of_rotation
+from mbs.recursions.rotors import rotor_efforts, rotor_moments
 from mbs.recursions.sliding import slid
-from mbs.spatial import PseudoInertia, cross, is_zero, zeros
+from mbs.spatial import PseudoInertia, cross, is_zero
 
 Wrench = tuple[SX, SX]
 """Force (3, 1) and moment (3, 1) about the origin of a frame, in that frame [N, N m]."""
@@ -32,7 +33,7 @@ class Dynamics:
         motions: of the links, each in its frame.
         own: the wrench that moves each body, in its frame.
         wrenches: the wrench that each joint transmits, in the frame of its link.
-        efforts: (nv, 1) its part along the motion [N m or N].
+        efforts: (nv, 1) its part along the motion, and what spins the rotors [N m or N].
     """
 
     motions: list[Acceleration]
@@ -49,7 +50,7 @@ def newton_euler(
     base: Acceleration,
     external: dict[int, Wrench] | None = None,
 ) -> Dynamics:
-    """The wrenches that produce the joint accelerations a, without friction and rotors.
+    """The wrenches that produce the joint accelerations a, without drives, friction and springs.
 
     Accelerations run from the base to the leaves, wrenches from the leaves to the base, with the
     inertial parameters regrouped.
@@ -67,16 +68,27 @@ def newton_euler(
         poses, bodies = slid(tree, poses, bodies, base_rests=is_zero(base.w))
     bodies = regrouped(tree, poses, bodies)
     motions = link_accelerations(tree, poses, v, a, base)
+    runs = runs_behind(tree, poses)
     own = [inertial_wrench(body, motion) for body, motion in zip(bodies, motions, strict=True)]
     wrenches = list(own)
     for j, wrench in (external or {}).items():
         wrenches[j] = _sum(wrenches[j], wrench)
+    for c, moment in rotor_moments(tree, v, a, motions).items():
+        wrenches[c] = (wrenches[c][0], wrenches[c][1] + moment)
+    loads = list(wrenches)
     for j in reversed(range(len(tree.links))):
         i = tree.links[j].antecedent
         if i >= 0:
-            wrenches[i] = _sum(wrenches[i], poses[j].wrench(*wrenches[j]))
-    efforts = (effort(link.motion, f, m) for link, (f, m) in zip(tree.links, wrenches, strict=True))
-    return Dynamics(motions, own, wrenches, casadi.vertcat(*efforts))
+            passed = poses[j].wrench(*wrenches[j])
+            wrenches[i] = _sum(wrenches[i], passed)
+            if j not in runs.get(i, ()) and poses[j].run == (j,):
+                loads[i] = _sum(loads[i], passed)
+    efforts = [effort(link.motion, f, m) for link, (f, m) in zip(tree.links, wrenches, strict=True)]
+    for i, members in runs.items():
+        along = [f[2] for f, _ in wrenches]
+        efforts[i] = loads[i][1][2] + moment_of_run(tree, poses, members, loads, along)
+    spin = rotor_efforts(tree, a, motions, base)
+    return Dynamics(motions, own, wrenches, casadi.vertcat(*efforts) + spin)
 
 
 def _sum(a: Wrench, b: Wrench) -> Wrench:
@@ -87,33 +99,3 @@ def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:
     """The wrench that moves a body: F = m vd + U ms, M = its moment of U + ms x vd."""
     f = body.m * motion.vd + casadi.mtimes(motion.rate.U, body.ms)
     return f, moment_of_rotation(body.S, motion.rate) + cross(body.ms, motion.vd)
-
-
-def rotor_and_friction(tree: Tree, v: SX, a: SX) -> SX:
-    """(nv, 1) Ia a + Fv v + Fs tanh(v / Fs_width) of every joint [N m or N].
-
-    Source: Khalil & Creusot 1997, eq. 20, its sign(v) smoothed over a width so that integrators
-    and optimisers can use the same model; a width of zero gives the sign.
-    """
-    return casadi.vertcat(*(_rotor_and_friction(link, v[link.v], a[link.v]) for link in tree.links))
-
-
-def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
-    total = zeros(link.motion.nv)
-    if link.motion is Motion.FREE:  # the velocity is in the turning frame
-        a = a + casadi.vertcat(cross(v[3:6], v[0:3]), zeros())
-    step = _smooth_sign(v, link.Fs_width)
-    for coefficient, rate in ((link.Ia, a), (link.Fv, v), (link.Fs, step)):
-        if not coefficient.is_zero():
-            total = total + coefficient * rate
-    return total
-
-
-def _smooth_sign(v: SX, width: SX) -> SX:
-    """tanh(v / width), and sign(v) for a width of zero."""
-    if width.is_zero():
-        return casadi.sign(v)
-    if width.is_constant():
-        return casadi.tanh(v / width)
-    vanishes = width == 0
-    return casadi.if_else(vanishes, casadi.sign(v), casadi.tanh(v / (width + vanishes)))

@@ -137,33 +137,6 @@ def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
     return result
 
 
-def chain_pose(poses: list[LinkPose], links: list[int]) -> Pose:
-    """The last of consecutive links seen from the frame before the first; identity when empty."""
-    pose = Pose.identity()
-    for j in links:
-        pose = poses[j].after(pose)
-    return pose
-
-
-def relative_pose(
-    tree: Tree, poses: list[LinkPose], a: tuple[int, Pose], b: tuple[int, Pose]
-) -> Pose:
-    """Frame b seen from frame a, through their common ancestor only.
-
-    Args:
-        tree: the links.
-        poses: of every link with respect to its antecedent.
-        a: link (-1 for the base) and pose of the frame in it.
-        b: likewise.
-    """
-    path_a, path_b = tree.path(a[0]), tree.path(b[0])
-    while path_a and path_b and path_a[0] == path_b[0]:
-        path_a, path_b = path_a[1:], path_b[1:]
-    to_a = chain_pose(poses, path_a) @ a[1]
-    to_b = chain_pose(poses, path_b) @ b[1]
-    return to_b if to_a.is_identity() else to_a.inverse() @ to_b
-
-
 def _joint(
     link: Link, seat: tuple[Screw, ...], q: SX
 ) -> tuple[tuple[Screw, ...], tuple[Displacement, ...]]:

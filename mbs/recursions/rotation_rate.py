@@ -66,7 +66,7 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
 
 
 def _difference(a: SX, first: SX, b: SX, second: SX) -> SX:
-    """a first - b second; one product when a = b or a = -b."""
+    """A first - b second; one product when a = b or a = -b."""
     if (a + b).is_zero():
         return a * (first + second)
     if (a - b).is_zero():

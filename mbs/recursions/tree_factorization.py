@@ -30,13 +30,15 @@ def solve_tree(A: SX, right: SX, before: list[int]) -> SX:
         before: for each row its ancestor, or -1; ancestors have smaller numbers.
     """
     H, n = SX(A), A.shape[0]
+    inverse = [SX(0)] * n  # -1 / D: its sign keeps products by it from being made divisions
     for k in reversed(range(n)):
         i = before[k]
+        inverse[k] = -1 / H[k, k]
         while i >= 0:
-            ratio = H[k, i] / H[k, k]
+            ratio = H[k, i] * inverse[k]
             j = i
             while j >= 0:
-                H[i, j] -= ratio * H[k, j]
+                H[i, j] += ratio * H[k, j]
                 j = before[j]
             H[k, i] = ratio
             i = before[i]
@@ -44,13 +46,12 @@ def solve_tree(A: SX, right: SX, before: list[int]) -> SX:
     for k in reversed(range(n)):
         i = before[k]
         while i >= 0:
-            x[i, :] -= H[k, i] * x[k, :]
+            x[i, :] += H[k, i] * x[k, :]
             i = before[i]
     for k in range(n):
-        x[k, :] /= H[k, k]
-    for k in range(n):
+        x[k, :] = -inverse[k] * x[k, :]
         i = before[k]
         while i >= 0:
-            x[k, :] -= H[k, i] * x[i, :]
+            x[k, :] += H[k, i] * x[i, :]
             i = before[i]
     return x

@@ -71,17 +71,21 @@ class Turn:
     def apply_to_tensor(self, tensor: SX) -> SX:
         """The symmetric tensor of the turned frame in the fixed one.
 
-        Nine multiplications: with w = c (a - e) - 2 s b the turned block is
+        Eight multiplications: with w = c (a - e) - 2 s b the turned block is
         [[e + c w, b + s w], [., a - c w]] for the block [[a, b], [b, e]].
         """
         k, h = _CYCLE[self.axis]
         m = 3 - k - h
         s, c = self.s, self.c
         a, b, e = tensor[k, k], tensor[k, h], tensor[h, h]
-        w = c * (a - e) - s * (2 * b)
         turned = SX(tensor)
-        turned[k, k], turned[h, h] = e + c * w, a - c * w
-        turned[k, h] = turned[h, k] = b + s * w
+        if c.is_zero():
+            turned[k, k], turned[h, h] = e, a
+            turned[k, h] = turned[h, k] = -b
+        elif not s.is_zero():
+            w = c * (a - e) - s * (2 * b)
+            turned[k, k], turned[h, h] = e + c * w, a - c * w
+            turned[k, h] = turned[h, k] = b + s * w
         turned[k, m] = turned[m, k] = c * tensor[k, m] - s * tensor[h, m]
         turned[h, m] = turned[m, h] = s * tensor[k, m] + c * tensor[h, m]
         return turned

@@ -1,0 +1,250 @@
+"""A, B and Q of Lagrange's form, without differentiation, from augmented bodies.
+
+Every particle of the system moves at r_dot = J v, so that A is the integral of J' J over the mass
+and B that of J' dJ/dt: dA/dt = B + B', and B v are the Coriolis and centrifugal efforts. For
+revolute and prismatic joints B is made of the Christoffel symbols; for quaternion joints, whose
+velocities are no rates of positions, it is their extension. Column j of B needs the moments of the
+mass behind joint j and how they change: the augmented body of link j.
+
+Source: Renaud 1986; Khalil & Creusot 1997, section 5.5; Echeandia & Wensing 2021.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi
+from casadi import DM, SX
+
+from mbs.assembly.tree import Tree
+from mbs.components.motion import Motion
+from mbs.recursions.accelerations import link_accelerations, resting_base
+from mbs.recursions.augmented import Augmented, Column, rotor_column
+from mbs.recursions.motion import effort, relative_motion, unit_motions
+from mbs.recursions.poses import LinkPose
+from mbs.recursions.regrouping import regrouped
+from mbs.recursions.rotors import spin_momenta
+from mbs.recursions.sliding import slid
+from mbs.spatial import (
+    Displacement,
+    FreeDisplacement,
+    MatrixTurn,
+    PseudoInertia,
+    Screw,
+    cross,
+    skew,
+    zeros,
+)
+from mbs.spatial.rotation import Turn
+
+Step = tuple[Displacement, SX]
+"""A displacement, and the velocity (3, 1) of its translation, both in the axes before it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LagrangeForm:
+    """tau = A a + B v + Q.
+
+    Attributes:
+        A: (nv, nv) symmetric inertia matrix [kg m^2, kg m, kg].
+        B: (nv, nv) Coriolis matrix; dA/dt - 2 B is skew-symmetric.
+        Q: (nv, 1) gravity efforts [N m or N].
+    """
+
+    A: SX
+    B: SX
+    Q: SX
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where the columns of a joint are written: its seat, or the frame of its link.
+
+    Joints with parallel axes, one after the other, may have parallel places: what comes from
+    behind them is then turned once, by the sum of their angles.
+
+    Attributes:
+        w: (3, 1) angular velocity of link j.
+        g: (3, 1) gravity acceleration.
+        inner: from the place to frame j; empty when it is frame j.
+        outer: to the place from frame i, or from the place of joint i when that is parallel.
+        parallel: whether it is.
+    """
+
+    w: SX
+    g: SX
+    inner: list[Step]
+    outer: list[Step]
+    parallel: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Work:
+    """The form being filled, and what its entries are read with.
+
+    Attributes:
+        form: so far.
+        tree: the links.
+        places: of the joints.
+        w: (3, 1) angular velocities of the links, each in its frame.
+    """
+
+    form: LagrangeForm
+    tree: Tree
+    places: list[_Place]
+    w: list[SX]
+
+
+def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
+    """The three matrices of the dynamic model.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        v: (nv, 1) joint velocities.
+    """
+    poses, bodies = slid(tree, poses, [PseudoInertia.of(link.inertia) for link in tree.links])
+    bodies = regrouped(tree, poses, bodies)
+    rest, base = zeros(tree.nv), resting_base(zeros())
+    w = [motion.w for motion in link_accelerations(tree, poses, v, rest, base)]
+    places = _places(tree, poses, v, w)
+    spins = spin_momenta(tree, 0.5 * v)
+    framed = [Augmented.of(body, spins.get(j, zeros())) for j, body in enumerate(bodies)]
+    placed = [Augmented.nothing()] * len(bodies)
+    form = LagrangeForm(zeros(tree.nv, tree.nv), zeros(tree.nv, tree.nv), zeros(tree.nv))
+    work = _Work(form, tree, places, w)
+    for j in reversed(range(len(tree.links))):
+        link, place = tree.links[j], places[j]
+        body = framed[j]
+        for step, _ in reversed(place.inner):
+            body = body.through(step)
+        body = body + placed[j]
+        _fill_columns(work, j, body)
+        if link.antecedent >= 0:
+            body = body.moved(*relative_motion(link.motion, 0.5 * v[link.v]))
+            for step, _ in reversed(place.outer):
+                body = body.through(step)
+            (placed if place.parallel else framed)[link.antecedent] += body
+    _add_drives(form, tree, v)
+    return form
+
+
+def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Place]:
+    """Where the columns of every joint are written.
+
+    Nothing is read before a joint on the base, so that it needs no seat.
+    """
+    result: list[_Place] = []
+    gravity: list[SX] = []
+    for j, link in enumerate(tree.links):
+        pose, i = poses[j], link.antecedent
+        linear, angular = relative_motion(link.motion, v[link.v])
+        w_i, g_i = (w[i], gravity[i]) if i >= 0 else (zeros(), tree.gravity)
+        gravity.append(pose.apply_inverse(g_i))
+        if link.motion is Motion.REVOLUTE and _follows(tree, poses, j, w):
+            result.append(_parallel(pose, result[i], angular))
+            continue
+        steps = _moving_steps(pose, w_i, linear)
+        if i < 0 or link.motion.nv > 1:
+            result.append(_Place(w[j], gravity[j], [], steps))
+        else:
+            seat = len(pose.seat)
+            seat_w, seat_g = pose.at_seat(w_i) + angular, pose.at_seat(g_i)
+            result.append(_Place(seat_w, seat_g, steps[seat:], steps[:seat]))
+    return result
+
+
+def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
+    """Whether the axis is parallel to that of the joint before, and turns across itself.
+
+    Where it does not, links move in a plane, and turning them one by one leaves more zeros.
+    """
+    run = poses[j].run
+    root = tree.links[run[0]].antecedent
+    if len(run) == 1 or root < 0:
+        return False
+    turning = poses[run[0]].at_seat(w[root])
+    return not (turning[0].is_zero() and turning[1].is_zero())
+
+
+def _parallel(pose: LinkPose, before: _Place, angular: SX) -> _Place:
+    """The place of a joint that is parallel to that of the joint before it."""
+    inner, _ = before.inner[0]
+    p = inner.point(pose.foot)
+    outer = FreeDisplacement(MatrixTurn(SX(DM.eye(3))), p)
+    motion = pose.motion[0]
+    assert isinstance(motion, Screw)
+    assert isinstance(pose.spin, Turn)
+    w = before.w + angular
+    screw = Screw(pose.spin, motion.t)
+    return _Place(
+        w,
+        before.g,
+        [(screw, cross(w, screw.point(zeros())))],
+        [(outer, cross(before.w, p))],
+        parallel=True,
+    )
+
+
+def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
+    """The displacements from frame i, which turns at w, to frame j; the last slides at `linear`."""
+    steps: list[Step] = []
+    for number, step in enumerate(pose.steps, 1):
+        velocity = cross(w, step.point(zeros()))
+        if number == len(pose.steps):
+            velocity = velocity + step.turn.apply(linear)
+        steps.append((step, velocity))
+        w = step.turn.apply_inverse(w)
+    return steps
+
+
+def _fill_columns(work: _Work, j: int, body: Augmented) -> None:
+    """Columns and rows of the velocities of joint j, its own block and those of its ancestors."""
+    form, link, place = work.form, work.tree.links[j], work.places[j]
+    spin = _at(place.inner, rotor_column(link, j, work.w[j]))
+    for number, (linear, angular) in enumerate(unit_motions(link.motion)):
+        k = link.v.start + number
+        column = body.column(place.w, linear, angular)
+        form.Q[k] = -casadi.dot(place.g, column.f)
+        column = column + spin
+        form.A[link.v, k] = effort(link.motion, column.f, column.m)
+        form.B[link.v, k] = effort(link.motion, column.f_rate, column.m_rate)
+        if link.rotor is not None:
+            form.A[k, k] += link.rotor.seen_at_joint + effort(link.motion, spin.f, spin.m)
+            form.B[k, k] += spin.row(link.motion, place.w)
+        _fill_ancestors(work, j, k, column)
+
+
+def _add_drives(form: LagrangeForm, tree: Tree, v: SX) -> None:
+    """What Ia adds; on a Free joint it is a mass too, whose velocity turns with the link."""
+    for link in tree.links:
+        for k in range(link.v.start, link.v.stop):
+            form.A[k, k] += link.Ia
+        if link.motion is Motion.FREE and not link.Ia.is_zero():
+            linear, angular = slice(link.v.start, link.v.start + 3), v[link.v][3:6]
+            form.B[linear, linear] += link.Ia * skew(angular)
+
+
+def _fill_ancestors(work: _Work, j: int, k: int, column: Column) -> None:
+    """Entries of velocity k of joint j, at whose place the column is, with its ancestors."""
+    form, tree, places, w = work.form, work.tree, work.places, work.w
+    driven = tree.links[j]
+    while (i := tree.links[j].antecedent) >= 0:
+        link, parallel = tree.links[i], places[j].parallel
+        column = _at(places[j].outer, column)
+        if tree.links[j] is driven:
+            carried = rotor_column(driven, i, w[i])
+            column = column + (_at(places[i].inner, carried) if parallel else carried)
+        entries = effort(link.motion, column.f, column.m)
+        form.A[link.v, k], form.A[k, link.v] = entries, entries.T
+        form.B[link.v, k] = effort(link.motion, column.f_rate, column.m_rate)
+        form.B[k, link.v] = column.row(link.motion, places[i].w if parallel else w[i]).T
+        column = column if parallel else _at(places[i].inner, column)
+        j = i
+
+
+def _at(steps: list[Step], column: Column) -> Column:
+    """A column in the frame before these displacements."""
+    for step, velocity in reversed(steps):
+        column = column.through(step, velocity)
+    return column

@@ -1,0 +1,268 @@
+"""The way from one frame of a tree to another one, as shifts and turns with the joints on it.
+
+Turns about parallel axes that follow each other are joined into one turn by the sum of their
+angles; what lies between them is seen from before the first.
+
+Source: Khalil & Kleinfinger 1986 for the frames; Renaud 1980 for sums of angles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import casadi
+from casadi import SX
+
+from mbs.assembly.tree import Link, Tree
+from mbs.components.motion import Motion
+from mbs.recursions.cost import cost
+from mbs.spatial import (
+    MatrixTurn,
+    Pose,
+    Rotation,
+    Turn,
+    axis_turn,
+    is_zero,
+    quaternion_rotation,
+    vector,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spin:
+    """A turn about z by an angle [rad], backwards when the way is walked back."""
+
+    angle: SX
+    backwards: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tilt:
+    """Any other turn."""
+
+    rotation: Rotation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shift:
+    """A displacement p, (3, 1), in the axes where it stands [m]."""
+
+    p: SX
+
+
+@dataclass(frozen=True, slots=True)
+class JointAt:
+    """Where joint k acts: on its axis z, or in frame k when it has three axes."""
+
+    link: int
+
+
+@dataclass(frozen=True, slots=True)
+class OriginOf:
+    """The origin of frame k, -1 for the base."""
+
+    link: int
+
+
+Step = Spin | Tilt | Shift | JointAt | OriginOf
+
+
+def way_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[Step]:
+    """The steps from the base to a frame at the positions q.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+        frame: link (-1 for the base) and pose of the frame in it.
+    """
+    j, inside = frame
+    steps: list[Step] = [OriginOf(-1)]
+    for k in tree.path(j):
+        link = tree.links[k]
+        steps += _link_steps(k, link, q[link.q])
+    if not is_zero(inside.p):
+        steps.append(Shift(inside.p))
+    if not inside.is_identity():
+        steps.append(Tilt(MatrixTurn(inside.R)))
+    return steps
+
+
+def _link_steps(k: int, link: Link, q: SX) -> list[Step]:
+    place, motion = link.placement, link.motion
+    slid = place.r + q if motion is Motion.PRISMATIC else place.r
+    steps: list[Step] = [
+        Spin(place.gamma),
+        Shift(vector([0, 0, place.b])),
+        Tilt(axis_turn("x", place.alpha)),
+        Shift(vector([place.d, 0, 0])),
+    ]
+    if motion in (Motion.REVOLUTE, Motion.PRISMATIC):
+        steps.append(JointAt(k))
+    if motion is Motion.REVOLUTE:
+        steps += [Spin(q), Spin(place.theta), Shift(vector([0, 0, slid]))]
+    else:
+        steps += [Spin(place.theta), Shift(vector([0, 0, slid]))]
+    if motion is Motion.FREE:
+        steps.append(Shift(q[0:3]))
+    if motion in (Motion.SPHERICAL, Motion.FREE):
+        steps += [Tilt(MatrixTurn(quaternion_rotation(q[motion.nq - 4 :]))), JointAt(k)]
+    return [*(step for step in steps if not _is_idle(step)), OriginOf(k)]
+
+
+def _is_idle(step: Step) -> bool:
+    match step:
+        case Spin(angle=angle):
+            return bool(angle.is_zero())
+        case Tilt(rotation=Turn(c=c)):
+            return bool(c.is_one())
+        case Shift(p=p):
+            return is_zero(p)
+    return False
+
+
+def walked_back(steps: Iterable[Step]) -> list[Step]:
+    """The same way from its end to its beginning."""
+    return [_inverse(step) for step in reversed(list(steps))]
+
+
+def _inverse(step: Step) -> Step:
+    match step:
+        case Spin(angle=angle, backwards=backwards):
+            return Spin(angle, not backwards)
+        case Tilt(rotation=rotation):
+            return Tilt(inverse_rotation(rotation))
+        case Shift(p=p):
+            return Shift(-p)
+    return step
+
+
+def inverse_rotation(rotation: Rotation) -> Rotation:
+    """The rotation the other way."""
+    if isinstance(rotation, Turn):
+        return Turn(rotation.axis, -rotation.s, rotation.c)
+    return MatrixTurn(rotation.matrix.T)
+
+
+def joined(steps: Sequence[Step], tree: Tree) -> list[Step]:
+    """The way with its successive turns about one z axis made one, after what lies between them.
+
+    Args:
+        steps: a way outwards from some frame.
+        tree: its links; joints with three axes need their own axes.
+
+    Returns:
+        the steps, without a Spin in them.
+    """
+    result: list[Step] = []
+    spins: list[Spin] = []
+    for step in steps:
+        match step:
+            case Spin():
+                spins.append(step)
+            case Shift(p=p):
+                result.append(Shift(_total(spins).apply(p)))
+            case JointAt(link=k) if _along_z(tree.links[k]):
+                result.append(step)
+            case OriginOf():
+                result.append(step)
+            case _:
+                result += [*_turns(spins), step]
+                spins = []
+    return result + _turns(spins)
+
+
+def _along_z(link: Link) -> bool:
+    return link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
+
+
+def _turns(spins: list[Spin]) -> list[Step]:
+    return [Tilt(_total(spins))] if spins else []
+
+
+def _total(spins: list[Spin]) -> Turn:
+    """One turn of several, their angles added in the order of the tree whichever way one goes."""
+    forward, backward = (
+        [spin.angle for spin in spins if spin.backwards is way] for way in (False, True)
+    )
+    angle = _sum(forward)
+    if not backward:
+        return axis_turn("z", angle)
+    turn = axis_turn("z", _sum(backward[::-1]) - angle)
+    return Turn("z", -turn.s, turn.c)
+
+
+def _sum(angles: list[SX]) -> SX:
+    total = SX(0)
+    for angle in angles:
+        total = total + angle
+    return total
+
+
+def way_between(
+    tree: Tree, q: SX, a: tuple[int, Pose], b: tuple[int, Pose]
+) -> tuple[list[Step], list[Step]]:
+    """The way from frame a to frame b: back to their common link, then out to b."""
+    to_a, to_b = way_to(tree, q, a), way_to(tree, q, b)
+    fork = OriginOf(common_link(tree, a[0], b[0]))
+    return walked_back(to_a[to_a.index(fork) + 1 :]), to_b[to_b.index(fork) + 1 :]
+
+
+def relative_pose(
+    tree: Tree, q: SX, a: tuple[int, Pose], b: tuple[int, Pose], *, outwards: bool = False
+) -> Pose:
+    """Frame b seen from frame a, turns about parallel axes joined.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+        a: link (-1 for the base) and pose of the frame in it.
+        b: likewise.
+        outwards: begin at frame a instead of frame b; the pose is the same, its operations are
+            others.
+    """
+    back, out = way_between(tree, q, a, b)
+    steps = joined([*back, *out], tree)
+    pose = Pose.identity()
+    for step in steps if outwards else reversed(steps):
+        match step, outwards:
+            case Shift(p=p), True:
+                pose = Pose(pose.R, pose.p + casadi.mtimes(pose.R, p))
+            case Shift(p=p), False:
+                pose = Pose(pose.R, pose.p + p)
+            case Tilt(rotation=rotation), True:
+                rows = (rotation.apply_inverse(pose.R[k, :].T).T for k in range(3))
+                pose = Pose(casadi.vertcat(*rows), pose.p)
+            case Tilt(rotation=rotation), False:
+                R = casadi.mtimes(rotation.matrix, pose.R)
+                pose = Pose(R, along(rotation, [pose.p])[0])
+    return pose
+
+
+def cheapest_pose(tree: Tree, q: SX, p: SX, a: tuple[int, Pose], b: tuple[int, Pose]) -> Pose:
+    """The relative pose from whichever end it takes fewer operations; p are the parameters."""
+    both = [relative_pose(tree, q, a, b, outwards=way) for way in (False, True)]
+    return min(both, key=lambda pose: cost(pose.matrix, q, p))
+
+
+def expressed(
+    tree: Tree, q: SX, axes: tuple[int, Pose], frame: tuple[int, Pose], vectors: Iterable[SX]
+) -> list[SX]:
+    """Vectors of a frame in the axes of another one, turn by turn."""
+    back, out = way_between(tree, q, axes, frame)
+    turned = list(vectors)
+    for step in reversed(joined([*back, *out], tree)):
+        if isinstance(step, Tilt):
+            turned = along(step.rotation, turned)
+    return turned
+
+
+def common_link(tree: Tree, a: int, b: int) -> int:
+    """The last link that is on the way to both links; -1 is the base."""
+    shared = [k for k, m in zip(tree.path(a), tree.path(b), strict=False) if k == m]
+    return shared[-1] if shared else -1
+
+
+def along(rotation: Rotation, vectors: Iterable[SX]) -> list[SX]:
+    """Each vector of the turned frame in the fixed one; zeros stay zeros."""
+    return [v if is_zero(v) else casadi.densify(rotation.apply(v)) for v in vectors]

@@ -1,0 +1,174 @@
+"""Block triangular form of a square matrix, and what it saves.
+
+Rows are matched with columns so that the diagonal has no structural zero; the strongly connected
+parts of the graph of the matched matrix are its diagonal blocks.
+
+Source: Duff and Reid 1978 for the blocks; Tarjan 1972 for the strongly connected parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX
+from numpy.typing import NDArray
+
+from mbs.solvers.small_linear import solve_square
+
+_EXPANDED = 7
+"""Largest determinant that is expanded; beyond it is taken of a factorisation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Rows and columns of a diagonal block, of equal number."""
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of its rows."""
+        return len(self.rows)
+
+    def of(self, A: SX) -> SX:
+        """The block of this matrix."""
+        return casadi.densify(A[list(self.rows), list(self.columns)])
+
+
+def block_triangular(pattern: NDArray[np.bool_]) -> tuple[Block, ...] | None:
+    """The diagonal blocks of a square matrix in an order in which equations can be solved.
+
+    Args:
+        pattern: (n, n) where the matrix may be other than zero.
+
+    Returns:
+        blocks; the rows of each have entries in its own columns and in those of blocks before
+        it. None when every matrix of this pattern is singular.
+    """
+    matched = _matching(pattern)
+    if matched is None:
+        return None
+    needs = [
+        [c for c in np.flatnonzero(pattern[matched[column]]).tolist() if c != column]
+        for column in range(len(pattern))
+    ]
+    return tuple(
+        Block(tuple(sorted(matched[column] for column in part)), tuple(sorted(part)))
+        for part in _strong_parts(needs)
+    )
+
+
+def _matching(pattern: NDArray[np.bool_]) -> list[int] | None:
+    """For each column a row of its own in which it is not zero, by augmenting paths."""
+    n = len(pattern)
+    row_of = [-1] * n
+    column_of = [-1] * n
+    for start in range(n):
+        if not _augment(pattern, start, row_of, column_of):
+            return None
+    return row_of
+
+
+def _augment(
+    pattern: NDArray[np.bool_], start: int, row_of: list[int], column_of: list[int]
+) -> bool:
+    """Match one more column; breadth first, so that no depth of recursion is needed."""
+    reached: dict[int, int] = {}
+    queue = [start]
+    for column in queue:
+        for row in np.flatnonzero(pattern[:, column]).tolist():
+            if row in reached:
+                continue
+            reached[row] = column
+            if column_of[row] >= 0:
+                queue.append(column_of[row])
+                continue
+            while row >= 0:
+                column = reached[row]
+                column_of[row] = column
+                row, row_of[column] = row_of[column], row
+            return True
+    return False
+
+
+def _strong_parts(needs: Sequence[Sequence[int]]) -> list[list[int]]:
+    """Strongly connected parts of a graph, those that others need first."""
+    n = len(needs)
+    number, low, on_stack = [-1] * n, [0] * n, [False] * n
+    stack: list[int] = []
+    parts: list[list[int]] = []
+    counter = 0
+    for root in range(n):
+        work = [(root, iter(needs[root]))] if number[root] < 0 else []
+        while work:
+            node, edges = work[-1]
+            if number[node] < 0:
+                number[node] = low[node] = counter
+                counter += 1
+                stack.append(node)
+                on_stack[node] = True
+            step = next(edges, None)
+            if step is None:
+                work.pop()
+                if work:
+                    above = work[-1][0]
+                    low[above] = min(low[above], low[node])
+                if low[node] == number[node]:
+                    cut = stack.index(node)
+                    parts.append(stack[cut:])
+                    for member in stack[cut:]:
+                        on_stack[member] = False
+                    del stack[cut:]
+            elif number[step] < 0:
+                work.append((step, iter(needs[step])))
+            elif on_stack[step]:
+                low[node] = min(low[node], number[step])
+    return parts
+
+
+def solve_blocks(A: SX, blocks: Sequence[Block], B: SX) -> SX:
+    """The solution X of A X = B, block after block.
+
+    Args:
+        A: (n, n), zero where the blocks say so.
+        blocks: of `block_triangular`.
+        B: (n, m).
+    """
+    X = SX.zeros(*B.shape)
+    for k, block in enumerate(blocks):
+        rows, columns = list(block.rows), list(block.columns)
+        right = B[rows, :]
+        for before in blocks[:k]:
+            known = list(before.columns)
+            right = right - casadi.mtimes(casadi.densify(A[rows, known]), X[known, :])
+        inverse = solve_square(block.of(A), casadi.densify(SX(DM.eye(block.size))))
+        X[columns, :] = casadi.mtimes(inverse, casadi.densify(right))
+    return X
+
+
+def determinant(A: SX) -> SX:
+    """Determinant of a small square matrix, without a division up to seven rows.
+
+    The minors of the first rows are each formed once, from those of one row less.
+    """
+    n = A.shape[0]
+    if n > _EXPANDED:
+        return SX(casadi.det(casadi.sparsify(A)))
+    minors: dict[tuple[int, ...], SX] = {(): SX(1)}
+    for row in range(n):
+        larger: dict[tuple[int, ...], SX] = {}
+        for columns, minor in minors.items():
+            for column in range(n):
+                entry = A[row, column]
+                if column in columns or entry.is_zero() or minor.is_zero():
+                    continue
+                key = tuple(sorted((*columns, column)))
+                after = len(key) - 1 - key.index(column)
+                term = -minor * entry if after % 2 else minor * entry
+                larger[key] = larger[key] + term if key in larger else term
+        minors = larger
+    return minors.get(tuple(range(n)), SX(0))

@@ -1,0 +1,50 @@
+"""Ways between frames against the poses of the links."""
+
+import casadi
+import numpy as np
+import pytest
+from casadi import SX
+from support.random_trees import ALL_KINDS, random_state, random_tree
+from support.symbolic_robots import symbolic_robot
+
+from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.route import expressed, joined, relative_pose, walked_back, way_to
+from mbs.spatial import Pose
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_way_between_any_two_frames_is_the_relative_pose(seed):
+    mechanism = random_tree(seed, n=6, kinds=ALL_KINDS, aligned=seed % 2 == 0).mechanism
+    system = mechanism.assemble()
+    q, tree = SX.sym("q", system.nq), system.tree
+    rng = np.random.default_rng(seed)
+    names = ["base", *(row.name for row in system.bodies)]
+    arrow = SX([0.3, -0.7, 1.1])
+    for _ in range(6):
+        a, b = (system.frame(names[k]) for k in rng.integers(0, len(names), 2))
+        placed = [*base_poses(tree, link_poses(tree, q)), Pose.identity()]
+        pose = (placed[a[0]] @ a[1]).inverse() @ (placed[b[0]] @ b[1])
+        found = relative_pose(tree, q, a, b)
+        other = relative_pose(tree, q, a, b, outwards=True)
+        (turned,) = expressed(tree, q, (a[0], a[1]), (b[0], b[1]), [arrow])
+        difference = casadi.vertcat(
+            *(casadi.vec(T.matrix - pose.matrix) for T in (found, other)),
+            turned - casadi.mtimes(pose.R, arrow),
+        )
+        values = casadi.Function("f", [q], [difference])(random_state(system, rng)[0])
+        np.testing.assert_allclose(np.array(values), 0, rtol=0, atol=1e-12)
+
+
+def test_there_and_back_is_nowhere():
+    system = symbolic_robot("puma560")
+    q = SX.sym("q", system.nq)
+    way = way_to(system.tree, q, system.frame(6))
+    point = SX([0.1, 0.2, 0.3])
+    for step in reversed(joined([*way, *walked_back(way)], system.tree)):
+        if hasattr(step, "p"):
+            point = point + step.p
+        if hasattr(step, "rotation"):
+            point = step.rotation.apply(point)
+    f = casadi.Function("f", [q, system.p], [point])
+    end = np.array(f(np.arange(6) * 0.4, system.p_default)).ravel()
+    np.testing.assert_allclose(end, [0.1, 0.2, 0.3], rtol=0, atol=1e-14)

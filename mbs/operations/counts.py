@@ -24,6 +24,13 @@ _TRIG = {
 }
 _KINDS = ("mul", "add", "div", "sqrt", "trig", "other")
 _FREE = {casadi.OP_INPUT, casadi.OP_CONST, casadi.OP_NEG, casadi.OP_ASSIGN}
+_KIND = {
+    **dict.fromkeys(_FREE, ""),
+    **dict.fromkeys(_ADD, "add"),
+    **dict.fromkeys(_DIV, "div"),
+    **dict.fromkeys(_TRIG, "trig"),
+    casadi.OP_SQRT: "sqrt",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,17 +106,7 @@ def _numbers(tally: Counter[str]) -> Count:
 def _kind(graph: Graph, number: int) -> str:
     """The attribute of Count that an operation adds to; empty when it is free."""
     op = graph.nodes[number].op
-    if op in _FREE:
-        return ""
-    if op in _MUL:
-        return _kind_of_product(graph, number)
-    if op in _ADD:
-        return "add"
-    if op in _DIV:
-        return "div"
-    if op == casadi.OP_SQRT:
-        return "sqrt"
-    return "trig" if op in _TRIG else "other"
+    return _kind_of_product(graph, number) if op in _MUL else _KIND.get(op, "other")
 
 
 def _kind_of_product(graph: Graph, number: int) -> str:

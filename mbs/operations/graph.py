@@ -69,6 +69,17 @@ class Graph:
                     alive[operand] = True
         return alive
 
+    def uses(self) -> list[int]:
+        """For each node how often nodes and outputs use it; a square uses its operand once."""
+        uses = [0] * len(self.nodes)
+        for number in range(len(self.nodes)):
+            for operand in self.operands(number):
+                uses[operand] += 1
+        for result in self.results:
+            for number in result:
+                uses[number] += 1
+        return uses
+
     def fixed_by(self, names: Iterable[str]) -> list[bool]:
         """For each node, whether constants and the inputs of these names alone determine it."""
         known = {k for k, port in enumerate(self.inputs) if port.name in set(names)}
@@ -91,14 +102,7 @@ def graph_of(function: Function) -> Graph:
     Raises:
         ModelError: it calls something that has no scalar operations, such as an integrator.
     """
-    if not function.is_a("SXFunction"):
-        try:
-            function = function.expand()
-        except RuntimeError as error:
-            raise ModelError(
-                f"{function.name()}: it is not made of scalar operations; give a Function that"
-                " expand() can turn into SX"
-            ) from error
+    function = _scalar(function)
     nodes: list[Node] = []
     work: dict[int, int] = {}
     results = [[-1] * function.nnz_out(k) for k in range(function.n_out())]
@@ -125,8 +129,30 @@ def graph_of(function: Function) -> Graph:
     )
 
 
-def function_of(graph: Graph) -> Function:
-    """The Function that computes a graph, nodes that no output needs left out."""
+def _scalar(function: Function) -> Function:
+    """The Function made of scalar operations alone."""
+    try:
+        scalar = function if function.is_a("SXFunction") else function.expand()
+        calls = any(
+            scalar.instruction_id(k) == casadi.OP_CALL for k in range(scalar.n_instructions())
+        )
+    except RuntimeError:
+        calls = True
+    if calls:
+        raise ModelError(
+            f"{function.name()}: it is not made of scalar operations; give a Function that"
+            " expand() can turn into SX without calls of other Functions, such as integrators"
+        )
+    return scalar
+
+
+def function_of(graph: Graph, defaults: Sequence[float] = ()) -> Function:
+    """The Function that computes a graph, nodes that no output needs left out.
+
+    Args:
+        graph: what to compute.
+        defaults: for each input the number that stands for it when it is not given.
+    """
     symbols = [SX.sym(port.name, port.sparsity) for port in graph.inputs]
     elements = [[SX(s.nz[k]) for k in range(s.nnz())] for s in symbols]
     alive = graph.live()
@@ -141,7 +167,8 @@ def function_of(graph: Graph) -> Function:
         for port, result in zip(graph.outputs, graph.results, strict=True)
     ]
     names = [port.name for port in graph.inputs], [port.name for port in graph.outputs]
-    return Function(graph.name, symbols, outputs, *names)
+    options = {"default_in": list(defaults)} if defaults else {}
+    return Function(graph.name, symbols, outputs, *names, options)
 
 
 def _value(node: Node, values: Sequence[SX], elements: list[list[SX]]) -> SX:

@@ -1,0 +1,1 @@
+"""Passes: each makes an equal graph, cheaper in one respect."""

@@ -1,0 +1,88 @@
+"""Whether two Functions are equal, at random points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from casadi import DM, Function
+
+from mbs.errors import ModelError
+
+_POINTS = 3
+_BOXES = ((0.1, 0.9), (-1.0, 1.0), (-3.0, 3.0), (0.5, 2.0), (1.0, 30.0), (-100.0, 100.0))
+_TRIES = 4
+_OF_THE_LARGEST, _OF_ALL = 1e-9, 1e-12
+
+Values = tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Witness:
+    """What a Function gives at some points.
+
+    Attributes:
+        name: of the Function.
+        points: numbers for every input.
+        values: the non-zero elements of every output, at each point.
+    """
+
+    name: str
+    points: tuple[tuple[DM, ...], ...]
+    values: tuple[Values, ...]
+
+    def require_equal(self, function: Function, what: str) -> None:
+        """Refuse a Function that gives something else where the first gave numbers.
+
+        Raises:
+            ModelError: says which output differs, and after what.
+        """
+        for point, expected in zip(self.points, self.values, strict=True):
+            got = _values(function, point)
+            scale = max((_largest(v) for v in expected), default=0.0)
+            for k, (one, other) in enumerate(zip(expected, got, strict=True)):
+                known = np.isfinite(one)
+                allowed = max(_OF_THE_LARGEST * _largest(one), _OF_ALL * max(1.0, scale))
+                if not np.all(np.abs(one[known] - other[known]) <= allowed):
+                    raise ModelError(
+                        f"{self.name}: {function.name_out(k)} is no longer the same after {what};"
+                        " leave that pass out, and please report it"
+                    )
+
+
+def witness(function: Function, seed: int = 0) -> Witness:
+    """A Function at points where it is finite, or finite in as many elements as possible.
+
+    Raises:
+        ModelError: it is finite at none of many points.
+    """
+    random = np.random.default_rng(seed)
+    tried: list[tuple[int, tuple[DM, ...], Values]] = []
+    for low, high in _BOXES * _TRIES:
+        point = tuple(
+            DM(function.sparsity_in(k), random.uniform(low, high, function.nnz_in(k)))
+            for k in range(function.n_in())
+        )
+        values = _values(function, point)
+        tried.append((sum(int(np.isfinite(v).sum()) for v in values), point, values))
+        elements = sum(v.size for v in values)
+        if sum(1 for finite, _, _ in tried if finite == elements) == _POINTS:
+            break
+    tried.sort(key=lambda trial: -trial[0])
+    best = tried[:_POINTS]
+    if elements and not best[0][0]:
+        raise ModelError(
+            f"{function.name()}: it gives no number at any of {len(tried)} points, so that a"
+            " simpler Function cannot be compared with it; check it for divisions by zero"
+        )
+    return Witness(function.name(), tuple(p for _, p, _ in best), tuple(v for _, _, v in best))
+
+
+def _values(function: Function, point: Sequence[DM]) -> Values:
+    outputs = Function.call(function, list(point))
+    return tuple(np.array(DM(output).nonzeros(), dtype=float) for output in outputs)
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))

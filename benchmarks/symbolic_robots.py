@@ -16,14 +16,14 @@ from mbs.formats import from_dict, to_mechanism
 Row = dict[str, Any]
 
 TEN = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-_LENGTHS = {"alpha": "AL", "d": "D", "r": "RL"}
+_SYMBOLS = {"alpha": "AL", "d": "D", "r": "RL"}
 _UP, _DOWN = pi / 2, -pi / 2
 _ANY = "symbol"
 _GENERAL = {"alpha": _ANY, "d": _ANY, "r": _ANY}
 
 ROBOTS: dict[str, list[Row]] = {
-    "general 6R": [{}, *(_GENERAL for _ in range(5))],
-    "PUMA 560": [
+    "general_6r": [{}, *(_GENERAL for _ in range(5))],
+    "puma560": [
         {},
         {"alpha": _DOWN, "r": _ANY},
         {"d": _ANY, "r": _ANY},
@@ -31,7 +31,7 @@ ROBOTS: dict[str, list[Row]] = {
         {"alpha": _DOWN},
         {"alpha": _UP},
     ],
-    "RX90": [
+    "rx90": [
         {},
         {"alpha": _UP},
         {"d": _ANY},
@@ -48,7 +48,7 @@ ROBOTS: dict[str, list[Row]] = {
         {"alpha": _DOWN},
         {"alpha": _UP},
     ],
-    "Stanford": [
+    "stanford": [
         {},
         {"alpha": _DOWN, "r": _ANY},
         {"alpha": _UP, "joint": "prismatic"},
@@ -56,7 +56,7 @@ ROBOTS: dict[str, list[Row]] = {
         {"alpha": _DOWN},
         {"alpha": _UP},
     ],
-    "SR400 tree": [
+    "sr400_tree": [
         {},
         {"alpha": _DOWN, "d": _ANY},
         {"d": _ANY},
@@ -69,27 +69,34 @@ ROBOTS: dict[str, list[Row]] = {
 }
 
 
-def symbolic_robot(name: str, *, base: bool) -> Mechanism:
-    """A robot with symbols for its lengths and inertial parameters.
+def symbolic_robot(name: str, inertia: str = "full") -> Mechanism:
+    """A robot with symbols for its lengths, oblique angles and inertial parameters.
 
     Args:
         name: a key of ROBOTS.
-        base: leave out what regrouping puts into other parameters: YY, MZ and M of a revolute
-            link, the inertia of a prismatic one, all but ZZ of the first.
+        inertia: "full" for all ten parameters of every link; "base" to leave out what regrouping
+            puts into others: YY, MZ and M of a revolute link, the inertia of a prismatic one, all
+            but ZZ of the first; "none" for a mass of 1 kg at every origin.
     """
-    rows = ROBOTS[name]
-    frames, bodies = [], []
-    for j, row in enumerate(rows, 1):
-        lengths = {k: f"{_LENGTHS[k]}{j}" for k, value in row.items() if value == _ANY}
-        frames.append({"antecedent": j - 1, "joint": "revolute", **row, **lengths})
-        kept = TEN if not base else _base_parameters(row, j)
-        bodies.append({"frame": j, **{parameter: f"{parameter}{j}" for parameter in kept}})
-    return to_mechanism(from_dict({"name": name, "frame": frames, "body": bodies}))
+    frames, bodies, values = [], [], {}
+    for j, row in enumerate(ROBOTS[name], 1):
+        symbols = {k: f"{_SYMBOLS[k]}{j}" for k, value in row.items() if value == _ANY}
+        values.update({symbol: 0.3 + 0.07 * j for symbol in symbols.values()})
+        frames.append({"antecedent": j - 1, "joint": "revolute", **row, **symbols})
+        bodies.append({"frame": j, **_inertia(row, j, inertia)})
+    table = {"name": name, "parameters": values, "frame": frames, "body": bodies}
+    return to_mechanism(from_dict(table))
 
 
-def _base_parameters(row: Row, j: int) -> tuple[str, ...]:
-    if j == 1:
-        return ("ZZ",)
-    if row.get("joint") == "prismatic":
-        return ("MX", "MY", "MZ", "M")
-    return tuple(parameter for parameter in TEN if parameter not in ("YY", "MZ", "M"))
+def _inertia(row: Row, j: int, inertia: str) -> Row:
+    if inertia == "none":
+        return {"M": 1}
+    if inertia == "full":
+        kept = TEN
+    elif j == 1:
+        kept = ("ZZ",)
+    elif row.get("joint") == "prismatic":
+        kept = ("MX", "MY", "MZ", "M")
+    else:
+        kept = tuple(parameter for parameter in TEN if parameter not in ("YY", "MZ", "M"))
+    return {parameter: f"{parameter}{j}" for parameter in kept}

@@ -12,13 +12,14 @@ from mbs.components import (
     Planar,
     Prismatic,
     Revolute,
+    Rotor,
     Spherical,
     Universal,
 )
 from mbs.components.axes import in_plane
 from mbs.components.motion import Motion
 from mbs.errors import DescriptionError
-from mbs.expressions import Parameter
+from mbs.expressions import Parameter, parameters_of
 
 KINDS = [
     (Revolute, 1, ["revolute"]),
@@ -93,6 +94,17 @@ def test_scoping_keeps_everything():
     assert str(gear.coefficients[1]) == "arm.n"
 
 
+def test_symbols_of_a_rotor_are_scoped_and_checked():
+    joint = Revolute("j", stiffness="K", rest="x", rotor=Rotor(inertia="J", ratio="N", axis="x"))
+    assert {p.name for e in joint.expressions() for p in parameters_of(e)} == {"K", "x", "J", "N"}
+    moved = joint.scoped("arm")
+    assert moved.rotor == Rotor(inertia="arm.J", ratio="arm.N", axis=(1, 0, 0))
+    assert (str(moved.stiffness), str(moved.rest)) == ("arm.K", "arm.x")
+    joint.check_values({"J": 0.1})
+    with pytest.raises(DescriptionError, match="j: inertia of the rotor is -1; give zero or more"):
+        joint.check_values({"J": -1.0})
+
+
 @pytest.mark.parametrize(
     ("options", "carries"),
     [
@@ -105,6 +117,9 @@ def test_scoping_keeps_everything():
         ({"Ia": "J"}, True),
         ({"Ia": Parameter("J", 0.0)}, True),
         ({"actuated": False, "Fv": 1}, True),
+        ({"actuated": False, "stiffness": "K"}, True),
+        ({"rest": 1.0}, False),
+        ({"rotor": Rotor(inertia=1e-4, ratio=100)}, True),
     ],
 )
 def test_efforts(options, carries):
@@ -117,6 +132,21 @@ def test_efforts(options, carries):
         (lambda: Revolute("j", Fv=-1), ["j: Fv is -1", "give zero or more"]),
         (lambda: Revolute("j", Fs="-2"), ["j: Fs is -2", "give zero or more"]),
         (lambda: Revolute("j", Ia=Parameter("J", -3.0)), ["j: Ia is -3", "give zero or more"]),
+        (lambda: Prismatic("j", stiffness=-3), ["j: stiffness is -3", "give zero or more"]),
+        (lambda: Revolute("j", rest="x+"), ["j, rest: "]),
+        (
+            lambda: Spherical("j", stiffness=3),
+            ["j: stiffness is given, but a Spherical joint has not one position", "give it to"],
+        ),
+        (lambda: Universal("j", rest=3), ["j: rest is given, but a Universal joint"]),
+        (lambda: Fixed("j", rotor=Rotor(inertia=1)), ["j: rotor is given, but a Fixed joint"]),
+        (lambda: Revolute("j", rotor=0.1), ["j: rotor is 0.1", "give Rotor(inertia="]),
+        (
+            lambda: Revolute("j", rotor=Rotor(inertia=-0.1)),
+            ["j: inertia of the rotor is -0.1", "give zero or more"],
+        ),
+        (lambda: Rotor(inertia=None), ["rotor, inertia: None is not a finite number"]),
+        (lambda: Rotor(inertia=1, axis=(0, 0, 0)), ["rotor: axis (0, 0, 0) has zero length"]),
         (lambda: Revolute("j", Fv=None), ["j, Fv: None is not a finite number", "give"]),
         (
             lambda: Revolute("j", axis=(0, 0, 0)),

@@ -260,7 +260,10 @@ BODY = '<worldbody><body name="b"><joint name="j" {}/><geom size=".1"/>{}</body>
 PLAIN = BODY.format("", "")
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/></fixed></tendon>'
 BAD = {
-    "spring": (BODY.format('stiffness="3"', ""), "joint 'j' has a spring (stiffness)"),
+    "spring of a ball": (
+        BODY.format('type="ball" stiffness="3"', ""),
+        "ball or free joint 'j' has a spring (stiffness)",
+    ),
     "tendon spring": (PLAIN + TENDON.format('stiffness="1"'), "tendon 't' has stiffness"),
     "tendon friction": (PLAIN + TENDON.format('frictionloss="1"'), "tendon 't' has frictionloss"),
     "tendon equality": (
@@ -323,3 +326,19 @@ def test_of_a_servo_only_the_driven_joint_is_read(xml):
     assert to_float(joints["a"].Ia) == 0.1
     assert to_float(joints["a"].Fv) == 0
     assert to_float(joints["b"].Fv) == 2
+
+
+SPRINGS = """<mujoco><worldbody><body pos="0 0 1">
+  <joint name="a" axis="1 2 0" stiffness="3" springref="40" ref="25" damping="0.2"/>
+  <geom size=".1" pos=".2 0 0"/>
+  <body pos=".3 0 0"><joint name="b" type="slide" axis="0 1 1" stiffness="20" springref="-.1"/>
+    <geom size=".1" pos="0 .1 0"/></body>
+</body></worldbody></mujoco>"""
+
+
+def test_springs_of_joints(xml):
+    system = read_mjcf(xml(SPRINGS)).assemble()
+    assert_equal_motion(Twin(system, mujoco.MjModel.from_xml_string(SPRINGS)))
+    stretched = mbs.models.gravity_effort(system)([0.9, 0.2])
+    relaxed = mbs.models.gravity_effort(system)([np.deg2rad(40), -0.1])
+    assert abs(float(stretched[1] - relaxed[1])) > 1

@@ -130,7 +130,13 @@ BAD = {
     "sigma": (("sigma = {0,1}", "sigma = {0,3}"), "small/frame 2: sigma is 3"),
     "sigma text": (("sigma = {0,1}", "sigma = {0,s}"), "robot.par:5: sigma is 's'"),
     "cyclic": (("ant = {0,1}", "ant = {2,1}"), "small/frame 1: antecedent 2 must be 0"),
-    "flexible": (("NJ = 2", "NJ = 2\neta = {0,1}"), "robot.par:4: eta makes joints flexible"),
+    "flexible": (("NJ = 2", "NJ = 2\neta = {0,2}"), "robot.par:4: eta of joint 2 is 2; use 0"),
+    "flexible text": (("NJ = 2", "NJ = 2\neta = {0,e}"), "robot.par:4: eta is 'e'; give a whole"),
+    "flexible weld": (
+        ("sigma = {0,1}", "sigma = {0,2}\neta = {0,1}"),
+        "eta of joint 2 is 1; use 0 for a rigid or fixed joint",
+    ),
+    "rest": (("NL =", "(* rest 3 = 1 *)\nNL ="), "robot.par:2: rest 3: there is no such joint"),
     "floating": (("NJ = 2", "NJ = 2\nis_floating = True"), "robot.par:4: is_floating is True"),
     "no variable": (("th1,", "0,"), "theta of frame 1 is 0"),
     "which": (("th1,", "A+B,"), "does not show the variable of this revolute joint; name it th1"),
@@ -271,6 +277,40 @@ def test_guess_and_width_survive_as_comments(tmp_path):
     assert again.guess == {"q1": 1.5, "q2": -0.5, "q3": 1e-9}
     assert again.parameters == {"w": 0.01}
     assert [str(row.Fs_width) for row in again.bodies] == ["0", "w", "0.001"]
+
+
+def test_flexible_joints(par, tmp_path):
+    table = read_par(par(SMALL.replace("NJ = 2", "NJ = 2\neta = {1,0}\nk = {KS,5}\nmu = {0,1}")))
+    assert [str(row.stiffness) for row in table.bodies] == ["KS", "0"]
+    assert [row.actuated for row in table.frames] == [False, True]
+    unnamed = read_par(par(SMALL.replace("NJ = 2", "NJ = 2\neta = {0,1}"), "unnamed.par"))
+    assert str(unnamed.bodies[1].stiffness) == "k2"
+    write_par(table, tmp_path / "again.par")
+    assert read_par(tmp_path / "again.par") == table
+
+
+def test_springs_survive_and_rotors_are_refused(tmp_path):
+    data = {
+        "name": "x",
+        "frame": LOOP_FRAMES,
+        "loop": [{"cut": [4, 5]}],
+        "body": [
+            {"frame": 2, "M": 1, "stiffness": "K2", "rest": 0.5},
+            {"frame": 4, "stiffness": 3, "rest": "x4"},
+        ],
+    }
+    table = from_dict(data)
+    write_par(table, tmp_path / "x.par")
+    assert "eta = {0,1,0,1}\nk = {0,K2,0,3}" in (tmp_path / "x.par").read_text()
+    springs = [
+        (row.frame, str(row.stiffness), str(row.rest))
+        for row in read_par(tmp_path / "x.par").bodies
+        if "stiffness" in row.drive
+    ]
+    assert springs == [(2, "K2", "0.5"), (4, "3", "x4")]
+    rotor = from_dict({**data, "body": [{"frame": 1, "rotor": {"inertia": 1}}]})
+    with pytest.raises(DescriptionError, match=r"x/body 1: a \.par file has no rotor; give Ia"):
+        write_par(rotor, tmp_path / "y.par")
 
 
 @pytest.mark.parametrize("write", [lambda x: write_par(x, "x.par"), to_dict, to_mechanism])

@@ -1,11 +1,12 @@
 import copy
 import math
 
+import casadi
 import numpy as np
 import pytest
 
 from mbs import Parameter
-from mbs.components import KhalilBody, Prismatic, Revolute, Spherical
+from mbs.components import KhalilBody, Prismatic, Revolute, Rotor, Spherical
 from mbs.errors import DescriptionError, ExportError
 from mbs.expressions import expression, to_float
 from mbs.formats import (
@@ -285,3 +286,66 @@ def test_width_of_dry_friction():
     assert to_float(joints["q1"].Fs_width) == 0
     assert joints["wrist"].Fs_width == expression("w")
     assert joints["q2"].Fs_width == default
+
+
+DRIVEN = changed(
+    ARM,
+    body__0__stiffness="K1",
+    body__0__rest=0.3,
+    body__1__rotor={"inertia": "J4", "ratio": -120, "axis": "-x"},
+)
+
+
+def test_springs_and_rotors(tmp_path):
+    table = from_dict(DRIVEN)
+    assert table.bodies[1].rotor == Rotor(inertia="J4", ratio=-120, axis=(-1, 0, 0))
+    assert to_dict(table)["body"][1]["rotor"] == {
+        "inertia": "J4",
+        "ratio": -120,
+        "axis": [-1, 0, 0],
+    }
+    assert to_dict(table)["body"][0]["rest"] == 0.3
+    write_toml(table, tmp_path / "arm.toml")
+    assert read_toml(tmp_path / "arm.toml") == table
+    joints = to_mechanism(table).components
+    assert (joints["q1"].stiffness, to_float(joints["q1"].rest)) == (expression("K1"), 0.3)
+    assert joints["wrist"].rotor == table.bodies[1].rotor
+    mechanism = to_mechanism(from_dict({**DRIVEN, "parameters": {"RL4": 0.45, "J4": 1e-4}}))
+    values = {p.name: p.default for p in mechanism.parameters()}
+    assert (values["J4"], values["K1"]) == (1e-4, None)
+
+
+def test_axis_of_a_rotor_is_in_the_frame_at_zero(tmp_path):
+    frames = [{"antecedent": 0}, {"antecedent": 1, "alpha": "pi/2", "theta": 0.3}]
+    rotor = {"inertia": 1e-3, "axis": [1, 0, 0]}
+    data = {"name": "x", "frame": frames, "body": [{"frame": 2, "M": 1, "rotor": rotor}]}
+    carried = to_mechanism(from_dict(data)).assemble().tree.links[1].rotor
+    assert carried.carrier == 0
+    axis = np.array(casadi.evalf(carried.axis)).ravel()
+    np.testing.assert_allclose(axis, [math.cos(0.3), 0, math.sin(0.3)], atol=1e-15)
+
+
+BAD_DRIVES = {
+    "text": (dict(body__0__rotor=3), "arm/body 1, rotor is 3; give a table"),
+    "no inertia": (dict(body__0__rotor={"ratio": 3}), "arm/body 1, rotor is {'ratio': 3}; give"),
+    "key": (
+        dict(body__0__rotor={"inertia": 1, "ration": 3}),
+        "arm/body 1, rotor: key 'ration' is unknown; did you mean 'ratio'",
+    ),
+    "value": (dict(body__0__rotor={"inertia": "1+"}), "arm/body 1, rotor, inertia: "),
+    "axis": (dict(body__0__rotor={"inertia": 1, "axis": "u"}), "body 1, rotor: axis 'u' is unkn"),
+    "weld": (
+        dict(body__0__frame=3, body__0__Ia=0, body__0__Fv=0, body__0__stiffness=1),
+        "arm/body 3: the frame is fixed but stiffness is given; take it out",
+    ),
+    "negative": (dict(body__0__stiffness=-1), "q1: stiffness is -1; give zero or more"),
+    "rotor": (dict(body__0__rotor={"inertia": -1}), "q1: inertia of the rotor is -1; give zero"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_DRIVES)
+def test_bad_drive_is_refused(case):
+    changes, message = BAD_DRIVES[case]
+    with pytest.raises(DescriptionError) as error:
+        to_mechanism(from_dict(changed(ARM, **changes)))
+    assert message in str(error.value)

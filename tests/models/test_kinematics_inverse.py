@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from support.closed_mechanisms import closed_chain, planar_loop
 from support.messages import refused
 from support.random_trees import ALL_KINDS, random_state, random_tree
-from support.symbolic_robots import symbolic_robot
+from symbolic_robots import symbolic_robot
 
 import mbs
 import mbs.loops
@@ -55,7 +55,7 @@ def test_arm(name, axes):
     ],
 )
 def test_blocks_of_an_arm_with_symbols(name, sizes):
-    system = symbolic_robot(name)
+    system = symbolic_robot(name, "none").assemble()
     target = Target(system.tree, SX.sym("q", 6), system.p, system.frame(6), system.frame("base"))
     square = square_jacobian(target, range(6), range(6))
     assert sorted(block.size for block in square.blocks) == sizes
@@ -64,7 +64,7 @@ def test_blocks_of_an_arm_with_symbols(name, sizes):
 def test_operations_stay_few():
     most = {"puma560": (74, 34), "rx90": (59, 25), "stanford": (50, 17)}
     for name, (mul, add) in most.items():
-        found = count(inverse_jacobian(symbolic_robot(name), 6))
+        found = count(inverse_jacobian(symbolic_robot(name, "none").assemble(), 6))
         assert found.mul + found.div <= mul
         assert found.add <= add
 
@@ -78,7 +78,7 @@ def test_operations_stay_few():
     ],
 )
 def test_factors_of_an_arm_with_symbols(name, constant, factors):
-    found = singularities(symbolic_robot(name), 6)
+    found = singularities(symbolic_robot(name, "none").assemble(), 6)
     assert found.constant == constant
     assert {str(factor) for factor in found.factors} == factors
     assert str(found).startswith(f"({constant}) * (")
@@ -127,7 +127,7 @@ def test_product_of_factors_is_the_determinant(name):
 
 
 def test_arm_without_structure_has_one_factor():
-    found = singularities(symbolic_robot("general_6r"), 6)
+    found = singularities(symbolic_robot("general_6r", "none").assemble(), 6)
     (factor,) = found.factors
     assert factor.text == "determinant of the 5 x 5 block of q1, q2, q3, q5, q6"
     q = np.linspace(-1, 2, 6)

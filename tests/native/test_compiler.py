@@ -52,7 +52,7 @@ def test_refused_code_names_the_error(tmp_path):
         compile_library([source], output=tmp_path / "bad.so")
 
 
-@pytest.mark.parametrize("name", ["dopri5.c", "driver.c"])
+@pytest.mark.parametrize("name", ["dopri5.c", "driver.c", "python_call.c"])
 def test_the_runtime_is_clean_c99(name, tmp_path):
     folder = resources.files("mbs.native") / "runtime"
     strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-DMBS_PROJECT"]

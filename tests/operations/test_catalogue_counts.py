@@ -1,36 +1,15 @@
 """Upper bounds of the operations of robots; a better recursion or pass may lower them."""
 
-import math
-
 import pytest
 from operations.expressions import require_equal
+from symbolic_robots import symbolic_robot
 
 import mbs
 from mbs.operations import count, simplify, split
 
-_RIGHT = math.pi / 2
-_RX90 = [
-    {},
-    {"alpha": _RIGHT},
-    {"d": "D3"},
-    {"alpha": -_RIGHT, "r": "RL4"},
-    {"alpha": _RIGHT},
-    {"alpha": -_RIGHT},
-]
-
-
-def _with_lengths(rows):
-    """A robot whose lengths are symbols."""
-    frames = [
-        {"antecedent": k, "joint": "revolute", "actuated": True, **row}
-        for k, row in enumerate(rows)
-    ]
-    lengths = {v: 0.4 for row in rows for v in row.values() if isinstance(v, str)}
-    return mbs.load({"name": "arm", "parameters": lengths, "frame": frames}).assemble()
-
 
 def test_the_jacobian_of_the_rx90():
-    f = mbs.models.jacobian(_with_lengths(_RX90), 6)
+    f = mbs.models.jacobian(symbolic_robot("rx90", "none").assemble(), 6)
     simple = simplify(f)
     found = count(simple)
     assert found.mul <= 30

@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 import pytest
 from casadi import SX
-from support.symbolic_robots import symbolic_robot
+from symbolic_robots import symbolic_robot
 
 import mbs.models
 from mbs.models.kinematics import jacobian
@@ -19,7 +19,7 @@ from mbs.recursions.renaud import cheapest_jacobian
     ("name", "most"), [("puma560", (32, 13)), ("rx90", (28, 9)), ("stanford", (26, 8))]
 )
 def test_operations_in_the_base_axes(name, most):
-    found = count(jacobian(symbolic_robot(name), 6))
+    found = count(jacobian(symbolic_robot(name, "none").assemble(), 6))
     assert (found.mul + found.div, found.add) <= most
     assert found.add <= most[1]
 
@@ -28,7 +28,7 @@ def test_operations_in_the_base_axes(name, most):
     ("name", "most"), [("puma560", (8, 4)), ("rx90", (6, 3)), ("stanford", (5, 0))]
 )
 def test_operations_in_the_intermediate_axes(name, most):
-    system = symbolic_robot(name)
+    system = symbolic_robot(name, "none").assemble()
     factors = jacobian(system, 6, form="renaud")
     q, p = SX.sym("q", 6), SX.sym("p", system.p.numel())
     _, _, J = factors(q, p)
@@ -41,7 +41,7 @@ def test_operations_in_the_intermediate_axes(name, most):
 
 
 def test_choice_is_the_least_of_all_ways():
-    system = symbolic_robot("general_6r")
+    system = symbolic_robot("general_6r", "none").assemble()
     q = SX.sym("q", 6)
     target = Target(system.tree, q, system.p, system.frame(6), system.frame("base"))
     seen = outlook(target)
@@ -55,7 +55,7 @@ def test_choice_is_the_least_of_all_ways():
 @pytest.mark.parametrize("reference", [None, -1, 0, 2, 5])
 @pytest.mark.parametrize("axes", [0, 3, 6])
 def test_no_choice_changes_the_result(axes, reference):
-    system = symbolic_robot("general_6r")
+    system = symbolic_robot("general_6r", "none").assemble()
     q = SX.sym("q", 6)
     home = system.frame("base")
     target = Target(system.tree, q, system.p, system.frame(6), system.frame(axes))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from casadi import SX
 from support.random_trees import ALL_KINDS, random_state, random_tree
-from support.symbolic_robots import symbolic_robot
+from symbolic_robots import symbolic_robot
 
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.recursions.route import expressed, joined, relative_pose, walked_back, way_to
@@ -36,7 +36,7 @@ def test_way_between_any_two_frames_is_the_relative_pose(seed):
 
 
 def test_there_and_back_is_nowhere():
-    system = symbolic_robot("puma560")
+    system = symbolic_robot("puma560", "none").assemble()
     q = SX.sym("q", system.nq)
     way = way_to(system.tree, q, system.frame(6))
     point = SX([0.1, 0.2, 0.3])

@@ -1,6 +1,6 @@
 """Operations of the models beside those of other tools, as the table of docs/operations.md.
 
-python benchmarks/operations.py docs/operations.md
+python benchmarks/count_operations.py docs/operations.md
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from casadi import Function
+
 import mbs
 from mbs.assembly import System
 from mbs.files import write_text
@@ -19,9 +21,7 @@ from mbs.operations import count, simplify
 sys.path.insert(0, str(Path(__file__).parent))
 from symbolic_robots import ROBOTS, symbolic_robot
 
-Builder = Callable[[System], "mbs.Function"]
-
-MODELS: dict[str, Callable[[System], object]] = {
+MODELS: dict[str, Callable[[System], Function]] = {
     "IDM": mbs.models.inverse_dynamics,
     "A": mbs.models.inertia_matrix,
     "H": mbs.models.bias,
@@ -31,46 +31,56 @@ MODELS: dict[str, Callable[[System], object]] = {
 }
 """Column of the table and the model that it counts."""
 
+TITLES = {
+    "general_6r": "general 6R",
+    "puma560": "PUMA 560",
+    "rx90": "RX90",
+    "iiwa": "iiwa",
+    "stanford": "Stanford",
+    "sr400_tree": "SR400 tree",
+}
+"""Names in the table."""
+
 OTHERS = {
-    ("general 6R", "IDM"): "470/376",
-    ("general 6R", "A"): "590/438",
-    ("general 6R", "H"): "458/358",
-    ("general 6R", "DDM"): "1701/1342",
-    ("PUMA 560", "IDM"): "314/253",
-    ("PUMA 560", "A"): "226/177",
-    ("PUMA 560", "H"): "298/227",
-    ("PUMA 560", "DDM"): "960/738",
-    ("PUMA 560", "DGM"): "62/32",
-    ("PUMA 560", "J"): "52/25",
-    ("RX90", "IDM"): "286/226",
-    ("RX90", "A"): "167/131",
-    ("RX90", "H"): "276/207",
-    ("RX90", "DDM"): "808/607",
-    ("RX90", "DGM"): "55/25",
-    ("RX90", "J"): "34/11",
+    ("general_6r", "IDM"): "470/376",
+    ("general_6r", "A"): "590/438",
+    ("general_6r", "H"): "458/358",
+    ("general_6r", "DDM"): "1701/1342",
+    ("puma560", "IDM"): "314/253",
+    ("puma560", "A"): "226/177",
+    ("puma560", "H"): "298/227",
+    ("puma560", "DDM"): "960/738",
+    ("puma560", "DGM"): "62/32",
+    ("puma560", "J"): "52/25",
+    ("rx90", "IDM"): "286/226",
+    ("rx90", "A"): "167/131",
+    ("rx90", "H"): "276/207",
+    ("rx90", "DDM"): "808/607",
+    ("rx90", "DGM"): "55/25",
+    ("rx90", "J"): "34/11",
     ("iiwa", "IDM"): "343/271",
     ("iiwa", "A"): "229/179",
     ("iiwa", "H"): "335/256",
     ("iiwa", "DDM"): "968/731",
     ("iiwa", "DGM"): "68/31",
     ("iiwa", "J"): "73/29",
-    ("Stanford", "IDM"): "260/211",
-    ("Stanford", "A"): "127/103",
-    ("Stanford", "H"): "248/189",
-    ("Stanford", "DDM"): "685/519",
-    ("Stanford", "DGM"): "43/18",
-    ("Stanford", "J"): "29/9",
-    ("SR400 tree", "IDM"): "410/323",
-    ("SR400 tree", "A"): "227/180",
-    ("SR400 tree", "H"): "388/283",
-    ("SR400 tree", "DDM"): "1113/845",
+    ("stanford", "IDM"): "260/211",
+    ("stanford", "A"): "127/103",
+    ("stanford", "H"): "248/189",
+    ("stanford", "DDM"): "685/519",
+    ("stanford", "DGM"): "43/18",
+    ("stanford", "J"): "29/9",
+    ("sr400_tree", "IDM"): "410/323",
+    ("sr400_tree", "A"): "227/180",
+    ("sr400_tree", "H"): "388/283",
+    ("sr400_tree", "DDM"): "1113/845",
 }
 """The fewest that OpenSYMORO (2015) or SymPyBotics (2014) give in base parameters, after their
 unused lines, lines of constants alone and repeated sub-expressions were removed."""
 
 _HEAD = """# Operations of the models
 
-Made by `python benchmarks/operations.py docs/operations.md`. Multiplications / additions of each
+Made by `python benchmarks/count_operations.py docs/operations.md`. Multiplications / additions of each
 model as it is built, then after `mbs.operations.simplify`, then the fewest of OpenSYMORO and
 SymPyBotics for the same robot in base parameters.
 
@@ -94,7 +104,7 @@ def main() -> None:
     if output is None:
         print(text)
     else:
-        write_text(output, text)
+        write_text(text, output)
 
 
 def table() -> str:
@@ -102,8 +112,10 @@ def table() -> str:
     lines = [_HEAD, "| robot | " + " | ".join(MODELS) + " |", "|---" * (len(MODELS) + 1) + "|"]
     begin = time.process_time()
     for name in ROBOTS:
-        system = symbolic_robot(name, base=False).assemble()
-        lines.append(f"| {name} | " + " | ".join(_cell(name, m, system) for m in MODELS) + " |")
+        system = symbolic_robot(name).assemble()
+        lines.append(
+            f"| {TITLES[name]} | " + " | ".join(_cell(name, m, system) for m in MODELS) + " |"
+        )
     print(f"{time.process_time() - begin:.1f} s", file=sys.stderr)
     lines += ["", "A cell reads: as built, *simplified*, (others)."]
     return "\n".join(lines) + "\n"

@@ -1,0 +1,36 @@
+"""Operations of the models of published robots: bounds that a change may only lower."""
+
+import pytest
+from symbolic_robots import ROBOTS, symbolic_robot
+
+import mbs
+from mbs.operations import count
+
+MODELS = {
+    "IDM": mbs.models.inverse_dynamics,
+    "A": mbs.models.inertia_matrix,
+    "H": mbs.models.bias,
+    "DDM": mbs.models.direct_dynamics,
+    "DGM": lambda system: mbs.models.transform(system, len(system.links)),
+    "J": lambda system: mbs.models.jacobian(system, len(system.links)),
+}
+BOUNDS = {
+    "general_6r": ["382/318", "332/273", "372/303", "795/647", "136/78", "138/75"],
+    "puma560": ["241/225", "137/133", "226/202", "454/406", "48/23", "32/13"],
+    "rx90": ["230/215", "115/109", "217/194", "423/374", "44/19", "28/9"],
+    "iiwa": ["276/261", "141/131", "268/246", "535/484", "68/31", "68/29"],
+    "stanford": ["212/204", "86/89", "200/184", "377/343", "43/18", "26/8"],
+    "sr400_tree": ["328/304", "154/156", "299/262", "560/501", "8/2", "6/1"],
+}
+"""Multiplications, divisions among them, and additions; symbols for lengths and inertias."""
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("inertia", ["full", "base"])
+def test_models_take_no_more_operations(robot, inertia):
+    system = symbolic_robot(robot, inertia).assemble()
+    for (name, build), bound in zip(MODELS.items(), BOUNDS[robot], strict=True):
+        found = count(build(system))
+        mul, add = (int(part) for part in bound.split("/"))
+        assert found.mul + found.div <= mul, name
+        assert found.add <= add, name

@@ -1,27 +1,39 @@
-"""A Function as machine code, equal to the interpreted one to the last bit."""
+"""A Function as machine code: equal to the interpreted one to the last bit, or faster."""
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import casadi
 
 from mbs.errors import ModelError
 from mbs.messages import quoted
+from mbs.native.array_calls import with_array_calls
 from mbs.native.cache import cached_library
 from mbs.native.compiler import compiler_found, flags_for
+from mbs.native.kernel import kernel_library
 
 
-def compiled(function: casadi.Function, *, derivatives: int = 1) -> casadi.Function:
+def compiled(
+    function: casadi.Function, *, derivatives: int = 1, fast: bool = False
+) -> casadi.Function:
     """The same Function backed by a cached shared library.
 
+    A call whose arguments are all numpy arrays returns numpy arrays, what has one column as a
+    vector, in about a microsecond: arrays of doubles whose columns follow each other in memory are
+    neither converted nor copied. `out=` takes arrays for the outputs. Any other call is as before.
+
     Without a compiler, or when the Function holds a node that CasADi cannot write as C, the
-    given Function is returned: the answers are the same, only slower.
+    given Function stays interpreted: the answers are the same, only slower.
 
     Args:
         function: any Function without free symbols.
         derivatives: how often the answer can be differentiated: 0, 1 (Jacobians, forward and
             reverse products) or 2 (Hessians too, for about five times the code). Beyond it
             CasADi refuses to differentiate.
+        fast: code for the processor of this computer, with fused multiplications and all sines
+            and cosines in vector lanes: two to three times faster, equal to the interpreted
+            Function to about 1e-15 of the largest element instead of the last bit.
 
     Returns:
         a Function with the same name, inputs, outputs and default inputs; of a model, with its
@@ -33,15 +45,21 @@ def compiled(function: casadi.Function, *, derivatives: int = 1) -> casadi.Funct
     """
     require_function(function)
     _check_order(derivatives)
-    if not compiler_found():
-        return function
-    source = c_source(function, derivatives=derivatives)
-    if unwritten(source):
-        return function
-    library = cached_library({"function.c": source}, flags_for(source))
-    external = casadi.external(function.name(), str(library))
     like: Any = getattr(function, "like", None)
-    return external if like is None else like(external)
+    library = _library(function, derivatives, fast) if compiler_found() else None
+    if library is None:
+        return with_array_calls(casadi.Function(function), None, like)
+    return with_array_calls(casadi.external(function.name(), str(library)), library, like)
+
+
+def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
+    """The library of a Function and its derivatives; None when they cannot be written as C."""
+    functions = [function, *_all_derivatives(function, derivatives)]
+    library = kernel_library(functions) if fast else None
+    if library is not None:
+        return library
+    source = generated(functions)
+    return None if unwritten(source) else cached_library({"function.c": source}, flags_for(source))
 
 
 def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
@@ -60,13 +78,7 @@ def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
     """
     require_function(function)
     _check_order(derivatives)
-    functions = [function]
-    if derivatives:
-        first = _derivatives(function)
-        functions += first
-        if derivatives == 2:
-            functions += [d for f in first[1:] for d in _derivatives(f)]
-    return generated(functions)
+    return generated([function, *_all_derivatives(function, derivatives)])
 
 
 def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
@@ -113,6 +125,13 @@ def require_function(function: object) -> None:
 def _check_order(derivatives: object) -> None:
     if derivatives not in (0, 1, 2):
         raise ModelError(f"derivatives is {quoted(derivatives)}; use 0, 1 or 2")
+
+
+def _all_derivatives(function: casadi.Function, order: int) -> list[casadi.Function]:
+    if order == 0:
+        return []
+    first = _derivatives(function)
+    return first if order == 1 else first + [d for f in first[1:] for d in _derivatives(f)]
 
 
 def _derivatives(function: casadi.Function) -> list[casadi.Function]:

@@ -13,7 +13,8 @@ from casadi import SX
 from mbs.assembly.tree import CarriedRotor
 from mbs.recursions.joint_axes import Drift, JointAxes, Step
 from mbs.recursions.joint_lines import Line
-from mbs.recursions.subtree_motion import SubtreeMotion, Wrench
+from mbs.recursions.newton_euler import Wrench
+from mbs.recursions.subtree_motion import SubtreeMotion
 from mbs.spatial import Rotation, cross
 
 

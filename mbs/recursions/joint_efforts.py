@@ -1,6 +1,6 @@
 """What a joint itself needs of effort, whatever moves with it: drive, friction and spring.
 
-Source: Khalil & Creusot 1997, eq. 20; Khalil & Dombre 2002, section 9.3, for elastic joints.
+Source: Khalil & Creusot 1997, eq. 20; Khalil & Dombre 2002 for elastic joints.
 """
 
 from __future__ import annotations

@@ -15,10 +15,8 @@ from mbs.assembly.tree import Tree
 from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.joint_axes import Drift, JointAxes, Step
 from mbs.recursions.joint_lines import Twist
-from mbs.recursions.newton_euler import inertial_wrench
+from mbs.recursions.newton_euler import Wrench, inertial_wrench
 from mbs.spatial import Displacement, Inertia, PseudoInertia, Rotation, Turn, cross, skew, zeros
-
-Wrench = tuple[SX, SX]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,97 @@
+"""Slopes of efforts and accelerations, by every method there is.
+
+Source: Carpentier & Mansard 2018; Singh, Russell & Wensing 2022.
+"""
+
+from __future__ import annotations
+
+import casadi
+import numpy as np
+from casadi import SX
+
+from mbs.assembly import System
+from mbs.assembly.rates import position_rate
+from mbs.models.direct_dynamics import direct_dynamics
+from mbs.models.inverse_dynamics import tree_efforts
+from mbs.models.symbols import ModelSymbols
+from mbs.recursions.accelerations import resting_base
+from mbs.recursions.composite_body import inertia_matrix as tree_inertia
+from mbs.recursions.joint_efforts import joint_efforts
+from mbs.recursions.newton_euler_derivatives import newton_euler_derivatives
+from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
+
+Blocks = dict[str, SX]
+"""Derivatives by the name of the input that they are taken with respect to."""
+
+
+def efforts_by_ad(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
+    """Derivatives of the efforts by differentiating the recursion, and the efforts."""
+    tau = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(a)))
+    blocks = {
+        "q": _along_motion(system, s, tau),
+        "v": casadi.jacobian(tau, s.v),
+        "a": s.reduced_matrix(tree_inertia(system.tree, s.poses)),
+    }
+    return blocks, tau
+
+
+def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
+    """The same by recursions of the derivatives, for trees."""
+    tree = system.tree
+    moving = newton_euler_derivatives(tree, s.poses, s.v, a, resting_base(tree.gravity))
+    joints = joint_efforts(tree, s.q, s.v, a)
+    blocks = {
+        "q": moving.dq + _along_motion(system, s, joints),
+        "v": moving.dv + casadi.jacobian(joints, s.v),
+        "a": moving.A + casadi.jacobian(joints, a),
+    }
+    return blocks, moving.efforts + joints
+
+
+def accelerations_by_efforts(
+    system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
+) -> tuple[Blocks, SX]:
+    """Derivatives of the accelerations from those of the efforts, and the accelerations."""
+    in_tree, n = s.reduction is None, s.size
+    by = efforts_by_recursion if in_tree else efforts_by_ad
+    symbol = SX.sym("a", n)
+    slopes, efforts = by(system, s, symbol)
+    A = slopes.pop("a")
+    if "p" in names:
+        slopes["p"] = casadi.jacobian(efforts, system.p)
+    before = velocity_antecedents(system.tree) if in_tree else list(range(-1, n - 1))
+    H = casadi.substitute(efforts, symbol, SX.zeros(n))
+    a = solve_tree(A, tau - H, before)
+    wanted = [name for name in slopes if name in names]
+    found = casadi.substitute([-slopes[name] for name in wanted], [symbol], [a])
+    right = [casadi.densify(SX(slope)) for slope in [*found, SX.eye(n)]]
+    ends = [0, *np.cumsum([block.shape[1] for block in right]).tolist()]
+    solved = casadi.horzsplit(solve_tree(A, casadi.horzcat(*right), before), ends)
+    blocks = dict(zip(wanted, solved, strict=False))
+    return {**blocks, "tau": casadi.triu2symm(casadi.triu(solved[-1]))}, a
+
+
+def accelerations_by_ad(
+    system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
+) -> tuple[Blocks, SX]:
+    """The same by differentiating the direct model."""
+    arguments = [s.q, s.v, tau, *([system.p] if system.parameters else [])]
+    a = SX(direct_dynamics(system).call(arguments)[0])
+    blocks = {
+        "q": _along_motion(system, s, a),
+        "v": casadi.jacobian(a, s.v),
+        "tau": casadi.jacobian(a, tau),
+    }
+    if "p" in names:
+        blocks["p"] = casadi.jacobian(a, system.p)
+    return blocks, a
+
+
+def _along_motion(system: System, s: ModelSymbols, value: SX) -> SX:
+    """Derivative of a value when the positions move with unit velocities."""
+    slope = casadi.jacobian(value, s.q)
+    if system.nq != system.nv:
+        u = SX.sym("u", system.nv)
+        rate = casadi.jacobian(position_rate(system.tree, s.q, u), u)
+        slope = casadi.mtimes(slope, rate)
+    return slope if s.reduction is None else casadi.mtimes(slope, s.reduction.G)

@@ -1,0 +1,135 @@
+"""Functions that take numpy arrays and give numpy arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from casadi import DM, Function
+
+from mbs.errors import ModelError
+from mbs.native.array_builtin import ArrayCall, array_builtin
+
+
+def with_array_calls(function: Function, library: Path | None, like: Any = None) -> Function:
+    """The Function, which answers arrays with arrays from now on.
+
+    Args:
+        function: one that nobody else holds.
+        library: has its code; None when it is interpreted.
+        like: the method of a model that gives another Function its checks and defaults.
+    """
+    result: Any = function if like is None else like(function)
+    call = array_builtin(function, library, like is not None) if library else None
+    result.__class__ = _class_with_arrays(type(result))
+    result._arrays = call or _declined
+    result._last = None if like is None else _default_of_last(function, like)
+    result._inputs = function.n_in()
+    return result  # type: ignore[no-any-return]
+
+
+class ArrayCalls:
+    """Mixed into a class of Functions.
+
+    A call whose arguments are all numpy arrays returns a numpy array, or a tuple of them; what has
+    one column is a vector. Any other call is CasADi's.
+    """
+
+    _arrays: ArrayCall
+    _last: np.ndarray[Any, Any] | None
+    _inputs: int
+
+    def __call__(self, *args: Any, out: Any = None, **kwargs: Any) -> Any:
+        """Evaluate it on arrays, numbers or symbols.
+
+        Args:
+            *args: the inputs in their order; the parameters of a model may be left out.
+            out: arrays of doubles that take the outputs, one or a tuple; fastest when matrices
+                are in columns (order="F") and share no memory with an input.
+            **kwargs: the inputs by name, as of any Function; the answer is then a dict.
+
+        Returns:
+            `out` if given.
+
+        Raises:
+            ModelError: `out` does not fit; of a model, an input has a wrong size, or the result
+                is not a number.
+        """
+        if self._last is not None and not kwargs and len(args) == self._inputs - 1:
+            args = (*args, self._last)
+        if not kwargs and len(args) == self._inputs:
+            outputs = () if out is None else out if isinstance(out, tuple) else (out,)
+            result = self._arrays(*args, *outputs)
+            if result is not None:
+                return result if out is None else out
+        result = super().__call__(*args, **kwargs)  # type: ignore[misc]
+        if out is not None:
+            return _copied(self, result, out)
+        arrays = bool(args) and not kwargs and all(isinstance(x, _ARRAYS) for x in args)
+        return _numpy(result) if arrays else result
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds what CasADi stores of the Function."""
+        return Function.deserialize, (self.serialize(),)  # type: ignore[attr-defined]
+
+    def __deepcopy__(self, dummy: Any = None) -> ArrayCalls:
+        """Itself: a Function never changes."""
+        return self
+
+
+_ARRAYS = (np.ndarray, np.generic)
+_CLASSES: dict[type, type] = {}
+
+
+def _class_with_arrays(base: type) -> type:
+    """The class of Functions with this mixin; one for each base."""
+    body = {"__doc__": base.__doc__, "__module__": base.__module__}
+    made = type(base.__name__, (ArrayCalls, base), body)
+    return _CLASSES.setdefault(base, made)
+
+
+def _declined(*_: Any) -> None:
+    """The answer of a builtin that takes nothing."""
+
+
+def _default_of_last(function: Function, like: Any) -> np.ndarray[Any, Any] | None:
+    """What a model takes for its last input p when it is left out; None when it must be given."""
+    if function.n_in() == 0 or function.name_in(function.n_in() - 1) != "p":
+        return None
+    symbols = function.sx_in()
+    echo = like(Function("echo", symbols, symbols[-1:], function.name_in(), ["value"]))
+    try:
+        value = echo(*(DM.zeros(s.shape) for s in symbols[:-1]))
+    except ModelError:
+        return None
+    return np.array(value).ravel()
+
+
+def _numpy(result: Any) -> Any:
+    if isinstance(result, tuple):
+        return tuple(map(_numpy, result))
+    array = DM(result).full()
+    return array.ravel() if array.shape[1] == 1 else array
+
+
+def _copied(function: Any, result: Any, out: Any) -> Any:
+    """`out` with the result in it."""
+    if isinstance(result, dict):
+        result = tuple(result.values())
+    results = result if isinstance(result, tuple) else (result,)
+    targets = out if isinstance(out, tuple) else (out,)
+    if len(targets) != len(results):
+        raise ModelError(
+            f"{function.name()}: out has {len(targets)} arrays, there are {len(results)} outputs"
+        )
+    for name, value, target in zip(function.name_out(), results, targets, strict=True):
+        array = _numpy(value)
+        fits = isinstance(target, np.ndarray) and target.shape in (array.shape, (*array.shape, 1))
+        if not (fits and target.dtype == np.float64 and target.flags.writeable):
+            raise ModelError(
+                f"{function.name()}: out for {name} must be a writable array of doubles of shape"
+                f" {array.shape}"
+            )
+        target[...] = array.reshape(target.shape)
+    return out

@@ -1,0 +1,83 @@
+"""One operation of a graph as a C expression."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import casadi
+
+from mbs.errors import ModelError
+from mbs.operations.graph import Graph, Node
+
+_BINARY: Mapping[int, str] = {
+    casadi.OP_ADD: "{} + {}",
+    casadi.OP_SUB: "{} - {}",
+    casadi.OP_MUL: "{} * {}",
+    casadi.OP_DIV: "{} / {}",
+    casadi.OP_LT: "{} < {}",
+    casadi.OP_LE: "{} <= {}",
+    casadi.OP_EQ: "{} == {}",
+    casadi.OP_NE: "{} != {}",
+    casadi.OP_AND: "{} && {}",
+    casadi.OP_OR: "{} || {}",
+    casadi.OP_IF_ELSE_ZERO: "{} ? {} : 0.0",
+    casadi.OP_POW: "pow({}, {})",
+    casadi.OP_CONSTPOW: "pow({}, {})",
+    casadi.OP_FMOD: "fmod({}, {})",
+    casadi.OP_REMAINDER: "remainder({}, {})",
+    casadi.OP_COPYSIGN: "copysign({}, {})",
+    casadi.OP_FMIN: "fmin({}, {})",
+    casadi.OP_FMAX: "fmax({}, {})",
+    casadi.OP_ATAN2: "atan2({}, {})",
+    casadi.OP_HYPOT: "hypot({}, {})",
+}
+_UNARY: Mapping[int, str] = {
+    casadi.OP_ASSIGN: "{0}",
+    casadi.OP_NEG: "-{0}",
+    casadi.OP_SQ: "{0} * {0}",
+    casadi.OP_TWICE: "{0} + {0}",
+    casadi.OP_INV: "1.0 / {0}",
+    casadi.OP_NOT: "!{0}",
+    casadi.OP_SIGN: "(double)(({0} > 0.0) - ({0} < 0.0))",
+    **{
+        getattr(casadi, f"OP_{name.upper()}"): f"{name}({{0}})"
+        for name in (
+            *("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil"),
+            *("fabs", "erf", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "log1p", "expm1"),
+        )
+    },
+}
+
+
+def expression(graph: Graph, number: int) -> str:
+    """The C expression of a node, its operands written by `operand`.
+
+    Raises:
+        ModelError: the operation has no equivalent in C's library.
+    """
+    op = graph.nodes[number].op
+    form = _BINARY.get(op) or _UNARY.get(op)
+    if form is None:
+        raise ModelError(
+            f"{graph.name}: operation {op} of CasADi has no C equivalent; compile without fast"
+        )
+    return form.format(*(operand(graph, n) for n in graph.operands(number)))
+
+
+def operand(graph: Graph, number: int) -> str:
+    """A node as it is written inside an expression: input, constant or name of its value."""
+    node = graph.nodes[number]
+    if node.op == casadi.OP_INPUT:
+        return f"i{node.args[0]}[{node.args[1]}]"
+    return constant(node) if node.op == casadi.OP_CONST else f"t{number}"
+
+
+def constant(node: Node) -> str:
+    """A constant that C reads back to the last bit."""
+    if math.isnan(node.value):
+        return "NAN"
+    if math.isinf(node.value):
+        return "INFINITY" if node.value > 0 else "(-INFINITY)"
+    text = repr(node.value)
+    return f"({text})" if text.startswith("-") else text

@@ -11,7 +11,7 @@ Source: Khalil & Kleinfinger 1986, section 2.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import casadi
@@ -20,15 +20,15 @@ from casadi import DM, SX
 
 from mbs.assembly.graph import Edge, Graph, inertia_of
 from mbs.assembly.spanning_tree import Branch, SpanningTree
-from mbs.assembly.tree import Link, Tree
+from mbs.assembly.tree import CarriedRotor, Link, Tree
 from mbs.components import Mechanism
 from mbs.components.motion import Freedom, Motion
 from mbs.expressions import to_sx
-from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z
+from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z, snapped
 
 _FLIP = Pose.turned(SX(DM([[1, 0, 0], [0, -1, 0], [0, 0, -1]])))
-Efforts = tuple[SX, SX, SX, SX]
-"""Ia, Fv, Fs and Fs_width of a joint."""
+_EFFORTS = ("Ia", "Fv", "Fs", "Fs_width", "stiffness", "rest")
+"""What acts on the velocity and position of every freedom of a joint."""
 
 _ALONG_Z = (Motion.REVOLUTE, Motion.PRISMATIC)
 
@@ -78,7 +78,7 @@ class _Draft:
     antecedent: int
     motion: Motion
     placement: Khalil
-    efforts: Efforts
+    edge: Edge
     fixed_frame: bool = False
     nodes: dict[int, Pose] = field(default_factory=dict)
 
@@ -130,7 +130,8 @@ def khalil_frames(
             own = inertia_of(node, mechanism, symbols)
             inertias[link] = inertias[link] + own.seen_from(MatrixTurn(pose.R), pose.p)
     gravity = casadi.vertcat(*(to_sx(g, symbols) for g in mechanism.world.gravity))
-    tree = Tree(_links(drafts, inertias), gravity)
+    rotors = [_rotor(draft.edge, place, symbols) for draft in drafts]
+    tree = Tree(_links(drafts, inertias, rotors, symbols), gravity)
     return Framed(tree, tuple(draft.joint for draft in drafts), tuple(cuts), homes)
 
 
@@ -152,7 +153,6 @@ def _extend(
     nodes = base if parent < 0 else drafts[parent].nodes
     here = nodes[branch.parent] @ near
     given = edge.khalil if branch.forward and nodes[branch.parent].is_identity() else None
-    efforts = _efforts(edge, symbols)
     freedoms = edge.joint.freedoms if branch.forward else edge.joint.freedoms[::-1]
     for freedom in freedoms:
         aligned = _aligned(freedom, branch.forward)
@@ -171,7 +171,7 @@ def _extend(
                 parent,
                 freedom.motion,
                 placement,
-                efforts,
+                edge,
                 fixed_frame=placement is given,
             )
         )
@@ -204,33 +204,44 @@ def _aligned(freedom: Freedom, forward: bool) -> Pose:
     return pose if forward else pose @ _FLIP
 
 
-def _efforts(edge: Edge, symbols: Mapping[str, SX]) -> Efforts:
-    joint = edge.joint
-    Ia, Fv, Fs, width = (
-        to_sx(value, symbols) for value in (joint.Ia, joint.Fv, joint.Fs, joint.Fs_width)
+def _rotor(
+    edge: Edge, place: Callable[[int], tuple[int, Pose]], symbols: Mapping[str, SX]
+) -> CarriedRotor | None:
+    """The rotor of a joint on the link that has the joint's frame_a."""
+    rotor = edge.joint.rotor
+    if rotor is None:
+        return None
+    link, pose = place(edge.a)
+    axis = edge.joint.freedoms[0].axis if rotor.axis is None else rotor.axis
+    return CarriedRotor(
+        carrier=link,
+        axis=snapped(casadi.mtimes((pose @ edge.pose_a).R, SX(DM(list(axis))))),
+        inertia=to_sx(rotor.inertia, symbols),
+        ratio=to_sx(rotor.ratio, symbols),
     )
-    return Ia, Fv, Fs, width
 
 
-def _links(drafts: list[_Draft], inertias: list[Inertia]) -> tuple[Link, ...]:
+def _links(
+    drafts: list[_Draft],
+    inertias: list[Inertia],
+    rotors: list[CarriedRotor | None],
+    symbols: Mapping[str, SX],
+) -> tuple[Link, ...]:
     links, nq, nv = [], 0, 0
-    for draft, inertia in zip(drafts, inertias, strict=True):
+    for draft, inertia, rotor in zip(drafts, inertias, rotors, strict=True):
         motion = draft.motion
-        Ia, Fv, Fs, width = draft.efforts
         q, v = slice(nq, nq + motion.nq), slice(nv, nv + motion.nv)
         links.append(
             Link(
-                draft.name,
-                draft.antecedent,
-                motion,
-                draft.placement,
-                inertia,
-                Ia,
-                Fv,
-                Fs,
-                width,
-                q,
-                v,
+                name=draft.name,
+                antecedent=draft.antecedent,
+                motion=motion,
+                placement=draft.placement,
+                inertia=inertia,
+                rotor=rotor,
+                q=q,
+                v=v,
+                **{name: to_sx(getattr(draft.edge.joint, name), symbols) for name in _EFFORTS},
             )
         )
         nq, nv = q.stop, v.stop

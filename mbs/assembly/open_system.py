@@ -19,7 +19,7 @@ from mbs.assembly.tables import (
     position_coordinates,
     velocity_coordinates,
 )
-from mbs.components import Free, Joint, Mechanism
+from mbs.components import Component, Free, Joint, Mechanism
 from mbs.components.rigid_body import Mount
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
@@ -181,17 +181,16 @@ def _bodies(mechanism: Mechanism, graph: Graph, framed: Framed) -> tuple[BodyRow
         for name, port in node.members
         if not port
     }
+    values = {p.name: p.default for p in mechanism.parameters() if p.default is not None}
     rows: list[BodyRow] = []
     for body in mechanism.bodies():
         if homes[body.name] >= 0 and not isinstance(body, Mount):
-            mass = _mass(mechanism, body.name)
+            mass = _mass(body, values)
             rows.append(BodyRow(body.name, homes[body.name] + 1, mass))
     return tuple(sorted(rows, key=lambda row: row.link))
 
 
-def _mass(mechanism: Mechanism, name: str) -> float | None:
-    body = mechanism.components[name]
-    values = {p.name: p.default for p in mechanism.parameters() if p.default is not None}
+def _mass(body: Component, values: Mapping[str, float]) -> float | None:
     for attribute in ("solid_mass", "mass", "M"):
         scalar = getattr(body, attribute, None)
         if scalar is not None:

@@ -11,6 +11,33 @@ from mbs.spatial import Inertia, Khalil
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CarriedRotor:
+    """A rotor that spins with a joint, mounted on one of the two links that the joint connects.
+
+    Attributes:
+        carrier: number of the link it is mounted on, or -1 for the base.
+        axis: (3, 1) unit vector of its axis, in the frame of that link.
+        inertia: about the axis [kg m^2].
+        ratio: velocity relative to the carrier for a unit velocity of the joint.
+    """
+
+    carrier: int
+    axis: SX
+    inertia: SX
+    ratio: SX
+
+    @property
+    def momentum(self) -> SX:
+        """(3, 1) angular momentum in the carrier for a unit velocity of the joint."""
+        return self.ratio * self.inertia * self.axis
+
+    @property
+    def seen_at_joint(self) -> SX:
+        """Inertia that the joint feels [kg m^2 or kg]."""
+        return self.ratio * self.ratio * self.inertia
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Link:
     """A moving link j and the elementary motion that carries it from its antecedent i.
 
@@ -24,6 +51,9 @@ class Link:
         Fv: viscous friction [N m s/rad or N s/m].
         Fs: dry friction [N m or N].
         Fs_width: velocity over which it changes sign [rad/s or m/s], zero for a step.
+        stiffness: of the spring of a joint of one degree of freedom [N m/rad or N/m].
+        rest: position at which the spring is at rest [rad or m].
+        rotor: that spins with the joint, or None.
         q: where its positions stand in q.
         v: where its velocities stand in v.
     """
@@ -37,6 +67,9 @@ class Link:
     Fv: SX
     Fs: SX
     Fs_width: SX
+    stiffness: SX
+    rest: SX
+    rotor: CarriedRotor | None
     q: slice
     v: slice
 

@@ -17,6 +17,7 @@ from mbs.components.joints import (
 from mbs.components.mechanism import Mechanism
 from mbs.components.placed import Placed
 from mbs.components.rigid_body import RigidBody, World
+from mbs.components.rotor import Rotor
 from mbs.components.solids import Box, Cylinder
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "Prismatic",
     "Revolute",
     "RigidBody",
+    "Rotor",
     "Spherical",
     "Universal",
     "World",

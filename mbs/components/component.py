@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from mbs.components.placement import KhalilStep, Placement, Rotation, displacement
@@ -111,6 +111,9 @@ def _expressions(value: object) -> Iterator[Expression]:
     elif isinstance(value, tuple):
         for element in value:
             yield from _expressions(element)
+    elif is_dataclass(value):
+        for f in fields(value):
+            yield from _expressions(getattr(value, f.name))
 
 
 def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
@@ -118,4 +121,8 @@ def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
         return change(value)
     if isinstance(value, tuple):
         return tuple(_mapped(element, change) for element in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(
+            value, **{f.name: _mapped(getattr(value, f.name), change) for f in fields(value)}
+        )
     return value

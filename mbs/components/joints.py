@@ -8,7 +8,7 @@ frame_b. The rows that close a loop through a cut joint follow from the same des
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from mbs.components.axes import in_plane, unit_axis
 from mbs.components.component import Component, Point
 from mbs.components.motion import Freedom, Motion
+from mbs.components.rotor import Rotor
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar, expression, to_float
 from mbs.messages import quoted
@@ -34,7 +35,13 @@ class Joint(Component):
         Fs: dry friction [N m or N], which acts as Fs tanh(v / Fs_width).
         Fs_width: velocity over which dry friction changes sign [rad/s or m/s]; zero for the
             step Fs sign(v), which identification wants and integrators do not.
-        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
+        Ia: inertia of the rotor seen at the joint [kg m^2 or kg], for what its spin does to the
+            link that carries it see `rotor`.
+        stiffness: of a spring between its two frames [N m/rad or N/m], of a joint of one degree
+            of freedom.
+        rest: position at which the spring is at rest [rad or m].
+        rotor: a `Rotor` that spins with a joint of one degree of freedom, its gyroscopic effects
+            included; besides Ia.
     """
 
     actuated: bool | None = None
@@ -43,6 +50,9 @@ class Joint(Component):
     Fs: Scalar = 0.0
     Fs_width: Scalar = 1e-3
     Ia: Scalar = 0.0
+    stiffness: Scalar = 0.0
+    rest: Scalar = 0.0
+    rotor: Rotor | None = None
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
@@ -50,11 +60,17 @@ class Joint(Component):
             raise DescriptionError(
                 f"{self.name}: actuated is {self.actuated!r}; give True, False or None"
             )
-        self._normalise("Fv", "Fs", "Fs_width", "Ia")
-        for name in ("Fv", "Fs", "Fs_width", "Ia"):
-            value = to_float(getattr(self, name))
+        self._normalise("Fv", "Fs", "Fs_width", "Ia", "stiffness", "rest")
+        if self.rotor is not None and not isinstance(self.rotor, Rotor):
+            raise DescriptionError(
+                f"{self.name}: rotor is {quoted(self.rotor)}; give Rotor(inertia=..., ratio=...)"
+            )
+        for name, scalar in self._magnitudes():
+            value = to_float(scalar)
             if value is not None and value < 0:
                 raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
+        if self.nv != 1 or len(self.freedoms) != 1:
+            self._refuse_drive()
         object.__setattr__(self, "limits", self._limits_by_suffix(self.limits))
 
     @property
@@ -79,9 +95,26 @@ class Joint(Component):
 
     @property
     def carries_effort(self) -> bool:
-        """Whether a motor, friction or a rotor acts on it."""
-        efforts = (expression(value) for value in (self.Fv, self.Fs, self.Ia))
-        return bool(self.actuated) or any(effort != Number(0.0) for effort in efforts)
+        """Whether a motor, friction, a spring or a rotor acts on it."""
+        efforts = (expression(value) for value in (self.Fv, self.Fs, self.Ia, self.stiffness))
+        acts = self.rotor is not None or any(effort != Number(0.0) for effort in efforts)
+        return bool(self.actuated) or acts
+
+    def _magnitudes(self) -> Iterator[tuple[str, Scalar]]:
+        """What may not be less than zero, with its name."""
+        for name in ("Fv", "Fs", "Fs_width", "Ia", "stiffness"):
+            yield name, getattr(self, name)
+        if self.rotor is not None:
+            yield "inertia of the rotor", self.rotor.inertia
+
+    def _refuse_drive(self) -> None:
+        """Springs and rotors belong to joints of one position."""
+        given = [name for name in ("stiffness", "rest") if getattr(self, name) != Number(0.0)]
+        for name in [*given, *(["rotor"] if self.rotor is not None else [])]:
+            raise DescriptionError(
+                f"{self.name}: {name} is given, but a {type(self).__name__} joint has not one"
+                " position that it could act on; give it to Revolute or Prismatic joints"
+            )
 
     def _limits_by_suffix(self, limits: Any) -> tuple[tuple[str, tuple[float, float]], ...]:
         if limits is None:

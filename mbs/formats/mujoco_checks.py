@@ -12,7 +12,7 @@ from mbs.formats.mujoco_model import MjcfModel, joint_transmissions
 
 
 def check_supported(mjcf: MjcfModel) -> None:
-    """Refuse springs, fluids, tendons that pull, and the like.
+    """Refuse fluids, tendons that pull, springs that are not linear, and the like.
 
     Raises:
         DescriptionError: the first such thing, by its name.
@@ -42,10 +42,13 @@ def _bodies(mjcf: MjcfModel) -> Iterator[str]:
 
 
 def _joints(mjcf: MjcfModel) -> Iterator[str]:
-    model = mjcf.data
+    model, kinds = mjcf.data, mjcf.mujoco.mjtJoint
+    on_axes = (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE))
     for j, name in enumerate(mjcf.joints):
-        if model.jnt_stiffness[j] or _any(model, "jnt_stiffnesspoly", j):
-            yield f"joint {name!r} has a spring (stiffness), which mbs does not model"
+        if model.jnt_stiffness[j] and int(model.jnt_type[j]) not in on_axes:
+            yield f"ball or free joint {name!r} has a spring (stiffness), which mbs does not model"
+        if _any(model, "jnt_stiffnesspoly", j):
+            yield f"joint {name!r} has a spring that is not linear, which mbs does not model"
         if _any(model, "dof_dampingpoly", int(model.jnt_dofadr[j])):
             yield f"joint {name!r} has damping that is not linear, which mbs does not model"
 

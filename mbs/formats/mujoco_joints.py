@@ -66,6 +66,9 @@ def _joint(mjcf: MjcfModel, j: int) -> Joint:
         return Spherical(**common)
     if model.jnt_limited[j]:
         common["limits"] = tuple(float(value) for value in model.jnt_range[j])
+    if model.jnt_stiffness[j]:
+        common["stiffness"] = float(model.jnt_stiffness[j])
+        common["rest"] = float(model.qpos_spring[model.jnt_qposadr[j]])
     axis = tuple(float(value) for value in model.jnt_axis[j])
     one_axis = Revolute if kind == kinds.mjJNT_HINGE else Prismatic
     return one_axis(axis=axis, **common)

@@ -12,14 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, expression, parameters_of, to_float
+from mbs.expressions import Expression, expression, parameters_of
 from mbs.formats.files import read_text
 from mbs.formats.par_file import (
     BASE_EXTRAS,
     BODY_KEYS,
+    FLEXIBLE,
     FRAME_KEYS,
     JOINT_EXTRAS,
     LINK_EXTRAS,
+    STIFFNESS,
     ParFile,
 )
 from mbs.formats.par_variable import split_variable
@@ -46,7 +48,7 @@ def read_par(path: str | Path, parameters: Mapping[str, float] | None = None) ->
     return RobotTable(
         name=file.name or Path(path).stem,
         frames=frames,
-        bodies=_bodies(file, NL, frames),
+        bodies=_bodies(file, NL, NJ, frames),
         loops=tuple(_loop(NL + k, NJ + k, frames) for k in range(1, NJ - NL + 1)),
         gravity=_gravity(file),
         parameters={**file.numbers("Value"), **(parameters or {})},
@@ -77,11 +79,6 @@ def _check_kind(file: ParFile, NL: int, NJ: int) -> None:
                 f"{file.where(key)} is {file.entries[key][1][0]}, but the base of a table does not"
                 " move; set it to 0 and put a free joint under the robot instead"
             )
-    eta = file.vector("eta", NJ, "joint") or ()
-    if any(to_float(expression(text, file.where("eta"))) != 0 for text in eta):
-        raise DescriptionError(
-            f"{file.where('eta')} makes joints flexible, which is not supported; set eta to 0"
-        )
 
 
 def _frames(file: ParFile, NF: int, closed: bool) -> tuple[FrameRow, ...]:
@@ -141,15 +138,39 @@ def _check_variables(file: ParFile, rows: tuple[FrameRow, ...], taken: Mapping[s
                     )
 
 
-def _bodies(file: ParFile, NL: int, frames: tuple[FrameRow, ...]) -> tuple[InertiaRow, ...]:
-    widths = _widths(file, NL)
+def _bodies(
+    file: ParFile, NL: int, NJ: int, frames: tuple[FrameRow, ...]
+) -> tuple[InertiaRow, ...]:
+    remarks = {kind: _remarks(file, kind, NJ) for kind in ("Fs_width", "rest")}
+    springs = _springs(file, NJ, frames)
     rows = []
-    for j in range(1, NL + 1):
-        values = _body(file, j, NL, fixed=frames[j - 1].sigma == 2)
-        if j in widths:
-            values["Fs_width"] = widths[j]
-        rows.append(InertiaRow(frame=j, **values))
+    for j in range(1, NJ + 1):
+        values: dict[str, Any] = {kind: at[j] for kind, at in remarks.items() if j in at}
+        if j in springs:
+            values["stiffness"] = springs[j]
+        if j <= NL:
+            values.update(_body(file, j, NL, fixed=frames[j - 1].sigma == 2))
+        if values:
+            rows.append(InertiaRow(j, **values))
     return tuple(rows)
+
+
+def _springs(file: ParFile, NJ: int, frames: tuple[FrameRow, ...]) -> dict[int, Expression]:
+    """The stiffness of the joints that eta makes flexible."""
+    eta = file.vector(FLEXIBLE, NJ, "joint") or ()
+    stiffness = file.vector(STIFFNESS, NJ, "joint")
+    springs: dict[int, Expression] = {}
+    for j, text in enumerate(eta, 1):
+        flexible = file.integer(FLEXIBLE, text)
+        if flexible not in (0, 1) or (flexible and frames[j - 1].sigma == 2):
+            raise DescriptionError(
+                f"{file.where(FLEXIBLE)} of joint {j} is {text}; use 0 for a rigid or fixed joint"
+                " and 1 for one with a spring"
+            )
+        if flexible:
+            value = f"{STIFFNESS}{j}" if stiffness is None else stiffness[j - 1]
+            springs[j] = expression(value, f"{file.where(STIFFNESS)} of joint {j}")
+    return springs
 
 
 def _body(file: ParFile, j: int, NL: int, *, fixed: bool) -> dict[str, Any]:
@@ -162,14 +183,14 @@ def _body(file: ParFile, j: int, NL: int, *, fixed: bool) -> dict[str, Any]:
     return values
 
 
-def _widths(file: ParFile, NL: int) -> dict[int, Expression]:
-    """Fs_width of the links that have a remark on it."""
-    widths: dict[int, Expression] = {}
-    for where, name, text in file.remarked("Fs_width"):
-        if not name.isdecimal() or not 1 <= int(name) <= NL:
-            raise DescriptionError(f"{where}: there is no such link; use 1 to {NL}")
-        widths[int(name)] = expression(text, where)
-    return widths
+def _remarks(file: ParFile, kind: str, NJ: int) -> dict[int, Expression]:
+    """What remarks of a kind say of joints."""
+    values: dict[int, Expression] = {}
+    for where, name, text in file.remarked(kind):
+        if not name.isdecimal() or not 1 <= int(name) <= NJ:
+            raise DescriptionError(f"{where}: there is no such joint; use 1 to {NJ}")
+        values[int(name)] = expression(text, where)
+    return values
 
 
 def _loop(moving: int, fixed: int, frames: tuple[FrameRow, ...]) -> CutRow:

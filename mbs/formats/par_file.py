@@ -2,7 +2,7 @@
 
 A file holds `KEY = number` and `KEY = {value, ...}`, where a vector may run over several lines.
 `(* ... *)` is a comment; comments `(* Value L = 0.3 *)`, `(* Guess q2 = -1.57 *)` and
-`(* Fs_width 3 = 0.01 *)` say what the format has no key for.
+`(* Fs_width 3 = 0.01 *)`, `(* rest 3 = 0.1 *)` say what the format has no key for.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ BODY_KEYS = {
 LINK_EXTRAS = ("FX", "FY", "FZ", "CX", "CY", "CZ")
 """Wrenches that links exert on their environment, kept as texts."""
 
-JOINT_EXTRAS = ("eta", "k", "QP", "QDP", "GAM")
+FLEXIBLE, STIFFNESS = "eta", "k"
+"""Vectors with one value for each joint: 1 for a flexible one, and its stiffness."""
+
+JOINT_EXTRAS = ("QP", "QDP", "GAM")
 """Vectors with one value for each joint, kept as texts."""
 
 BASE_EXTRAS = {"W0": 3, "WP0": 3, "V0": 3, "VP0": 3, "Z": 16}
@@ -51,6 +54,8 @@ _KNOWN = (
     *_OLD_SPELLING,
     *BODY_KEYS,
     *LINK_EXTRAS,
+    FLEXIBLE,
+    STIFFNESS,
     *JOINT_EXTRAS,
     *BASE_EXTRAS,
     *_OTHER_KEYS,
@@ -59,7 +64,7 @@ _ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
 _COMMENT = re.compile(r"\(\*.*?\*\)", re.DOTALL)
 _NAME = re.compile(r"\(\*\s*Robotname\s*=\s*'([^'\n]*)'")
 _SOURCE = re.compile(r"\(\*\s*Source\s*=\s*'([^\n]*)'\s*\*\)")
-_REMARK = re.compile(r"\(\*\s*(Value|Guess|Fs_width)\s+([\w.]+)\s*=\s*([^\n]*?)\s*\*\)")
+_REMARK = re.compile(r"\(\*\s*(Value|Guess|Fs_width|rest)\s+([\w.]+)\s*=\s*([^\n]*?)\s*\*\)")
 _SHORTEST_MISSPELT, _SIMILAR = 3, 0.75
 
 
@@ -71,7 +76,7 @@ class ParFile:
         path: of the file.
         name, source: of the robot, empty where the file does not say them.
         entries: key -> (line number, texts of the values).
-        remarks: (kind, name) -> (line number, text), the kind Value, Guess or Fs_width.
+        remarks: (kind, name) -> (line number, text), the kind Value, Guess, Fs_width or rest.
     """
 
     path: str

@@ -9,8 +9,15 @@ from pathlib import Path
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar, expression, parameters_of, to_float
 from mbs.files import write_text
-from mbs.formats.par_file import BASE_EXTRAS, BODY_KEYS, JOINT_EXTRAS, LINK_EXTRAS
-from mbs.formats.rows import DRIVE, FrameRow, InertiaRow
+from mbs.formats.par_file import (
+    BASE_EXTRAS,
+    BODY_KEYS,
+    FLEXIBLE,
+    JOINT_EXTRAS,
+    LINK_EXTRAS,
+    STIFFNESS,
+)
+from mbs.formats.rows import FrameRow, InertiaRow
 from mbs.formats.table import RobotTable, require_table
 
 _GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
@@ -21,13 +28,13 @@ def write_par(table: RobotTable, path: str | Path) -> None:
     """Write the table as a .par file.
 
     The format knows no names of joints and bodies, no limits, and no grouped bodies: these are
-    lost, and joint j is q<j> when the file is read again. Values of symbols, `guess` and
-    `Fs_width` are written as comments, which `read_par` reads. The file says of every joint
+    lost, and joint j is q<j> when the file is read again. Values of symbols, `guess`, `Fs_width`
+    and `rest` are written as comments, which `read_par` reads. The file says of every joint
     whether a motor drives it: where the table leaves the choice to the assembly, what it chooses.
 
     Raises:
-        DescriptionError: it is not a table, or a loop, a symbol, or the drive of a cut joint
-            cannot be said in this format.
+        DescriptionError: it is not a table, or a loop, a symbol, a rotor, or the drive of a cut
+            joint cannot be said in this format.
         ExportError: the file cannot be written.
     """
     require_table(table)
@@ -43,7 +50,7 @@ def _lines(table: RobotTable) -> Iterator[str]:
     yield f"(* Robotname = '{re.sub(r'[^A-Za-z0-9 _-]', '_', table.name)}' *)"
     if table.source:
         yield f"(* Source = '{_one_line(table.source)}' *)"
-    yield from _remarks(table, NL)
+    yield from _remarks(table, NJ)
     yield f"NL = {NL}\nNJ = {NJ}\nNF = {NF}\nType = {_kind(table)}"
     yield "\n(* Geometric parameters *)"
     yield _vector("ant", (row.antecedent for row in table.frames))
@@ -58,6 +65,7 @@ def _lines(table: RobotTable) -> Iterator[str]:
         yield _vector(key, (_text(getattr(row, name)) for row in rows))
     yield from _extras(table, LINK_EXTRAS)
     yield "\n(* Joint parameters *)"
+    yield from _springs(table, NJ)
     yield from _extras(table, JOINT_EXTRAS)
     yield "\n(* Base: motion, gravity, place *)"
     yield _vector("G", (_text(value) for value in table.gravity))
@@ -65,14 +73,26 @@ def _lines(table: RobotTable) -> Iterator[str]:
     yield "\n(* End of definition *)"
 
 
-def _remarks(table: RobotTable, NL: int) -> Iterator[str]:
+def _remarks(table: RobotTable, NJ: int) -> Iterator[str]:
     """Comments for what the format has no key for."""
     numbers = {table.joint_name(j): j for j in range(1, len(table.frames) + 1)}
     yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
     yield from (f"(* Guess q{numbers[name]} = {value!r} *)" for name, value in table.guess.items())
     for row in table.bodies:
-        if row.frame <= NL and to_float(expression(row.Fs_width)) != InertiaRow(row.frame).Fs_width:
-            yield f"(* Fs_width {row.frame} = {_text(row.Fs_width)} *)"
+        for kind in ("Fs_width", "rest"):
+            value, usual = expression(getattr(row, kind)), getattr(InertiaRow(row.frame), kind)
+            if row.frame <= NJ and to_float(value) != usual:
+                yield f"(* {kind} {row.frame} = {_text(value)} *)"
+
+
+def _springs(table: RobotTable, NJ: int) -> Iterator[str]:
+    stiffness = ["0"] * NJ
+    for row in table.bodies:
+        if "stiffness" in row.drive:
+            stiffness[row.frame - 1] = _text(row.stiffness)
+    if any(text != "0" for text in stiffness):
+        yield _vector(FLEXIBLE, (int(text != "0") for text in stiffness))
+        yield _vector(STIFFNESS, stiffness)
 
 
 def _motors(table: RobotTable) -> Iterator[int]:
@@ -144,11 +164,14 @@ def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:
 
 def _check_drives(table: RobotTable, NL: int) -> None:
     for row in table.bodies:
-        given = [name for name in DRIVE if to_float(expression(getattr(row, name))) != 0]
+        where = f"{table.name}/body {row.frame}"
+        if row.rotor is not None:
+            raise DescriptionError(f"{where}: a .par file has no rotor; give Ia, or write TOML")
+        given = [name for name in row.drive if name != "stiffness"]
         if row.frame > NL and given:
             raise DescriptionError(
-                f"{table.name}/body {row.frame}: a .par file has no {given[0]} of a cut joint; cut"
-                " the loop at another joint, or write TOML"
+                f"{where}: a .par file has no {given[0]} of a cut joint; cut the loop at another"
+                " joint, or write TOML"
             )
 
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mbs.expressions import Scalar
+from mbs.components import Rotor
+from mbs.expressions import Scalar, expression, to_float
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
 """The six parameters of a frame, in the order in which the displacements are made."""
 
-DRIVE = ("Ia", "Fv", "Fs")
-"""Rotor inertia and friction of the joint of a body row, zero where there are none."""
+DRIVE = ("Ia", "Fv", "Fs", "stiffness")
+"""Rotor inertia, friction and spring of the joint of a body row, zero where there are none."""
 
-BODY_SCALARS = (*TEN_PARAMETERS, *DRIVE, "Fs_width")
+BODY_SCALARS = (*TEN_PARAMETERS, *DRIVE, "Fs_width", "rest")
 """The scalars of a body row."""
 
 JOINTS = ("revolute", "prismatic", "fixed")
@@ -67,6 +68,10 @@ class InertiaRow:
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
         Fv, Fs: viscous [N m s/rad or N s/m] and dry friction [N m or N].
         Fs_width: velocity over which dry friction changes sign [rad/s or m/s], 0 for a step.
+        stiffness: of the spring of the joint [N m/rad or N/m].
+        rest: position at which the spring is at rest [rad or m].
+        rotor: that spins with the joint, on the antecedent of the frame; its axis, where given,
+            is in the axes of frame j at the zero position.
         name: of the body, link<j> when empty.
         grouped: the values are base parameters, which need not belong to a single body.
     """
@@ -86,8 +91,17 @@ class InertiaRow:
     Fv: Scalar = 0.0
     Fs: Scalar = 0.0
     Fs_width: Scalar = 1e-3
+    stiffness: Scalar = 0.0
+    rest: Scalar = 0.0
+    rotor: Rotor | None = None
     name: str = ""
     grouped: bool = False
+
+    @property
+    def drive(self) -> list[str]:
+        """Names of what acts on the joint and is not zero."""
+        given = [name for name in DRIVE if to_float(expression(getattr(self, name))) != 0]
+        return [*given, *(["rotor"] if self.rotor is not None else [])]
 
 
 @dataclass(frozen=True, slots=True)

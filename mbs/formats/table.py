@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from mbs.components import Rotor
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, parameters_of, to_float
 from mbs.formats.rows import (
     BODY_SCALARS,
-    DRIVE,
     GEOMETRY,
     LOOP_JOINTS,
     CutRow,
@@ -113,9 +113,14 @@ def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
 def _bare(row: Row, names: tuple[str, ...]) -> Row:
     """The row with symbols that are names only: their values are kept in the table."""
     values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
-    if isinstance(row, InertiaRow) and _is_int(row.frame):
-        values["frame"] = int(row.frame)
+    if isinstance(row, InertiaRow):
+        values["frame"] = int(row.frame) if _is_int(row.frame) else row.frame
+        values["rotor"] = row.rotor and replace(row.rotor, **_bare_scalars(row.rotor))
     return replace(row, **values)
+
+
+def _bare_scalars(rotor: Rotor) -> dict[str, Expression]:
+    return {name: expression(str(getattr(rotor, name))) for name in ("inertia", "ratio")}
 
 
 def _plain_cut(loop: CutRow) -> CutRow:
@@ -208,6 +213,7 @@ def _scalars(rows: Any) -> Iterator[Expression]:
         yield from (getattr(row, key) for key in GEOMETRY)
     for row in bodies:
         yield from (getattr(row, key) for key in BODY_SCALARS)
+        yield from (row.rotor.inertia, row.rotor.ratio) if row.rotor is not None else ()
     yield from gravity
 
 
@@ -220,9 +226,9 @@ def _check_bodies(table: RobotTable) -> None:
         if body.frame in seen:
             raise DescriptionError(f"{where}: two bodies are on this frame; give their sum once")
         seen.add(body.frame)
-        if table.frames[body.frame - 1].sigma == 2 and _nonzero(body, DRIVE):
+        if table.frames[body.frame - 1].sigma == 2 and body.drive:
             raise DescriptionError(
-                f"{where}: the frame is fixed but Ia, Fv or Fs is given; set them to zero"
+                f"{where}: the frame is fixed but {body.drive[0]} is given; take it out"
             )
 
 
@@ -243,8 +249,8 @@ def _check_loops(table: RobotTable) -> None:
                 " place the frame on a link"
             )
     for body in table.bodies:
-        inert = (*TEN_PARAMETERS, *(() if _is_moving(table, body.frame) else DRIVE))
-        if body.frame in table.cut_frames and _nonzero(body, inert):
+        driven = body.drive and not _is_moving(table, body.frame)
+        if body.frame in table.cut_frames and (driven or _has_inertia(body)):
             raise DescriptionError(
                 f"{table.name}/body {body.frame}: the frame belongs to a cut joint, which has no"
                 " body; give the inertia to the link it is placed on"
@@ -281,8 +287,8 @@ def _check_loop(where: str, loop: CutRow, frames: tuple[FrameRow, ...]) -> None:
         )
 
 
-def _nonzero(body: InertiaRow, names: tuple[str, ...]) -> bool:
-    return any(to_float(getattr(body, name)) != 0 for name in names)
+def _has_inertia(body: InertiaRow) -> bool:
+    return any(to_float(getattr(body, name)) != 0 for name in TEN_PARAMETERS)
 
 
 def _is_int(value: object) -> bool:

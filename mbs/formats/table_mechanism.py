@@ -20,7 +20,7 @@ from mbs.components import (
 from mbs.errors import DescriptionError
 from mbs.expressions import expression, to_float
 from mbs.formats.files import component_name
-from mbs.formats.rows import CutRow, FrameRow, InertiaRow
+from mbs.formats.rows import DRIVE, CutRow, FrameRow, InertiaRow
 from mbs.formats.table import RobotTable, require_table
 from mbs.spatial.inertia import TEN_PARAMETERS
 
@@ -102,10 +102,7 @@ def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) ->
         "name": table.joint_name(j),
         "actuated": actuated,
         "limits": table.frames[j - 1].limits,
-        "Ia": row.Ia,
-        "Fv": row.Fv,
-        "Fs": row.Fs,
-        "Fs_width": row.Fs_width,
+        **{name: getattr(row, name) for name in (*DRIVE, "Fs_width", "rest", "rotor")},
     }
 
 

@@ -10,6 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from mbs.components import Rotor
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar
 from mbs.files import write_text
@@ -20,7 +21,8 @@ from mbs.messages import did_you_mean
 
 _TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "guess", "extras")
 _FRAME = ("antecedent", "joint", "sigma", "actuated", "mu", *GEOMETRY, "limits", "name")
-_BODY = ("frame", *BODY_SCALARS, "name", "grouped")
+_BODY = ("frame", *BODY_SCALARS, "rotor", "name", "grouped")
+_ROTOR = ("inertia", "ratio", "axis")
 _LOOP = ("cut", "joint")
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -148,8 +150,21 @@ def _body(row: Mapping[str, Any], where: str) -> InertiaRow:
         frame=row["frame"],
         name=_text(row, "name", where),
         grouped=grouped,
+        rotor=_rotor(row["rotor"], f"{where}, rotor") if "rotor" in row else None,
         **{key: row[key] for key in BODY_SCALARS if key in row},
     )
+
+
+def _rotor(data: Any, where: str) -> Rotor:
+    if not isinstance(data, Mapping) or "inertia" not in data:
+        raise DescriptionError(
+            f"{where} is {data!r}; give a table {{inertia = ..., ratio = ..., axis = ...}}"
+        )
+    _check_keys(data, _ROTOR, where)
+    try:
+        return Rotor(**data)
+    except DescriptionError as error:
+        raise DescriptionError(f"{where.removesuffix('rotor')}{error}") from None
 
 
 def _loop(row: Mapping[str, Any], where: str) -> CutRow:
@@ -207,6 +222,10 @@ def _frame_dict(row: FrameRow) -> dict[str, Any]:
 
 def _body_dict(row: InertiaRow) -> dict[str, Any]:
     data: dict[str, Any] = {"frame": row.frame, **_without_defaults(row, BODY_SCALARS)}
+    if row.rotor is not None:
+        data["rotor"] = _without_defaults(row.rotor, ("inertia", "ratio"))
+        if row.rotor.axis is not None:
+            data["rotor"]["axis"] = list(row.rotor.axis)
     if row.name:
         data["name"] = row.name
     if row.grouped:
@@ -214,7 +233,7 @@ def _body_dict(row: InertiaRow) -> dict[str, Any]:
     return data
 
 
-def _without_defaults(row: FrameRow | InertiaRow, scalars: Iterable[str]) -> dict[str, Any]:
+def _without_defaults(row: FrameRow | InertiaRow | Rotor, scalars: Iterable[str]) -> dict[str, Any]:
     defaults = {field.name: field.default for field in fields(row)}
     values = {key: _plain(getattr(row, key)) for key in scalars}
     return {key: value for key, value in values.items() if value != defaults[key]}
@@ -250,4 +269,6 @@ def _toml(value: Any) -> str:
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
         return f"[{', '.join(_toml(element) for element in value)}]"
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{_key(k)} = {_toml(v)}' for k, v in value.items())} }}"
     return repr(value)

@@ -8,10 +8,13 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.models.symbols import symbols_of
 from mbs.recursions.energy import kinetic_energy, potential_energy
+from mbs.recursions.joint_efforts import spring_energy
 
 
 def energy(system: System, coordinates: str = "independent") -> Function:
-    """``energy(q, v) -> E, U``: kinetic energy, rotors included, and potential energy of gravity.
+    """``energy(q, v) -> E, U``: kinetic energy, rotors included, and potential energy.
+
+    The potential energy is that of gravity and of the springs of the joints.
 
     Source: Khalil & Creusot 1997, eq. 49-50.
 
@@ -20,13 +23,14 @@ def energy(system: System, coordinates: str = "independent") -> Function:
         coordinates: of a closed system, "independent" or "tree".
 
     Returns:
-        Function of q (nq, 1) and v (m, 1); E, U [J], U zero with everything at the base's origin.
+        Function of q (nq, 1) and v (m, 1); E, U [J], U zero with everything at the base's
+        origin and the springs at rest.
     """
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         E = kinetic_energy(system.tree, s.poses, s.v_tree)
-        U = potential_energy(system.tree, s.poses)
+        U = potential_energy(system.tree, s.poses) + spring_energy(system.tree, s.q)
         return [("q", s.q), ("v" + s.suffix, s.v)], [("E", E), ("U", U)]
 
     return model_function(system, ("energy", coordinates), build)

@@ -1,37 +1,42 @@
-"""The dynamic model in Lagrange's form: tau = A a + B v + Q.
-
-B is made of the Christoffel symbols, so that dA/dt - 2 B is skew-symmetric. For quaternion joints,
-whose velocities are not rates of positions, Hamel's terms are added as a skew-symmetric block.
-
-Source: Khalil & Creusot 1997, section 5.5; Hamel 1904 for quasi-velocities.
-"""
+"""The dynamic model in Lagrange's form: tau = A a + B v + Q."""
 
 from __future__ import annotations
 
 import casadi
 from casadi import SX, Function
 
-from mbs.assembly import System, Tree
-from mbs.assembly.model_function import Named, model_function
+from mbs.assembly import System
+from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.rates import position_rate
-from mbs.components.motion import Motion
 from mbs.errors import ModelError
+from mbs.messages import quoted
 from mbs.models.inverse_dynamics import tree_gravity
-from mbs.models.symbols import symbols_of
+from mbs.models.symbols import ModelSymbols, symbols_of
+from mbs.operations import count
+from mbs.recursions.augmented_body import LagrangeForm, lagrange_form
+from mbs.recursions.christoffel import christoffel
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
-from mbs.spatial import skew
+from mbs.recursions.joint_efforts import spring_effort
+
+_METHODS = ("auto", "renaud", "christoffel")
+_SHORT = 8
+"""Velocities up to which differentiation may win, in mechanisms that move in a plane."""
 
 
-def lagrange(
-    system: System, method: str = "christoffel", coordinates: str = "independent"
-) -> Function:
-    """``lagrange(q, v) -> A, B, Q``: inertia matrix, Coriolis matrix and gravity efforts.
+def lagrange(system: System, method: str = "auto", coordinates: str = "independent") -> Function:
+    """``lagrange(q, v) -> A, B, Q``: inertia matrix, Coriolis matrix, gravity and spring efforts.
 
-    Friction is not part of it. For closed systems B is G' (A dG/dt + B G).
+    dA/dt - 2 B is skew-symmetric. Friction is not part of it. For closed systems B is
+    G' (A dG/dt + B G).
+
+    Source: Renaud 1986; Khalil & Creusot 1997, section 5.5.
 
     Args:
         system: open or closed; q must close the loops.
-        method: "christoffel".
+        method: "renaud", a recursion over augmented bodies, "christoffel", which differentiates
+            the inertia matrix, or "auto" for the one that takes fewer operations. Their B are the
+            same but for the velocities of quaternion joints, where there are several with these
+            properties; "auto" then takes the recursion.
         coordinates: of a closed system, "independent" or "tree".
 
     Returns:
@@ -40,49 +45,51 @@ def lagrange(
     Raises:
         ModelError: another method was asked for.
     """
-    if method != "christoffel":
-        raise ModelError(f"{system.name}: method is {method!r}; use 'christoffel'")
+    require_system(system)
+    if method not in _METHODS:
+        raise ModelError(
+            f"{system.name}: method is {quoted(method)}; use one of {', '.join(_METHODS)}"
+        )
+    if method == "auto":
+        return _cheapest(system, coordinates)
+    return _model(system, method, coordinates)
 
+
+def _cheapest(system: System, coordinates: str) -> Function:
+    renaud = _model(system, "renaud", coordinates)
+    if system.nv > _SHORT or system.nq > system.nv:
+        return renaud
+    return min(renaud, _model(system, "christoffel", coordinates), key=_cost)
+
+
+def _cost(function: Function) -> int:
+    taken = count(function)
+    return taken.mul + taken.add + taken.div
+
+
+def _model(system: System, method: str, coordinates: str) -> Function:
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
-        A = tree_inertia(system.tree, s.poses)
-        v = SX.sym("v", system.nv)
-        B = casadi.substitute(christoffel(system.tree, s.q, v, A), v, s.v_tree)
+        form = _by_renaud(system, s) if method == "renaud" else _by_christoffel(system, s)
+        B = form.B
         if s.reduction is not None:
             G = s.reduction.G
             G_rate = casadi.jtimes(G, s.q, position_rate(system.tree, s.q, s.v_tree))
-            B = casadi.mtimes(G.T, casadi.mtimes(A, G_rate) + casadi.mtimes(B, G))
-        Q = s.reduced_effort(tree_gravity(system, s))
-        outputs = (("A", s.reduced_matrix(A)), ("B", B), ("Q", Q))
+            B = casadi.mtimes(G.T, casadi.mtimes(form.A, G_rate) + casadi.mtimes(B, G))
+        Q = s.reduced_effort(form.Q)
+        outputs = (("A", s.reduced_matrix(form.A)), ("B", B), ("Q", Q))
         return [("q", s.q), ("v" + s.suffix, s.v)], [(n + s.suffix, x) for n, x in outputs]
 
-    return model_function(system, ("lagrange", coordinates), build)
+    return model_function(system, ("lagrange", method, coordinates), build)
 
 
-def christoffel(tree: Tree, q: SX, v: SX, A: SX) -> SX:
-    """B (nv, nv) = (dA/dt + D - D') / 2 with D = d(A v)/dq N(q), plus Hamel's block.
-
-    Args:
-        tree: the links.
-        q: (nq, 1) symbols.
-        v: (nv, 1) symbols.
-        A: (nv, nv) inertia matrix at q.
-    """
-    momentum = casadi.mtimes(A, v)
-    direction = SX.sym("u", tree.nv)
-    rate = position_rate(tree, q, direction)
-    D = casadi.jacobian(casadi.jtimes(momentum, q, rate), direction)
-    A_rate = casadi.jtimes(A, q, position_rate(tree, q, v))
-    B = 0.5 * (A_rate + D - D.T)
-    for link in tree.links:
-        if link.motion in (Motion.SPHERICAL, Motion.FREE):
-            B[link.v, link.v] += _hamel(link.motion, momentum[link.v])
-    return B
+def _by_renaud(system: System, s: ModelSymbols) -> LagrangeForm:
+    form = lagrange_form(system.tree, s.poses, s.v_tree)
+    return LagrangeForm(form.A, form.B, form.Q + spring_effort(system.tree, s.q))
 
 
-def _hamel(motion: Motion, momentum: SX) -> SX:
-    """The matrix that times the joint's own velocity is w x p (and V x p) of its momentum p."""
-    if motion is Motion.SPHERICAL:
-        return -skew(momentum)
-    linear, angular = skew(momentum[0:3]), skew(momentum[3:6])
-    return -casadi.vertcat(casadi.horzcat(SX.zeros(3, 3), linear), casadi.horzcat(linear, angular))
+def _by_christoffel(system: System, s: ModelSymbols) -> LagrangeForm:
+    A = tree_inertia(system.tree, s.poses)
+    v = SX.sym("v", system.nv)
+    B = casadi.substitute(christoffel(system.tree, s.q, v, A), v, s.v_tree)
+    return LagrangeForm(A, B, tree_gravity(system, s))

@@ -4,7 +4,7 @@ What joint j cannot tell from a part of link i belongs to link i: mass on the ax
 joint, the whole rotational inertia behind a prismatic joint, the mass at the centre of a
 spherical joint. The equations stay the same; their constants are sums that are computed once.
 
-Source: Gautier & Khalil 1990; Khalil & Bennis 1994 (regrouped inertial parameters).
+Source: Gautier & Khalil 1990.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The matrix U of a turning body, and its moment, on the fewest products.
 
-Source: Khalil & Creusot 1997, eq. 8-10 and 18.
+Source: Balafoutis, Patel & Misra 1988 for the moment; Khalil & Creusot 1997, eq. 8-10.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 They hold the ten inertial parameters in the form in which the moment of a turning body takes the
 fewest products.
 
-Source: Atkeson, An & Hollerbach 1986 (the pseudo-inertia of computer animation and mechanics).
+Source: Balafoutis, Patel & Misra 1988 (Euler's tensor of a body).
 """
 
 from __future__ import annotations

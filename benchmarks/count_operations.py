@@ -80,8 +80,8 @@ unused lines, lines of constants alone and repeated sub-expressions were removed
 
 _HEAD = """# Operations of the models
 
-Made by `python benchmarks/count_operations.py docs/operations.md`. Multiplications / additions of each
-model as it is built, then after `mbs.operations.simplify`, then the fewest of OpenSYMORO and
+Made by `python benchmarks/count_operations.py docs/operations.md`. Multiplications / additions of
+each model as it is built, then after `mbs.operations.simplify`, then the fewest of OpenSYMORO and
 SymPyBotics for the same robot in base parameters.
 
 The convention is that of Khalil & Kleinfinger 1987: lengths and inertial parameters are symbols,

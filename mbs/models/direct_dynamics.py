@@ -16,10 +16,9 @@ from mbs.loops.reduction import independent_closure
 from mbs.loops.velocity import acceleration_bias, velocity_rows
 from mbs.messages import quoted
 from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.moving_base import base_under_gravity
+from mbs.models.surroundings import Surroundings, surroundings
 from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
 from mbs.operations import count
-from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.articulated_body import articulated_accelerations, inertia_pivots
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.joint_efforts import joint_efforts
@@ -61,6 +60,7 @@ def direct_dynamics(
     method: str = "auto",
     coordinates: str = "independent",
     *,
+    f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
     """``ddm(q, v, tau) -> a``: the accelerations that the joint efforts produce.
@@ -79,12 +79,14 @@ def direct_dynamics(
         method: "articulated" for open chains, "composite", or "auto" for the one that takes
             fewer operations.
         coordinates: of a closed system, "independent" or "tree".
+        f_ext: add an input f_ext (6, bodies): for each row of `system.bodies` the wrench
+            [force; moment] that the body exerts on its environment, in the body's frame.
         moving_base: add the inputs v_0 (6), velocity [V; w] of the base, a_0 (6), accelerations
             [vd; wd] of its origin and angular, both in its own axes, and R_0 (3, 3), orientation
             of the base in the frame in which gravity is given.
 
     Returns:
-        Function of q (nq, 1), v and tau (m, 1), v_0, a_0, R_0; a (m, 1) [rad/s^2 or m/s^2].
+        Function of q (nq, 1), v and tau (m, 1), f_ext, v_0, a_0, R_0; a (m, 1) [rad/s^2 or m/s^2].
 
     Raises:
         ModelError: some joint moves no inertia, so that its acceleration is not determined; or
@@ -96,11 +98,11 @@ def direct_dynamics(
     _require_inertia(system)
 
     def model(method: str) -> Function:
-        return _model(system, method, moving_base, coordinates)
+        return _model(system, method, coordinates, f_ext, moving_base)
 
     if method != "auto":
         return model(method)
-    key = ("cheapest ddm", moving_base, coordinates)
+    key = ("cheapest ddm", coordinates, f_ext, moving_base)
     cheapest: Function = system.cached(key, lambda: _cheapest(system, model))
     return cheapest
 
@@ -140,38 +142,42 @@ def _cost(function: Function) -> int:
     return taken.mul + taken.add + 2 * taken.div
 
 
-def _model(system: System, method: str, moving_base: bool, coordinates: str) -> Function:
+def _model(
+    system: System, method: str, coordinates: str, f_ext: bool, moving_base: bool
+) -> Function:
     in_tree = coordinates == "tree" and system.is_closed
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         name, tau = s.input("tau")
-        base, motion = base_under_gravity(system.tree.gravity, moving_base)
-        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, tau), *motion]
+        around = surroundings(system, f_ext, moving_base)
+        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, tau), *around.inputs]
         if in_tree:
-            a, lam = _tree_accelerations(system, s, tau, base)
+            a, lam = _tree_accelerations(system, s, tau, around)
             return inputs, [("a", a), ("lam", lam)]
         accelerations = _articulated if method == "articulated" else _composite
-        return inputs, [("a" + s.suffix, accelerations(system, s, tau, base))]
+        return inputs, [("a" + s.suffix, accelerations(system, s, tau, around))]
 
-    return model_function(system, ("ddm", method, moving_base, coordinates), build)
+    return model_function(system, ("ddm", method, coordinates, f_ext, moving_base), build)
 
 
-def _articulated(system: System, s: ModelSymbols, tau: SX, base: Acceleration) -> SX:
+def _articulated(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:
     joints = joint_efforts(system.tree, s.q, s.v, SX.zeros(system.nv))
-    return articulated_accelerations(system.tree, s.poses, s.v, tau - joints, base)
+    return articulated_accelerations(
+        system.tree, s.poses, s.v, tau - joints, around.base, around.external
+    )
 
 
-def _composite(system: System, s: ModelSymbols, tau: SX, base: Acceleration) -> SX:
+def _composite(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:
     A = tree_inertia(system.tree, s.poses)
-    H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), base))
+    H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around))
     if s.reduction is None:
         return solve_tree(A, tau - H, velocity_antecedents(system.tree))
     return solve_tree(s.reduced_matrix(A), tau - H, list(range(-1, s.size - 1)))
 
 
 def _tree_accelerations(
-    system: System, s: ModelSymbols, tau: SX, base: Acceleration
+    system: System, s: ModelSymbols, tau: SX, around: Surroundings
 ) -> tuple[SX, SX]:
     """Accelerations of the tree and efforts of the closure, massless links included.
 
@@ -179,7 +185,7 @@ def _tree_accelerations(
     finite where rows become dependent, and one refinement restores the digits that this costs.
     """
     A = tree_inertia(system.tree, s.poses)
-    H = tree_efforts(system, s, SX.zeros(system.nv), base)
+    H = tree_efforts(system, s, SX.zeros(system.nv), around)
     J = velocity_rows(system, s.q, independent_closure(system, s.q))
     psi = acceleration_bias(system, s.q, s.v, J)
     c = _penalty(system)

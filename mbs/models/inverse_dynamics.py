@@ -7,13 +7,12 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.models.moving_base import base_under_gravity
+from mbs.models.surroundings import Surroundings, surroundings
 from mbs.models.symbols import ModelSymbols, symbols_of
-from mbs.recursions.accelerations import Acceleration, resting_base
+from mbs.recursions.accelerations import resting_base
 from mbs.recursions.joint_efforts import joint_efforts, spring_effort
 from mbs.recursions.names import newton_euler_names
-from mbs.recursions.newton_euler import Dynamics, Wrench, newton_euler
-from mbs.spatial import cross
+from mbs.recursions.newton_euler import Dynamics, newton_euler
 
 
 def inverse_dynamics(
@@ -45,15 +44,10 @@ def inverse_dynamics(
     def build() -> tuple[Named, Named, Named]:
         s = symbols_of(system, coordinates)
         name, a = s.input("a")
-        wrenches = SX.sym("f_ext", 6, len(system.bodies))
-        external = external_wrenches(system, wrenches) if f_ext else None
-        base, motion = base_under_gravity(system.tree.gravity, moving_base)
-        dynamics = tree_dynamics(system, s, s.tree_acceleration(a), base, external)
-        tau = s.reduced_effort(with_joints(system, s, dynamics, s.tree_acceleration(a)))
-        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, a)]
-        extra: Named = [("f_ext", wrenches)] if f_ext else []
-        names = newton_euler_names(dynamics)
-        return [*inputs, *extra, *motion], [("tau" + s.suffix, tau)], names
+        around = surroundings(system, f_ext, moving_base)
+        tau, names = _efforts(system, s, s.tree_acceleration(a), around)
+        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, a), *around.inputs]
+        return inputs, [("tau" + s.suffix, tau)], names
 
     return model_function(system, ("idm", f_ext, moving_base, coordinates), build)
 
@@ -78,12 +72,10 @@ def bias(
 
     def build() -> tuple[Named, Named, Named]:
         s = symbols_of(system, coordinates)
-        base, motion = base_under_gravity(system.tree.gravity, moving_base)
-        a = s.tree_acceleration(SX.zeros(s.size))
-        dynamics = tree_dynamics(system, s, a, base)
-        H = s.reduced_effort(with_joints(system, s, dynamics, a))
-        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), *motion]
-        return inputs, [("H" + s.suffix, H)], newton_euler_names(dynamics)
+        around = surroundings(system, moves=moving_base)
+        H, names = _efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around)
+        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), *around.inputs]
+        return inputs, [("H" + s.suffix, H)], names
 
     return model_function(system, ("bias", moving_base, coordinates), build)
 
@@ -117,26 +109,21 @@ def gravity_effort(
     return model_function(system, ("gravity", moving_base, coordinates), build)
 
 
-def tree_dynamics(
-    system: System,
-    s: ModelSymbols,
-    a: SX,
-    base: Acceleration,
-    external: dict[int, Wrench] | None = None,
-) -> Dynamics:
-    """The recursions over the tree for its accelerations a (nv, 1), without joint effects."""
-    return newton_euler(system.tree, s.poses, s.v_tree, a, base, external)
+def _efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> tuple[SX, Named]:
+    """Efforts of the input coordinates for accelerations of the tree, and what stands between."""
+    dynamics = _dynamics(system, s, a, around)
+    tau = dynamics.efforts + joint_efforts(system.tree, s.q, s.v_tree, a)
+    return s.reduced_effort(tau), newton_euler_names(dynamics)
 
 
-def with_joints(system: System, s: ModelSymbols, dynamics: Dynamics, a: SX) -> SX:
-    """(nv, 1) efforts with the drives, friction and springs of the joints."""
-    return dynamics.efforts + joint_efforts(system.tree, s.q, s.v_tree, a)
-
-
-def tree_efforts(system: System, s: ModelSymbols, a: SX, base: Acceleration | None = None) -> SX:
+def tree_efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> SX:
     """(nv, 1) efforts of the tree, those of its joints included, for accelerations a (nv, 1)."""
-    resting = resting_base(system.tree.gravity)
-    return with_joints(system, s, tree_dynamics(system, s, a, base or resting), a)
+    joints = joint_efforts(system.tree, s.q, s.v_tree, a)
+    return _dynamics(system, s, a, around).efforts + joints
+
+
+def _dynamics(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> Dynamics:
+    return newton_euler(system.tree, s.poses, s.v_tree, a, around.base, around.external)
 
 
 def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> SX:
@@ -145,15 +132,3 @@ def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> 
     base = resting_base(system.tree.gravity if gravity is None else gravity)
     efforts = newton_euler(system.tree, s.poses, rest, rest, base).efforts
     return efforts + spring_effort(system.tree, s.q)
-
-
-def external_wrenches(system: System, wrenches: SX) -> dict[int, Wrench]:
-    """The wrenches of bodies, (6, bodies) in their frames, brought to the frames of their links."""
-    result: dict[int, Wrench] = {}
-    for column, row in enumerate(system.bodies):
-        link, pose = system.frames[row.name]
-        f = casadi.mtimes(pose.R, wrenches[0:3, column])
-        m = casadi.mtimes(pose.R, wrenches[3:6, column]) + cross(pose.p, f)
-        before = result.get(link)
-        result[link] = (f, m) if before is None else (before[0] + f, before[1] + m)
-    return result

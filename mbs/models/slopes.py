@@ -13,6 +13,7 @@ from mbs.assembly import System
 from mbs.assembly.rates import position_rate
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.inverse_dynamics import tree_efforts
+from mbs.models.surroundings import surroundings
 from mbs.models.symbols import ModelSymbols
 from mbs.recursions.accelerations import resting_base
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
@@ -26,7 +27,7 @@ Blocks = dict[str, SX]
 
 def efforts_by_ad(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
     """Derivatives of the efforts by differentiating the recursion, and the efforts."""
-    tau = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(a)))
+    tau = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(a), surroundings(system)))
     blocks = {
         "q": _along_motion(system, s, tau),
         "v": casadi.jacobian(tau, s.v),

@@ -8,7 +8,7 @@ Source: Featherstone 1983; Brandl, Johanni & Otter 1988; Khalil & Creusot 1997, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi
@@ -18,7 +18,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
 from mbs.recursions.accelerations import Acceleration, link_accelerations
 from mbs.recursions.articulated_inertia import ArticulatedInertia, Drive, Pivot
-from mbs.recursions.newton_euler import inertial_wrench
+from mbs.recursions.newton_euler import Wrench, inertial_wrench
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
 from mbs.recursions.rotors import rotor_efforts, rotor_moments
@@ -65,7 +65,12 @@ def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
 
 
 def articulated_accelerations(
-    tree: Tree, poses: list[LinkPose], v: SX, efforts: SX, base: Acceleration
+    tree: Tree,
+    poses: list[LinkPose],
+    v: SX,
+    efforts: SX,
+    base: Acceleration,
+    external: Mapping[int, Wrench],
 ) -> SX:
     """(nv, 1) joint accelerations that efforts produce, friction and springs left out.
 
@@ -78,18 +83,22 @@ def articulated_accelerations(
         v: (nv, 1) joint velocities.
         efforts: (nv, 1) without those of friction and springs.
         base: motion of the base; see `resting_base`.
+        external: for some links the wrench that they exert on their environment.
     """
-    rests = is_zero(base.w)
-    moved, inertias = slid(tree, poses, [link.inertia for link in tree.links], base_rests=rests)
-    _, bodies = slid(
-        tree, poses, [PseudoInertia.of(link.inertia) for link in tree.links], base_rests=rests
-    )
+    moved, inertias = poses, [link.inertia for link in tree.links]
+    bodies = [PseudoInertia.of(inertia) for inertia in inertias]
+    if not external:
+        rests = is_zero(base.w)
+        moved, inertias = slid(tree, poses, inertias, base_rests=rests)
+        _, bodies = slid(tree, poses, bodies, base_rests=rests)
     still = SX.zeros(tree.nv)
     motions = link_accelerations(tree, moved, v, still, base)
     wrenches = [
         casadi.vertcat(*inertial_wrench(body, motion))
         for body, motion in zip(regrouped(tree, moved, bodies), motions, strict=True)
     ]
+    for j, wrench in external.items():
+        wrenches[j] += casadi.vertcat(*wrench)
     for carrier, moment in rotor_moments(tree, v, still, motions).items():
         wrenches[carrier] += casadi.vertcat(zeros(), moment)
     left = efforts - rotor_efforts(tree, still, motions, base)

@@ -162,6 +162,24 @@ def test_moving_base(method, name):
     np.testing.assert_allclose(back, a, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("method", ["articulated", "composite"])
+@pytest.mark.parametrize("name", ["puma560", "two_branch_tree", "four_bar"])
+def test_external_wrenches(method, name):
+    system = mbs.load(name).assemble()
+    method = "composite" if system.is_closed else method
+    rng = np.random.default_rng(3)
+    m = len(system.active)
+    q = list(system.posture)
+    v, a = rng.uniform(-1, 1, (2, m))
+    wrenches = rng.uniform(-1, 1, (6, len(system.bodies)))
+    loaded = mbs.models.inverse_dynamics(system, f_ext=True)(q, v, a, wrenches)
+    free = mbs.models.inverse_dynamics(system)(q, v, a)
+    assert float(casadi.norm_inf(loaded - free)) > 0.1
+    ddm = mbs.models.direct_dynamics(system, method, f_ext=True)
+    back = np.array(ddm(q, v, loaded, wrenches)).ravel()
+    np.testing.assert_allclose(back, a, rtol=0, atol=1e-9)
+
+
 def test_symbols_stay_symbols():
     m = Mechanism("pendulum", gravity=(0, -9.81, 0))
     bob, rod = m.add(PointMass("bob", mass=mbs.Parameter("m", 2.0))), m.add(Body("rod"))

@@ -64,7 +64,7 @@ def moment_of_run(
     axis = first.at_seat(vector([0, 0, 1]))
     moments = {j: loads[j][1] for j in members}
     pushes = {j: loads[j][0] for j in members}
-    total = cross(axis, vector([first.foot[0], 0, 0]))[2] * forces[members[0]]
+    total = cross(axis, first.at_seat(first.foot))[2] * forces[members[0]]
     for j in reversed(members[1:]):
         i, foot = tree.links[j].antecedent, poses[j].foot
         moments[i] = moments[i] + vector([0, -foot[0] * forces[j], 0])

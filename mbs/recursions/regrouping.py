@@ -15,9 +15,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.motion import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Body, Inertia, Screw, elements
-
-_ROUNDING = 1e-15
+from mbs.spatial import Body, Inertia, Screw, elements, exact_sum
 
 
 def regrouped(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]:
@@ -35,8 +33,9 @@ def regrouped(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Bod
             continue
         bodies[j], moved = _parts(link.motion, bodies[j])
         if link.antecedent >= 0:
-            bodies[link.antecedent] += _seen_through(moved, link.motion, poses[j])
-    return _without_rounding(bodies)
+            part = _seen_through(moved, link.motion, poses[j])
+            bodies[link.antecedent] = _joined(bodies[link.antecedent], part)
+    return bodies
 
 
 def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
@@ -63,25 +62,16 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
     return body
 
 
-def _without_rounding(bodies: list[Body]) -> list[Body]:
-    """Sums of constants that ought to cancel made zero, so that they fold."""
-    every = [value for body in bodies for value in _entries(body)]
-    numbers = [abs(float(value)) for value in every if value.is_constant()]
-    least = _ROUNDING * max(numbers, default=0.0)
+def _joined(body: Body, part: Body) -> Body:
+    """Two bodies welded together; numbers that cancel are zero, so that they fold."""
+    both = zip(_moments(body), _moments(part), strict=True)
+    return type(body)(*(_sum(a, b) for a, b in both))
 
-    def clean(matrix: SX) -> SX:
-        kept = SX(matrix)
-        for k in range(kept.numel()):
-            if kept[k].is_constant() and abs(float(kept[k])) <= least:
-                kept[k] = 0
-        return kept
 
-    return [type(b)(*(clean(part) for part in _moments(b))) for b in bodies]
+def _sum(a: SX, b: SX) -> SX:
+    entries = (exact_sum(x, y) for x, y in zip(elements(a), elements(b), strict=True))
+    return casadi.reshape(casadi.vertcat(*entries), *a.shape)
 
 
 def _moments(body: Body) -> tuple[SX, SX, SX]:
     return body.J if isinstance(body, Inertia) else body.S, body.ms, body.m
-
-
-def _entries(body: Body) -> list[SX]:
-    return elements(casadi.vertcat(*(casadi.vec(part) for part in _moments(body))))

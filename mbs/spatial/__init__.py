@@ -12,7 +12,7 @@ from mbs.spatial.pseudo_inertia import PseudoInertia
 from mbs.spatial.quaternion import quaternion_rate, quaternion_rotation
 from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, align_z, axis_turn
 from mbs.spatial.screw import Body, Displacement, FreeDisplacement, Screw
-from mbs.spatial.vectors import cross, elements, is_zero, skew, snapped, vector, zeros
+from mbs.spatial.vectors import cross, elements, exact_sum, is_zero, skew, snapped, vector, zeros
 
 __all__ = [
     "Body",
@@ -30,6 +30,7 @@ __all__ = [
     "axis_turn",
     "cross",
     "elements",
+    "exact_sum",
     "is_zero",
     "quaternion_rate",
     "quaternion_rotation",

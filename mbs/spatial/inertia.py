@@ -8,7 +8,7 @@ import casadi
 from casadi import SX
 
 from mbs.spatial.rotation import Rotation
-from mbs.spatial.vectors import skew, zeros
+from mbs.spatial.vectors import exact_sum, skew, zeros
 
 TEN_PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Names of the inertial parameters, in the order of Khalil & Kleinfinger 1986."""
@@ -87,12 +87,11 @@ class Inertia:
         if t.is_zero():
             return self
         J, ms = SX(self.J), SX(self.ms)
-        ms[axis] += self.m * t
-        across = t * (self.ms[axis] + ms[axis])
+        ms[axis] = exact_sum(ms[axis], self.m * t)
+        across = t * exact_sum(self.ms[axis], ms[axis])
         for k in ((axis + 1) % 3, (axis + 2) % 3):
-            J[k, k] += across
-            J[axis, k] -= t * self.ms[k]
-            J[k, axis] = J[axis, k]
+            J[k, k] = exact_sum(J[k, k], across)
+            J[axis, k] = J[k, axis] = exact_sum(J[axis, k], -t * self.ms[k])
         return Inertia(J, ms, self.m)
 
     def along_axis(self) -> tuple[Inertia, Inertia]:
@@ -102,7 +101,7 @@ class Inertia:
         """
         J, on_axis = SX(self.J), zeros(3, 3)
         on_axis[0, 0] = on_axis[1, 1] = self.J[1, 1]
-        J[0, 0], J[1, 1] = self.J[0, 0] - self.J[1, 1], 0
+        J[0, 0], J[1, 1] = exact_sum(self.J[0, 0], -self.J[1, 1]), 0
         ms, height = SX(self.ms), zeros()
         height[2], ms[2] = self.ms[2], 0
         return Inertia(J, ms, SX(0)), Inertia(on_axis, height, self.m)

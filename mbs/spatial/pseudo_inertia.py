@@ -15,7 +15,7 @@ from casadi import SX
 
 from mbs.spatial.inertia import Inertia
 from mbs.spatial.rotation import Rotation
-from mbs.spatial.vectors import zeros
+from mbs.spatial.vectors import exact_sum, zeros
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class PseudoInertia:
         S = casadi.densify(-J)
         for k in range(3):
             m, n = (k + 1) % 3, (k + 2) % 3
-            S[k, k] = 0.5 * (J[m, m] + J[n, n] - J[k, k])
+            S[k, k] = 0.5 * exact_sum(J[m, m] + J[n, n], -J[k, k])
         return PseudoInertia(S, inertia.ms, inertia.m)
 
     def __add__(self, other: PseudoInertia) -> PseudoInertia:
@@ -55,11 +55,10 @@ class PseudoInertia:
         if t.is_zero():
             return self
         S, ms = SX(self.S), SX(self.ms)
-        ms[axis] += self.m * t
+        ms[axis] = exact_sum(ms[axis], self.m * t)
         for k in ((axis + 1) % 3, (axis + 2) % 3):
-            S[axis, k] += t * self.ms[k]
-            S[k, axis] = S[axis, k]
-        S[axis, axis] += t * (self.ms[axis] + ms[axis])
+            S[axis, k] = S[k, axis] = exact_sum(S[axis, k], t * self.ms[k])
+        S[axis, axis] = exact_sum(S[axis, axis], t * exact_sum(self.ms[axis], ms[axis]))
         return PseudoInertia(S, ms, self.m)
 
     def along_axis(self) -> tuple[PseudoInertia, PseudoInertia]:

@@ -6,6 +6,7 @@ import casadi
 from casadi import SX
 
 _SNAP = 1e-12
+_ROUNDING = 2e-15
 
 
 def vector(elements: Iterable[SX | float]) -> SX:
@@ -42,6 +43,17 @@ def elements(value: SX) -> list[SX]:
     """The scalars of a matrix, column by column, zeros included."""
     dense = casadi.densify(value)
     return [SX(dense[k]) for k in range(dense.numel())]
+
+
+def exact_sum(a: SX, b: SX) -> SX:
+    """The scalar a + b; zero where two numbers cancel but for the rounding of their last digits.
+
+    Constants that ought to cancel fold only so; what is small by itself stays.
+    """
+    total = SX(a + b)
+    if not (a.is_constant() and b.is_constant()):
+        return total
+    return SX(0) if abs(float(total)) <= _ROUNDING * (abs(float(a)) + abs(float(b))) else total
 
 
 def snapped(value: SX) -> SX:

@@ -1,19 +1,11 @@
 """Operations of the models of published robots: bounds that a change may only lower."""
 
 import pytest
+from count_operations import MODELS
 from symbolic_robots import ROBOTS, symbolic_robot
 
-import mbs
 from mbs.operations import count
 
-MODELS = {
-    "IDM": mbs.models.inverse_dynamics,
-    "A": mbs.models.inertia_matrix,
-    "H": mbs.models.bias,
-    "DDM": mbs.models.direct_dynamics,
-    "DGM": lambda system: mbs.models.transform(system, len(system.links)),
-    "J": lambda system: mbs.models.jacobian(system, len(system.links)),
-}
 BOUNDS = {
     "general_6r": ["382/318", "332/273", "372/303", "795/647", "136/78", "138/75"],
     "puma560": ["241/225", "137/133", "226/202", "454/406", "48/23", "32/13"],

@@ -10,6 +10,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from mbs.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from mbs import (
         components,
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
     from mbs.expressions import Parameter
     from mbs.result import Result
     from mbs.robots import load
-
-__version__ = "0.1.0"
 
 _NAMES = {
     "Mechanism": "mbs.components",

@@ -5,6 +5,7 @@
     │   └── ExpressionError   a text is not a number or an expression of symbols
     ├── AssemblyError         the components do not form a mechanism
     ├── LoopError             a closed loop has no usable posture
+    │   ├── NoClosedForm      a loop is solved by iteration only
     │   └── Unclosable        no posture closes the loop
     ├── ModelError            a model was asked for that the system does not have
     ├── SolverError           a numerical method could not go on
@@ -33,6 +34,10 @@ class AssemblyError(MbsError, ValueError):
 
 class LoopError(MbsError):
     """A closed loop has no usable posture."""
+
+
+class NoClosedForm(LoopError):
+    """A loop whose passive joints no closed form known here gives."""
 
 
 class Unclosable(LoopError):

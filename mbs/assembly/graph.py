@@ -12,6 +12,7 @@ from casadi import SX
 
 from mbs.components import Component, Fixed, Joint, Mechanism, Point, RigidBody
 from mbs.components.placement import KhalilStep
+from mbs.components.transmissions import Transmission
 from mbs.errors import AssemblyError
 from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose
 
@@ -79,6 +80,7 @@ def connection_graph(
         raise AssemblyError(
             f"{mechanism.name}: there is no joint that moves; connect bodies by joints"
         )
+    _check_transmissions(mechanism)
     welds = _welds(mechanism, symbols)
     _require_connected(mechanism, welds)
     at = _evaluator(symbols, values)
@@ -95,6 +97,26 @@ def connection_graph(
         if joint.name in joints
     )
     return Graph(tuple(nodes), edges)
+
+
+def _check_transmissions(mechanism: Mechanism) -> None:
+    """Refuse a gear, rack or screw between coordinates that do not turn or slide as it needs."""
+    motions = {
+        f"{joint.name}.{freedom.suffix}" if freedom.suffix else joint.name: freedom.motion
+        for joint in mechanism.joints()
+        for freedom in joint.freedoms
+    }
+    for coupling in mechanism.couplings():
+        if isinstance(coupling, Transmission):
+            roles = zip(("driven", "driver"), coupling.kinds, strict=True)
+            for role, kind in roles:
+                name = getattr(coupling, role)
+                if motions.get(name, kind) is not kind:
+                    raise AssemblyError(
+                        f"{mechanism.name}: the {role} coordinate of {type(coupling).__name__}"
+                        f" {coupling.name!r} must be {kind.value}, but {name!r} is"
+                        f" {motions[name].value}; name another coordinate"
+                    )
 
 
 def inertia_of(node: Node, mechanism: Mechanism, symbols: Mapping[str, SX]) -> Inertia:

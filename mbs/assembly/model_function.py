@@ -12,6 +12,7 @@ from casadi import DM, MX, SX, Function
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
+from mbs.messages import quoted
 
 Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""
@@ -114,9 +115,17 @@ class ModelFunction(Function):
         return {name: given[name] for name in names}
 
     def _check(self, name: str, value: Any) -> None:
-        wanted = self.size1_in(name)
-        shape = value.shape if hasattr(value, "shape") else np.shape(value)
+        wanted, width = self.size_in(name)
+        shape = _shape(value)
+        if shape is None:
+            raise ModelError(f"{self._title}: {name} is {quoted(value)}; give numbers")
         rows, columns = (*shape, 1, 1)[:2]
+        if width > 1 and not self.elements(name):
+            if rows == wanted and columns % width == 0:
+                return
+            raise ModelError(
+                f"{self._title}: {name} has the shape {shape}, it needs {(wanted, width)}"
+            )
         if rows == wanted or (rows, columns) == (1, wanted):
             return
         if shape == () and isinstance(value, (int, float)) and value == 0:
@@ -129,14 +138,28 @@ class ModelFunction(Function):
         every = outputs if isinstance(outputs, tuple) else (outputs,)
         if all(isinstance(o, (SX, MX)) or DM(o).is_regular() for o in every):
             return
+        loops = ", no posture closes the loops there" if self._system.is_closed else ""
         raise ModelError(
-            f"{self._title}: the result is not a number; an input is not finite, no posture closes"
-            " the loops there, or the posture is singular"
+            f"{self._title}: the result is not a number; an input is not finite{loops}, a parameter"
+            " takes a value that has no sense, or the posture is singular"
         )
 
     def _shapes(self) -> str:
         sizes = (f"{name} {self.size_in(name)}" for name in self.name_in())
         return ", ".join(sizes)
+
+
+def _shape(value: Any) -> tuple[int, ...] | None:
+    """Rows and columns of what may be an input; None of what is no number."""
+    if isinstance(value, (SX, MX, DM)):
+        return value.shape
+    if isinstance(value, (list, tuple)) and any(isinstance(e, (SX, MX, DM)) for e in value):
+        return (len(value),)
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return None
+    return array.shape if array.dtype.kind in "biuf" else None
 
 
 def _matrix(value: Any) -> Any:

@@ -16,6 +16,9 @@ from mbs.assembly.tables import (
     BodyRow,
     Coordinate,
     LoopRow,
+    Places,
+    attached_forces,
+    force_elements,
     position_coordinates,
     velocity_coordinates,
 )
@@ -43,7 +46,8 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
     coupled = [name for c in mechanism.couplings() for name in (c.driven, c.driver)]
-    wanted = (*guessed, *coupled)
+    pushed = [force.coordinate for force in force_elements(mechanism) if force.coordinate]
+    wanted = (*guessed, *coupled, *pushed)
     keep = {name for joint in mechanism.joints() for name in _owners(joint, wanted)}
     spanning = spanning_tree(
         mechanism.name, graph, keep=keep, cut=mechanism.cuts, given_order=mechanism.keep_order
@@ -59,6 +63,8 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     actuated = [_is_actuated(joint, in_loops) for _, _, joint in moved]
     coordinates = position_coordinates(moved, actuated)
     _check_names(mechanism, coordinates)
+    speeds = velocity_coordinates(moved, actuated)
+    places, cut = _places(graph, framed), _cut_coordinates(framed.cuts)
     return System(
         name=mechanism.name,
         source=mechanism.source,
@@ -68,13 +74,14 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         parameters=parameters,
         p=casadi.vertcat(*symbols.values()) if symbols else SX(0, 1),
         coordinates=coordinates,
-        speeds=velocity_coordinates(moved, actuated),
-        cut_coordinates=_cut_coordinates(framed.cuts),
+        speeds=speeds,
+        cut_coordinates=cut,
         bodies=_bodies(mechanism, graph, framed),
-        frames=_frames(mechanism, graph, framed, symbols),
+        frames=_frames(mechanism, places, symbols),
         named_frames=tuple(mechanism.frames),
         loops=_loop_rows(mechanism, framed),
         posture=tuple(zero_position(framed.tree)),
+        forces=attached_forces(mechanism, places, (coordinates, speeds, cut), symbols),
     )
 
 
@@ -198,14 +205,18 @@ def _mass(body: Component, values: Mapping[str, float]) -> float | None:
     return 0.0
 
 
+def _places(graph: Graph, framed: Framed) -> Places:
+    return {
+        port: (link, pose @ inside)
+        for node, (link, pose) in zip(graph.nodes, framed.homes, strict=True)
+        for port, inside in node.members.items()
+    }
+
+
 def _frames(
-    mechanism: Mechanism, graph: Graph, framed: Framed, symbols: Mapping[str, SX]
+    mechanism: Mechanism, places: Places, symbols: Mapping[str, SX]
 ) -> dict[str, tuple[int, Pose]]:
     """The base, every body's reference frame, and every frame that was given a name."""
-    places: dict[tuple[str, str], tuple[int, Pose]] = {}
-    for node, (link, pose) in zip(graph.nodes, framed.homes, strict=True):
-        for port, inside in node.members.items():
-            places[port] = link, pose @ inside
     frames = {"base": places[mechanism.world.name, ""]}
     for body in (mechanism.world, *mechanism.bodies()):
         link, pose = frames[body.name] = places[body.name, ""]

@@ -47,7 +47,8 @@ def spanning_tree(
 
     Prim's algorithm from the world: among the joints that reach a new body, the one that is
     least wanted as a cut comes first (driven or guessed before passive, few freedoms before
-    many), then the one nearest to the base, which keeps loops short.
+    many), then the one nearest to the base, which keeps loops short. Constraints, which place
+    nothing, are always cut.
 
     Args:
         name: of the mechanism, for messages.
@@ -61,12 +62,9 @@ def spanning_tree(
     """
     chosen = _prim(graph, set(keep), set(cut))
     reached = {0} | {edge.a for edge in chosen} | {edge.b for edge in chosen}
-    for number, node in enumerate(graph.nodes):
+    for number in range(len(graph.nodes)):
         if number not in reached:
-            raise AssemblyError(
-                f"{name}: no chain of joints leads from the world to {node.name!r};"
-                " connect it, or connect it to the world by a Free joint"
-            )
+            raise AssemblyError(_unreached(name, graph, number))
     for edge in chosen:
         if edge.joint.name in cut:
             raise AssemblyError(
@@ -80,6 +78,19 @@ def spanning_tree(
     return SpanningTree(tuple(branches), cuts)
 
 
+def _unreached(name: str, graph: Graph, number: int) -> str:
+    """That nothing places a node, and what to do."""
+    holders = [e.joint for e in graph.edges if number in (e.a, e.b) and not e.joint.places]
+    where = f"{name}: no chain of joints leads from the world to {graph.nodes[number].name!r}"
+    if holders:
+        joint = holders[0]
+        return (
+            f"{where}: {type(joint).__name__} {joint.name!r} constrains it but does not place it;"
+            " connect it to the world by a Free joint, too"
+        )
+    return f"{where}; connect it, or connect it to the world by a Free joint"
+
+
 def _prim(graph: Graph, keep: set[str], cut: set[str]) -> list[Edge]:
     depth = {0: 0}
     chosen: list[Edge] = []
@@ -87,8 +98,8 @@ def _prim(graph: Graph, keep: set[str], cut: set[str]) -> list[Edge]:
 
     def offer(node: int) -> None:
         for number, edge in enumerate(graph.edges):
-            if node in (edge.a, edge.b):
-                joint = edge.joint
+            joint = edge.joint
+            if joint.places and node in (edge.a, edge.b):
                 passive = not (joint.carries_effort or joint.name in keep)
                 key = (joint.name in cut, passive, joint.nv, depth[node], number)
                 heapq.heappush(queue, (key, number))

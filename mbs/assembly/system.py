@@ -9,12 +9,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import casadi
+import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.rates import position_rate
 from mbs.assembly.report import report
 from mbs.assembly.tables import (
+    AttachedForce,
     BodyRow,
     Closure,
     Coordinate,
@@ -69,6 +71,7 @@ class System:
         loops: one row for each loop or coupling.
         posture: a position q that closes the loops, or all zero.
         closure: how the loops constrain velocities; None for an open chain.
+        forces: springs, dampers and other force elements.
     """
 
     name: str
@@ -87,6 +90,7 @@ class System:
     loops: tuple[LoopRow, ...]
     posture: tuple[float, ...]
     closure: Closure | None = None
+    forces: tuple[AttachedForce, ...] = ()
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -126,7 +130,7 @@ class System:
 
     def report(self) -> str:
         """What was assembled, in plain sentences."""
-        return report(self)
+        return "\n".join([report(self), *(force.sentence for force in self.forces)])
 
     def qdot(self, q: Any, v: Any) -> Any:
         """(nq, 1) time derivative of q; it differs from v for quaternion joints only.
@@ -156,11 +160,16 @@ class System:
         Raises:
             ModelError: there is no such frame.
         """
-        if isinstance(name, int):
+        if isinstance(name, (int, np.integer)) and not isinstance(name, bool):
             if 0 <= name <= len(self.tree.links):
-                return name - 1, Pose.identity()
+                return int(name) - 1, Pose.identity()
             raise ModelError(
-                f"{self.name}: there is no link {name}; the links are 1 to {len(self.tree.links)}"
+                f"{self.name}: there is no link {name}; the links are 1 to {len(self.tree.links)},"
+                " and 0 is the base"
+            )
+        if not isinstance(name, str):
+            raise ModelError(
+                f"{self.name}: {quoted(name)} names no frame; give a text or the number of a link"
             )
         if name in self.frames:
             return self.frames[name]

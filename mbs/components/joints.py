@@ -79,6 +79,11 @@ class Joint(Component):
         raise NotImplementedError
 
     @property
+    def places(self) -> bool:
+        """Whether its coordinates can place one frame in the other, as in a tree they must."""
+        return True
+
+    @property
     def frame_a(self) -> Point:
         """The frame that the joint moves with respect to."""
         return Point(self, "a")

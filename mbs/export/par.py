@@ -81,13 +81,18 @@ def _table(system: System) -> RobotTable:
 
 
 def _check(system: System) -> None:
+    if system.forces:
+        raise ModelError(
+            f"{system.name}: force element {system.forces[0].element.name!r} cannot be said in a"
+            " .par file; take it out"
+        )
     for link in system.tree.links:
         if link.motion not in _SIGMA:
             raise ModelError(
                 f"{system.name}/{link.name}: a .par file has no {link.motion.value} joint; use"
                 " revolute and prismatic joints"
             )
-        if getattr(link, "rotor", None) is not None:
+        if link.rotor is not None:
             raise ModelError(
                 f"{system.name}/{link.name}: a .par file has no rotor on a moving link; give its"
                 " inertia seen at the joint as Ia"

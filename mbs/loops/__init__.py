@@ -1,8 +1,18 @@
 """Closed loops: closure equations, their independent rows, postures, reduction."""
 
 from mbs.loops.closure import closure
+from mbs.loops.function import function
+from mbs.loops.modes import Mode, modes
 from mbs.loops.posture import solve
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
 
-__all__ = ["closure", "closure_jacobian", "reduction_matrix", "solve"]
+__all__ = [
+    "Mode",
+    "closure",
+    "closure_jacobian",
+    "function",
+    "modes",
+    "reduction_matrix",
+    "solve",
+]

@@ -49,7 +49,7 @@ def analysed(system: System, guess: Mapping[str, float]) -> System:
     postures = [posture, *_others(system, posture, p)]
     J = _jacobian(system)
     jacobians = [np.array(J(q, p)) for q in postures]
-    ranks = [rank(matrix, _GAP) for matrix in jacobians]
+    ranks = _ranks(jacobians)
     generic = max(ranks)
     posture = postures[ranks.index(generic)]
     regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
@@ -100,6 +100,13 @@ def _others(system: System, posture: Matrix, p: Matrix) -> list[Matrix]:
         if len(found) == _POSTURES:
             break
     return found
+
+
+def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
+    """Rank of each, small values measured by the largest of all: a whole Jacobian may vanish."""
+    values = [np.linalg.svd(matrix, compute_uv=False) for matrix in jacobians]
+    largest = max(float(np.max(row, initial=0.0)) for row in values)
+    return [int(np.sum(row > _GAP * largest)) for row in values]
 
 
 def _independent_velocities(

@@ -8,7 +8,7 @@ Source: Khalil & Creusot 1997, section 3.4; rows by joint type as in Haug 1989, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import casadi
 import numpy as np
@@ -18,15 +18,20 @@ from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import Named, model_function
 from mbs.components import (
+    ConstantVelocity,
     Cylindrical,
     Fixed,
     Free,
     Planar,
+    PointOnLine,
+    PointOnPlane,
     Prismatic,
     Revolute,
+    Rod,
     Spherical,
     Universal,
 )
+from mbs.expressions import to_sx
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, align_z
 
@@ -78,13 +83,19 @@ def facing(system: System, q: SX) -> SX:
     for cut in system.cuts:
         pose = _between(system, q, cut)
         joint = cut.edge.joint
-        axis = getattr(joint, "axis", None)
         if cut.welded or isinstance(joint, (Fixed, Prismatic)):
             cosines.extend(pose.R[k, k] for k in range(3))
-        elif axis is not None:
-            z = SX(DM(list(axis)))
-            cosines.append(casadi.dot(z, casadi.mtimes(pose.R, z)))
+        elif isinstance(joint, ConstantVelocity):
+            cosines.append(0.5 * (casadi.trace(pose.R) - _along(pose, joint.axis)))
+        elif isinstance(joint, (Revolute, Cylindrical, Planar)):
+            cosines.append(_along(pose, joint.axis))
     return casadi.vertcat(*cosines) if cosines else SX(0, 1)
+
+
+def _along(pose: Pose, axis: Sequence[float]) -> SX:
+    """Cosine between an axis of frame_b and the same axis of frame_a."""
+    z = SX(DM(list(axis)))
+    return casadi.dot(z, casadi.mtimes(pose.R, z))
 
 
 def _between(system: System, q: SX, cut: Cut) -> Pose:
@@ -98,10 +109,21 @@ def _cut_rows(system: System, q: SX, cut: Cut) -> Rows:
     joint = cut.edge.joint
     if cut.welded:
         return [*_position(pose, "xyz"), *_orientation(pose)]
+    if isinstance(joint, Rod):
+        return _rod(pose, to_sx(joint.length, _symbols(system)))
     axis = getattr(joint, "axis", (0.0, 0.0, 1.0))
     inside = Pose.turned(align_z(np.array(axis)))
     along = inside.inverse() @ pose @ inside
     return _ROWS[type(joint)](along, joint)
+
+
+def _symbols(system: System) -> dict[str, SX]:
+    return {parameter.name: system.p[k] for k, parameter in enumerate(system.parameters)}
+
+
+def _rod(pose: Pose, length: SX) -> Rows:
+    """Its effort is the force that pushes the ends apart; near zero the row is the lengthening."""
+    return [("force along", (casadi.sumsqr(pose.p) - length**2) / (2 * length))]
 
 
 def _position(pose: Pose, axes: str) -> Rows:
@@ -128,12 +150,20 @@ def _universal(pose: Pose, joint: Universal) -> Rows:
     return [*_position(pose, "xyz"), ("moment across", cosine)]
 
 
+def _same_turn(pose: Pose) -> Rows:
+    """Frame_b is turned about an axis in the plane x, y of frame_a, so that it has not spun."""
+    return [("moment z", 0.5 * (pose.R[1, 0] - pose.R[0, 1]))]
+
+
 _ROWS: dict[type, Callable[[Pose, object], Rows]] = {
     Revolute: lambda pose, joint: [*_position(pose, "xyz"), *_tilt(pose)],
     Prismatic: lambda pose, joint: [*_position(pose, "xy"), *_orientation(pose)],
     Cylindrical: lambda pose, joint: [*_position(pose, "xy"), *_tilt(pose)],
     Planar: lambda pose, joint: [*_position(pose, "z"), *_tilt(pose)],
     Spherical: lambda pose, joint: _position(pose, "xyz"),
+    PointOnLine: lambda pose, joint: _position(pose, "xy"),
+    PointOnPlane: lambda pose, joint: _position(pose, "z"),
+    ConstantVelocity: lambda pose, joint: [*_position(pose, "xyz"), *_same_turn(pose)],
     Universal: lambda pose, joint: _universal(pose, joint),  # type: ignore[arg-type]
     Fixed: lambda pose, joint: [*_position(pose, "xyz"), *_orientation(pose)],
     Free: lambda pose, joint: [],

@@ -11,6 +11,8 @@ from mbs.assembly.model_function import require_system
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.closing import Closed, Closing, Vector, closure_parameters
 from mbs.loops.continuation import followed_posture
+from mbs.loops.function import posture_on
+from mbs.loops.independent import fixed_positions, independent_names
 from mbs.messages import quoted
 
 _RESTARTS = 60
@@ -24,34 +26,44 @@ def solve(
     q_active: Mapping[str, float] | Sequence[float] | None = None,
     *,
     guess: Mapping[str, float] | None = None,
+    branch: str | Sequence[str] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
     """A posture with the given positions that closes the loops.
 
     Without a guess the assembled posture is moved along a straight line to the given positions,
     in steps small enough to keep its branch. With a guess the posture next to it is looked for.
+    With a branch the loops are closed by closed forms (`mbs.loops.function`).
 
     Args:
         system: the assembled mechanism.
         q_active: positions of the independent joints in the order of `system.active`, those left
             out staying as in the assembled posture; or positions of any joints by name.
         guess: approximate positions of other joints, which choose the branch.
+        branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names
+            stays as it was assembled. Positions are then those of independent joints.
         parameters: values of symbols, the others at their defaults.
 
     Returns:
         q (nq,) [rad or m].
 
     Raises:
-        Unclosable: no posture was found; the message says by how much the loops stay open.
-        ModelError: a name is unknown, or a value is not finite.
+        Unclosable: no posture was found; the message says by how much the loops stay open, or
+            what can be reached on the branch.
+        NoClosedForm: a branch was named, but a loop is solved by iteration only.
+        ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
     """
     require_system(system)
     if not isinstance(guess, Mapping | None):
         raise ModelError(
             f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
         )
-    names = [system.speeds[k].name for k in system.active]
-    fixed = _fixed(system, names, q_active)
+    if branch is not None:
+        if guess:
+            raise ModelError(f"{system.name}: guess and branch both choose the branch; give one")
+        return posture_on(system, q_active, branch, parameters)
+    names = independent_names(system)
+    fixed = fixed_positions(system, q_active)
     p = closure_parameters(system, parameters)
     target = np.array(system.position({**(guess or {}), **fixed}))
     if all(name in names for name in fixed):
@@ -62,26 +74,6 @@ def solve(
     if guess:
         return closed_posture(Closing(system, p, held), target)
     return followed_posture(system, target, held, p)
-
-
-def _fixed(
-    system: System, names: Sequence[str], values: Mapping[str, float] | Sequence[float] | None
-) -> dict[str, float]:
-    """The given positions by name."""
-    if values is None or isinstance(values, Mapping):
-        return dict(values or {})
-    try:
-        given = [float(x) for x in values]
-    except (TypeError, ValueError):
-        raise ModelError(
-            f"{system.name}: q_active is {quoted(values)}; give numbers for {', '.join(names)}"
-        ) from None
-    if len(given) != len(names):
-        raise ModelError(
-            f"{system.name}: q_active has {len(given)} values, the independent joints are"
-            f" {len(names)}: {', '.join(names)}"
-        )
-    return dict(zip(names, given, strict=True))
 
 
 def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:

@@ -13,9 +13,11 @@ from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, ja
 from mbs.models.kinematics import jacobian
 from mbs.models.lagrange import lagrange
 from mbs.models.link_motion import jacobian_dot_velocity, link_accelerations, link_velocities
+from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
 from mbs.models.singularities import singularities
 
 __all__ = [
+    "acceleration_closure",
     "bias",
     "direct_dynamics",
     "direct_dynamics_derivatives",
@@ -35,5 +37,6 @@ __all__ = [
     "link_velocities",
     "singularities",
     "transform",
+    "velocity_closure",
     "with_implicit_jacobian",
 ]

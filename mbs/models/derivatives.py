@@ -8,7 +8,13 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.model_function import (
+    ModelFunction,
+    Named,
+    default_in,
+    model_function,
+    require_system,
+)
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.models.direct_dynamics import direct_dynamics
@@ -19,11 +25,15 @@ from mbs.models.slopes import (
     efforts_by_ad,
     efforts_by_recursion,
 )
+from mbs.models.staged_accelerations import staged_accelerations
 from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
 from mbs.operations import count
 
 _COMPARED = 6
 """Velocities up to which both methods are built and their operations counted."""
+
+_STAGED = 10
+"""Velocities from which the columns of -A^-1 dtau are a map, not written out one by one."""
 
 
 def inverse_dynamics_derivatives(
@@ -88,7 +98,8 @@ def direct_dynamics_derivatives(
     The accelerations solve tau = idm(q, v, a), so that their derivatives are those of the efforts
     at these accelerations, multiplied by -A^-1; da_dtau = A^-1. One factorisation of A serves
     them and the accelerations. da_dq is along the velocities, as in
-    `inverse_dynamics_derivatives`.
+    `inverse_dynamics_derivatives`. For a tree with many velocities the columns of the solution
+    are a map, which fast machine code computes several at a time; `expand()` writes them out.
 
     Source: Carpentier & Mansard 2018, section IV.
 
@@ -128,9 +139,21 @@ def direct_dynamics_derivatives(
             return inputs, _outputs("a" + s.suffix, s, names, blocks, a)
 
         key = ("ddm_derivatives", chosen, coordinates, names)
+        if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
+            staged: Function = system.cached(key, lambda: _staged(system, names))
+            return staged
         return model_function(system, key, symbols)
 
     return _chosen(system, ("ddm_derivatives", coordinates, names), method, build, "implicit")
+
+
+def _staged(system: System, names: tuple[str, ...]) -> Function:
+    """The derivatives of accelerations of a large tree."""
+    inputs, outputs = staged_accelerations(system, names)
+    labels = ["q", "v", "tau", "p"][: len(inputs)], [*(f"da_d{name}" for name in names), "a"]
+    options = {"default_in": default_in(system, 3)}
+    function = Function("ddm_derivatives", inputs, outputs, *labels, options)
+    return ModelFunction(function, system)
 
 
 def _checked(
@@ -181,15 +204,10 @@ def _chosen(
             return build("ad" if recursive == "analytical" else recursive)
         if system.nv > _COMPARED:
             return build(recursive)
-        return min(build(recursive), build("ad"), key=_cost)
+        return min(build(recursive), build("ad"), key=lambda model: count(model).price)
 
     function: Function = system.cached(("cheapest", *key), cheapest)
     return function
-
-
-def _cost(function: Function) -> int:
-    taken = count(function)
-    return taken.mul + taken.add + taken.div
 
 
 def _outputs(of: str, s: ModelSymbols, names: tuple[str, ...], blocks: Blocks, value: SX) -> Named:

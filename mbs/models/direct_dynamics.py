@@ -15,13 +15,12 @@ from mbs.errors import ModelError
 from mbs.loops.reduction import independent_closure
 from mbs.loops.velocity import acceleration_bias, velocity_rows
 from mbs.messages import quoted
-from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.surroundings import Surroundings, surroundings
+from mbs.models.inverse_dynamics import own_efforts, tree_efforts
+from mbs.models.surroundings import Surroundings, exerted, surroundings
 from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
 from mbs.operations import count
 from mbs.recursions.articulated_body import articulated_accelerations, inertia_pivots
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
-from mbs.recursions.joint_efforts import joint_efforts
 from mbs.recursions.poses import link_poses
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
 from mbs.solvers.rank import rank
@@ -125,7 +124,7 @@ def _cheapest(system: System, model: Callable[[str], Function]) -> Function:
     articulated = model("articulated")
     if not _composite_may_win(system):
         return articulated
-    return min(model("composite"), articulated, key=_cost)
+    return min(model("composite"), articulated, key=lambda model: count(model).price)
 
 
 def _composite_may_win(system: System) -> bool:
@@ -134,12 +133,6 @@ def _composite_may_win(system: System) -> bool:
     for before in velocity_antecedents(system.tree):
         depths.append(depths[before] + 1 if before >= 0 else 0)
     return sum(d * (d + 1) + 4 * d for d in depths) < _ARTICULATED * system.nv
-
-
-def _cost(function: Function) -> int:
-    """Operations, with a division as two."""
-    taken = count(function)
-    return taken.mul + taken.add + 2 * taken.div
 
 
 def _model(
@@ -162,10 +155,9 @@ def _model(
 
 
 def _articulated(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:
-    joints = joint_efforts(system.tree, s.q, s.v, SX.zeros(system.nv))
-    return articulated_accelerations(
-        system.tree, s.poses, s.v, tau - joints, around.base, around.external
-    )
+    left = tau - own_efforts(system, s, SX.zeros(system.nv))
+    external = exerted(system, around, s.poses, s.q, s.v)
+    return articulated_accelerations(system.tree, s.poses, s.v, left, around.base, external)
 
 
 def _composite(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:

@@ -8,13 +8,15 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.models.symbols import symbols_of
 from mbs.recursions.energy import kinetic_energy, potential_energy
+from mbs.recursions.force_elements import element_energy
 from mbs.recursions.joint_efforts import spring_energy
 
 
 def energy(system: System, coordinates: str = "independent") -> Function:
     """``energy(q, v) -> E, U``: kinetic energy, rotors included, and potential energy.
 
-    The potential energy is that of gravity and of the springs of the joints.
+    The potential energy is that of gravity, of the springs of the joints and of what force elements
+    store.
 
     Source: Khalil & Creusot 1997, eq. 49-50.
 
@@ -30,7 +32,8 @@ def energy(system: System, coordinates: str = "independent") -> Function:
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         E = kinetic_energy(system.tree, s.poses, s.v_tree)
-        U = potential_energy(system.tree, s.poses) + spring_energy(system.tree, s.q)
+        elastic = spring_energy(system.tree, s.q) + element_energy(system.tree, system.forces, s.q)
+        U = potential_energy(system.tree, s.poses) + elastic
         return [("q", s.q), ("v" + s.suffix, s.v)], [("E", E), ("U", U)]
 
     return model_function(system, ("energy", coordinates), build)

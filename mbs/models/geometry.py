@@ -13,6 +13,8 @@ from mbs.assembly.model_function import (
     model_function,
     require_system,
 )
+from mbs.errors import NoClosedForm
+from mbs.loops.function import function as closed_form
 from mbs.loops.numeric import follow_active
 from mbs.recursions.route import cheapest_pose
 
@@ -59,8 +61,8 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
     """``dgm(q) -> T``: the pose of the terminal frame seen from the base.
 
     For a closed system the input is q_a, the positions of the independent joints; the others
-    follow from the assembled posture in small steps, so that its branch is kept. Where that
-    leads nowhere T is NaN, and a call with numbers is refused.
+    follow on the branch of the assembled posture: in closed form where `mbs.loops.function` knows
+    one, else in small steps. Where that leads nowhere T is NaN, and a call with numbers is refused.
 
     Source: Khalil & Creusot 1997, section 3.1.
 
@@ -89,6 +91,20 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
 
 
 def _closed_geometry(system: System, name: str | int, pose: Function) -> Function:
+    try:
+        loops = closed_form(system)
+    except NoClosedForm:
+        return _followed_geometry(system, name, pose)
+
+    def build() -> tuple[Named, Named]:
+        q_a = SX.sym("q_a", len(system.active))
+        p = [system.p] if system.parameters else []
+        return [("q_a", q_a)], [("T", pose.call([loops.call([q_a, *p])[0], *p])[0])]
+
+    return model_function(system, ("dgm", name), build)
+
+
+def _followed_geometry(system: System, name: str | int, pose: Function) -> Function:
     def make() -> Function:
         follow = follow_active(system)
         inputs = [MX.sym("q_a", len(system.active))]

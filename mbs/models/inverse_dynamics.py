@@ -7,9 +7,10 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.models.surroundings import Surroundings, surroundings
+from mbs.models.surroundings import Surroundings, exerted, surroundings
 from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.recursions.accelerations import resting_base
+from mbs.recursions.force_elements import coordinate_efforts, element_efforts
 from mbs.recursions.joint_efforts import joint_efforts, spring_effort
 from mbs.recursions.names import newton_euler_names
 from mbs.recursions.newton_euler import Dynamics, newton_euler
@@ -17,22 +18,22 @@ from mbs.recursions.newton_euler import Dynamics, newton_euler
 
 def inverse_dynamics(
     system: System,
-    f_ext: bool = False,
     coordinates: str = "independent",
     *,
+    f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
     """``idm(q, v, a) -> tau``: the joint efforts that produce the accelerations a.
 
-    Rotors, viscous and dry friction and springs of the joints are included.
+    Rotors, viscous and dry friction and springs of the joints are included, and force elements.
 
     Source: Khalil & Kleinfinger 1987; Khalil & Creusot 1997, eq. 15-20 and 22.
 
     Args:
         system: open or closed; q must close the loops.
+        coordinates: of a closed system, "independent" for idm(q, v_a, a_a) -> tau_a, or "tree".
         f_ext: add an input f_ext (6, bodies): for each row of `system.bodies` the wrench
             [force; moment] that the body exerts on its environment, in the body's frame.
-        coordinates: of a closed system, "independent" for idm(q, v_a, a_a) -> tau_a, or "tree".
         moving_base: add the inputs v_0 (6), velocity [V; w] of the base, a_0 (6), accelerations
             [vd; wd] of its origin and angular, both in its own axes, and R_0 (3, 3), orientation
             of the base in the frame in which gravity is given.
@@ -57,7 +58,7 @@ def bias(
 ) -> Function:
     """``bias(q, v) -> H``: the efforts at zero acceleration, so that tau = A a + H.
 
-    Coriolis, centrifugal and gravity efforts, friction and springs of the joints.
+    Coriolis, centrifugal and gravity efforts, friction and springs of the joints, force elements.
 
     Source: Khalil & Creusot 1997, eq. 25 and section 5.3.1.
 
@@ -84,6 +85,8 @@ def gravity_effort(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
     """``gravity(q) -> Q``: the efforts that hold the mechanism still, against springs too.
+
+    Every force element acts as it does at rest: springs, stops and sources, not dampers.
 
     Source: Khalil & Creusot 1997, eq. 23.
 
@@ -112,23 +115,36 @@ def gravity_effort(
 def _efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> tuple[SX, Named]:
     """Efforts of the input coordinates for accelerations of the tree, and what stands between."""
     dynamics = _dynamics(system, s, a, around)
-    tau = dynamics.efforts + joint_efforts(system.tree, s.q, s.v_tree, a)
+    tau = dynamics.efforts + own_efforts(system, s, a)
     return s.reduced_effort(tau), newton_euler_names(dynamics)
 
 
 def tree_efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> SX:
     """(nv, 1) efforts of the tree, those of its joints included, for accelerations a (nv, 1)."""
-    joints = joint_efforts(system.tree, s.q, s.v_tree, a)
-    return _dynamics(system, s, a, around).efforts + joints
+    return _dynamics(system, s, a, around).efforts + own_efforts(system, s, a)
+
+
+def own_efforts(system: System, s: ModelSymbols, a: SX) -> SX:
+    """(nv, 1) what the joints need themselves: drives, friction, springs and stops."""
+    acting = coordinate_efforts(system.tree, system.forces, s.q, s.v_tree)
+    return joint_efforts(system.tree, s.q, s.v_tree, a) + acting
 
 
 def _dynamics(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> Dynamics:
-    return newton_euler(system.tree, s.poses, s.v_tree, a, around.base, around.external)
+    external = exerted(system, around, s.poses, s.q, s.v_tree)
+    return newton_euler(system.tree, s.poses, s.v_tree, a, around.base, external)
 
 
 def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> SX:
-    """(nv, 1) efforts of the tree that hold it still, against gravity and springs."""
+    """(nv, 1) efforts of the tree that hold it still, against gravity, springs and sources."""
     rest = SX.zeros(system.nv)
     base = resting_base(system.tree.gravity if gravity is None else gravity)
     efforts = newton_euler(system.tree, s.poses, rest, rest, base).efforts
-    return efforts + spring_effort(system.tree, s.q)
+    return efforts + static_efforts(system, s)
+
+
+def static_efforts(system: System, s: ModelSymbols) -> SX:
+    """(nv, 1) efforts of the tree that hold its springs, stops and sources at rest."""
+    rest = SX.zeros(system.nv)
+    acting = element_efforts(system.tree, system.forces, s.poses, s.q, rest)
+    return spring_effort(system.tree, s.q) + acting

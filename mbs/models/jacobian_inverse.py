@@ -8,10 +8,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.errors import ModelError
-from mbs.messages import quoted
-from mbs.models.square_selection import Selection, selection
-from mbs.recursions.square_jacobian import SquareJacobian
+from mbs.models.square_selection import selection
 from mbs.solvers.block_triangular import solve_blocks
 
 
@@ -50,8 +47,8 @@ def inverse_jacobian(
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
 
     def build() -> tuple[Named, Named]:
-        q = SX.sym("q", system.nq)
-        return [("q", q)], [("J_inv", _regular(system, chosen, q).inverse())]
+        q, square = chosen.regular(system)
+        return [("q", q)], [("J_inv", square.inverse())]
 
     return model_function(system, ("inverse_jacobian", chosen), build)
 
@@ -65,7 +62,7 @@ def inverse_kinematics(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """``ikm(q, twist) -> v``: the same velocities, without forming the inverse.
+    """``ikm(q, twist) -> v_of_columns``: the same velocities, without forming the inverse.
 
     Source: Khalil & Creusot 1997, section 4.6.
 
@@ -78,8 +75,8 @@ def inverse_kinematics(
         coordinates: likewise.
 
     Returns:
-        Function of q (nq, 1) and twist (m, 1), the named rows of [V; w] [m/s, rad/s]; v (m, 1),
-        the named joint velocities.
+        Function of q (nq, 1) and twist (m, 1), the named rows of [V; w] [m/s, rad/s];
+        v_of_columns (m, 1), the named joint velocities.
 
     Raises:
         ModelError: as for `inverse_jacobian`.
@@ -87,8 +84,8 @@ def inverse_kinematics(
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
 
     def build() -> tuple[Named, Named]:
-        q, twist = SX.sym("q", system.nq), SX.sym("twist", len(chosen.rows))
-        square = _regular(system, chosen, q)
+        q, square = chosen.regular(system)
+        twist = SX.sym("twist", len(chosen.rows))
         assert square.blocks is not None
         v = solve_blocks(square.B, square.blocks, square.seen(twist))
         return [("q", q), ("twist", twist)], [("v_of_columns", v)]
@@ -127,20 +124,4 @@ def jacobian_determinant(
         ModelError: no such frame, row or column, or not as many rows as columns.
     """
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
-
-    def build() -> tuple[Named, Named]:
-        q = SX.sym("q", system.nq)
-        return [("q", q)], [("det", chosen.of(system, q).determinant())]
-
-    return model_function(system, ("determinant", chosen), build)
-
-
-def _regular(system: System, chosen: Selection, q: SX) -> SquareJacobian:
-    square = chosen.of(system, q)
-    if square.blocks is None:
-        raise ModelError(
-            f"{system.name}: rows {', '.join(map(str, chosen.rows))} and columns"
-            f" {', '.join(chosen.names)} of the Jacobian of {quoted(chosen.frame)} are singular in"
-            " every posture; name other rows or columns"
-        )
-    return square
+    return chosen.determinant(system)

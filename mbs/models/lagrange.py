@@ -10,13 +10,12 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.rates import position_rate
 from mbs.errors import ModelError
 from mbs.messages import quoted
-from mbs.models.inverse_dynamics import tree_gravity
+from mbs.models.inverse_dynamics import static_efforts, tree_gravity
 from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.operations import count
 from mbs.recursions.augmented_body import LagrangeForm, lagrange_form
 from mbs.recursions.christoffel import christoffel
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
-from mbs.recursions.joint_efforts import spring_effort
 
 _METHODS = ("auto", "renaud", "christoffel")
 _SHORT = 8
@@ -26,7 +25,8 @@ _SHORT = 8
 def lagrange(system: System, method: str = "auto", coordinates: str = "independent") -> Function:
     """``lagrange(q, v) -> A, B, Q``: inertia matrix, Coriolis matrix, gravity and spring efforts.
 
-    dA/dt - 2 B is skew-symmetric. Friction is not part of it. For closed systems B is
+    dA/dt - 2 B is skew-symmetric. Friction and dampers are not part of it; Q holds what force
+    elements need at rest. For closed systems B is
     G' (A dG/dt + B G).
 
     Source: Renaud 1986; Khalil & Creusot 1997, section 5.5.
@@ -59,12 +59,9 @@ def _cheapest(system: System, coordinates: str) -> Function:
     renaud = _model(system, "renaud", coordinates)
     if system.nv > _SHORT or system.nq > system.nv:
         return renaud
-    return min(renaud, _model(system, "christoffel", coordinates), key=_cost)
-
-
-def _cost(function: Function) -> int:
-    taken = count(function)
-    return taken.mul + taken.add + taken.div
+    return min(
+        renaud, _model(system, "christoffel", coordinates), key=lambda model: count(model).price
+    )
 
 
 def _model(system: System, method: str, coordinates: str) -> Function:
@@ -85,7 +82,7 @@ def _model(system: System, method: str, coordinates: str) -> Function:
 
 def _by_renaud(system: System, s: ModelSymbols) -> LagrangeForm:
     form = lagrange_form(system.tree, s.poses, s.v_tree)
-    return LagrangeForm(form.A, form.B, form.Q + spring_effort(system.tree, s.q))
+    return LagrangeForm(form.A, form.B, form.Q + static_efforts(system, s))
 
 
 def _by_christoffel(system: System, s: ModelSymbols) -> LagrangeForm:

@@ -84,8 +84,8 @@ def jacobian_dot_velocity(
     system: System,
     frame: str | int,
     expressed_in: str | int = "base",
-    coordinates: str = "independent",
     *,
+    coordinates: str = "independent",
     moving_base: bool = False,
 ) -> Function:
     """``jpqp(q, v) -> jpqp``: dJ/dt v, the acceleration of a frame when a is zero.

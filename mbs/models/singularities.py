@@ -108,13 +108,8 @@ def singularities(
 
 
 def _singularities(system: System, chosen: Selection) -> Singularities:
-    q = SX.sym("q", system.nq)
-    square = chosen.of(system, q)
-
-    def determinant() -> tuple[Named, Named]:
-        return [("q", q)], [("det", square.determinant())]
-
-    whole = model_function(system, ("determinant", chosen), determinant)
+    q, square = chosen.of(system)
+    whole = chosen.determinant(system)
     if square.blocks is None:
         return Singularities("0", (), whole)
     constant, factors = _constant_and_factors(system, chosen, square, q)
@@ -165,8 +160,8 @@ def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | N
     f = Function("f", [variables], [det, back])
     samples = random_samples(system.tree, len(system.parameters))
     pairs = [tuple(map(float, f(np.concatenate(sample)))) for sample in samples]
-    same = all(math.isclose(a, b, rel_tol=_SAME, abs_tol=_SAME) for a, b in pairs)
-    return parts if same else None
+    allowed = _SAME * max(abs(a) for a, _ in pairs)
+    return parts if all(abs(a - b) <= allowed for a, b in pairs) else None
 
 
 def _scaled(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:

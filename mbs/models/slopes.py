@@ -17,6 +17,7 @@ from mbs.models.surroundings import surroundings
 from mbs.models.symbols import ModelSymbols
 from mbs.recursions.accelerations import resting_base
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
+from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.joint_efforts import joint_efforts
 from mbs.recursions.newton_euler_derivatives import newton_euler_derivatives
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
@@ -40,7 +41,8 @@ def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks
     """The same by recursions of the derivatives, for trees."""
     tree = system.tree
     moving = newton_euler_derivatives(tree, s.poses, s.v, a, resting_base(tree.gravity))
-    joints = joint_efforts(tree, s.q, s.v, a)
+    acting = element_efforts(tree, system.forces, s.poses, s.q, s.v)
+    joints = joint_efforts(tree, s.q, s.v, a) + acting
     blocks = {
         "q": moving.dq + _along_motion(system, s, joints),
         "v": moving.dv + casadi.jacobian(joints, s.v),

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from casadi import SX
+from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import require_system
+from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.reduction import reduction
 from mbs.messages import did_you_mean, quoted
@@ -40,12 +40,43 @@ class Selection:
     reduced: bool
     names: tuple[str, ...]
 
-    def of(self, system: System, q: SX) -> SquareJacobian:
-        """The matrix at the symbols q, in blocks."""
+    def of(self, system: System) -> tuple[SX, SquareJacobian]:
+        """Symbols q, (nq, 1), and the matrix at them in blocks; formed once."""
+        found: tuple[SX, SquareJacobian] = system.cached(
+            ("square_jacobian", self), lambda: self._formed(system)
+        )
+        return found
+
+    def _formed(self, system: System) -> tuple[SX, SquareJacobian]:
+        q = SX.sym("q", system.nq)
         frame, axes = system.frame(self.frame), system.frame(self.expressed_in)
         target = Target(system.tree, q, system.p, frame, axes)
         G = reduction(system, q).G if self.reduced else None
-        return square_jacobian(target, self.rows, self.columns, G)
+        return q, square_jacobian(target, self.rows, self.columns, G)
+
+    def regular(self, system: System) -> tuple[SX, SquareJacobian]:
+        """The same of a matrix that has an inverse.
+
+        Raises:
+            ModelError: it is singular in every posture.
+        """
+        q, square = self.of(system)
+        if square.blocks is None:
+            raise ModelError(
+                f"{system.name}: rows {', '.join(map(str, self.rows))} and columns"
+                f" {', '.join(self.names)} of the Jacobian of {quoted(self.frame)} are singular in"
+                " every posture; name other rows or columns"
+            )
+        return q, square
+
+    def determinant(self, system: System) -> Function:
+        """``determinant(q) -> det``."""
+
+        def build() -> tuple[Named, Named]:
+            q, square = self.of(system)
+            return [("q", q)], [("det", square.determinant())]
+
+        return model_function(system, ("determinant", self), build)
 
 
 def selection(
@@ -92,6 +123,8 @@ def _numbers(
     system: System, what: str, given: Iterable[Any], names: Sequence[str]
 ) -> tuple[int, ...]:
     numbers: list[int] = []
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        given = [given]
     for value in given:
         if isinstance(value, str):
             if value not in names:

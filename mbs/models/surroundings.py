@@ -10,7 +10,9 @@ from casadi import SX
 from mbs.assembly import System
 from mbs.assembly.model_function import Named
 from mbs.recursions.accelerations import Acceleration, moving_base, resting_base
+from mbs.recursions.force_elements import element_wrenches
 from mbs.recursions.newton_euler import Wrench
+from mbs.recursions.poses import LinkPose
 from mbs.spatial import cross
 
 
@@ -54,6 +56,30 @@ def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Su
     return Surroundings(base, external, inputs)
 
 
+def exerted(
+    system: System, around: Surroundings, poses: list[LinkPose], q: SX, v: SX
+) -> dict[int, Wrench]:
+    """For some links the wrench that they exert on their environment, force elements included.
+
+    Args:
+        system: whose force elements act.
+        around: what else acts.
+        poses: of every link with respect to its antecedent.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities of the tree.
+    """
+    result = dict(around.external)
+    for link, wrench in element_wrenches(system.tree, system.forces, poses, q, v).items():
+        _add(result, link, wrench)
+    return result
+
+
+def _add(wrenches: dict[int, Wrench], link: int, wrench: Wrench) -> None:
+    before = wrenches.get(link)
+    f, m = wrench
+    wrenches[link] = wrench if before is None else (before[0] + f, before[1] + m)
+
+
 def _on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
     """The wrenches of bodies, (6, bodies) in their frames, brought to the frames of their links."""
     result: dict[int, Wrench] = {}
@@ -61,6 +87,5 @@ def _on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
         link, pose = system.frames[row.name]
         f = casadi.mtimes(pose.R, wrenches[0:3, column])
         m = casadi.mtimes(pose.R, wrenches[3:6, column]) + cross(pose.p, f)
-        before = result.get(link)
-        result[link] = (f, m) if before is None else (before[0] + f, before[1] + m)
+        _add(result, link, (f, m))
     return result

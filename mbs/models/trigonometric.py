@@ -6,6 +6,7 @@ s^2 + c^2 = 1, and a factor is written with sums of angles where that makes it s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -21,7 +22,8 @@ Atom = tuple[Literal["x", "s", "c"], tuple[tuple[int, int], ...]]
 Monomial = tuple[tuple[Atom, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
-_ROUNDING = Fraction(1, 10**12)
+_ROUNDING = Fraction(1, 10**13)
+_CONSTANT_ROUNDING = 1e-15
 _MOST_NODES = 200
 _MOST_TERMS = 80
 _MOST_FACTORED = 30
@@ -41,7 +43,7 @@ def total(a: Polynomial, b: Polynomial, sign: int = 1) -> Polynomial:
     """The sum a + sign b."""
     result = dict(a)
     for monomial, coefficient in b.items():
-        result[monomial] = result.get(monomial, Fraction(0)) + sign * coefficient
+        _add(result, monomial, sign * coefficient)
     return _within_reason({m: c for m, c in result.items() if c})
 
 
@@ -50,9 +52,16 @@ def product(a: Polynomial, b: Polynomial) -> Polynomial:
     result: Polynomial = {}
     for m, x in a.items():
         for n, y in b.items():
-            monomial = _joined(m, n)
-            result[monomial] = result.get(monomial, Fraction(0)) + x * y
+            _add(result, _joined(m, n), x * y)
     return _within_reason({m: c for m, c in result.items() if c})
+
+
+def _add(result: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
+    """One term more; zero where two cancel but for the rounding of the numbers they come from."""
+    before = result.get(monomial, Fraction(0))
+    both = before + coefficient
+    cancelled = abs(both) <= _ROUNDING * (abs(before) + abs(coefficient))
+    result[monomial] = Fraction(0) if cancelled else both
 
 
 def _joined(m: Monomial, n: Monomial) -> Monomial:
@@ -77,20 +86,21 @@ def polynomial_of(expression: SX, variables: SX) -> Polynomial:
     graph = graph_of(Function("f", [variables], [casadi.densify(expression)], {"cse": True}))
     if len(graph.nodes) > _MOST_NODES:
         raise NotTrigonometric
+    least = _CONSTANT_ROUNDING * max((abs(node.value) for node in graph.nodes), default=0.0)
     values: list[Polynomial] = []
     for number in range(len(graph.nodes)):
-        values.append(lowered(_value(graph, number, values), "s"))
+        values.append(lowered(_value(graph, number, values, least), "s"))
     return values[graph.results[0][0]]
 
 
-def _value(graph: Graph, number: int, values: list[Polynomial]) -> Polynomial:
+def _value(graph: Graph, number: int, values: list[Polynomial], least: float) -> Polynomial:
     node = graph.nodes[number]
     operands = [values[k] for k in graph.operands(number)]
     match node.op:
         case casadi.OP_INPUT:
             return variable(node.args[1])
         case casadi.OP_CONST:
-            return _constant(node.value)
+            return _constant(node.value, least)
         case casadi.OP_NEG:
             return product({(): Fraction(-1)}, operands[0])
         case casadi.OP_SQ:
@@ -114,8 +124,11 @@ def _operation(op: int, operands: list[Polynomial]) -> Polynomial:
     raise NotTrigonometric
 
 
-def _constant(value: float) -> Polynomial:
-    return {(): Fraction(repr(value))} if value else {}
+def _constant(value: float, least: float) -> Polynomial:
+    """A number; zero when it is what numbers as large as the others of the graph left of it."""
+    if not math.isfinite(value):
+        raise NotTrigonometric
+    return {(): Fraction(repr(value))} if abs(value) > least else {}
 
 
 def _sine_cosine(angle: Polynomial) -> tuple[Polynomial, Polynomial]:
@@ -226,18 +239,11 @@ def factored(polynomial: Polynomial) -> Factored:
     Raises:
         NotTrigonometric: it is too long to be factored in a moment.
     """
-    polynomial = _without_rounding(polynomial)
     if not polynomial:
         return Factored(Fraction(0), ())
     choices = [_factor(lowered(polynomial, which)) for which in ("s", "c")]
     best = min(choices, key=lambda found: sum(len(f) for f, _ in found.factors))
     return Factored(best.number, tuple((_shortest(f), power) for f, power in best.factors))
-
-
-def _without_rounding(polynomial: Polynomial) -> Polynomial:
-    """Terms left out that are what products of decimal numbers leave of a zero."""
-    largest = max((abs(c) for c in polynomial.values()), default=Fraction(0))
-    return {m: c for m, c in polynomial.items() if abs(c) > _ROUNDING * largest}
 
 
 def _shortest(polynomial: Polynomial) -> Polynomial:

@@ -33,7 +33,8 @@ def compiled(
             CasADi refuses to differentiate.
         fast: code for the processor of this computer, with fused multiplications and all sines
             and cosines in vector lanes: two to three times faster, equal to the interpreted
-            Function to about 1e-15 of the largest element instead of the last bit.
+            Function to about 1e-15 of the largest element instead of the last bit. A map
+            (`Function.map`) is computed for several columns at once.
 
     Returns:
         a Function with the same name, inputs, outputs and default inputs; of a model, with its

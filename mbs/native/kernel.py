@@ -31,7 +31,8 @@ def kernel_library(functions: Sequence[Function]) -> Path | None:
     """The library of fast code of Functions with different names.
 
     Returns:
-        path of the library; None when some Function is not made of scalar operations that C has.
+        path of the library; None when some Function is not made of scalar operations that C has,
+        and of maps of them.
 
     Raises:
         CompilerError: there is no compiler, or it refused the code.

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from importlib import resources
-from itertools import groupby
+from itertools import accumulate
 
 from casadi import Function
 
+from mbs.native.block_code import BlockCode
 from mbs.native.function_table import function_table
-from mbs.native.operators import expression, operand
-from mbs.native.schedule import LANES, Batch, Step, blocks, gives, needs, schedule
-from mbs.native.slots import Slots, slots
+from mbs.native.map_source import direct_columns, map_source
+from mbs.native.memory import Memory
+from mbs.native.schedule import Batch, Step, blocks, gives, phases, schedule
+from mbs.native.slots import slots
+from mbs.native.staged import Mapped, Staged, staged
 from mbs.operations.graph import Graph, graph_of
 
 BLOCK = 500
@@ -20,7 +22,6 @@ BLOCK = 500
 
 _INLINE = 16  # batches of angles whose code stands in the function; more are called
 
-_MANY_ZEROS = 4  # in a row, from which they are stored at once
 _SHORT = 2500  # operations up to which gcc gains by reordering them before it assigns registers
 
 _GCC = """\
@@ -31,7 +32,7 @@ _GCC = """\
 _HEAD = """\
 #include <math.h>
 #include <string.h>
-#include "sincos.h"
+#include "lanes.h"
 #define casadi_int long long int
 #define NOINLINE __attribute__((noinline))
 #define ALIGNED __attribute__((aligned(64)))
@@ -50,7 +51,7 @@ def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str
     the interpreter in the last digits.
 
     Args:
-        functions: made of scalar operations, or to be expanded to them.
+        functions: made of scalar operations and of maps of them, or to be expanded to them.
         block: assignments in one C function.
 
     Returns:
@@ -59,134 +60,58 @@ def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str
     Raises:
         ModelError: some Function has no scalar operations, or one that C does not have.
     """
-    header = resources.files("mbs.native").joinpath("runtime/sincos.h").read_text("utf-8")
-    files = {f"{function.name()}.c": _file(function, block) for function in functions}
-    return {**files, "sincos.h": header}
+    runtime = resources.files("mbs.native").joinpath("runtime")
+    headers = {name: runtime.joinpath(name).read_text("utf-8") for name in ("sincos.h", "lanes.h")}
+    return {**{f"{function.name()}.c": _file(function, block) for function in functions}, **headers}
 
 
 def _file(function: Function, block: int) -> str:
-    graph = graph_of(function)
+    stages = staged(function) or Staged(function, ())
+    graph = graph_of(stages.scalar)
     scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
-    return "\n".join([scheduling, _HEAD, _function(function, graph, block)])
+    return "\n".join([scheduling, _HEAD, _function(function, graph, stages.maps, block)])
 
 
-def _function(function: Function, graph: Graph, block: int) -> str:
+def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: int) -> str:
     name = function.name()
-    order = schedule(graph)
-    inline = sum(isinstance(step, Batch) for step in order) <= _INLINE
-    pieces = blocks(graph, order, block)
-    code = _Code(graph, slots(graph, pieces), "mbs_sincos8" if inline else "mbs_sincos8_call")
-    spare = max((len(result) for result in graph.results), default=0)
+    late = {port: k + 1 for k, m in enumerate(maps) for port in m.outputs}
+    pieces = _pieces(graph, late, len(maps), block)
+    begins = [0, *accumulate(map(len, pieces))]
+    every = [steps for some in pieces for steps in some]
+    columns, elsewhere = direct_columns(graph, maps, function.n_out())
+    where = slots(graph, every, {port: begins[k] for port, k in late.items()}, elsewhere)
+    batches = sum(isinstance(step, Batch) for steps in every for step in steps)
+    code = BlockCode(graph, where, "mbs_sincos8" if batches <= _INLINE else "mbs_sincos8_call")
+    memory = Memory(function, graph, where.count)
+    sources = []
+    for k, m in enumerate(maps):
+        buffers = [memory.buffer(port) for port in m.outputs]
+        sources.append(map_source(f"{name}_map{k}", m, columns, buffers, block))
+    calls: list[str] = []
+    for k in range(len(pieces)):
+        calls += [f"  {name}_map{k - 1}(out, lanes);"] if k else []
+        calls += [f"  {name}_part{j}(in, out, w);" for j in range(begins[k], begins[k + 1])]
     return "\n".join(
         [
-            *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
+            *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(every)),
+            *(source.text for source in sources),
             f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w,"
             " int mem)",
             "{",
-            *code.pointers(),
-            *(f"  {name}_part{k}(in, out, w);" for k in range(len(pieces))),
+            *memory.pointers(),
+            *calls,
             "  return 0;",
             "}",
-            function_table(function, code.where.count + spare),
+            function_table(function, memory.size + max((s.work for s in sources), default=0)),
         ]
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Code:
-    """The C functions of one graph.
-
-    Attributes:
-        graph: what is computed.
-        where: what its blocks leave for each other.
-        sincos: the C function for a batch of angles.
-    """
-
-    graph: Graph
-    where: Slots
-    sincos: str
-
-    def pointers(self) -> list[str]:
-        """Lines that replace what a caller left out: inputs are zero, outputs are lost."""
-        graph = self.graph
-        most = max((port.sparsity.nnz() for port in graph.inputs), default=0)
-        inputs = (f"arg[{k}] ? arg[{k}] : zeros" for k in range(len(graph.inputs)))
-        lost = f"w + {self.where.count}"
-        outputs = (f"res[{k}] ? res[{k}] : {lost}" for k in range(len(graph.outputs)))
-        return [
-            f"  static const double zeros[{most or 1}];",
-            f"  const double *const in[] = {{{', '.join(inputs) or '0'}}};",
-            f"  double *const out[] = {{{', '.join(outputs) or '0'}}};",
-        ]
-
-    def block(self, name: str, number: int, steps: Sequence[Step]) -> str:
-        """A C function: loads what earlier ones left, computes, stores what later ones need."""
-        inputs, outputs = range(len(self.graph.inputs)), range(len(self.graph.outputs))
-        lines = [
-            f"static {'NOINLINE ' if self.where.blocks > 1 else ''}void {name}"
-            "(const double *const *in, double *const *out, double *restrict w)",
-            "{",
-            *(f"  const double *restrict i{k} = in[{k}];" for k in inputs),
-            *(f"  double *restrict o{k} = out[{k}];" for k in outputs),
-        ]
-        if number == 0:
-            lines += self._stores(None)
-        known: set[int] = set()
-        of = self.where.of
-        for step in steps:
-            lines += self._loads(step, known)
-            lines += self._values(step)
-            known.update(gives(step))
-            for n in gives(step):
-                lines += [f"  w[{of[n]}] = t{n};"] if n in of else []
-                lines += self._stores(n)
-        return "\n".join([*lines, "}"])
-
-    def _loads(self, step: Step, known: set[int]) -> list[str]:
-        of = self.where.of
-        wanted = [n for n in dict.fromkeys(needs(self.graph, step)) if n not in known and n in of]
-        known.update(wanted)
-        return [f"  const double t{n} = w[{of[n]}];" for n in wanted]
-
-    def _values(self, step: Step) -> list[str]:
-        if not isinstance(step, Batch):
-            return [f"  const double t{step} = {expression(self.graph, step)};"]
-        angles = [operand(self.graph, n) for n in step.angles]
-        angles += ["0.0"] * (LANES - len(angles))
-        array = f"sc{step.angles[0]}"
-        return [
-            f"  double {array}[{2 * LANES}] ALIGNED;",
-            f"  {self.sincos}({', '.join(angles)}, {array});",
-            *(f"  const double t{n} = {array}[{place}];" for n, place in step.results),
-        ]
-
-    def _stores(self, n: int | None) -> list[str]:
-        """The outputs that are a node; with None those that are inputs and constants."""
-        lines: list[str] = []
-        for (k, text), elements in groupby(self._leaving(n), lambda row: (row[0], row[2])):
-            places = [element for _, element, _ in elements]
-            for first, last in _runs(places):
-                target, length = f"o{k}[{first}]", last - first + 1
-                if text == "0.0" and length >= _MANY_ZEROS:
-                    lines.append(f"  memset(&{target}, 0, {length} * sizeof(double));")
-                else:
-                    lines += [f"  o{k}[{place}] = {text};" for place in range(first, last + 1)]
-        return lines
-
-    def _leaving(self, n: int | None) -> list[tuple[int, int, str]]:
-        """Where a node leaves and what is written: number of the output, element, expression."""
-        return [
-            (k, element, operand(self.graph, node))
-            for k, element, node in self.where.outputs.get(n, ())
-        ]
-
-
-def _runs(places: Sequence[int]) -> list[tuple[int, int]]:
-    """First and last of each run of consecutive numbers."""
-    runs: list[tuple[int, int]] = []
-    for place in places:
-        if runs and place == runs[-1][1] + 1:
-            runs[-1] = (runs[-1][0], place)
-        else:
-            runs.append((place, place))
-    return runs
+def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Step]]]:
+    """The blocks before the first map, between it and the second one, and so on."""
+    phase = phases(graph, late)
+    order = schedule(graph, phase)
+    every: list[list[Step]] = [[] for _ in range(maps + 1)]
+    for step in order:
+        every[max(phase[n] for n in gives(step))].append(step)
+    return [blocks(graph, steps, block) for steps in every]

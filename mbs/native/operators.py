@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import casadi
 
@@ -50,8 +50,19 @@ _UNARY: Mapping[int, str] = {
 }
 
 
-def expression(graph: Graph, number: int) -> str:
-    """The C expression of a node, its operands written by `operand`.
+ELEMENTWISE = frozenset((*_BINARY, *_UNARY))
+"""CasADi's codes of the operations that C has."""
+
+
+def expression(
+    graph: Graph, number: int, written: Callable[[Graph, int], str] | None = None
+) -> str:
+    """The C expression of a node.
+
+    Args:
+        graph: has it.
+        number: of the node.
+        written: gives the text of an operand; `operand` unless told.
 
     Raises:
         ModelError: the operation has no equivalent in C's library.
@@ -62,7 +73,8 @@ def expression(graph: Graph, number: int) -> str:
         raise ModelError(
             f"{graph.name}: operation {op} of CasADi has no C equivalent; compile without fast"
         )
-    return form.format(*(operand(graph, n) for n in graph.operands(number)))
+    write = written or operand
+    return form.format(*(write(graph, n) for n in graph.operands(number)))
 
 
 def operand(graph: Graph, number: int) -> str:

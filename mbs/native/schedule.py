@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import TypeAlias
@@ -39,17 +39,22 @@ Step: TypeAlias = int | Batch
 """A node to compute by its own operation, or a batch."""
 
 
-def schedule(graph: Graph) -> list[Step]:
+def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
     """Every step that the outputs need, each after what it needs.
 
     Angles made of inputs alone come first, all their sines and cosines at once; angles made of
     those next, and so on; then all that remains, in the order of the graph.
+
+    Args:
+        graph: what to compute.
+        phase: of each node, as `phases` tells; nodes of different phases share no batch.
     """
+    phase = phase or [0] * len(graph.nodes)
     pending = graph.live()
     for number, node in enumerate(graph.nodes):
         pending[number] = pending[number] and node.op not in _FREE
     steps: list[Step] = []
-    for batches in _batches(graph, pending):
+    for batches in _batches(graph, pending, phase):
         angles = [angle for batch in batches for angle in batch.angles]
         steps += _take(_ancestors(graph, angles, pending), pending)
         for batch in batches:
@@ -57,6 +62,22 @@ def schedule(graph: Graph) -> list[Step]:
             for number, _ in batch.results:
                 pending[number] = False
     return [*steps, *_take(range(len(graph.nodes)), pending)]
+
+
+def phases(graph: Graph, late: Mapping[int, int]) -> list[int]:
+    """For each node the phase in which it can be computed.
+
+    Args:
+        graph: has the nodes.
+        late: of inputs that are not known from the beginning, the phase from which they are.
+    """
+    phase: list[int] = []
+    for number, node in enumerate(graph.nodes):
+        if node.op == casadi.OP_INPUT:
+            phase.append(late.get(node.args[0], 0))
+        else:
+            phase.append(max((phase[k] for k in graph.operands(number)), default=0))
+    return phase
 
 
 def blocks(graph: Graph, steps: Sequence[Step], size: int) -> list[list[Step]]:
@@ -104,16 +125,16 @@ def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) ->
     return sorted(wanted)
 
 
-def _batches(graph: Graph, alive: Sequence[bool]) -> list[list[Batch]]:
+def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[list[Batch]]:
     """The batches, those first that need no others."""
     depth = [0] * len(graph.nodes)
-    levels: dict[int, dict[int, list[tuple[int, int]]]] = {}
+    levels: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
     for number, node in enumerate(graph.nodes):
         operands = graph.operands(number)
         depth[number] = max((depth[k] for k in operands), default=0)
         if node.op in (casadi.OP_SIN, casadi.OP_COS) and alive[number]:
             part = 0 if node.op == casadi.OP_SIN else LANES
-            angles = levels.setdefault(depth[number], {})
+            angles = levels.setdefault((phase[number], depth[number]), {})
             angles.setdefault(operands[0], []).append((number, part))
             depth[number] += 1
     return [_split(levels[level]) for level in sorted(levels)]

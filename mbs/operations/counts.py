@@ -15,6 +15,8 @@ from casadi import Function
 
 from mbs.operations.graph import Graph, graph_of
 
+_DIVISION = 2
+"""Multiplications that take the time of a division."""
 _MUL = {casadi.OP_MUL, casadi.OP_SQ}
 _ADD = {casadi.OP_ADD, casadi.OP_SUB, casadi.OP_TWICE}
 _DIV = {casadi.OP_DIV, casadi.OP_INV}
@@ -60,6 +62,14 @@ class Count:
     def total(self) -> int:
         """All operations, each counted once."""
         return self.mul + self.add + self.div + self.sqrt + self.trig + self.other
+
+    @property
+    def price(self) -> int:
+        """What decides between two ways: multiplications, additions, and twice the divisions.
+
+        Ways to one result have the same sines, cosines and roots.
+        """
+        return self.mul + self.add + _DIVISION * self.div
 
     def __str__(self) -> str:
         """Multiplications (divisions among them) / additions, as tables give them."""

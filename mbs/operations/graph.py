@@ -10,6 +10,7 @@ import casadi
 from casadi import SX, Function, Sparsity
 
 from mbs.errors import ModelError
+from mbs.messages import quoted
 
 
 class Node(NamedTuple):
@@ -100,8 +101,11 @@ def graph_of(function: Function) -> Graph:
     """The scalar operations of a Function; one made of MX is expanded first.
 
     Raises:
-        ModelError: it calls something that has no scalar operations, such as an integrator.
+        ModelError: it is no Function, or it calls something that has no scalar operations, such
+            as an integrator.
     """
+    if not isinstance(function, Function) or function.is_null():
+        raise ModelError(f"{quoted(function)} is not a Function; give a casadi.Function")
     function = _scalar(function)
     nodes: list[Node] = []
     work: dict[int, int] = {}

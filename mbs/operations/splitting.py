@@ -54,8 +54,8 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
             Function does not have are ignored.
 
     Returns:
-        `setup(p) -> c`, of the parameters that the Function has in its order, and
-        `main(..., c) -> ...`, of its other inputs and its outputs.
+        `setup(p) -> c`, of the parameters that the Function has in its order, for a model with
+        their defaults, and `main(..., c) -> ...`, of its other inputs and its outputs.
 
     Raises:
         ModelError: the Function has no scalar operations, or an input is named c.
@@ -67,8 +67,10 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
         )
     kept = _needed_of_parameters(graph, names)
     column = Port(_CONSTANTS, Sparsity.dense(len(kept), 1))
+    setup = function_of(_setup(graph, names, kept, column))
+    like = getattr(function, "like", None)
     return Split(
-        function_of(_setup(graph, names, kept, column)),
+        setup if like is None else like(setup),
         function_of(_main(graph, names, kept, column)),
         tuple(port.name for port in graph.inputs),
     )

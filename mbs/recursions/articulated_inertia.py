@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.spatial import Displacement, Inertia, Rotation, Screw, Turn, skew, zeros
-from mbs.spatial.screw import AXES
+from mbs.spatial import Displacement, Inertia, Rotation, Screw, skew, zeros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +44,7 @@ class ArticulatedInertia:
     def turned(self, R: Rotation) -> ArticulatedInertia:
         """The same body about the same point in the axes of frame i."""
         return ArticulatedInertia(
-            R.apply_to_tensor(self.M), _turned_square(R, self.H), R.apply_to_tensor(self.J)
+            R.apply_to_tensor(self.M), R.apply_to_square(self.H), R.apply_to_tensor(self.J)
         )
 
     def slid(self, axis: int, t: SX) -> ArticulatedInertia:
@@ -159,22 +158,6 @@ class Pivot:
         twist = SX(twist)
         twist[self.direction] = own
         return twist, own - before
-
-
-def _turned_square(R: Rotation, square: SX) -> SX:
-    """R square R'; twelve multiplications about a coordinate axis."""
-    if not isinstance(R, Turn):
-        return casadi.mtimes(casadi.mtimes(R.matrix, square), R.matrix.T)
-    turned = casadi.horzcat(*(R.apply(square[k, :].T) for k in range(3))).T
-    turned = casadi.horzcat(*(R.apply(turned[:, k]) for k in range(3)))
-    axis = AXES[R.axis]
-    k, h = (axis + 1) % 3, (axis + 2) % 3
-    s, c = R.s, R.c
-    if not (s.is_zero() or c.is_zero()):
-        w = c * (square[k, k] - square[h, h]) - s * (square[k, h] + square[h, k])
-        turned[k, k], turned[h, h] = square[h, h] + c * w, square[k, k] - c * w
-        turned[k, h], turned[h, k] = square[k, h] + s * w, square[h, k] + s * w
-    return turned
 
 
 def _symmetric_product(a: SX, b: SX) -> SX:

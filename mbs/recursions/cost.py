@@ -9,7 +9,7 @@ from mbs.operations import count
 
 
 def cost(value: SX, q: SX, p: SX) -> int:
-    """Multiplications, divisions and additions of a matrix.
+    """The price of a matrix; see `mbs.operations.counts.Count.price`.
 
     Args:
         value: of the symbols q and p.
@@ -17,5 +17,5 @@ def cost(value: SX, q: SX, p: SX) -> int:
         p: (np, 1) parameters; operations on them alone are free.
     """
     names = ["q", "p"], ["value"]
-    total = count(Function("f", [q, p], [casadi.densify(value)], *names, {"cse": True}))
-    return total.mul + total.add + total.div
+    f = Function("f", [q, p], [casadi.densify(value)], *names, {"cse": True})
+    return count(f).price

@@ -13,7 +13,7 @@ from casadi import SX
 from mbs.assembly.tree import CarriedRotor
 from mbs.recursions.joint_axes import Drift, JointAxes, Step
 from mbs.recursions.joint_lines import Line
-from mbs.recursions.newton_euler import Wrench
+from mbs.recursions.newton_euler import Wrench, add_wrenches
 from mbs.recursions.subtree_motion import SubtreeMotion
 from mbs.spatial import Rotation, cross
 
@@ -96,10 +96,10 @@ class EffortColumn:
 
 def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
     """What a joint changes that moves a subtree along a line, in the axes of both."""
-    spinning = _sum(subtree.wrench_of(line.second), subtree.wrench_of_spin(line.spin))
+    spinning = add_wrenches(subtree.wrench_of(line.second), subtree.wrench_of_spin(line.spin))
     return EffortColumn(
-        dq=_sum(spinning, subtree.wrench_of_displacement(line.unit)),
-        dv=_sum(subtree.wrench_of(line.faster), subtree.wrench_of_spin(line.unit.angular)),
+        dq=add_wrenches(spinning, subtree.wrench_of_displacement(line.unit)),
+        dv=add_wrenches(subtree.wrench_of(line.faster), subtree.wrench_of_spin(line.unit.angular)),
         momentum=subtree.wrench_of(line.unit),
         spin=subtree.spin_of(line.unit),
     )
@@ -109,7 +109,3 @@ def rotor_couple(rotor: CarriedRotor, axes: JointAxes) -> Couple:
     """The couple of a rotor, in the axes of the joint of the link that carries it."""
     momentum = rotor.momentum if axes.turn is None else axes.turn.apply(rotor.momentum)
     return Couple(cross(axes.w, momentum), momentum)
-
-
-def _sum(a: Wrench, b: Wrench) -> Wrench:
-    return a[0] + b[0], a[1] + b[1]

@@ -72,7 +72,7 @@ def newton_euler(
     own = [inertial_wrench(body, motion) for body, motion in zip(bodies, motions, strict=True)]
     wrenches = list(own)
     for j, wrench in (external or {}).items():
-        wrenches[j] = _sum(wrenches[j], wrench)
+        wrenches[j] = add_wrenches(wrenches[j], wrench)
     for c, moment in rotor_moments(tree, v, a, motions).items():
         wrenches[c] = (wrenches[c][0], wrenches[c][1] + moment)
     loads = list(wrenches)
@@ -80,9 +80,9 @@ def newton_euler(
         i = tree.links[j].antecedent
         if i >= 0:
             passed = poses[j].wrench(*wrenches[j])
-            wrenches[i] = _sum(wrenches[i], passed)
+            wrenches[i] = add_wrenches(wrenches[i], passed)
             if j not in runs.get(i, ()) and poses[j].run == (j,):
-                loads[i] = _sum(loads[i], passed)
+                loads[i] = add_wrenches(loads[i], passed)
     efforts = [effort(link.motion, f, m) for link, (f, m) in zip(tree.links, wrenches, strict=True)]
     for i, members in runs.items():
         along = [f[2] for f, _ in wrenches]
@@ -91,7 +91,8 @@ def newton_euler(
     return Dynamics(motions, own, wrenches, casadi.vertcat(*efforts) + spin)
 
 
-def _sum(a: Wrench, b: Wrench) -> Wrench:
+def add_wrenches(a: Wrench, b: Wrench) -> Wrench:
+    """The sum of two wrenches about one point."""
     return a[0] + b[0], a[1] + b[1]
 
 

@@ -59,6 +59,11 @@ class LinkPose:
         return _origin(self.steps)
 
     @property
+    def height(self) -> SX:
+        """Distance of the frame from its seat, along the axis of the joint [m]."""
+        return _origin(self.motion)[2]
+
+    @property
     def matrix(self) -> SX:
         """(3, 3) orientation of j in i."""
         R = Pose.identity().R

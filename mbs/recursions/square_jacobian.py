@@ -10,7 +10,7 @@ Source: Renaud 1980; Khalil & Creusot 1997, section 4.6.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi
 import numpy as np
@@ -106,7 +106,7 @@ def square_jacobian(
     if G is None:
         places = _places(tree, found, columns)
     else:
-        found = replace(found, J=found.J @ _values(target, G))
+        found = found.combined(_values(target, G))
         places = [*spread(found.on_the_way), len(found.frames) - 1]
     size = len(found.frames)
     views = _views(found, places, rows, columns)

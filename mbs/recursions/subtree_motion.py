@@ -16,7 +16,7 @@ from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.joint_axes import Drift, JointAxes, Step
 from mbs.recursions.joint_lines import Twist
 from mbs.recursions.newton_euler import Wrench, inertial_wrench
-from mbs.spatial import Displacement, Inertia, PseudoInertia, Rotation, Turn, cross, skew, zeros
+from mbs.spatial import Displacement, Inertia, PseudoInertia, Rotation, cross, skew, zeros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ class SubtreeMotion:
     def turned(self, R: Rotation) -> SubtreeMotion:
         """In the axes of frame i, R being the orientation of the present ones in i."""
         f, m = R.apply(self.f), R.apply(self.m)
-        return SubtreeMotion(self.body.turned(R), _turned(R, self.K), R.apply(self.n), f, m)
+        return SubtreeMotion(self.body.turned(R), R.apply_to_square(self.K), R.apply(self.n), f, m)
 
     def slid(self, axis: int, t: SX) -> SubtreeMotion:
         """Displaced by t [m] along a coordinate axis."""
@@ -138,22 +138,6 @@ def _displaced(motion: SubtreeMotion, step: Displacement) -> SubtreeMotion:
     for axis in range(3):
         moved = moved.slid(axis, p[axis])
     return moved
-
-
-def _turned(R: Rotation, K: SX) -> SX:
-    """R K R'; about a coordinate axis with twelve products."""
-    if not isinstance(R, Turn):
-        return casadi.mtimes(casadi.mtimes(R.matrix, K), R.matrix.T)
-    k = ("xyz".index(R.axis) + 1) % 3
-    h, m = (k + 1) % 3, (k + 2) % 3
-    w = R.c * (K[k, k] - K[h, h]) - R.s * (K[k, h] + K[h, k])
-    turned = SX(K)
-    turned[k, k], turned[h, h] = K[h, h] + R.c * w, K[k, k] - R.c * w
-    turned[k, h], turned[h, k] = K[k, h] + R.s * w, K[h, k] + R.s * w
-    for a, b in (((k, m), (h, m)), ((m, k), (m, h))):
-        turned[a] = R.c * K[a] - R.s * K[b]
-        turned[b] = R.s * K[a] + R.c * K[b]
-    return turned
 
 
 def subtree_motions(

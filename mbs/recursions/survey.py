@@ -6,7 +6,7 @@ structure is known before a symbol is touched.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi
 import numpy as np
@@ -23,18 +23,23 @@ Array = NDArray[np.float64]
 
 _SAMPLES = 3
 _ZERO = 1e-10
+"""Of lengths in units of the survey, and of components of unit vectors."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
     """A frame's Jacobian and the frames on the way to it, at random postures.
 
+    Lengths are parts of the largest one, so that a small mechanism has no more zeros than a large
+    one.
+
     Attributes:
         frames: the base, the links on the way, and at last the axes that were asked for.
         R: (frames, samples, 3, 3) their orientations in the base.
         p: (frames, samples, 3) their origins in the base.
         target_p: (samples, 3) origin of the frame that moves, in the base.
-        J: (samples, 6, nv) Jacobian in the base.
+        J: (samples, 6, nv) Jacobian in the base, for velocities in units of their own.
+        units: (nv,) these: of a tree's joints the length where they slide, 1 where they turn.
     """
 
     frames: tuple[Frame, ...]
@@ -42,6 +47,14 @@ class Survey:
     p: Array
     target_p: Array
     J: Array
+    units: Array
+
+    def combined(self, G: Array) -> Survey:
+        """The same of other velocities, of which G (samples, nv, m) makes these."""
+        parts = G / self.units[:, None]
+        sizes = np.abs(parts).max(axis=(0, 1))
+        units = 1 / np.where(sizes > 0, sizes, 1.0)
+        return replace(self, J=self.J @ parts * units, units=units)
 
     @property
     def on_the_way(self) -> range:
@@ -95,9 +108,12 @@ def survey(target: Target) -> Survey:
     T = np.array([np.array(v[0]).reshape(4, -1, 4).swapaxes(0, 1) for v in values])
     T = T.swapaxes(0, 1)
     J_values = np.array([np.array(v[1]) for v in values])
-    return Survey(
-        tuple(frames[:-1]), T[:-1, :, :3, :3], T[:-1, :, :3, 3], T[-1, :, :3, 3], J_values
-    )
+    length = float(np.abs(T[:, :, :3, 3]).max()) or 1.0
+    slides = (np.abs(J_values[:, 3:]) < _ZERO).all(axis=(0, 1))
+    units = np.where(slides, length, 1.0)
+    J_values[:, :3] /= length
+    p = T[:, :, :3, 3] / length
+    return Survey(tuple(frames[:-1]), T[:-1, :, :3, :3], p[:-1], p[-1], J_values * units, units)
 
 
 def random_samples(tree: Tree, parameters: int) -> list[tuple[Array, Array]]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbs.spatial.angles import sin_cos
 from mbs.spatial.vectors import snapped
 
-_CYCLE = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
+_AXES = "xyz"
 
 
 class Rotation(Protocol):
@@ -36,6 +36,9 @@ class Rotation(Protocol):
     def apply_to_tensor(self, tensor: SX) -> SX:
         """The symmetric tensor of frame j, (3, 3), in frame i."""
 
+    def apply_to_square(self, square: SX) -> SX:
+        """Any tensor of frame j, (3, 3), in frame i."""
+
 
 @dataclass(frozen=True, slots=True)
 class Turn:
@@ -46,9 +49,19 @@ class Turn:
     c: SX
 
     @property
+    def along(self) -> int:
+        """Number of the axis: 0, 1 or 2 for x, y or z."""
+        return _AXES.index(self.axis)
+
+    @property
+    def across(self) -> tuple[int, int]:
+        """Numbers of the axes that turn, the first towards the second."""
+        return (self.along + 1) % 3, (self.along + 2) % 3
+
+    @property
     def matrix(self) -> SX:
         """(3, 3) orientation of the turned frame."""
-        k, h = _CYCLE[self.axis]
+        k, h = self.across
         R = SX(DM.eye(3))
         R[k, k], R[k, h], R[h, k], R[h, h] = self.c, -self.s, self.s, self.c
         return casadi.densify(R)
@@ -62,32 +75,39 @@ class Turn:
         return self._turned(vector, -self.s)
 
     def _turned(self, vector: SX, s: SX) -> SX:
-        k, h = _CYCLE[self.axis]
+        k, h = self.across
         turned = SX(vector)
         turned[k] = self.c * vector[k] - s * vector[h]
         turned[h] = s * vector[k] + self.c * vector[h]
         return turned
 
     def apply_to_tensor(self, tensor: SX) -> SX:
-        """The symmetric tensor of the turned frame in the fixed one.
+        """The symmetric tensor of the turned frame in the fixed one; eight multiplications."""
+        k, h = self.across
+        m, turned = self.along, self.apply_to_square(tensor)
+        turned[h, k], turned[m, k], turned[m, h] = turned[k, h], turned[k, m], turned[h, m]
+        return turned
 
-        Eight multiplications: with w = c (a - e) - 2 s b the turned block is
-        [[e + c w, b + s w], [., a - c w]] for the block [[a, b], [b, e]].
+    def apply_to_square(self, square: SX) -> SX:
+        """Any tensor of the turned frame in the fixed one; twelve multiplications.
+
+        With w = c (a - e) - s (b + d) the turned block is [[e + c w, b + s w], [d + s w, a - c w]]
+        for the block [[a, b], [d, e]].
         """
-        k, h = _CYCLE[self.axis]
-        m = 3 - k - h
+        (k, h), m = self.across, self.along
         s, c = self.s, self.c
-        a, b, e = tensor[k, k], tensor[k, h], tensor[h, h]
-        turned = SX(tensor)
+        a, b, d, e = square[k, k], square[k, h], square[h, k], square[h, h]
+        turned = SX(square)
         if c.is_zero():
-            turned[k, k], turned[h, h] = e, a
-            turned[k, h] = turned[h, k] = -b
+            turned[k, k], turned[k, h], turned[h, k], turned[h, h] = e, -d, -b, a
         elif not s.is_zero():
-            w = c * (a - e) - s * (2 * b)
-            turned[k, k], turned[h, h] = e + c * w, a - c * w
-            turned[k, h] = turned[h, k] = b + s * w
-        turned[k, m] = turned[m, k] = c * tensor[k, m] - s * tensor[h, m]
-        turned[h, m] = turned[m, h] = s * tensor[k, m] + c * tensor[h, m]
+            w = c * (a - e) - s * (b + d)
+            cw, sw = c * w, s * w
+            turned[k, k], turned[h, h] = e + cw, a - cw
+            turned[k, h], turned[h, k] = b + sw, d + sw
+        for first, second in (((k, m), (h, m)), ((m, k), (m, h))):
+            turned[first] = c * square[first] - s * square[second]
+            turned[second] = s * square[first] + c * square[second]
         return turned
 
 
@@ -107,7 +127,11 @@ class MatrixTurn:
 
     def apply_to_tensor(self, tensor: SX) -> SX:
         """The symmetric tensor of the turned frame in the fixed one."""
-        return casadi.mtimes(casadi.mtimes(self.matrix, tensor), self.matrix.T)
+        return self.apply_to_square(tensor)
+
+    def apply_to_square(self, square: SX) -> SX:
+        """Any tensor of the turned frame in the fixed one."""
+        return casadi.mtimes(casadi.mtimes(self.matrix, square), self.matrix.T)
 
 
 def axis_turn(axis: str, angle: SX) -> Turn:

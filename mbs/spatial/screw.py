@@ -19,8 +19,6 @@ from mbs.spatial.vectors import cross, is_zero
 Body = TypeVar("Body", Inertia, PseudoInertia)
 """A rigid body in either form of its ten parameters."""
 
-AXES = {"x": 0, "y": 1, "z": 2}
-
 
 class Displacement(Protocol):
     """Where a frame j stands in a frame i."""
@@ -59,7 +57,7 @@ class Screw:
     @property
     def axis(self) -> int:
         """0, 1 or 2 for x, y or z."""
-        return AXES[self.turn.axis]
+        return self.turn.along
 
     def point(self, r: SX) -> SX:
         """A point of frame j, (3, 1), in frame i [m]."""
@@ -71,7 +69,7 @@ class Screw:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
         f, m = self.turn.apply(f), SX(self.turn.apply(m))
         if not self.t.is_zero():
-            k, h = (self.axis + 1) % 3, (self.axis + 2) % 3
+            k, h = self.turn.across
             m[k] -= self.t * f[h]
             m[h] += self.t * f[k]
         return f, m

@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 import pytest
 from casadi import SX, cos, sin
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from mbs.models.trigonometric import (
@@ -48,7 +48,7 @@ def test_every_form_has_the_same_value(expression):
         polynomial = polynomial_of(expression, x)
         found = factored(polynomial)
     except NotTrigonometric:
-        return
+        assume(False)
     for form in (
         polynomial,
         lowered(polynomial, "s"),
@@ -80,6 +80,25 @@ def test_zero_is_found():
     expression = cos(a) ** 2 + sin(a) ** 2 - 1
     assert polynomial_of(expression, x) == {}
     assert factored({}).number == 0
+
+
+def test_small_terms_stay_and_rounding_goes():
+    tiny = d * sin(a) + 1e-14 * e * cos(a)
+    assert len(polynomial_of(tiny, x)) == 2
+    ((factor, _),) = factored(polynomial_of(tiny, x)).factors
+    assert len(factor) == 2
+    lengths = 1e-9 * d * sin(a) + 3e-18 * d * cos(b)
+    assert len(polynomial_of(lengths, x)) == 2
+    cancelled = d * sin(a) + (0.1 * e) * (0.7 * cos(a)) - (0.1 * 0.7) * e * cos(a)
+    assert len(polynomial_of(cancelled, x)) == 1
+    folded = 0.4 * d * sin(a) + (0.1 + 0.2 - 0.3) * e * cos(a)
+    assert len(polynomial_of(folded, x)) == 1
+
+
+@pytest.mark.parametrize("number", [np.inf, -np.inf, np.nan])
+def test_what_is_no_number_is_refused(number):
+    with pytest.raises(NotTrigonometric):
+        polynomial_of(number * a + 0.1 * b, x)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from operations.expressions import function, require_equal
 import mbs
 from mbs.errors import ModelError
 from mbs.operations import PASSES, Pass, catalogue, count, simplification, simplify
+from mbs.operations.verification import witness
 
 
 def _rotations(q, x):
@@ -55,6 +56,31 @@ def test_a_pass_that_changes_the_function_is_refused(monkeypatch):
     monkeypatch.setattr("mbs.operations.pipeline.PASSES", (*PASSES[:2], wrong))
     with pytest.raises(ModelError, match="f: o0 is no longer the same after the pass wrong"):
         simplify(function("a b", lambda a, b: a * b))
+
+
+@pytest.mark.parametrize("size", [1e-14, 1e-30])
+def test_a_wrong_pass_is_seen_on_small_numbers(monkeypatch, size):
+    wrong = Pass("wrong", "first output is 0", _zeroed)
+    monkeypatch.setattr("mbs.operations.pipeline.PASSES", (*PASSES[:2], wrong))
+    with pytest.raises(ModelError, match="o0 is no longer the same after the pass wrong"):
+        simplify(function("a b", lambda a, b: size * (a + b)))
+
+
+def test_zeros_are_zeros():
+    proof = witness(function("a b", lambda a, b: casadi.if_else(a > 1e9, b, 0)))
+    proof.require_equal(function("a b", lambda a, b: casadi.fmin(a * a, 0)), "a detour")
+    with pytest.raises(ModelError, match="o0 is no longer the same after a mistake"):
+        proof.require_equal(function("a b", lambda a, b: 1e-300 + 0 * (a > 1e9)), "a mistake")
+
+
+def test_an_output_that_is_nothing_but_rounding_may_vanish():
+    def cancelling(a, b):
+        s, c = casadi.sin(a), casadi.cos(a)
+        return 3e5 * (b * s * s + b * c * c - b)
+
+    f = function("a b", cancelling)
+    assert 0 < max(abs(float(f(0.1 * k, 0.7))) for k in range(9)) < 1e-9
+    assert abs(float(simplify(f)(0.4, 0.7))) < 1e-9
 
 
 def _zeroed(graph, parameters):

@@ -57,7 +57,6 @@ def test_choice_is_the_least_of_all_ways():
 def test_no_choice_changes_the_result(axes, reference):
     system = symbolic_robot("general_6r", "none").assemble()
     q = SX.sym("q", 6)
-    home = system.frame("base")
     target = Target(system.tree, q, system.p, system.frame(6), system.frame(axes))
     seen = outlook(target)
     ways = [frame_jacobian(seen, reference, m) for m in (0, 3, seen.turns)]
@@ -68,9 +67,6 @@ def test_no_choice_changes_the_result(axes, reference):
         np.testing.assert_allclose(other, first, rtol=0, atol=1e-13)
     whole = np.array(mbs.models.jacobian(system, 6, expressed_in=axes)(sample[0]))
     T = np.array(mbs.models.transform(system, 6, relative_to=axes)(sample[0]))
-    place = system.frame(0 if reference is None else reference + 1)
-    assert home[0] == -1
-    assert place[0] < 6
     if reference is not None:
         at = np.array(mbs.models.transform(system, reference + 1, relative_to=axes)(sample[0]))
         whole[:3] += np.cross(whole[3:].T, at[:3, 3] - T[:3, 3]).T

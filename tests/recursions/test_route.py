@@ -8,7 +8,16 @@ from support.random_trees import ALL_KINDS, random_state, random_tree
 from symbolic_robots import symbolic_robot
 
 from mbs.recursions.poses import base_poses, link_poses
-from mbs.recursions.route import expressed, joined, relative_pose, walked_back, way_to
+from mbs.recursions.route import (
+    Shift,
+    Spin,
+    Tilt,
+    expressed,
+    joined,
+    relative_pose,
+    walked_back,
+    way_to,
+)
 from mbs.spatial import Pose
 
 
@@ -41,10 +50,13 @@ def test_there_and_back_is_nowhere():
     way = way_to(system.tree, q, system.frame(6))
     point = SX([0.1, 0.2, 0.3])
     for step in reversed(joined([*way, *walked_back(way)], system.tree)):
-        if hasattr(step, "p"):
-            point = point + step.p
-        if hasattr(step, "rotation"):
-            point = step.rotation.apply(point)
+        match step:
+            case Shift(p=p):
+                point = point + p
+            case Tilt(rotation=rotation):
+                point = rotation.apply(point)
+            case Spin():
+                pytest.fail("a spin was not made a turn")
     f = casadi.Function("f", [q, system.p], [point])
     end = np.array(f(np.arange(6) * 0.4, system.p_default)).ravel()
     np.testing.assert_allclose(end, [0.1, 0.2, 0.3], rtol=0, atol=1e-14)

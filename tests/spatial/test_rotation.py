@@ -6,7 +6,17 @@ import pytest
 from casadi import DM, SX
 from support.random_trees import random_rotation
 
-from mbs.spatial import MatrixTurn, align_z, axis_turn, is_zero, sin_cos, skew, snapped, vector
+from mbs.spatial import (
+    MatrixTurn,
+    Turn,
+    align_z,
+    axis_turn,
+    is_zero,
+    sin_cos,
+    skew,
+    snapped,
+    vector,
+)
 
 QUARTERS = {0: (0, 1), 1: (1, 0), 2: (0, -1), 3: (-1, 0)}
 
@@ -100,8 +110,6 @@ def test_matrix_turn_is_the_same_as_its_matrix():
 
 def test_turning_a_tensor_costs_nine_multiplications():
     s, c = SX.sym("s"), SX.sym("c")
-    from mbs.spatial import Turn
-
     a = [SX.sym(f"a{k}") for k in range(6)]
     J = casadi.vertcat(
         casadi.horzcat(a[0], a[1], a[2]),
@@ -158,3 +166,23 @@ def test_is_zero_and_skew():
     assert not is_zero(vector([0, 1e-30, 0]))
     a, b = np.array([1.0, -2, 3]), np.array([0.4, 5, -6])
     np.testing.assert_allclose(DM(skew(SX(DM(a)))).full() @ b, np.cross(a, b), atol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [0.7, 0.0, np.pi / 2, -np.pi / 2, np.pi])
+@pytest.mark.parametrize("axis", "xyz")
+def test_any_tensor_is_turned(axis, angle):
+    turn, square = axis_turn(axis, SX(angle)), np.random.default_rng(5).standard_normal((3, 3))
+    R = rodrigues(np.eye(3)["xyz".index(axis)], angle)
+    for one in (turn, MatrixTurn(turn.matrix)):
+        turned = DM(one.apply_to_square(SX(DM(square)))).full()
+        np.testing.assert_allclose(turned, R @ square @ R.T, atol=2e-15)
+
+
+def test_turning_any_tensor_costs_twelve_multiplications_and_a_quarter_turn_none():
+    s, c = SX.sym("s"), SX.sym("c")
+    square = SX.sym("a", 3, 3)
+    for turn, most in ((Turn("y", s, c), 12), (Turn("y", SX(-1), SX(0)), 0)):
+        f = casadi.Function("f", [s, c, square], [turn.apply_to_square(square)])
+        kinds = [f.instruction_id(n) for n in range(f.n_instructions())]
+        assert kinds.count(casadi.OP_MUL) == most
+        assert most or casadi.OP_ADD not in kinds

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import textwrap
 import unicodedata
@@ -16,6 +15,7 @@ from mbs.export.languages.quantities import Elements, elements_of, joint_label
 from mbs.export.languages.unit import Argument
 from mbs.operations.counts import Count, count_graph
 from mbs.operations.graph import Graph, Port
+from mbs.version import __version__
 
 _WIDTH = 90
 _KINDS = {
@@ -52,13 +52,8 @@ def header(
         elements = elements_of(function, port.name)
         lines += _argument(direction, port, argument, elements, names[k])
     lines += ["", *_paragraph(_cost(graph))]
-    lines.append(f"Units are SI and radians. Written by mbs {_version()}.")
+    lines.append(f"Units are SI and radians. Written by mbs {__version__}.")
     return tuple(_ascii(line) for line in lines)
-
-
-def _version() -> str:
-    """Of the package, whose curated names this layer must not import."""
-    return str(importlib.import_module("mbs").__version__)
 
 
 def _argument(

@@ -75,7 +75,8 @@ def joint_label(name: str) -> str:
 def angle_names(graph: Graph, inputs: Sequence[Sequence[str]]) -> dict[int, str]:
     """Sines and cosines of joint angles: S2, C2, S23 of q2 + q3, S2m3 of q2 - q3.
 
-    A constant added to the angle shows as `off`.
+    A constant added to the angle shows as `off`. From ten joints on, S1_2 is of q1 + q2: S12 is
+    of q12.
 
     Args:
         graph: any.
@@ -95,12 +96,13 @@ def _angle_order(name: str) -> tuple[bool, int, str, bool]:
 
 def _angle_names(graph: Graph, inputs: Sequence[Sequence[str]]) -> Iterator[tuple[int, str]]:
     sums: dict[int, tuple[Term, ...] | None] = {}
+    apart = any(re.fullmatch(r"q\d\d+", name) for names in inputs for name in names)
     for number, node in enumerate(graph.nodes):
         sums[number] = _sum_of_angles(graph, number, sums, inputs)
         letter = {casadi.OP_SIN: "S", casadi.OP_COS: "C"}.get(node.op)
         terms = sums[node.args[0]] if letter else None
         if letter and terms and any(term.label != _OFFSET for term in terms):
-            yield number, letter + _joined(terms)
+            yield number, letter + _joined(terms, apart)
 
 
 _OFFSET = "off"
@@ -131,10 +133,15 @@ def _sum_of_angles(
     return tuple(terms)
 
 
-def _joined(terms: Sequence[Term]) -> str:
-    """The labels in order, `m` before one that is subtracted; the offset comes last, unsigned."""
+def _joined(terms: Sequence[Term], apart: bool) -> str:
+    """The labels in order, `m` before one that is subtracted; the offset comes last, unsigned.
+
+    Args:
+        terms: the angles that are added up.
+        apart: whether every two labels are kept apart, and not long ones alone.
+    """
     joints = sorted((t for t in terms if t.label != _OFFSET), key=_order)
-    long = len(joints) > 1 and any(len(term.label) > 1 for term in joints)
+    long = apart or any(len(term.label) > 1 for term in joints)
     text = ""
     for term in joints:
         between = "_" if long and text else ""

@@ -1,0 +1,91 @@
+"""Gears, racks and screws: couplings of coordinates, with the ratio that their names suggest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from mbs.components.coupling import Coupling
+from mbs.components.motion import Motion
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Scalar, expression, to_float
+
+
+@dataclass(frozen=True, slots=True)
+class Transmission(Coupling):
+    """driven = offset + k driver, between coordinates of the kinds that it is made for.
+
+    Attributes:
+        offset: position of driven where the driver is at zero [rad or m].
+    """
+
+    kinds: ClassVar[tuple[Motion, Motion]]
+    """What driven and driver have to be."""
+
+    coefficients: tuple[Scalar, ...] = field(init=False, default=(0.0, 1.0))
+    offset: Scalar = field(kw_only=True, default=0.0)
+
+    def _set_factor(self, given: str, factor: Expression) -> None:
+        """Couple by `factor`, which comes from the attribute `given` and may not be zero."""
+        if to_float(factor) == 0:
+            raise DescriptionError(
+                f"{self.name}: {given} is 0, which ties nothing; give another number, less than"
+                " zero where the two turn in opposite ways"
+            )
+        object.__setattr__(self, "coefficients", (self.offset, factor))
+        Coupling.__post_init__(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Gear(Transmission):
+    """A pair of gears: the driven angle is `ratio` times the driving one.
+
+    Attributes:
+        ratio: turns of driven for a turn of the driver; less than zero for wheels that mesh from
+            outside about parallel axes.
+    """
+
+    kinds = (Motion.REVOLUTE, Motion.REVOLUTE)
+    ratio: Scalar = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._normalise("ratio", "offset")
+        self._set_factor("ratio", expression(self.ratio))
+
+
+@dataclass(frozen=True, slots=True)
+class RackAndPinion(Transmission):
+    """A rack, the driven displacement, that a pinion moves by `radius` times its angle.
+
+    A wheel that rolls along a straight line is the same relation.
+
+    Attributes:
+        radius: of the pitch circle of the pinion [m]; less than zero where the rack moves the
+            other way.
+    """
+
+    kinds = (Motion.PRISMATIC, Motion.REVOLUTE)
+    radius: Scalar = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._normalise("radius", "offset")
+        self._set_factor("radius", expression(self.radius))
+
+
+@dataclass(frozen=True, slots=True)
+class Screw(Transmission):
+    """A nut, the driven displacement, that moves by `pitch` for a turn of the driving angle.
+
+    On the coordinates `.s` and `.phi` of one Cylindrical joint it makes a screw joint.
+
+    Attributes:
+        pitch: advance for a whole turn [m]; less than zero for a left-hand thread.
+    """
+
+    kinds = (Motion.PRISMATIC, Motion.REVOLUTE)
+    pitch: Scalar = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._normalise("pitch", "offset")
+        self._set_factor("pitch", expression(self.pitch) / (2 * math.pi))

@@ -1,0 +1,201 @@
+"""A loop as its unknown joints in cyclic order, and the known poses between them.
+
+Walking once around the loop leads back to the start: X_1 J_1 X_2 J_2 .. X_n J_n = 1. Each J_k
+turns about or slides along its own z axis; each X_k is made of links, and of joints whose positions
+are known by then.
+
+Source: Khalil & Creusot 1997, eq. 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from casadi import SX
+
+from mbs.assembly import System
+from mbs.assembly.khalil_frames import Cut
+from mbs.components import PointOnLine, Rod, Spherical
+from mbs.components.motion import Freedom, Motion
+from mbs.expressions import to_sx
+from mbs.recursions.route import common_link
+from mbs.spatial import Pose, align_z, axis_turn, snapped, vector
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """A joint of the loop whose position is looked for.
+
+    Attributes:
+        name: of the coordinate.
+        motion: revolute or prismatic along its z axis; spherical turns in any way.
+        place: number in q, or None for a cut joint.
+        sign: -1 where the way around the loop runs through the joint backwards.
+    """
+
+    name: str
+    motion: Motion
+    place: int | None
+    sign: int
+
+    @property
+    def turns(self) -> bool:
+        """Whether the joint turns."""
+        return self.motion is not Motion.PRISMATIC
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gap:
+    """The known way from one unknown joint to the next.
+
+    Attributes:
+        pose: of the next joint's frame, seen from the frame after the joint before.
+        pivots: (3, 1) points on the axes of known revolute joints on the way, seen likewise.
+    """
+
+    pose: Pose = field(default_factory=Pose.identity)
+    pivots: tuple[SX, ...] = ()
+
+    def then(self, pose: Pose) -> Gap:
+        """The way with one more piece at its end."""
+        return Gap(self.pose @ pose, self.pivots)
+
+    def after(self, gap: Gap) -> Gap:
+        """The way with another one before it."""
+        seen = (snapped(gap.pose.p + gap.pose.R @ pivot) for pivot in self.pivots)
+        return Gap(gap.pose @ self.pose, (*gap.pivots, *seen))
+
+    def inverse(self) -> Gap:
+        """The way back."""
+        back = self.pose.inverse()
+        return Gap(back, tuple(snapped(back.p + back.R @ pivot) for pivot in self.pivots))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ring:
+    """A loop: gap k comes before joint k.
+
+    Attributes:
+        joints: the unknown joints.
+        gaps: as many.
+    """
+
+    joints: tuple[Unknown, ...]
+    gaps: tuple[Gap, ...]
+
+    def rotated(self, first: int) -> Ring:
+        """The same loop begun at another joint."""
+        return Ring(
+            self.joints[first:] + self.joints[:first], self.gaps[first:] + self.gaps[:first]
+        )
+
+    def reversed(self) -> Ring:
+        """The same loop walked the other way round."""
+        joints = tuple(replace(joint, sign=-joint.sign) for joint in self.joints[::-1])
+        gaps = tuple(gap.inverse() for gap in (self.gaps[0], *self.gaps[:0:-1]))
+        return Ring(joints, gaps)
+
+    def without(self, k: int) -> Ring:
+        """The loop with joint k held at zero."""
+        n = len(self.joints)
+        merged = self.gaps[(k + 1) % n].after(self.gaps[k])
+        gaps = [merged if m == (k + 1) % n else gap for m, gap in enumerate(self.gaps) if m != k]
+        return Ring(tuple(j for m, j in enumerate(self.joints) if m != k), tuple(gaps))
+
+
+@dataclass(slots=True)
+class _Walk:
+    """The way so far: what was passed, and the gap since the last unknown joint."""
+
+    joints: list[Unknown] = field(default_factory=list)
+    gaps: list[Gap] = field(default_factory=list)
+    gap: Gap = field(default_factory=Gap)
+
+    def over(self, pose: Pose) -> None:
+        self.gap = self.gap.then(pose)
+
+    def through(self, joint: Unknown) -> None:
+        self.joints.append(joint)
+        self.gaps.append(self.gap)
+        self.gap = Gap()
+
+    def ring(self) -> Ring:
+        if not self.joints:
+            return Ring((), ())
+        first = self.gaps[0].after(self.gap)
+        return Ring(tuple(self.joints), (first, *self.gaps[1:]))
+
+
+def loop_links(system: System, cut: Cut) -> tuple[list[int], list[int]]:
+    """The links from frame_a of a cut joint back to the common link, and from there to frame_b."""
+    fork = common_link(system.tree, cut.link_a, cut.link_b)
+    back, out = (
+        [k for k in system.tree.path(link) if k not in system.tree.path(fork)]
+        for link in (cut.link_a, cut.link_b)
+    )
+    return back[::-1], out
+
+
+def ring_of(system: System, cut: Cut, known: Container[int], q: SX) -> Ring:
+    """The loop of a cut joint, from its frame_a through the tree and the joint itself.
+
+    Args:
+        system: whose loop it is.
+        cut: the joint.
+        known: numbers in q of the positions that are known.
+        q: (nq, 1) symbols, of which the known ones are used.
+    """
+    walk = _Walk()
+    back, out = loop_links(system, cut)
+    walk.over(cut.pose_a.inverse())
+    for k in back:
+        _pass(walk, system, k, -1, known, q)
+        walk.over(system.tree.links[k].placement.pose().inverse())
+    for k in out:
+        walk.over(system.tree.links[k].placement.pose())
+        _pass(walk, system, k, 1, known, q)
+    walk.over(cut.pose_b)
+    if not cut.welded:
+        symbols = {p.name: system.p[k] for k, p in enumerate(system.parameters)}
+        _pass_cut(walk, cut, symbols)
+    return walk.ring()
+
+
+def _pass(walk: _Walk, system: System, k: int, sign: int, known: Container[int], q: SX) -> None:
+    """Through the joint of link k."""
+    link = system.tree.links[k]
+    if link.q.start not in known or link.motion not in (Motion.REVOLUTE, Motion.PRISMATIC):
+        walk.through(Unknown(link.name, link.motion, link.q.start, sign))
+        return
+    position = q[link.q] if sign > 0 else -q[link.q]
+    if link.motion is Motion.PRISMATIC:
+        walk.over(Pose.moved(vector([0, 0, position])))
+        return
+    walk.gap = replace(walk.gap, pivots=(*walk.gap.pivots, walk.gap.pose.p))
+    walk.over(Pose.turned(axis_turn("z", position).matrix))
+
+
+def _pass_cut(walk: _Walk, cut: Cut, symbols: Mapping[str, SX]) -> None:
+    """Back through the freedoms of the cut joint, from its frame_b to its frame_a."""
+    joint = cut.edge.joint
+    ball = Unknown(joint.name, Motion.SPHERICAL, None, -1)
+    freedoms = joint.freedoms
+    if isinstance(joint, Spherical):
+        walk.through(ball)
+        return
+    if isinstance(joint, Rod):
+        walk.through(ball)
+        walk.over(Pose.moved(vector([to_sx(joint.length, symbols), 0, 0])))
+        walk.through(ball)
+        return
+    if isinstance(joint, PointOnLine):
+        walk.through(ball)
+        freedoms = (Freedom(Motion.PRISMATIC, joint.axis),)
+    for freedom in reversed(freedoms):
+        aligned = Pose.turned(align_z(np.array(freedom.axis)))
+        name = f"{joint.name}.{freedom.suffix}" if freedom.suffix else joint.name
+        walk.over(aligned)
+        walk.through(Unknown(name, freedom.motion, None, -1))
+        walk.over(aligned.inverse())

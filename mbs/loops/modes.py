@@ -1,0 +1,116 @@
+"""Every posture that closes the loops for given positions of the independent joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from casadi import SX, Function
+
+from mbs.assembly import System
+from mbs.errors import LoopError
+from mbs.loops.closed_form.plan import Stage, plan
+from mbs.loops.closing import Closing, Vector, closure_parameters
+from mbs.loops.closure import facing
+from mbs.loops.independent import Given, independent_positions
+
+_OPEN = 1e-10
+_SAME = 1e-9
+_MOST = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One way to assemble a mechanism.
+
+    Attributes:
+        q: (nq) the posture [rad or m], angles within half a turn of zero.
+        branch: what tells it from the others, such as ("j3:+",); one label for each loop that
+            closes in two ways.
+        residual: largest closure row there.
+    """
+
+    q: tuple[float, ...]
+    branch: tuple[str, ...]
+    residual: float
+
+
+def modes(
+    system: System,
+    q_active: Given = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+) -> list[Mode]:
+    """All postures with these positions of the independent joints, by closed forms.
+
+    Each is checked with every closure row and for joints that face the right way. The list is
+    empty where the mechanism cannot be assembled; two modes that meet are listed once.
+
+    Args:
+        system: the assembled mechanism.
+        q_active: positions of the independent joints, by name or in the order of
+            `system.active`; those left out stay as in the assembled posture.
+        parameters: values of symbols, the others at their defaults.
+
+    Raises:
+        NoClosedForm: a loop is solved by iteration only.
+        LoopError: there are more than 4096 branches.
+        ModelError: a joint is unknown or not independent, or a value is not finite.
+    """
+    stages = plan(system)
+    count = math.prod(len(stage.labels) for stage in stages)
+    if count > _MOST:
+        raise LoopError(
+            f"{system.name}: {count} branches are too many to list; name one in mbs.loops.solve"
+        )
+    p = closure_parameters(system, parameters)
+    start = np.zeros(system.nq)
+    start[list(system.active)] = independent_positions(system, q_active)
+    found: list[Mode] = []
+    for q, branch in _postures(stages, start, p, ()):
+        mode = _checked(system, q, branch, p)
+        if mode is not None and not any(_same(mode, other) for other in found):
+            found.append(mode)
+    return found
+
+
+def _postures(
+    stages: Sequence[Stage], q: Vector, p: Vector, branch: tuple[str, ...]
+) -> Iterator[tuple[Vector, tuple[str, ...]]]:
+    """Postures and branches, one loop after the other; NaN ends a branch."""
+    if not stages:
+        yield q, branch
+        return
+    stage, rest = stages[0], stages[1:]
+    values = np.array(stage.values(q, p))
+    for way, label in enumerate(stage.labels):
+        if np.all(np.isfinite(values[:, way])):
+            longer = q.copy()
+            longer[list(stage.places)] = values[:, way]
+            yield from _postures(rest, longer, p, branch + ((label,) if label else ()))
+
+
+def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> Mode | None:
+    residual = 0.0
+    if system.is_closed:
+        rows, _ = Closing(system, p).rows(q)
+        residual = float(np.max(np.abs(rows), initial=0.0))
+        cosines = np.array(_facing(system)(q, p))
+        if residual > _OPEN or not np.all(cosines > 0):
+            return None
+    return Mode(tuple(float(x) for x in q), branch, residual)
+
+
+def _facing(system: System) -> Function:
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        return Function("facing", [q, system.p], [facing(system, q)])
+
+    function: Function = system.cached("facing", build)
+    return function
+
+
+def _same(mode: Mode, other: Mode) -> bool:
+    return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)

@@ -1,0 +1,188 @@
+"""How closed loops tie the velocities and accelerations of active, passive and cut joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.rates import position_rate
+from mbs.components import Free, Spherical, Universal
+from mbs.components.motion import Motion
+from mbs.errors import ModelError
+from mbs.loops.reduction import independent_closure
+from mbs.loops.velocity import acceleration_bias, velocity_rows
+from mbs.models.symbols import symbols_of
+from mbs.recursions.route import relative_pose
+from mbs.solvers.small_linear import solve_square
+from mbs.spatial import Pose, zeros
+
+
+def velocity_closure(system: System) -> Function:
+    """``velocity_closure(q) -> Wa, Wp, Wac, Wpc, Wc, W, G``: how the loops tie the velocities.
+
+    The first rows, Wa v_a + Wp v_p = 0, are the independent closure rows (`system.closure.rows`),
+    couplings included. The others, Wac v_a + Wpc v_p + Wc v_c = 0, give the velocities v_c of the
+    cut joints, in the order of their freedoms: displacement, then angle; a spherical joint has
+    the angular velocity of its frame_b, in frame_b. Wc is minus the identity.
+
+    Source: Khalil & Creusot 1997, eq. 11-13.
+
+    Args:
+        system: with closed loops; m independent, r passive and c cut velocities.
+
+    Returns:
+        Function of q (nq, 1) that closes the loops; Wa (r, m), Wp (r, r), Wac (c, m), Wpc (c, r),
+        Wc (c, c), W (r, m) with v_p = W v_a, and G (nv, m) with v = G v_a; columns in the order
+        of `system.closure.active` and `.passive` [rad or m in each].
+
+    Raises:
+        ModelError: the system is an open chain.
+    """
+    require_system(system)
+
+    def build() -> tuple[Named, Named]:
+        q = SX.sym("q", system.nq)
+        rows = _loop_rows(system, q)
+        J, C, active, passive = rows.tree, rows.cut, rows.active, rows.passive
+        W = -solve_square(J[:, passive], J[:, active])
+        outputs = [
+            ("Wa", J[:, active]),
+            ("Wp", J[:, passive]),
+            ("Wac", C[:, active]),
+            ("Wpc", C[:, passive]),
+            ("Wc", -SX(DM.eye(C.shape[0]))),
+            ("W", W),
+            ("G", _whole(system, W)),
+        ]
+        return [("q", q)], outputs
+
+    return model_function(system, ("velocity_closure",), build)
+
+
+def acceleration_closure(system: System, coordinates: str = "independent") -> Function:
+    """``acceleration_closure(q, v_a) -> Psi, Phi, G_dot``: what accelerations have besides W a.
+
+    Wa a_a + Wp a_p + Psi = 0 and Wac a_a + Wpc a_p + Wc a_c + Phi = 0, with the matrices of
+    `velocity_closure`; G_dot is the rate of G along the motion.
+
+    Source: Khalil & Creusot 1997, eq. 14.
+
+    Args:
+        system: with closed loops.
+        coordinates: "independent" (the velocities are v_a) or "tree" (all of them, v, which
+            must keep the loops closed).
+
+    Returns:
+        Function of q (nq, 1) that closes the loops and v_a (m, 1), or v (nv, 1); Psi (r, 1),
+        Phi (c, 1), G_dot (nv, m).
+
+    Raises:
+        ModelError: the system is an open chain, or there are no such coordinates.
+    """
+    require_system(system)
+
+    def build() -> tuple[Named, Named]:
+        _require_loops(system)
+        s = symbols_of(system, coordinates)
+        rows = _loop_rows(system, s.q)
+        speed = SX.sym("v", system.nv)
+        both = casadi.vertcat(rows.tree, rows.cut)
+        bias = acceleration_bias(system, s.q, speed, both)
+        J, r = rows.tree, rows.tree.shape[0]
+        W = -solve_square(J[:, rows.passive], J[:, rows.active])
+        J_dot = _rate(system, J, s.q, speed)
+        turned = casadi.mtimes(J_dot, _whole(system, W))
+        W_dot = -solve_square(J[:, rows.passive], turned)
+        G_dot = _whole(system, W_dot, moving=False)
+        values = casadi.substitute([bias, G_dot], [speed], [s.v_tree])
+        outputs = [("Psi", values[0][:r]), ("Phi", values[0][r:]), ("G_dot", values[1])]
+        return [("q", s.q), (f"v{s.suffix}", s.v)], outputs
+
+    return model_function(system, ("acceleration_closure", coordinates), build)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """Rows that act on the velocities of the tree, and the two kinds of columns.
+
+    Attributes:
+        tree: (r, nv) independent closure rows.
+        cut: (c, nv) velocities of the cut joints.
+        active, passive: numbers of columns.
+    """
+
+    tree: SX
+    cut: SX
+    active: list[int]
+    passive: list[int]
+
+
+def _require_loops(system: System) -> None:
+    if system.closure is None:
+        raise ModelError(
+            f"{system.name}: an open chain has no loops whose velocities could be tied; use the"
+            " models of open chains"
+        )
+
+
+def _loop_rows(system: System, q: SX) -> _Rows:
+    _require_loops(system)
+    closure = system.closure
+    assert closure is not None
+    J = velocity_rows(system, q, independent_closure(system, q))
+    cut = [_cut_velocities(system, q, cut) for cut in system.cuts if not cut.welded]
+    C = casadi.vertcat(*cut) if cut else SX(0, system.nv)
+    return _Rows(J, casadi.densify(C), list(closure.active), list(closure.passive))
+
+
+def _cut_velocities(system: System, q: SX, cut: Cut) -> SX:
+    """(c, nv) velocities of the freedoms of one cut joint, as rows on those of the tree."""
+    ends = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
+    pose = relative_pose(system.tree, q, *ends)
+    v = SX.sym("v", system.nv)
+    rate = position_rate(system.tree, q, v)
+    V = casadi.jtimes(pose.p, q, rate)
+    R_dot = casadi.reshape(casadi.jtimes(casadi.vec(pose.R), q, rate), 3, 3)
+    spin = casadi.mtimes(R_dot, pose.R.T)
+    w = casadi.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
+    values = _freedom_velocities(cut, pose, V, w)
+    return casadi.jacobian(casadi.vertcat(*values), v) if values else SX(0, system.nv)
+
+
+def _freedom_velocities(cut: Cut, pose: Pose, V: SX, w: SX) -> list[SX]:
+    """Velocities of the freedoms, from those of frame_b in the axes of frame_a, V and w."""
+    joint = cut.edge.joint
+    if isinstance(joint, Free):
+        return [casadi.mtimes(pose.R.T, V), casadi.mtimes(pose.R.T, w)]
+    if isinstance(joint, Spherical):
+        return [casadi.mtimes(pose.R.T, w)]
+    axes = [SX(DM(list(freedom.axis))) for freedom in joint.freedoms]
+    if isinstance(joint, Universal):
+        return [casadi.dot(axes[0], w), casadi.dot(casadi.mtimes(pose.R, axes[1]), w)]
+    return [
+        casadi.dot(axis, V if freedom.motion is Motion.PRISMATIC else w)
+        for axis, freedom in zip(axes, joint.freedoms, strict=True)
+    ]
+
+
+def _rate(system: System, matrix: SX, q: SX, v: SX) -> SX:
+    """Rate of a matrix of q along the velocities v."""
+    rate = casadi.jtimes(casadi.vec(matrix), q, position_rate(system.tree, q, v))
+    return casadi.reshape(rate, *matrix.shape)
+
+
+def _whole(system: System, W: SX, *, moving: bool = True) -> SX:
+    """(nv, m) W in its passive rows; in the active rows the identity, or zero for a rate."""
+    closure = system.closure
+    assert closure is not None
+    G = zeros(system.nv, len(closure.active))
+    if moving:
+        for column, k in enumerate(closure.active):
+            G[k, column] = SX(1)
+    G[list(closure.passive), :] = W
+    return G

@@ -1,0 +1,251 @@
+"""A Function of MX as scalar operations with maps between them.
+
+`Function.map` repeats a Function over the columns of matrices. Expanded, every column is written
+out; here the map stays one step, which machine code computes several columns at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, TypeAlias
+
+import casadi
+from casadi import MX, SX, Function
+
+from mbs.errors import ModelError
+from mbs.native.operators import ELEMENTWISE
+from mbs.native.schedule import LANES
+
+_MAPS = ("Map", "OmpMap", "ThreadMap")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mapped:
+    """A Function of one column, and the columns it is computed of.
+
+    Attributes:
+        column: the Function.
+        columns: how many there are.
+        shared: for each of its inputs, whether all columns have the same.
+        inputs: of each of its inputs the number of the output of `Staged.scalar` that holds it:
+            its non-zero elements when it is shared, else those of LANES columns row by row, then
+            those of the next LANES; zeros complete the last columns.
+        outputs: of each of its outputs the number of the input of `Staged.scalar` that is it:
+            (non-zero elements, columns).
+    """
+
+    column: Function
+    columns: int
+    shared: tuple[bool, ...]
+    inputs: tuple[int, ...]
+    outputs: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Staged:
+    """Scalar operations with maps between them.
+
+    Attributes:
+        scalar: all operations outside the maps, a Function of SX. Its inputs are those of the
+            whole Function, then the outputs of the maps; its outputs are those of the whole
+            Function, then the inputs of the maps.
+        maps: each uses what the inputs and the maps before it determine.
+    """
+
+    scalar: Function
+    maps: tuple[Mapped, ...]
+
+
+def staged(function: Function) -> Staged | None:
+    """The stages of a Function.
+
+    Returns:
+        None when there is no map in it, or it has operations between the maps that are not made
+        of scalars or are not known here.
+    """
+    if not any(f.class_name() in _MAPS for f in (function, *function.find_functions())):
+        return None
+    trace = _Trace()
+    inputs = [SX.sym(name, function.sparsity_in(k)) for k, name in enumerate(function.name_in())]
+    try:
+        outputs = trace.called(function, inputs)
+    except (ModelError, RuntimeError, NotImplementedError):
+        return None
+    ins, outs = function.n_in(), function.n_out()
+    names = [f"i{k}" for k in range(ins + len(trace.symbols))]
+    results = [f"o{k}" for k in range(outs + len(trace.arguments))]
+    every_in, every_out = [*inputs, *trace.symbols], [*outputs, *trace.arguments]
+    scalar = Function(function.name(), every_in, every_out, names, results)
+    maps = tuple(
+        Mapped(
+            m.column,
+            m.columns,
+            m.shared,
+            tuple(outs + k for k in m.inputs),
+            tuple(ins + k for k in m.outputs),
+        )
+        for m in trace.maps
+    )
+    return Staged(scalar, maps)
+
+
+class _Tiled(NamedTuple):
+    """A matrix repeated to the right."""
+
+    value: SX
+    times: int
+
+
+_Value: TypeAlias = SX | _Tiled
+
+
+@dataclass(slots=True, eq=False)
+class _Trace:
+    """What a call of a Function on symbols does.
+
+    Attributes:
+        symbols: the outputs of the maps met so far.
+        arguments: their inputs.
+        maps: numbers in them count these two lists alone.
+    """
+
+    symbols: list[SX] = field(default_factory=list)
+    arguments: list[SX] = field(default_factory=list)
+    maps: list[Mapped] = field(default_factory=list)
+
+    def called(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+        """The outputs."""
+        if function.class_name() in _MAPS:
+            return self._mapped(function, arguments)
+        if function.is_a("MXFunction"):
+            return self._interpreted(function, arguments)
+        if function.is_a("SXFunction"):
+            return [SX(y) for y in function.call([_whole(x) for x in arguments])]
+        raise ModelError(f"{function.name()} is not made of scalar operations")
+
+    def _interpreted(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+        work: dict[int, _Value] = {}
+        results = [[SX(0)] * function.nnz_out(k) for k in range(function.n_out())]
+        for k in range(function.n_instructions()):
+            op, node = function.instruction_id(k), function.instruction_MX(k)
+            source, target = function.instruction_input(k), function.instruction_output(k)
+            if op == casadi.OP_OUTPUT:
+                place, value = node.info(), _whole(work[source[0]])
+                for j in range(value.nnz()):
+                    results[place["ind"]][place["offset"] + j] = SX(value.nz[j])
+                continue
+            if op == casadi.OP_INPUT:
+                outputs: Sequence[_Value] = [_part(arguments, node)]
+            else:
+                outputs = self._step(op, node, [work[n] if n >= 0 else SX(0) for n in source])
+            work.update(zip(target, outputs, strict=True))
+        return [
+            SX(function.sparsity_out(k), casadi.vertcat(*result))
+            if result
+            else SX(function.sparsity_out(k))
+            for k, result in enumerate(results)
+        ]
+
+    def _step(self, op: int, node: MX, arguments: list[_Value]) -> Sequence[_Value]:
+        if op == casadi.OP_CALL:
+            return self.called(node.which_function(), arguments)
+        if op == casadi.OP_HORZREPMAT:
+            value = _whole(arguments[0])
+            return [_Tiled(value, node.shape[1] // value.shape[1])]
+        values = [_whole(x) for x in arguments]
+        if op in ELEMENTWISE:
+            return [SX.binary(op, *values) if len(values) == 2 else SX.unary(op, *values)]
+        if op in _SPLITS:
+            ends = [0]
+            for k in range(node.n_out()):
+                ends.append(ends[-1] + node.get_output(k).shape[op == casadi.OP_HORZSPLIT])
+            return list(_SPLITS[op](values[0], ends))
+        if op not in _MOVES:
+            raise ModelError(f"operation {op} of CasADi between maps is not known here")
+        return [SX(_MOVES[op](node, values))]
+
+    def _mapped(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+        column, columns = function, 1
+        while column.class_name() in _MAPS:
+            facts = column.info()
+            column, columns = facts["f"], columns * facts["n"]
+        first_in, first_out = len(self.arguments), len(self.symbols)
+        shared = tuple(isinstance(x, _Tiled) and x.times == columns for x in arguments)
+        for k, x in enumerate(arguments):
+            if isinstance(x, _Tiled) and shared[k]:
+                self.arguments.append(_elements(casadi.project(x.value, column.sparsity_in(k))))
+            else:
+                value = casadi.project(_whole(x), function.sparsity_in(k))
+                self.arguments.append(_in_lanes(value, column.nnz_in(k), columns))
+        results = []
+        for k in range(column.n_out()):
+            symbol = SX.sym(f"m{len(self.symbols)}", column.nnz_out(k), columns)
+            self.symbols.append(symbol)
+            results.append(SX(function.sparsity_out(k), _elements(symbol)))
+        ends = range(first_in, len(self.arguments)), range(first_out, len(self.symbols))
+        self.maps.append(Mapped(column, columns, shared, *map(tuple, ends)))
+        return results
+
+
+def _whole(value: _Value) -> SX:
+    return casadi.repmat(value.value, 1, value.times) if isinstance(value, _Tiled) else value
+
+
+def _part(arguments: Sequence[_Value], node: MX) -> _Value:
+    """The argument, or the part of it, that an input node stands for."""
+    place, pattern = node.info(), node.sparsity()
+    argument = arguments[place["ind"]]
+    if isinstance(argument, _Tiled) and argument.value.shape[0] == pattern.shape[0]:
+        return argument
+    value, first = _whole(argument), place["offset"]
+    return SX(pattern, _elements(value)[first : first + pattern.nnz()])
+
+
+def _elements(value: SX) -> SX:
+    """The non-zero elements as a vector."""
+    return SX(value.nz[:]) if value.nnz() else SX(0, 1)
+
+
+def _in_lanes(value: SX, rows: int, columns: int) -> SX:
+    """Columns side by side, LANES at a time, completed by zeros."""
+    elements = casadi.vertcat(_elements(value), 0)
+    places = [
+        column * rows + row if column < columns else rows * columns
+        for first in range(0, columns, LANES)
+        for row in range(rows)
+        for column in range(first, first + LANES)
+    ]
+    return SX(elements[places]) if places else SX(0, 1)
+
+
+def _selected(node: MX, values: list[SX]) -> SX:
+    """Some non-zero elements of a matrix in another pattern."""
+    facts, pattern = node.info(), node.sparsity()
+    if "nz" in facts:
+        places = list(facts["nz"])
+    elif "slice" in facts:
+        places = list(_range(facts["slice"]))
+    else:
+        inner, outer = _range(facts["inner"]), _range(facts["outer"])
+        places = [a + b for a in outer for b in inner]
+    if any(place < 0 for place in places):
+        raise ModelError("a selection that leaves elements out is not known here")
+    return SX(pattern, _elements(values[0])[places]) if places else SX(pattern)
+
+
+def _range(slice_: Mapping[str, int]) -> range:
+    return range(slice_["start"], slice_["stop"], slice_["step"])
+
+
+_SPLITS = {casadi.OP_HORZSPLIT: casadi.horzsplit, casadi.OP_VERTSPLIT: casadi.vertsplit}
+_MOVES: Mapping[int, Callable[[MX, list[SX]], SX]] = {
+    casadi.OP_CONST: lambda node, _: SX(node.to_DM()),
+    casadi.OP_RESHAPE: lambda node, values: SX(node.sparsity(), _elements(values[0])),
+    casadi.OP_TRANSPOSE: lambda _, values: values[0].T,
+    casadi.OP_MTIMES: lambda _, values: values[0] + casadi.mtimes(values[1], values[2]),
+    casadi.OP_HORZCAT: lambda _, values: casadi.horzcat(*values),
+    casadi.OP_VERTCAT: lambda _, values: casadi.vertcat(*values),
+    casadi.OP_PROJECT: lambda node, values: casadi.project(values[0], node.sparsity()),
+    casadi.OP_GETNONZEROS: _selected,
+}

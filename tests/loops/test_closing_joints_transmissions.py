@@ -1,0 +1,163 @@
+"""Gears, racks and screws: against plain couplings, and against equations by hand."""
+
+import numpy as np
+import pytest
+
+import mbs
+import mbs.models
+import mbs.simulate
+from mbs.components import (
+    Body,
+    Box,
+    Coupling,
+    Cylindrical,
+    Gear,
+    PointMass,
+    Prismatic,
+    RackAndPinion,
+    Revolute,
+    Rod,
+    Screw,
+)
+from mbs.loops import closure, reduction_matrix, solve
+
+J, M, GRAVITY = 0.3, 2.0, 9.81
+
+
+def drive(coupling, load, pinion="pinion"):
+    """A driven pinion and a load that slides along, or turns about, the vertical z."""
+    m = mbs.Mechanism("drive", gravity=(0, 0, -GRAVITY))
+    wheel = m.add(Body("wheel", 1.0, inertia=(0.2, 0.2, J)))
+    m.connect(m.world, Revolute(pinion, actuated=True), wheel)
+    body = m.add(Body("load", M, inertia=(0.5, 0.5, 0.7)))
+    m.connect(m.world.at(1.0), load, body)
+    m.add(coupling)
+    return m.assemble()
+
+
+def models(system):
+    """Efforts, inertia and accelerations at a state that closes the system."""
+    q = solve(system, [0.8])
+    tau = mbs.models.inverse_dynamics(system)(q, 1.2, -0.7)
+    a = mbs.models.direct_dynamics(system)(q, 1.2, tau)
+    A = mbs.models.inertia_matrix(system)(q)
+    return np.array([*q, float(tau), float(a), float(A)])
+
+
+@pytest.mark.parametrize(
+    ("named", "factor", "load"),
+    [
+        (Gear("k", "load_axis", "pinion", ratio=-0.4), -0.4, Revolute("load_axis")),
+        (RackAndPinion("k", "load_axis", "pinion", radius=0.05), 0.05, Prismatic("load_axis")),
+        (
+            Screw("k", "load_axis", "pinion", pitch=0.02, offset=0.3),
+            0.02 / (2 * np.pi),
+            Prismatic("load_axis"),
+        ),
+    ],
+)
+def test_a_transmission_is_the_coupling_of_its_factor(named, factor, load):
+    offset = 0.3 if isinstance(named, Screw) else 0.0
+    plain = Coupling("k", "load_axis", "pinion", (offset, factor))
+    a, b = drive(named, load), drive(plain, load)
+    np.testing.assert_array_equal(models(a), models(b))
+    assert a.closure.mobility == 1
+    assert a.report() == b.report()
+    assert "Coupling k: load_axis follows pinion." in a.report()
+    q, tau, back, inertia = np.split(models(a), [2, 3, 4])
+    assert q[1] == pytest.approx(offset + factor * q[0], abs=1e-13)
+    assert back[0] == pytest.approx(-0.7, abs=1e-12)
+    slides = isinstance(load, Prismatic)
+    total = J + factor**2 * (M if slides else 0.7)
+    assert inertia[0] == pytest.approx(total, abs=1e-12)
+    weight = factor * M * GRAVITY if slides else 0.0
+    assert tau[0] == pytest.approx(total * -0.7 + weight, abs=1e-12)
+
+
+def test_a_screw_joint_sinks_and_turns():
+    m = mbs.Mechanism("screw", gravity=(0, 0, -GRAVITY))
+    nut = m.add(Body("nut", M, inertia=(0.2, 0.2, 0.001)))
+    m.connect(m.world, Cylindrical("c"), nut)
+    m.add(Screw("thread", driven="c.s", driver="c.phi", pitch="h"))
+    m.values["h"] = mbs.Parameter("h", -0.1, "m")
+    system = m.assemble()
+    assert system.closure.mobility == 1
+    run = mbs.simulate.run(system, 1.0, tolerance=1e-11, quiet=True)
+    lead = -0.1 / (2 * np.pi)
+    fall = -GRAVITY * M * lead**2 / (M * lead**2 + 0.001) / 2
+    np.testing.assert_allclose(run["c.s.q"], fall * run.time**2, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(run["c.phi.q"], run["c.s.q"] / lead, rtol=0, atol=1e-9)
+    total = run["kinetic_energy"] + run["potential_energy"]
+    assert np.ptp(total) < 1e-8
+
+
+def test_a_wheel_rolls_down_a_slope():
+    """A disc on a carriage: the rack is the ground."""
+    slope, r = 0.3, 0.25
+    m = mbs.Mechanism("wheel", gravity=(GRAVITY * np.sin(slope), 0, -GRAVITY * np.cos(slope)))
+    hub = m.add(PointMass("hub", 0.5))
+    disc = m.add(Body("disc", M, inertia=(M * r**2 / 4, M * r**2 / 2, M * r**2 / 4)))
+    m.connect(m.world, Prismatic("along", axis="x"), hub)
+    m.connect(hub, Revolute("turn", axis="y"), disc)
+    m.add(RackAndPinion("ground", driven="along", driver="turn", radius=r))
+    system = m.assemble()
+    run = mbs.simulate.run(system, 1.0, tolerance=1e-11, quiet=True)
+    a = GRAVITY * np.sin(slope) * (M + 0.5) / (1.5 * M + 0.5)
+    np.testing.assert_allclose(run["along.q"], a * run.time**2 / 2, rtol=0, atol=1e-9)
+
+
+def press():
+    """A pinion drives a rack, whose rod turns a rocker."""
+    m = mbs.Mechanism("press", gravity=(0, -GRAVITY, 0))
+    wheel = m.add(Body("wheel", 1.0, inertia=(0.02, 0.02, 0.03)))
+    rack, rocker = m.add(PointMass("rack", M)), m.add(Box("rocker", length=0.5, mass=1.0))
+    m.connect(m.world.at(0, -0.1), Revolute("pinion", actuated=True), wheel)
+    m.connect(m.world, Prismatic("slide", axis="x"), rack)
+    m.connect(m.world.at(0.9), Revolute("rocker_axis"), rocker.left)
+    m.connect(rack, Rod("rod", length=mbs.Parameter("rod_length", 0.8, "m")), rocker.right)
+    m.add(RackAndPinion("mesh", driven="slide", driver="pinion", radius=0.1))
+    return m
+
+
+def test_rod_and_rack_in_one_mechanism():
+    system = press().assemble(guess={"rocker_axis": 1.8})
+    assert system.closure.mobility == 1
+    assert [row.closing for row in system.loops] == ["rod", "coupling"]
+    q = solve(system, {"pinion": 0.5})
+    names = [c.name for c in system.coordinates]
+    slide, rocker = q[names.index("slide")], q[names.index("rocker_axis")]
+    assert slide == pytest.approx(0.05, abs=1e-13)
+    gap = [0.9 + 0.5 * np.cos(rocker) - slide, 0.5 * np.sin(rocker)]
+    assert np.hypot(*gap) == pytest.approx(0.8, abs=1e-12)
+    G = np.array(reduction_matrix(system)(q)).ravel()
+    rate = gap[0] * (-0.5 * np.sin(rocker)) + gap[1] * 0.5 * np.cos(rocker)
+    assert G[names.index("rocker_axis")] == pytest.approx(gap[0] * 0.1 / rate, abs=1e-10)
+
+
+def test_inside_another_mechanism():
+    outer = mbs.Mechanism("pair", gravity=(0, -GRAVITY, 0))
+    for side, x in (("left", -1.0), ("right", 1.0)):
+        placed = outer.add(press(), side)
+        outer.connect(outer.world.at(x), placed.base)
+    system = outer.assemble(guess={"left.rocker_axis": 1.8, "right.rocker_axis": 1.8})
+    assert system.closure.mobility == 2
+    assert [p.name for p in system.parameters] == ["left.rod_length", "right.rod_length"]
+    phi = closure(system)(system.posture, [0.8, 0.8])
+    assert np.abs(np.array(phi)).max() < 1e-12
+
+
+def test_fmu_follows_the_simulation(tmp_path):
+    system = press().assemble(guess={"rocker_axis": 1.8})
+    mbs.export.fmu(system, tmp_path / "press.fmu")
+    for length in (0.8, 0.75):
+        run = mbs.simulate.run(system, 0.5, parameters={"rod_length": length}, tolerance=1e-10)
+        fmu = mbs.simulate.fmu(
+            tmp_path / "press.fmu",
+            0.5,
+            parameters={"rod_length": length},
+            tolerance=1e-10,
+            quiet=True,
+        )
+        assert np.ptp(run["rocker_axis.q"]) > 0.01
+        for name in ("pinion.q", "slide.q", "rocker_axis.q", "rocker_axis.v"):
+            np.testing.assert_allclose(fmu[name], run[name], rtol=0, atol=1e-6)

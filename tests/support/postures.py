@@ -1,0 +1,34 @@
+"""Postures found by search alone: Gauss-Newton from many random starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbs.loops.closing import Closing, closure_parameters
+
+
+def searched(system, q_a, starts=150, seed=0, reach=3.5):
+    """All postures with these independent positions that random starts lead to."""
+    rng = np.random.default_rng(seed)
+    closing = Closing(system, closure_parameters(system), system.active)
+    found = []
+    for _ in range(starts):
+        q = rng.uniform(-reach, reach, system.nq)
+        q[list(system.active)] = q_a
+        closed = closing.nearest(q)
+        if closed.is_closed and not any(same(system, closed.q, other) for other in found):
+            found.append(closed.q)
+    return found
+
+
+def same(system, q, other, tolerance=1e-5):
+    """Whether two postures agree, angles up to whole turns."""
+    gap = np.subtract(q, other)
+    turns = [coordinate.unit == "rad" for coordinate in system.coordinates]
+    gap[turns] = np.remainder(gap[turns] + np.pi, 2 * np.pi) - np.pi
+    return np.abs(gap).max(initial=0.0) < tolerance
+
+
+def active(system, q=None):
+    """The positions of the independent joints at a posture, the assembled one if none is given."""
+    return np.array(system.posture if q is None else q)[list(system.active)]

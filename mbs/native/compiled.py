@@ -107,7 +107,7 @@ def unwritten(source: str) -> str:
 
 
 def require_function(function: object) -> None:
-    """Refuse what is not a Function of numbers.
+    """Refuse what is not a Function of numbers, or has no equations to write.
 
     Raises:
         ModelError: says what to give.
@@ -121,6 +121,10 @@ def require_function(function: object) -> None:
     if function.has_free():
         free = ", ".join(str(symbol) for symbol in function.get_free())
         raise ModelError(f"{function.name()}: symbols {free} are free; make them inputs")
+    if function.is_a("External"):
+        raise ModelError(
+            f"{function.name()} is machine code already; give the Function that it was made of"
+        )
 
 
 def _check_order(derivatives: object) -> None:

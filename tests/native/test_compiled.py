@@ -143,3 +143,11 @@ def test_every_level_of_optimization_gives_the_same_bits(level, monkeypatch):
         np.array_equal(a.full(), b.full())
         for a, b in zip(example()(x, 1.7), compiled(example())(x, 1.7), strict=True)
     )
+
+
+def test_machine_code_is_not_compiled_again():
+    g = compiled(example(), derivatives=0)
+    with pytest.raises(ModelError, match="example is machine code already"):
+        compiled(g)
+    with pytest.raises(ModelError, match="example is machine code already"):
+        mbs.export.code(g, "c")

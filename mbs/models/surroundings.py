@@ -11,7 +11,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named
 from mbs.recursions.accelerations import Acceleration, moving_base, resting_base
 from mbs.recursions.force_elements import element_wrenches
-from mbs.recursions.newton_euler import Wrench
+from mbs.recursions.newton_euler import Wrench, add_wrenches
 from mbs.recursions.poses import LinkPose
 from mbs.spatial import cross
 
@@ -76,8 +76,7 @@ def exerted(
 
 def _add(wrenches: dict[int, Wrench], link: int, wrench: Wrench) -> None:
     before = wrenches.get(link)
-    f, m = wrench
-    wrenches[link] = wrench if before is None else (before[0] + f, before[1] + m)
+    wrenches[link] = wrench if before is None else add_wrenches(before, wrench)
 
 
 def _on_links(system: System, wrenches: SX) -> dict[int, Wrench]:

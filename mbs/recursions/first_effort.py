@@ -13,7 +13,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.motion import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Rotation, cross, vector, zeros
+from mbs.spatial import Rotation, cross, vector
 
 Wrench = tuple[SX, SX]
 
@@ -39,12 +39,7 @@ def _stands_across(poses: list[LinkPose], members: list[int]) -> bool:
     first = poses[members[0]]
     axis = first.at_seat(vector([0, 0, 1]))
     square = axis[2].is_zero() and first.foot[1].is_zero()
-    return bool(square) and all(_height(poses[j]).is_zero() for j in members)
-
-
-def _height(pose: LinkPose) -> SX:
-    """Distance of the frame from its seat, along the axis."""
-    return pose.motion[0].point(zeros())[2]
+    return bool(square) and all(poses[j].height.is_zero() for j in members)
 
 
 def moment_of_run(

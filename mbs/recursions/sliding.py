@@ -43,10 +43,10 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
             continue
         behind = [k for k, link in enumerate(tree.links) if link.antecedent == j]
         if not behind or (len(behind) == 1 and j in resting):
-            rise[j] = -_height(poses[j])
+            rise[j] = -poses[j].height
         elif len(behind) == 1 and len(poses[behind[0]].run) > 1:
             k = behind[0]
-            rise[j] = poses[k].foot[2] + _height(poses[k]) + rise[k]
+            rise[j] = poses[k].foot[2] + poses[k].height + rise[k]
     return rise
 
 
@@ -60,16 +60,9 @@ def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
                 found.add(j)
         elif i in found and poses[j].foot[0].is_zero() and poses[j].foot[1].is_zero():
             on_axis_of_base = tree.links[i].antecedent < 0
-            if on_axis_of_base or (poses[j].foot[2].is_zero() and _height(poses[i]).is_zero()):
+            if on_axis_of_base or (poses[j].foot[2].is_zero() and poses[i].height.is_zero()):
                 found.add(j)
     return found
-
-
-def _height(pose: LinkPose) -> SX:
-    """Distance r of the frame from the foot of its axis."""
-    screw = pose.motion[0]
-    assert isinstance(screw, Screw)
-    return screw.t
 
 
 def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:

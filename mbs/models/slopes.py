@@ -5,8 +5,10 @@ Source: Carpentier & Mansard 2018; Singh, Russell & Wensing 2022.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from itertools import accumulate
+
 import casadi
-import numpy as np
 from casadi import SX
 
 from mbs.assembly import System
@@ -20,7 +22,12 @@ from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.joint_efforts import joint_efforts
 from mbs.recursions.newton_euler_derivatives import newton_euler_derivatives
-from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
+from mbs.recursions.tree_factorization import (
+    TreeFactor,
+    factorized,
+    substituted,
+    velocity_antecedents,
+)
 
 Blocks = dict[str, SX]
 """Derivatives by the name of the input that they are taken with respect to."""
@@ -51,27 +58,53 @@ def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks
     return blocks, moving.efforts + joints
 
 
+def implicit_formula(
+    system: System, s: ModelSymbols, tau: SX, names: Collection[str]
+) -> tuple[TreeFactor, SX, Blocks]:
+    """What the derivatives of the accelerations are solved from.
+
+    Args:
+        system: any.
+        s: its symbols.
+        tau: (m, 1) efforts.
+        names: what to differentiate with respect to, of "q", "v" and "p".
+
+    Returns:
+        the factors of A, the accelerations, and for each name minus the derivative of the efforts
+        at these accelerations.
+    """
+    before = solution_order(system, s)
+    by = efforts_by_recursion if s.reduction is None else efforts_by_ad
+    symbol = SX.sym("a", s.size)
+    slopes, efforts = by(system, s, symbol)
+    factor = factorized(slopes["a"], before)
+    if "p" in names:
+        slopes["p"] = casadi.jacobian(efforts, system.p)
+    H = casadi.substitute(efforts, symbol, SX.zeros(s.size))
+    a = substituted(factor, tau - H, before)
+    minus = casadi.substitute([-SX(slopes[name]) for name in names], [symbol], [a])
+    return factor, a, dict(zip(names, map(casadi.densify, minus), strict=True))
+
+
+def solution_order(system: System, s: ModelSymbols) -> list[int]:
+    """For each velocity that is input, the one before it in A; see `factorized`."""
+    if s.reduction is None:
+        return velocity_antecedents(system.tree)
+    return list(range(-1, s.size - 1))
+
+
 def accelerations_by_efforts(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
     """Derivatives of the accelerations from those of the efforts, and the accelerations."""
-    in_tree, n = s.reduction is None, s.size
-    by = efforts_by_recursion if in_tree else efforts_by_ad
-    symbol = SX.sym("a", n)
-    slopes, efforts = by(system, s, symbol)
-    A = slopes.pop("a")
-    if "p" in names:
-        slopes["p"] = casadi.jacobian(efforts, system.p)
-    before = velocity_antecedents(system.tree) if in_tree else list(range(-1, n - 1))
-    H = casadi.substitute(efforts, symbol, SX.zeros(n))
-    a = solve_tree(A, tau - H, before)
-    wanted = [name for name in slopes if name in names]
-    found = casadi.substitute([-slopes[name] for name in wanted], [symbol], [a])
-    right = [casadi.densify(SX(slope)) for slope in [*found, SX.eye(n)]]
-    ends = [0, *np.cumsum([block.shape[1] for block in right]).tolist()]
-    solved = casadi.horzsplit(solve_tree(A, casadi.horzcat(*right), before), ends)
-    blocks = dict(zip(wanted, solved, strict=False))
-    return {**blocks, "tau": casadi.triu2symm(casadi.triu(solved[-1]))}, a
+    wanted = [name for name in names if name != "tau"]
+    factor, a, right = implicit_formula(system, s, tau, wanted)
+    sides = [*right.values(), casadi.densify(SX.eye(s.size))]
+    ends = [0, *accumulate(side.shape[1] for side in sides)]
+    every = substituted(factor, casadi.horzcat(*sides), solution_order(system, s))
+    *solved, inverse = casadi.horzsplit(every, ends)
+    blocks = dict(zip(wanted, solved, strict=True))
+    return {**blocks, "tau": casadi.triu2symm(casadi.triu(inverse))}, a
 
 
 def accelerations_by_ad(

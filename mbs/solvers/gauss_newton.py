@@ -55,6 +55,8 @@ def gauss_newton(
     """
     x = np.array(start, dtype=float)
     r, J = function(x)
+    if not _finite(r, J):
+        return Root(x, np.inf, False)
     for _ in range(iterations):
         if _largest(r) <= tolerance:
             break
@@ -63,7 +65,8 @@ def gauss_newton(
         while length > 1e-6:
             trial = x + length * step
             r_trial, J_trial = function(trial)
-            if np.all(np.isfinite(r_trial)) and np.linalg.norm(r_trial) < np.linalg.norm(r):
+            lower = np.linalg.norm(r_trial) < np.linalg.norm(r)
+            if lower and _finite(r_trial, J_trial):
                 break
             length /= 2
         else:
@@ -73,6 +76,10 @@ def gauss_newton(
         if stalled:
             break
     return Root(x, float(np.linalg.norm(r)), _largest(r) <= tolerance)
+
+
+def _finite(r: Vector, J: Vector) -> bool:
+    return bool(np.all(np.isfinite(r)) and np.all(np.isfinite(J)))
 
 
 def _largest(r: Vector) -> float:

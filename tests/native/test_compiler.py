@@ -52,10 +52,14 @@ def test_refused_code_names_the_error(tmp_path):
         compile_library([source], output=tmp_path / "bad.so")
 
 
-@pytest.mark.parametrize("name", ["dopri5.c", "driver.c", "python_call.c"])
-def test_the_runtime_is_clean_c99(name, tmp_path):
+RUNTIME = ("stepper.c", "dopri5.c", "rodas.c", "events.c", "driver.c", "python_call.c")
+
+
+@pytest.mark.parametrize("name", RUNTIME)
+@pytest.mark.parametrize("parts", [(), ("MBS_PROJECT", "MBS_RODAS", "MBS_EVENTS")])
+def test_the_runtime_is_clean_c99(name, parts, tmp_path):
     folder = resources.files("mbs.native") / "runtime"
-    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-DMBS_PROJECT"]
+    strict = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", *(f"-D{p}" for p in parts)]
     command = [*find_compiler().command, *strict, "-c", str(folder / name)]
     answer = subprocess.run([*command, "-o", str(tmp_path / "x.o")], capture_output=True, text=True)
     assert answer.returncode == 0, answer.stderr

@@ -30,8 +30,8 @@ _CORE = (
     "fmi2.c",
 )
 _CORE_HEADERS = ("core.h", "internal.h", "closure.h")
-_RUNTIME = ("dopri5.c",)
-_RUNTIME_HEADERS = ("dopri5.h",)
+_RUNTIME = ("stepper.c", "dopri5.c")
+_RUNTIME_HEADERS = ("stepper.h", "dopri5.h")
 _FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")
 SOURCES = ("model.c", *_CORE, *_RUNTIME)
 """C files to compile, in the folder `sources` of the FMU."""

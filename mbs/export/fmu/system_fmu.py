@@ -26,7 +26,8 @@ def fmu(
 ) -> Path:
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
-    Inputs are the efforts of the actuated joints, `name.tau`. Outputs are positions, velocities
+    Inputs are the efforts of the actuated joints, `name.tau`, or where the motor or torque of a
+    drive line turns one its own input, such as `motor.voltage`. Outputs are positions, velocities
     and accelerations of all joints, `name.q`, `name.v`, `name.a`, and the terminal frame in the
     base: `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`. States are
     the independent joints; in a closed system the others are solved for at every evaluation, so
@@ -71,7 +72,7 @@ def fmu_model(
         name=system.name,
         description=system.report().splitlines()[0],
         states=_states(system, state, x),
-        inputs=tuple(_effort(system.speeds[k]) for k in state.inputs),
+        inputs=(*(_effort(system.speeds[k]) for k in state.inputs), *_device_inputs(system)),
         outputs=_outputs(system, state),
         parameters=_parameters(system),
         dependents=tuple(
@@ -113,7 +114,29 @@ def _states(system: System, state: MinimalState, start: list[float]) -> tuple[St
         )
         for speed in (system.speeds[k] for k in system.active)
     ]
-    return (*positions, *velocities)
+    return (*positions, *velocities, *_device_states(system))
+
+
+def _device_states(system: System) -> list[State]:
+    return [
+        State(
+            name=name,
+            unit=unit,
+            description=f"state of {device.name}",
+            derivative_unit=f"{unit}/s",
+            output=True,
+        )
+        for device in system.devices
+        for name, unit in device.states
+    ]
+
+
+def _device_inputs(system: System) -> list[Variable]:
+    return [
+        Variable(name=name, unit=unit, description=f"input of {device.name}")
+        for device in system.devices
+        for name, unit in [device.input]
+    ]
 
 
 def _limits(coordinate: Coordinate) -> str:
@@ -171,6 +194,11 @@ def _outputs(system: System, state: MinimalState) -> tuple[Variable, ...]:
         )
         for row in (1, 2, 3)
         for column in (1, 2, 3)
+    ]
+    rows += [
+        Variable(name=name, unit=unit, description=f"of {device.name}")
+        for device in system.devices
+        for name, unit in device.outputs
     ]
     return tuple(rows)
 

@@ -1,13 +1,22 @@
 /* Integration of generated functions, as Python calls it.
  *
- * Compiled with mbs_rhs(t, x, p) -> xdot and, when MBS_PROJECT is defined,
- * mbs_project(x, p) -> (x, residual), which is one Newton step onto the constraints.
+ * Compiled with mbs_rhs(t, x, p) -> xdot and, when these are defined,
+ *   MBS_PROJECT  mbs_project(x, p) -> (x, residual), one Newton step onto the constraints
+ *   MBS_RODAS    mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t); else Dormand and Prince
+ *   MBS_EVENTS   mbs_indicators(t, x, p) and mbs_rates(t, x, p), as many values each, and
+ *                mbs_jump(t, x, p, fired) -> (x, modes); the modes are the last of p
  */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "dopri5.h"
+#ifdef MBS_RODAS
+#include "rodas.h"
+#endif
+#ifdef MBS_EVENTS
+#include "events.h"
+#endif
 
 #ifdef _WIN32
 #define EXPORT __declspec(dllexport)
@@ -20,28 +29,51 @@
 
 typedef long long integer;
 
-int mbs_rhs(const double **arg, double **res, integer *iw, double *w, int mem);
-int mbs_rhs_work(integer *arg, integer *res, integer *iw, integer *w);
+#define GENERATED(f)                                                               \
+    int f(const double **arg, double **res, integer *iw, double *w, int mem);      \
+    int f##_work(integer *arg, integer *res, integer *iw, integer *w)
+
+GENERATED(mbs_rhs);
 #ifdef MBS_PROJECT
-int mbs_project(const double **arg, double **res, integer *iw, double *w, int mem);
-int mbs_project_work(integer *arg, integer *res, integer *iw, integer *w);
+GENERATED(mbs_project);
+#endif
+#ifdef MBS_RODAS
+GENERATED(mbs_jacobian);
+#endif
+#ifdef MBS_EVENTS
+GENERATED(mbs_indicators);
+GENERATED(mbs_rates);
+GENERATED(mbs_jump);
 #endif
 
 typedef struct {
-    dopri5 solver;
+    stepper solver;
     double *p, *memory, *work, *w, *moved;
     const double **arg;
     double **res;
     integer *iw;
+    int n_p;
+#ifdef MBS_EVENTS
+    events events;
+    double *event_work;
+    int n_modes;
+#endif
 } driver;
 
-static int rhs(void *user, double t, const double *x, double *xdot) {
-    driver *d = user;
+typedef int (*work_of)(integer *, integer *, integer *, integer *);
+typedef int (*value_of)(const double **, double **, integer *, double *, int);
+
+static int call(driver *d, value_of f, double t, const double *x, double *first, double *second) {
     d->arg[0] = &t;
     d->arg[1] = x;
     d->arg[2] = d->p;
-    d->res[0] = xdot;
-    return mbs_rhs(d->arg, d->res, d->iw, d->w, 0);
+    d->res[0] = first;
+    d->res[1] = second;
+    return f(d->arg, d->res, d->iw, d->w, 0);
+}
+
+static int rhs(void *user, double t, const double *x, double *xdot) {
+    return call(user, mbs_rhs, t, x, xdot, NULL);
 }
 
 #ifdef MBS_PROJECT
@@ -64,6 +96,35 @@ static int project(void *user, double t, double *x) {
 }
 #endif
 
+#ifdef MBS_RODAS
+static int jacobian(void *user, double t, const double *x, double *J, double *f_t) {
+    return call(user, mbs_jacobian, t, x, J, f_t);
+}
+#endif
+
+#ifdef MBS_EVENTS
+static int indicators(void *user, double t, const double *x, double *values) {
+    return call(user, mbs_indicators, t, x, values, NULL);
+}
+
+static int rates(void *user, double t, const double *x, double *values) {
+    return call(user, mbs_rates, t, x, values, NULL);
+}
+
+static int jump(void *user, double t, double *x, const double *fired) {
+    driver *d = user;
+    double *modes = d->p + d->n_p - d->n_modes, *next = d->event_work;
+    int i;
+    d->arg[3] = fired;
+    if (call(d, mbs_jump, t, x, d->moved, next)) return 1;
+    for (i = 0; i < d->n_modes; i++)
+        if (!isfinite(next[i])) return 1;
+    memcpy(x, d->moved, sizeof(double) * (size_t)d->solver.n);
+    memcpy(modes, next, sizeof(double) * (size_t)d->n_modes);
+    return 0;
+}
+#endif
+
 static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
 
 EXPORT void mbs_close(driver *d) {
@@ -76,29 +137,65 @@ EXPORT void mbs_close(driver *d) {
     free((void *)d->arg);
     free((void *)d->res);
     free(d->iw);
+#ifdef MBS_EVENTS
+    free(d->event_work);
+#endif
     free(d);
 }
 
-static void grow(integer *size, const integer *other) {
+/* The largest scratch that any of the functions asks for. */
+static void sizes(integer *size) {
+    static const work_of works[] = {
+        mbs_rhs_work,
+#ifdef MBS_PROJECT
+        mbs_project_work,
+#endif
+#ifdef MBS_RODAS
+        mbs_jacobian_work,
+#endif
+#ifdef MBS_EVENTS
+        mbs_indicators_work, mbs_rates_work,    mbs_jump_work,
+#endif
+    };
+    size_t k;
     int i;
-    for (i = 0; i < 4; i++)
-        if (other[i] > size[i]) size[i] = other[i];
+    for (k = 0; k < sizeof works / sizeof *works; k++) {
+        integer other[4];
+        works[k](other, other + 1, other + 2, other + 3);
+        for (i = 0; i < 4; i++)
+            if (other[i] > size[i]) size[i] = other[i];
+    }
 }
 
-/* NULL: out of memory. */
-EXPORT driver *mbs_open(int n, int n_p, const double *p, double rtol, double atol, double t) {
-    driver *d = calloc(1, sizeof *d);
-    integer size[4] = {3, 2, 0, 0}, other[4];
-    if (!d) return NULL;
-    mbs_rhs_work(other, other + 1, other + 2, other + 3);
-    grow(size, other);
-#ifdef MBS_PROJECT
-    mbs_project_work(other, other + 1, other + 2, other + 3);
-    grow(size, other);
+static void begin(driver *d, int n) {
+#ifdef MBS_RODAS
+    rodas_init(&d->solver, n, rhs, jacobian, d, d->memory, d->work);
+#else
+    dopri5_init(&d->solver, n, rhs, d, d->memory, d->work);
 #endif
+#ifdef MBS_PROJECT
+    d->solver.project = project;
+#endif
+}
+
+static size_t work_size(size_t n) {
+#ifdef MBS_RODAS
+    return RODAS_WORK(n);
+#else
+    return DOPRI5_WORK(n);
+#endif
+}
+
+/* control: rtol, atol, the longest step. NULL: out of memory. */
+EXPORT driver *mbs_open(int n, int n_p, const double *p, const double *control, double t) {
+    driver *d = calloc(1, sizeof *d);
+    integer size[4] = {4, 2, 0, 0};
+    if (!d) return NULL;
+    sizes(size);
+    d->n_p = n_p;
     d->p = array(n_p, sizeof *d->p);
-    d->memory = array(DOPRI5_MEMORY(n), sizeof *d->memory);
-    d->work = array(DOPRI5_WORK(n), sizeof *d->work);
+    d->memory = array(STEPPER_MEMORY(n), sizeof *d->memory);
+    d->work = array(work_size(n), sizeof *d->work);
     d->moved = array(n, sizeof *d->moved);
     d->arg = array(size[0], sizeof *d->arg);
     d->res = array(size[1], sizeof *d->res);
@@ -109,28 +206,55 @@ EXPORT driver *mbs_open(int n, int n_p, const double *p, double rtol, double ato
         return NULL;
     }
     memcpy(d->p, p, sizeof *p * (size_t)n_p);
-    dopri5_init(&d->solver, n, rhs, d, d->memory, d->work);
-    d->solver.rtol = rtol;
-    d->solver.atol = atol;
-#ifdef MBS_PROJECT
-    d->solver.project = project;
-#endif
-    dopri5_start(&d->solver, t);
+    begin(d, n);
+    d->solver.rtol = control[0];
+    d->solver.atol = control[1];
+    d->solver.h_max = control[2];
+    stepper_start(&d->solver, t);
     return d;
 }
 
 EXPORT int mbs_begin(driver *d, double *x) {
-    if (!d->solver.project) return DOPRI5_OK;
-    return d->solver.project(d, dopri5_time(&d->solver), x) ? DOPRI5_PROJECTION_FAILED : DOPRI5_OK;
+    double t = stepper_time(&d->solver);
+    if (d->solver.project && d->solver.project(d, t, x)) return STEPPER_PROJECTION_FAILED;
+#ifdef MBS_EVENTS
+    return events_start(&d->events, x);
+#else
+    return STEPPER_OK;
+#endif
 }
 
 EXPORT int mbs_table(driver *d, double *x, const double *times, long long count, double *table,
                      long long *done, long long budget) {
     long filled = (long)*done;
-    int status = dopri5_table(&d->solver, x, times, (long)count, table, &filled, (long)budget);
+#ifdef MBS_EVENTS
+    int status =
+        events_table(&d->events, x, times, (long)count, table, &filled, (long)budget);
+#else
+    int status =
+        stepper_table(&d->solver, x, times, (long)count, table, &filled, (long)budget);
+#endif
     *done = filled;
     return status;
 }
 
-EXPORT double mbs_time(const driver *d) { return dopri5_time(&d->solver); }
-EXPORT double mbs_step(const driver *d) { return dopri5_wanted_step(&d->solver); }
+EXPORT double mbs_time(const driver *d) { return stepper_time(&d->solver); }
+EXPORT double mbs_step(const driver *d) { return stepper_wanted_step(&d->solver); }
+
+#ifdef MBS_EVENTS
+/* Before mbs_begin. 1: out of memory. */
+EXPORT int mbs_watch(driver *d, int count, int n_modes) {
+    size_t size = (size_t)n_modes + (size_t)EVENTS_WORK(d->solver.n, count);
+    d->event_work = array(size, sizeof *d->event_work);
+    if (!d->event_work) return 1;
+    d->n_modes = n_modes;
+    events_init(&d->events, &d->solver, count, indicators, rates, jump, d->event_work + n_modes);
+    return 0;
+}
+
+/* The last event: which indicators fired, and the modes after it. */
+EXPORT void mbs_event(const driver *d, double *fired, double *modes) {
+    memcpy(fired, events_fired(&d->events), sizeof *fired * (size_t)d->events.count);
+    memcpy(modes, d->p + d->n_p - d->n_modes, sizeof *modes * (size_t)d->n_modes);
+}
+#endif

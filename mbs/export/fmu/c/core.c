@@ -188,7 +188,7 @@ core_status core_exit_initialization(core *c) {
     if (status) return status;
     status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     if (status) return status;
-    dopri5_start(&c->solver, c->m.time);
+    stepper_start(&c->solver, c->m.time);
     c->m.mode = c->m.cosimulation ? STEP : EVENT;
     return CORE_OK;
 }

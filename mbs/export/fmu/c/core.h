@@ -44,7 +44,7 @@ typedef struct {
     double values[N_VALUES + 1];
     double guess[NZ + 1];
     double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
-    double solver[DOPRI5_MEMORY(NX)];
+    double solver[STEPPER_MEMORY(NX)];
 } core_memory;
 
 typedef struct {
@@ -52,7 +52,7 @@ typedef struct {
     char *name;
     core_logger log;
     void *host;
-    dopri5 solver;
+    stepper solver;
     double work[DOPRI5_WORK(NX) + 1], z[NZ + 1];
     const double **arg;
     double **res;

@@ -86,7 +86,7 @@ static int sane(const core_memory *m) {
     if (!m->stale && !all_finite(v, N_VALUES)) return 0;
     if (!all_finite(m->guess, NZ) || !all_finite(m->posture_z, NZ)) return 0;
     if (!all_finite(m->posture_x, NX)) return 0;
-    for (i = 0; i < DOPRI5_MEMORY(0); i++)
+    for (i = 0; i < STEPPER_MEMORY(0); i++)
         if (isnan(m->solver[i])) return 0;
     return 1;
 }

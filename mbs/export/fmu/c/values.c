@@ -61,7 +61,7 @@ static void changed(core *c) {
     if (c->m.mode & (INSTANTIATED | INITIALIZATION))
         c->m.closed = 0;
     else
-        dopri5_restart(&c->solver);
+        stepper_restart(&c->solver);
 }
 
 /* A guess equal to the start value in the model description says nothing: many hosts write all. */

@@ -1,0 +1,247 @@
+#include "events.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+enum { LOOKS = 2, TANGENTS = 30, SECANTS = 20, MAX_JUMPS = 20, MAX_IDLE = 100 };
+
+static const double DEPARTURE = 1e-8; /* part of a step in which what rises may become positive */
+
+/* work: a state, then k values each of */
+static double *part(const events *e, int i) {
+    return e->work + e->solver->n + (size_t)i * e->count;
+}
+static double *left(const events *e) { return part(e, 0); }
+static double *right(const events *e) { return part(e, 1); }
+static double *middle(const events *e) { return part(e, 2); }
+static double *left_rate(const events *e) { return part(e, 3); }
+static double *right_rate(const events *e) { return part(e, 4); }
+static double *middle_rate(const events *e) { return part(e, 5); }
+static double *armed(const events *e) { return part(e, 6); }
+static double *due(const events *e) { return part(e, 7); }
+static double *fired(const events *e) { return part(e, 8); }
+static void copy(const events *e, double *to, const double *from) {
+    memcpy(to, from, sizeof(double) * (size_t)e->count);
+}
+
+void events_init(events *e, stepper *solver, int count, events_values indicators,
+                 events_values rates, events_jump jump, double *work) {
+    memset(e, 0, sizeof *e);
+    e->solver = solver;
+    e->count = count;
+    e->indicators = indicators;
+    e->rates = rates;
+    e->jump = jump;
+    e->work = work;
+    e->last = -HUGE_VAL;
+}
+
+const double *events_fired(const events *e) { return fired(e); }
+
+/* rates: NULL, or how fast the indicators rise there. */
+static int look(const events *e, const double *x, double t, double *values, double *rates) {
+    void *user = e->solver->user;
+    int status = stepper_state(e->solver, x, t, e->work);
+    if (status) return status;
+    if (e->indicators(user, t, e->work, values)) return EVENTS_INDICATORS_FAILED;
+    if (rates && e->rates(user, t, e->work, rates)) return EVENTS_INDICATORS_FAILED;
+    return stepper_all_finite(values, e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
+}
+
+/* The least of the indicators that can fire. */
+static double least(const events *e, const double *values) {
+    double value = HUGE_VAL;
+    int k;
+    for (k = 0; k < e->count; k++)
+        if (armed(e)[k] > 0.0) value = fmin(value, values[k]);
+    return value;
+}
+
+static void arm(const events *e, const double *values) {
+    int k;
+    for (k = 0; k < e->count; k++)
+        if (values[k] > 0.0) armed(e)[k] = 1.0;
+}
+
+/* Which indicators ask for a jump at the present state. One that is zero to the tolerance and does
+ * not clearly fall waits: the first look at the next step tells whether it leaves zero. */
+static int judge(events *e, const double *x) {
+    double t = stepper_time(e->solver), step = stepper_last_step(e->solver);
+    double slack = fmax(1e3 * DBL_EPSILON * fabs(t), DEPARTURE * step), zero = e->solver->atol;
+    int k, status = look(e, x, t, left(e), left_rate(e));
+    if (status) return status;
+    e->pending = 0;
+    for (k = 0; k < e->count; k++) {
+        double value = left(e)[k], rise = left_rate(e)[k];
+        int waits = value >= -fmax(zero, rise * slack) && !(rise * step < -zero);
+        armed(e)[k] = value > 0.0;
+        due(e)[k] = value <= 0.0 && !waits;
+        if (due(e)[k] > 0.0) e->pending = 1;
+    }
+    return STEPPER_OK;
+}
+
+int events_start(events *e, const double *x) { return judge(e, x); }
+
+static int returned(const events *e) {
+    int k;
+    for (k = 0; k < e->count; k++)
+        if (!(armed(e)[k] > 0.0) && right(e)[k] <= 0.0) return 1;
+    return 0;
+}
+
+/* What has just left zero may be back at the first look: look earlier, until it is above. */
+static int first_look(const events *e, const double *x, double start, double *end) {
+    double step = stepper_last_step(e->solver);
+    int k, status = look(e, x, *end, right(e), right_rate(e));
+    while (!status && returned(e)) {
+        double half = start + 0.5 * (*end - start);
+        if (*end - start <= 4 * DBL_EPSILON * fmax(fabs(*end), 1e-3 * step)) {
+            for (k = 0; k < e->count; k++)
+                if (!(armed(e)[k] > 0.0)) armed(e)[k] = 1.0, left(e)[k] = DBL_MIN;
+            return STEPPER_OK;
+        }
+        *end = half;
+        status = look(e, x, half, right(e), right_rate(e));
+    }
+    return status;
+}
+
+static double next_guess(double a, double b, double low, double high, double margin, int count) {
+    if (count >= SECANTS || b - a <= 4 * margin) return a + 0.5 * (b - a);
+    return fmin(fmax(a + (b - a) * low / (low - high), a + margin), b - margin);
+}
+
+/* The first time after a at which an indicator is not positive: secants with a safeguard, and
+ * the half of each value that stays (the Illinois rule). */
+static int locate(const events *e, const double *x, double a, double *b) {
+    double low = least(e, left(e)), high = least(e, right(e)), value;
+    double step = stepper_last_step(e->solver);
+    int count = 0, side = 0, status;
+    for (;; count++) {
+        double margin = 2 * DBL_EPSILON * fmax(fmax(fabs(a), fabs(*b)), 1e-3 * step);
+        double t = next_guess(a, *b, low, high, margin, count);
+        if (!(t > a && t < *b) || *b - a <= 1e-3 * DBL_EPSILON * step) return STEPPER_OK;
+        status = look(e, x, t, middle(e), NULL);
+        if (status) return status;
+        value = least(e, middle(e));
+        if (value > 0.0) {
+            if (side > 0) high *= 0.5;
+            a = t, low = value, side = 1;
+        } else {
+            if (side < 0) low *= 0.5;
+            *b = t, high = value, side = -1;
+            copy(e, right(e), middle(e));
+        }
+    }
+}
+
+/* An indicator that falls at a and rises at *b: if it is not positive in between, *b becomes a time
+ * when it is not. Tangents at the ends bound what is convex from below; they are drawn again from
+ * where they meet, until they stay positive. */
+static int find_dip(const events *e, const double *x, int k, double a, double *b) {
+    double low = left(e)[k], fall = left_rate(e)[k];
+    double end = *b, high = right(e)[k], rise = right_rate(e)[k];
+    int i, status;
+    for (i = 0; i < TANGENTS && fall < 0.0 && rise > 0.0; i++) {
+        double width = end - a, meet = (low - high + rise * width) / (rise - fall), t;
+        int inside = meet > 0.0 && meet < width;
+        if (inside && low + fall * meet > 0.0) return STEPPER_OK;
+        t = a + (inside ? meet : 0.5 * width);
+        status = look(e, x, t, middle(e), middle_rate(e));
+        if (status) return status;
+        if (middle(e)[k] <= 0.0) {
+            copy(e, right(e), middle(e));
+            copy(e, right_rate(e), middle_rate(e));
+            *b = t;
+            return STEPPER_OK;
+        }
+        if (middle_rate(e)[k] < 0.0)
+            a = t, low = middle(e)[k], fall = middle_rate(e)[k];
+        else
+            end = t, high = middle(e)[k], rise = middle_rate(e)[k];
+    }
+    return STEPPER_OK;
+}
+
+static int find_dips(const events *e, const double *x, double a, double *b) {
+    int k, status = STEPPER_OK;
+    for (k = 0; k < e->count && !status; k++)
+        if (armed(e)[k] > 0.0 && left(e)[k] > 0.0 && right(e)[k] > 0.0)
+            status = find_dip(e, x, k, a, b);
+    return status;
+}
+
+static int stop_at_event(events *e, double *x, double a, double b) {
+    int k, status = locate(e, x, a, &b);
+    if (status) return status;
+    for (k = 0; k < e->count; k++) due(e)[k] = armed(e)[k] > 0.0 && right(e)[k] <= 0.0;
+    e->pending = 1;
+    return stepper_rewind(e->solver, x, b);
+}
+
+/* One step, cut at its first event. */
+static int step(events *e, double *x, double limit) {
+    double start = stepper_time(e->solver), from = start, end;
+    int number = 1, status = stepper_step(e->solver, x, limit);
+    end = stepper_time(e->solver);
+    while (!status && from < end) {
+        double next = number < LOOKS ? start + number * (end - start) / LOOKS : end, to = next;
+        status = from > start ? look(e, x, to, right(e), right_rate(e))
+                              : first_look(e, x, start, &to);
+        if (!status) status = find_dips(e, x, from, &to);
+        if (status) return status;
+        if (least(e, right(e)) <= 0.0) return stop_at_event(e, x, from, to);
+        arm(e, right(e));
+        copy(e, left(e), right(e));
+        copy(e, left_rate(e), right_rate(e));
+        if (to == next) number++;
+        from = to;
+    }
+    return status;
+}
+
+/* Jumps until no indicator asks for another one. */
+static int settle(events *e, double *x, double limit) {
+    stepper *s = e->solver;
+    double t = stepper_time(s);
+    int i, k, status;
+    memset(fired(e), 0, sizeof(double) * (size_t)e->count);
+    stepper_restart_afresh(s);
+    for (i = 0; e->pending; i++) {
+        for (k = 0; k < e->count; k++) fired(e)[k] = fmax(fired(e)[k], due(e)[k]);
+        if (i == MAX_JUMPS) return EVENTS_DO_NOT_SETTLE;
+        if (e->jump(s->user, t, x, due(e)) || !stepper_all_finite(x, s->n))
+            return EVENTS_JUMP_FAILED;
+        if (s->project && (s->project(s->user, t, x) || !stepper_all_finite(x, s->n)))
+            return STEPPER_PROJECTION_FAILED;
+        status = judge(e, x);
+        if (status) return status;
+    }
+    e->idle = t - e->last <= 1e3 * DBL_EPSILON * fmax(fabs(t), fabs(limit)) ? e->idle + 1 : 0;
+    e->last = t;
+    return e->idle > MAX_IDLE ? EVENTS_STAND_STILL : EVENTS_FIRED;
+}
+
+int events_table(events *e, double *x, const double *times, long count, double *table, long *done,
+                 long budget) {
+    stepper *s = e->solver;
+    long last = s->steps + budget;
+    int status = STEPPER_OK;
+    while (*done < count && !status) {
+        double t = times[*done], now = stepper_time(s);
+        if (t < now || (t == now && !e->pending)) {
+            status = stepper_state(s, x, t, table + (size_t)*done * s->n);
+            if (!status) ++*done;
+            s->since_output = 0;
+        } else if (e->pending) {
+            status = settle(e, x, times[count - 1]);
+        } else if (s->steps >= last) {
+            return STEPPER_MORE;
+        } else {
+            status = step(e, x, times[count - 1]);
+        }
+    }
+    return status;
+}

@@ -1,0 +1,200 @@
+#include "stepper.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+/* places in memory */
+enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, SLOPE };
+
+static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 10.0, BETA = 0.04;
+static const double NEAR_ZERO = 1e-10; /* part of the limit below which time counts as zero */
+
+void stepper_init(stepper *s, int n, const stepper_method *method, stepper_rhs rhs, void *user,
+                  double *memory, double *work) {
+    memset(s, 0, sizeof *s);
+    s->n = n;
+    s->method = method;
+    s->rhs = rhs;
+    s->user = user;
+    s->rtol = s->atol = 1e-8;
+    s->h_max = HUGE_VAL;
+    s->max_steps = 100000;
+    s->memory = memory;
+    s->work = work;
+}
+
+void stepper_start(stepper *s, double t) {
+    memset(s->memory, 0, sizeof(double) * (size_t)STEPPER_MEMORY(s->n));
+    s->memory[TIME] = s->memory[LAST_END] = t;
+    s->memory[ERROR] = 1e-4;
+    s->steps = s->rejected = s->since_output = 0;
+}
+
+void stepper_restart(stepper *s) {
+    s->memory[SLOPE_VALID] = 0.0;
+    s->memory[ERROR] = 1e-4;
+}
+
+void stepper_restart_afresh(stepper *s) {
+    stepper_restart(s);
+    s->memory[STEP] = 0.0;
+}
+
+double stepper_time(const stepper *s) { return s->memory[TIME]; }
+double stepper_wanted_step(const stepper *s) { return s->memory[STEP]; }
+double stepper_last_step(const stepper *s) { return s->memory[LAST_STEP]; }
+
+double *stepper_slope(const stepper *s) { return s->memory + SLOPE; }
+double *stepper_trial(const stepper *s) { return s->work; }
+double *stepper_candidate(const stepper *s) { return s->work + s->n; }
+
+int stepper_all_finite(const double *v, int n) {
+    int i;
+    for (i = 0; i < n; i++)
+        if (!isfinite(v[i])) return 0;
+    return 1;
+}
+
+int stepper_evaluate(const stepper *s, double t, const double *x, double *xdot) {
+    if (s->rhs(s->user, t, x, xdot)) return STEPPER_RHS_FAILED;
+    return stepper_all_finite(xdot, s->n) ? STEPPER_OK : STEPPER_NOT_FINITE;
+}
+
+void stepper_close(stepper *s, const double *slope) {
+    if (slope) memcpy(stepper_slope(s), slope, sizeof(double) * (size_t)s->n);
+    s->memory[SLOPE_VALID] = slope ? 1.0 : 0.0;
+}
+
+static double norm(const stepper *s, const double *v, const double *x, const double *y) {
+    double sum = 0.0;
+    int i;
+    for (i = 0; i < s->n; i++) {
+        double size = s->nominal ? s->nominal[i] : 1.0;
+        double r = v[i] / (s->atol * size + s->rtol * fmax(fabs(x[i]), fabs(y[i])));
+        sum += r * r;
+    }
+    return s->n ? sqrt(sum / s->n) : 0.0;
+}
+
+/* A step that an explicit Euler step and its curvature suggest (Hairer et al. 1993, II.4). */
+static double first_step(stepper *s, const double *x, double span) {
+    const double *k1 = stepper_slope(s);
+    double *y = stepper_trial(s), *k2 = stepper_candidate(s), d0, d1, d2, h0, h1;
+    int i;
+    d0 = norm(s, x, x, x);
+    d1 = norm(s, k1, x, x);
+    h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
+    h0 = fmin(h0, span);
+    for (i = 0; i < s->n; i++) y[i] = x[i] + h0 * k1[i];
+    if (stepper_evaluate(s, s->memory[TIME] + h0, y, k2)) return h0 * 1e-3;
+    for (i = 0; i < s->n; i++) y[i] = k2[i] - k1[i];
+    d2 = norm(s, y, x, x) / h0;
+    h1 = fmax(d1, d2) <= 1e-15 ? fmax(1e-6, h0 * 1e-3) : pow(0.01 / fmax(d1, d2), 0.2);
+    return fmin(fmin(100 * h0, h1), span);
+}
+
+/* Project the candidate and make it the state; the slope there opens the next step. */
+static int accept(stepper *s, double *x, double t_new, double h) {
+    double *y = stepper_candidate(s);
+    int status;
+    s->method->keep(s, x, h);
+    if (s->project) {
+        if (s->project(s->user, t_new, y)) return STEPPER_PROJECTION_FAILED;
+        if (!stepper_all_finite(y, s->n)) return STEPPER_NOT_FINITE;
+    }
+    status = s->method->close(s, t_new);
+    if (status) return status;
+    memcpy(x, y, sizeof(double) * (size_t)s->n);
+    s->memory[TIME] = s->memory[LAST_END] = t_new;
+    s->memory[LAST_STEP] = h;
+    return STEPPER_OK;
+}
+
+static int open_step(stepper *s, const double *x, double limit) {
+    double *m = s->memory;
+    if (m[SLOPE_VALID] == 0.0) {
+        int status = stepper_evaluate(s, m[TIME], x, stepper_slope(s));
+        if (!status && s->method->open) status = s->method->open(s, x);
+        if (status) return status;
+        m[SLOPE_VALID] = 1.0;
+    }
+    if (m[STEP] <= 0.0) m[STEP] = first_step(s, x, limit - m[TIME]);
+    m[STEP] = fmin(m[STEP], s->h_max);
+    return STEPPER_OK;
+}
+
+/* One try of one step towards limit. STEPPER_MORE: accepted. STEPPER_OK: rejected, try again. */
+static int try_step(stepper *s, double *x, double limit) {
+    double *m = s->memory, t = m[TIME], h = m[STEP], error = 0.0, factor;
+    int status, cut = t + 1.01 * h >= limit;
+    if (cut) h = limit - t;
+    s->steps++;
+    status = s->method->attempt(s, x, h);
+    if (!status) {
+        error = norm(s, stepper_trial(s), x, stepper_candidate(s));
+        if (!isfinite(error)) status = STEPPER_NOT_FINITE;
+    }
+    if (!status && error <= 1.0) {
+        status = accept(s, x, cut ? limit : t + h, h);
+        if (!status) {
+            factor = SAFETY * pow(m[ERROR], BETA) / pow(fmax(error, 1e-10), 0.2 - 0.75 * BETA);
+            h *= fmin(GROW, fmax(SHRINK, factor));
+            m[STEP] = cut ? fmax(h, m[STEP]) : h;
+            if (!cut) m[ERROR] = fmax(error, 1e-4);
+            return STEPPER_MORE;
+        }
+    }
+    s->rejected++;
+    m[STEP] = h * (status ? 0.25 : fmax(SHRINK, SAFETY / pow(error, 0.2)));
+    if (m[STEP] > 4 * DBL_EPSILON * fmax(fabs(t), NEAR_ZERO * fabs(limit))) return STEPPER_OK;
+    return status ? status : STEPPER_STEP_TOO_SMALL;
+}
+
+int stepper_step(stepper *s, double *x, double limit) {
+    int status = open_step(s, x, limit);
+    while (!status) {
+        if (s->since_output++ >= s->max_steps) return STEPPER_TOO_MANY_STEPS;
+        status = try_step(s, x, limit);
+    }
+    return status == STEPPER_MORE ? STEPPER_OK : status;
+}
+
+int stepper_state(const stepper *s, const double *x, double t, double *row) {
+    double h = s->memory[LAST_STEP];
+    if (t >= s->memory[TIME]) {
+        memcpy(row, x, sizeof(double) * (size_t)s->n);
+        return STEPPER_OK;
+    }
+    s->method->interpolate(s, (t - (s->memory[LAST_END] - h)) / h, row);
+    if (s->project && s->project(s->user, t, row)) return STEPPER_PROJECTION_FAILED;
+    return stepper_all_finite(row, s->n) ? STEPPER_OK : STEPPER_NOT_FINITE;
+}
+
+int stepper_rewind(stepper *s, double *x, double t) {
+    double *y = stepper_trial(s);
+    int status = stepper_state(s, x, t, y);
+    if (status) return status;
+    memcpy(x, y, sizeof(double) * (size_t)s->n);
+    s->memory[TIME] = t;
+    stepper_close(s, NULL);
+    return STEPPER_OK;
+}
+
+int stepper_table(stepper *s, double *x, const double *times, long count, double *table, long *done,
+                  long budget) {
+    long last = s->steps + budget;
+    int status = STEPPER_OK;
+    while (*done < count && !status) {
+        if (times[*done] <= s->memory[TIME]) {
+            status = stepper_state(s, x, times[*done], table + (size_t)*done * s->n);
+            if (!status) ++*done;
+            s->since_output = 0;
+        } else if (s->steps >= last) {
+            return STEPPER_MORE;
+        } else {
+            status = stepper_step(s, x, times[count - 1]);
+        }
+    }
+    return status;
+}

@@ -1,0 +1,219 @@
+"""An integration, its functions brought into one form and its arguments checked."""
+
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+import numpy.typing as npt
+
+from mbs.errors import ModelError
+from mbs.messages import quoted
+from mbs.solvers.events import Events
+
+Array = npt.NDArray[np.float64]
+
+METHODS = ("dopri5", "rodas")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equations:
+    """The functions of an integration, every input and output dense.
+
+    Attributes:
+        rhs: `mbs_rhs(t, x, p) -> xdot`.
+        jacobian: `mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t)`; None when the method is
+            explicit.
+        project: `mbs_project(x, p) -> (x, residual)`; None without constraints.
+        indicators: `mbs_indicators(t, x, p) -> g`; None, as the next two, without events.
+        rates: `mbs_rates(t, x, p) -> dg/dt` along the motion.
+        jump: `mbs_jump(t, x, p, fired) -> (x, modes)`.
+    """
+
+    rhs: casadi.Function
+    jacobian: casadi.Function | None = None
+    project: casadi.Function | None = None
+    indicators: casadi.Function | None = None
+    rates: casadi.Function | None = None
+    jump: casadi.Function | None = None
+
+    @property
+    def all(self) -> list[casadi.Function]:
+        """Those that there are."""
+        functions = (
+            self.rhs,
+            self.jacobian,
+            self.project,
+            self.indicators,
+            self.rates,
+            self.jump,
+        )
+        return [f for f in functions if f is not None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """An integration, its arguments checked.
+
+    Attributes:
+        equations: its functions.
+        x0: (nx,) state at the first time.
+        times: (m,) s, increasing.
+        p: (np + nm,) parameters and modes.
+        modes: number of modes, nm.
+        rtol: relative tolerance of the error of one step.
+        atol: absolute tolerance of the error of one step.
+        max_step: the longest step, s.
+    """
+
+    equations: Equations
+    x0: Array
+    times: Array
+    p: Array
+    modes: int
+    rtol: float
+    atol: float
+    max_step: float
+
+
+def equations(
+    rhs: casadi.Function, project: casadi.Function | None, method: str, events: Events | None
+) -> Equations:
+    """The functions under the names that the driver calls.
+
+    Args:
+        rhs: `rhs(t, x, p) -> xdot`.
+        project: `project(x, p) -> (x, residual)`, or None.
+        method: one of METHODS.
+        events: None when there are none.
+
+    Raises:
+        ModelError: a function has the wrong inputs or outputs, or there is no such method.
+    """
+    if method not in METHODS:
+        raise ModelError(
+            f"integrate: method is {quoted(method)}; use 'dopri5', or 'rodas' for stiff equations"
+        )
+    if rhs.n_in() not in (2, 3) or rhs.numel_in(0) != 1:
+        raise ModelError(f"{rhs}: the right-hand side of an integration is rhs(t, x, p) -> xdot")
+    n, n_p = rhs.numel_in(1), rhs.numel_in(2) if rhs.n_in() == 3 else 0
+    if rhs.numel_out(0) != n:
+        raise ModelError(
+            f"{rhs.name()}: it gives {rhs.numel_out(0)} slopes for {n} states; give one for each"
+        )
+    t, x, p = casadi.MX.sym("t"), casadi.MX.sym("x", n), casadi.MX.sym("p", n_p)
+    txp = [t, x, p]
+    slope = casadi.vec(_first(rhs, txp[: rhs.n_in()]))
+    f = _dense("mbs_rhs", txp, slope)
+    jacobian = None
+    if method == "rodas":
+        f_xt = [casadi.jacobian(slope, v) for v in (x, t)]
+        jacobian = _dense("mbs_jacobian", txp, *f_xt)
+    g = None if project is None else _projection(project, x, p)
+    if events is None:
+        return Equations(f, jacobian, g)
+    return Equations(f, jacobian, g, *_event_functions(events, txp, slope))
+
+
+def _first(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
+    return function(*inputs) if function.n_out() == 1 else function(*inputs)[0]
+
+
+def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
+    return casadi.Function(name, inputs, [casadi.densify(value) for value in outputs])
+
+
+def _projection(project: casadi.Function, x: casadi.MX, p: casadi.MX) -> casadi.Function:
+    n = x.numel()
+    if project.n_out() != 2 or project.numel_in(0) != n or project.numel_out(0) != n:
+        raise ModelError(f"{project}: a projection is project(x, p) -> (x, residual), x ({n},)")
+    outputs = project(*[x, p][: project.n_in()])
+    return _dense("mbs_project", [x, p], *map(casadi.vec, outputs))
+
+
+def _event_functions(
+    events: Events, txp: list[casadi.MX], slope: casadi.MX
+) -> tuple[casadi.Function, casadi.Function, casadi.Function]:
+    t, x, p = txp
+    indicators, jump, n_modes = events.indicators, events.jump, len(numbers(events.modes))
+    sizes = [1, x.numel(), p.numel()]
+    given = [indicators.numel_in(k) for k in range(indicators.n_in())]
+    if len(given) not in (2, 3) or given != sizes[: len(given)] or n_modes > sizes[2]:
+        raise ModelError(
+            f"{indicators}: indicators of events are indicators(t, x, p) -> g with the inputs of "
+            f"the right-hand side, {sizes[1]} states and {sizes[2]} parameters and modes"
+        )
+    g = casadi.vec(_first(indicators, txp[: len(given)]))
+    fired = casadi.MX.sym("fired", g.numel())
+    taken = [jump.numel_in(k) for k in range(jump.n_in())]
+    left = [jump.numel_out(k) for k in range(jump.n_out())]
+    wanted = [sizes[1], n_modes] if n_modes or len(left) == 2 else [sizes[1]]
+    if taken != [*sizes, g.numel()] or left != wanted:
+        raise ModelError(
+            f"{jump}: the jump of an event is jump(t, x, p, fired) -> (x, modes), x ({sizes[1]},), "
+            f"p ({sizes[2]},) with the modes last, fired ({g.numel()},), modes ({n_modes},)"
+        )
+    rate = casadi.jtimes(g, x, slope) + casadi.jtimes(g, t, casadi.MX(1))
+    after = [jump(*txp, fired)] if len(left) == 1 else list(jump(*txp, fired))
+    modes = casadi.vec(after[1]) if n_modes else casadi.MX(0, 1)
+    return (
+        _dense("mbs_indicators", txp, g),
+        _dense("mbs_rates", txp, rate),
+        _dense("mbs_jump", [*txp, fired], casadi.vec(after[0]), modes),
+    )
+
+
+def problem(
+    functions: Equations,
+    x0: npt.ArrayLike,
+    times: npt.ArrayLike,
+    p: npt.ArrayLike | None,
+    modes: npt.ArrayLike,
+    tolerances: tuple[float, float],
+    max_step: float,
+) -> Problem:
+    """The integration of given functions.
+
+    Args:
+        functions: what `equations` gave.
+        x0: (nx,) state at the first time.
+        times: (m,) s, increasing.
+        p: (np,) parameters; none by default.
+        modes: (nm,) at the first time.
+        tolerances: relative and absolute tolerance of the error of one step.
+        max_step: the longest step, s; infinite when only the error limits it.
+
+    Raises:
+        ModelError: an argument does not fit the functions.
+    """
+    f = functions.rhs
+    n, n_p = f.numel_in(1), f.numel_in(2)
+    x, t, m = numbers(x0), numbers(times), numbers(modes)
+    own = numbers([] if p is None else p)
+    if len(x) != n or len(own) + len(m) != n_p:
+        given = f"{len(x)} initial states and {len(own)} parameters"
+        raise ModelError(
+            f"integrate: {given}{f' and {len(m)} modes' if len(m) else ''} were given; "
+            f"the right-hand side has {n} states and {n_p} parameters"
+        )
+    if not all(np.isfinite(values).all() for values in (x, t, own, m)):
+        raise ModelError("integrate: a state, a time or a parameter is not finite; give numbers")
+    if len(t) == 0 or np.any(np.diff(t) < 0):
+        raise ModelError("integrate: times must be one or more, in increasing order")
+    rtol, atol = tolerances
+    if not all(isinstance(value, (int, float)) and 0 < value < np.inf for value in tolerances):
+        raise ModelError(f"integrate: tolerances {rtol!r} and {atol!r} must be positive numbers")
+    if not (isinstance(max_step, (int, float)) and max_step > 0):
+        raise ModelError(f"integrate: the longest step {max_step!r} must be a positive number, s")
+    return Problem(functions, x, t, np.concatenate([own, m]), len(m), rtol, atol, max_step)
+
+
+def numbers(values: npt.ArrayLike) -> Array:
+    """A vector of numbers.
+
+    Raises:
+        ModelError: they are none.
+    """
+    try:
+        return np.array(values, dtype=float).reshape(-1)
+    except (TypeError, ValueError):
+        raise ModelError(f"integrate: {quoted(values)} are not numbers; give real ones") from None

@@ -1,0 +1,261 @@
+"""Steps with error control, dense output and projection: the twin of `native/runtime/stepper.c`.
+
+The twins serve where there is no C compiler, and take the same steps. A change here is a change
+there.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mbs.errors import SolverError
+
+Array = npt.NDArray[np.float64]
+RightHandSide = Callable[[float, Array], Array]
+Projection = Callable[[float, Array], Array]
+
+EPSILON = float(np.finfo(float).eps)
+SAFETY, SHRINK, GROW, BETA = 0.9, 0.2, 10.0, 0.04
+NEAR_ZERO = 1e-10
+MAX_STEPS = 100_000
+REASONS = {
+    "steps": f"more than {MAX_STEPS} steps between two output times; ask for a looser tolerance "
+    "or, when fast decays are in the system, for a method for stiff equations",
+    "small": "error control asks for a step below the rounding of time; "
+    "look for a singularity or a jump",
+    "rhs": "the right-hand side has no value there",
+    "projection": "the projection onto the constraints does not converge; "
+    "look for a singular posture",
+    "finite": "a value is not finite; look for a singularity",
+    "indicators": "an event indicator has no value there",
+    "jump": "the jump of an event has no value there",
+    "settle": "the events there do not settle, each jump asks for another one; "
+    "let the jump make the indicators positive, or zero and rising",
+    "standstill": "more than 100 events, and time hardly advances; "
+    "add a mode in which what repeats is at rest",
+}
+
+
+class Failure(Exception):
+    """An evaluation had no answer, so the step must be shortened."""
+
+
+@dataclass(slots=True)
+class Stepper(ABC):
+    """One integration under way, by a method whose error estimate is of order 4.
+
+    Attributes:
+        rhs: slope at a time and a state.
+        project: a state moved onto the constraints, or None.
+        t: present time.
+        x: present state, (n,).
+        max_step: the longest step, s.
+        h: step that error control wants next; 0 before the first one.
+        slope: slope at the present state, or None when it is not known.
+        last_step: length of the last step.
+        last_end: time at its end.
+    """
+
+    rhs: RightHandSide
+    project: Projection | None
+    t: float
+    x: Array
+    rtol: float
+    atol: float
+    max_step: float = math.inf
+    h: float = 0.0
+    error: float = 1e-4
+    since_output: int = 0
+    last_step: float = 0.0
+    last_end: float = 0.0
+    slope: Array | None = None
+    dense: tuple[Array, ...] = ()
+
+    @abstractmethod
+    def _open(self, slope: Array) -> None:
+        """Compute what rejected tries of a step from the present state share."""
+
+    @abstractmethod
+    def _attempt(self, h: float, slope: Array) -> tuple[Array, Array]:
+        """The state after a step, and its error."""
+
+    @abstractmethod
+    def _keep(self, h: float, y: Array) -> tuple[Array, ...]:
+        """Dense output of the attempt that led to y."""
+
+    @abstractmethod
+    def _close(self, t: float, y: Array) -> Array | None:
+        """The slope at the new state when the attempt gave it."""
+
+    @abstractmethod
+    def _interpolate(self, a: float) -> Array:
+        """State at a part a of the last step."""
+
+    def table(self, times: Array, row: int, rows: Array, budget: int) -> int:
+        """Fill rows from `row` on with the states at times, in about `budget` steps.
+
+        Args:
+            times: (m,) s, increasing.
+            row: first row to fill.
+            rows: (m, n) table that is filled.
+            budget: number of steps after which to return.
+
+        Returns:
+            the first row not filled yet.
+
+        Raises:
+            SolverError: the integration cannot go on.
+        """
+        try:
+            with np.errstate(all="ignore"):  # what overflows is rejected as not finite
+                while row < len(times):
+                    if times[row] <= self.t:
+                        rows[row] = self.output(float(times[row]))
+                        row += 1
+                    elif budget <= 0:
+                        break
+                    else:
+                        budget -= self.step(float(times[-1]))
+        except Failure as failure:
+            raise failed(self.t, self.h, str(failure)) from failure
+        return row
+
+    def output(self, t: float) -> Array:
+        """The state at a time within the last step, for a row of the table."""
+        self.since_output = 0
+        return self.state(t)
+
+    def state(self, t: float) -> Array:
+        """The state at a time within the last step, projected, (n,)."""
+        if t >= self.t:
+            return self.x
+        y = self._interpolate((t - (self.last_end - self.last_step)) / self.last_step)
+        return y if self.project is None else self.project(t, y)
+
+    def rewind(self, t: float) -> None:
+        """Go back to a time within the last step; earlier states of it remain at hand."""
+        self.x = self.state(t)
+        self.t, self.slope = t, None
+
+    def restart(self, x: Array) -> None:
+        """Go on from another state at the present time, with a new first step."""
+        self.x, self.slope, self.h, self.error = x, None, 0.0, 1e-4
+
+    def step(self, limit: float) -> int:
+        """Try steps towards limit until one is accepted.
+
+        Returns:
+            how many were tried.
+
+        Raises:
+            Failure: none can be accepted.
+        """
+        tried = 0
+        if self.slope is None:
+            self.slope = self._slope(self.t, self.x)
+            self._open(self.slope)
+        if self.h <= 0.0:
+            self.h = self._first_step(self.slope, limit - self.t)
+        self.h = min(self.h, self.max_step)
+        while True:
+            self.since_output += 1
+            tried += 1
+            if self.since_output > MAX_STEPS:
+                raise Failure("steps")
+            if self._try_step(self.slope, limit):
+                return tried
+
+    def _try_step(self, slope: Array, limit: float) -> bool:
+        cut = self.t + 1.01 * self.h >= limit
+        h = limit - self.t if cut else self.h
+        reason = ""
+        error = 0.0
+        try:
+            y, difference = self._attempt(h, slope)
+            error = self._norm(difference, y)
+            if not np.isfinite(error):
+                raise Failure("finite")
+            if error <= 1.0:
+                self._accept(y, limit if cut else self.t + h, h)
+                self._lengthen(h, error, cut)
+                return True
+        except Failure as failure:
+            reason = str(failure)
+        self.h = h * (0.25 if reason else max(SHRINK, SAFETY / error**0.2))
+        if self.h <= 4 * EPSILON * max(abs(self.t), NEAR_ZERO * abs(limit)):
+            raise Failure(reason or "small")
+        return False
+
+    def _accept(self, y: Array, t_new: float, h: float) -> None:
+        dense = self._keep(h, y)
+        if self.project is not None:
+            y = self.project(t_new, y)
+        self.slope = self._close(t_new, y)
+        self.dense = dense
+        self.t, self.x, self.last_step, self.last_end = t_new, y, h, t_new
+
+    def _lengthen(self, h: float, error: float, cut: bool) -> None:
+        factor = SAFETY * self.error**BETA / max(error, 1e-10) ** (0.2 - 0.75 * BETA)
+        h *= min(GROW, max(SHRINK, factor))
+        self.h = max(h, self.h) if cut else h
+        if not cut:
+            self.error = max(error, 1e-4)
+
+    def _slope(self, t: float, x: Array) -> Array:
+        if not np.isfinite(x).all():
+            raise Failure("finite")
+        try:
+            value = self.rhs(t, x)
+        except RuntimeError as error:
+            raise Failure("rhs") from error
+        if not np.isfinite(value).all():
+            raise Failure("finite")
+        return value
+
+    def _norm(self, v: Array, y: Array) -> float:
+        scale = self.atol + self.rtol * np.maximum(np.abs(self.x), np.abs(y))
+        r = v / scale
+        return float(np.sqrt(np.dot(r, r) / len(r))) if len(r) else 0.0
+
+    def _first_step(self, slope: Array, span: float) -> float:
+        """A step that an explicit Euler step and its curvature suggest (Hairer 1993, II.4)."""
+        d0, d1 = self._norm(self.x, self.x), self._norm(slope, self.x)
+        h0 = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, span)
+        try:
+            k2 = self._slope(self.t + h0, self.x + h0 * slope)
+        except Failure:
+            return h0 * 1e-3
+        d2 = self._norm(k2 - slope, self.x) / h0
+        top = max(d1, d2)
+        h1 = max(1e-6, h0 * 1e-3) if top <= 1e-15 else (0.01 / top) ** 0.2
+        return float(min(100 * h0, h1, span))
+
+
+def failed(t: float, h: float, reason: str, fired: Sequence[int] = ()) -> SolverError:
+    """The error that says when, with which step and why an integration stopped.
+
+    Args:
+        t: time of the last accepted state, s.
+        h: step that was wanted next, s; 0 when there was none.
+        reason: a key of REASONS.
+        fired: numbers of the event indicators that are to blame.
+
+    Returns:
+        an error to raise.
+    """
+    step = f" with step {h:.3g} s" if h > 0 else ""
+    who = f"; indicators {', '.join(map(str, fired))}" if fired else ""
+    return SolverError(f"integration stopped at t = {t:.9g} s{step}: {REASONS[reason]}{who}")
+
+
+def combine(weights: Sequence[float], k: Sequence[Array]) -> Any:
+    """Weighted sum of stages."""
+    total = weights[0] * k[0]
+    for weight, slope in zip(weights[1:], k[1:], strict=True):
+        total = total + weight * slope
+    return total

@@ -12,16 +12,29 @@ from mbs.errors import DescriptionError
 from mbs.expressions import Parameter
 from mbs.formats import from_dict, read_mjcf, read_par, read_toml, read_urdf, to_mechanism
 from mbs.messages import did_you_mean
+from mbs.robots.akr3000 import akr3000
+from mbs.robots.andrews_squeezer import andrews_squeezer
+from mbs.robots.bricard import bricard
 from mbs.robots.cart_pole import cart_pole
+from mbs.robots.delta import delta
+from mbs.robots.differential_wrist import differential_wrist
 from mbs.robots.five_bar import five_bar
+from mbs.robots.flyball_governor import flyball_governor
 from mbs.robots.four_bar import four_bar
+from mbs.robots.modelica_four_bar import modelica_four_bar
+from mbs.robots.n_four_bar import n_four_bar
 from mbs.robots.planar_2r import planar_2r
 from mbs.robots.puma560 import puma560
 from mbs.robots.rx90 import rx90
 from mbs.robots.scara import scara
+from mbs.robots.simple_pendulum import simple_pendulum
+from mbs.robots.single_cylinder_engine import single_cylinder_engine
+from mbs.robots.slider_crank import slider_crank
 from mbs.robots.sr400 import sr400
 from mbs.robots.stanford import stanford
+from mbs.robots.stewart_platform import stewart_platform
 from mbs.robots.two_branch_tree import two_branch_tree
+from mbs.robots.whipple_bicycle import whipple_bicycle
 
 _CATALOGUE: Mapping[str, Callable[[], Mechanism]] = MappingProxyType(
     {
@@ -37,6 +50,19 @@ _CATALOGUE: Mapping[str, Callable[[], Mechanism]] = MappingProxyType(
             sr400,
             five_bar,
             four_bar,
+            whipple_bicycle,
+            slider_crank,
+            single_cylinder_engine,
+            modelica_four_bar,
+            simple_pendulum,
+            n_four_bar,
+            andrews_squeezer,
+            bricard,
+            flyball_governor,
+            akr3000,
+            delta,
+            stewart_platform,
+            differential_wrist,
         )
     }
 )

@@ -19,6 +19,30 @@ MOBILITY = {
     "sr400": 6,
     "five_bar": 2,
     "four_bar": 1,
+    "slider_crank": 1,
+    "single_cylinder_engine": 1,
+    "modelica_four_bar": 1,
+    "simple_pendulum": 1,
+    "n_four_bar": 1,
+    "andrews_squeezer": 1,
+    "bricard": 1,
+    "flyball_governor": 4,
+    "akr3000": 6,
+    "delta": 3,
+    "stewart_platform": 6,
+    "differential_wrist": 2,
+    "whipple_bicycle": 3,
+}
+OPEN = {
+    "puma560",
+    "stanford",
+    "rx90",
+    "scara",
+    "planar_2r",
+    "cart_pole",
+    "two_branch_tree",
+    "simple_pendulum",
+    "flyball_governor",
 }
 
 
@@ -40,7 +64,7 @@ def turn(T):
 def test_mobility(name):
     system = assembled(name)
     assert len(system.active) == MOBILITY[name]
-    assert system.is_closed == (name in ("sr400", "five_bar", "four_bar"))
+    assert system.is_closed == (name not in OPEN)
 
 
 def test_puma560_at_zero():

@@ -1,0 +1,33 @@
+"""A wrist of bevel gears: two motors beside each other pitch and roll the tool."""
+
+from __future__ import annotations
+
+from mbs.components import Body, Gear, Mechanism, Revolute
+
+_SOURCE = "Textbook mechanism; ratio, masses and inertias are illustrative"
+
+
+def differential_wrist(ratio: float = 1.0) -> Mechanism:
+    """Differential wrist: motors q1, q2 turn two side gears about y, the tool pitches and rolls.
+
+    The carrier turns about y in `pitch`; the tool turns on it about x in `roll`, and its bevel
+    gear meshes with both side gears, which turn by mesh1, mesh2 on the carrier: roll = ratio mesh1
+    = -ratio mesh2. Hence pitch = (q1 + q2) / 2 and roll = ratio (q1 - q2) / 2. The shafts of the
+    motors lie on one line with the carrier's: each closes a loop of which only the turn is
+    independent. Ratio, masses and inertias are illustrative.
+
+    Args:
+        ratio: teeth of a side gear over those of the tool's gear.
+    """
+    m = Mechanism("differential_wrist", source=_SOURCE)
+    carrier = m.add(Body("carrier", mass=1.2, com=(0.02, 0, 0), inertia=(2e-3, 2e-3, 2.5e-3)))
+    tool = m.add(Body("tool", mass=0.8, com=(0.12, 0, 0.01), inertia=(6e-4, 3e-3, 3e-3)))
+    m.connect(m.world, Revolute("pitch", axis="y", actuated=False), carrier)
+    m.connect(carrier, Revolute("roll", axis="x", actuated=False), tool)
+    for k, sign in ((1, 1), (2, -1)):
+        gear = m.add(Body(f"gear{k}", mass=0.3, inertia=(1e-4, 2e-4, 1e-4)))
+        m.connect(carrier.at(0, 0.05 * sign), Revolute(f"mesh{k}", axis="y", actuated=False), gear)
+        motor = Revolute(f"q{k}", axis="y", actuated=True, Ia=5e-3)
+        m.connect(m.world.at(0, 0.05 * sign), motor, gear)
+        m.add(Gear(f"teeth{k}", driven="roll", driver=f"mesh{k}", ratio=sign * ratio))
+    return m

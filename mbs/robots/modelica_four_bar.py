@@ -1,0 +1,46 @@
+"""A spatial four-bar mechanism, example Fourbar1 of the Modelica Standard Library."""
+
+from __future__ import annotations
+
+from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.robots.bars import round_bar
+
+_SOURCE = (
+    "Modelica Standard Library, Modelica.Mechanics.MultiBody.Examples.Loops.Fourbar1; Otter,"
+    " Elmqvist & Mattsson 2003"
+)
+_GRAVITY = 9.80665
+_DIAMETER, _STEEL = 0.05, 7700
+_CRANK, _ROCKER, _ROD = (0, 0.5, 0.1), (0, 0.2, 0), (-1, 0.3, 0.1)
+
+
+def modelica_four_bar() -> Mechanism:
+    """Crank b1, massive connecting rod b3 and a rocker b2 that slides: six hinges, one slide.
+
+    j1 turns the crank about x in the origin; j2 slides the foot of b2 along x, from x = 1.2 m; rev
+    and rev1 about y and z carry the rod on it; j3, j4, j5 about x, y, z close the loop at the end
+    of the crank. All bars are steel cylinders of 0.05 m diameter; gravity is 9.80665 m/s^2 along
+    -y. It is assembled with j1 = 0, where j2 is -0.2 m and all angles are zero; the example
+    starts with 300 degrees/s, `v0={"j1": 5.235987755982989}`.
+
+    Source: Modelica Standard Library, example Fourbar1; its loops: Otter et al. 2003.
+    """
+    gravity = (0, -_GRAVITY, 0)
+    m = Mechanism("modelica_four_bar", gravity=gravity, source=_SOURCE, guess={"j2": -0.2})
+    b1 = m.add(round_bar("b1", _CRANK, _DIAMETER, _STEEL))
+    b2 = m.add(round_bar("b2", _ROCKER, _DIAMETER, _STEEL))
+    b3 = m.add(round_bar("b3", _ROD, _DIAMETER, _STEEL))
+    j1, rev, rev1, j3, j4, j5 = (
+        Revolute(name, axis=axis, actuated=False)
+        for name, axis in zip(("j1", "rev", "rev1", "j3", "j4", "j5"), "xyzxyz", strict=True)
+    )
+    m.connect(m.world, j1, b1)
+    m.connect(m.world.at(1.2), Prismatic("j2", axis="x"), b2)
+    hub, cross, spider = (m.add(Body(name)) for name in ("hub", "cross", "spider"))
+    m.connect(b2.at(*_ROCKER), rev, hub)
+    m.connect(hub, rev1, b3)
+    m.connect(b1.at(*_CRANK), j3, cross)
+    m.connect(cross, j4, spider)
+    m.connect(spider, j5, b3.at(*_ROD))
+    m.cut(j5)
+    return m

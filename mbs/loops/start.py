@@ -1,0 +1,68 @@
+"""The start of a motion: positions that close the loops, and velocities that keep them closed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mbs.assembly import System
+from mbs.errors import ModelError
+from mbs.loops.closing import Vector
+from mbs.loops.posture import require_closed, solve
+from mbs.loops.reduction import reduction_matrix
+
+Values = Mapping[str, float] | Sequence[float] | None
+
+
+def start(
+    system: System, q0: Values, v0: Values, parameters: Mapping[str, float] | None
+) -> tuple[Vector, Vector]:
+    """Positions (nq,) that close the loops and velocities (nv,) that fit them.
+
+    Args:
+        system: open or closed.
+        q0: positions by coordinate name [rad or m], the others as in the assembled posture; in a
+            closed system the loops are closed with the independent ones as given.
+        v0: velocities by name [rad/s or m/s], the others zero; in a closed system they may be of
+            any joints, and the others follow.
+        parameters: values of symbols, the others at their defaults.
+
+    Raises:
+        Unclosable: the loops cannot be closed at these positions.
+        LoopError: q0 holds all positions and leaves the loops open.
+        ModelError: a name is unknown, or the loops allow no motion with these velocities.
+    """
+    q = np.array(system.position(q0))
+    if not system.is_closed:
+        return q, np.array(system.velocity(v0))
+    if isinstance(q0, Mapping) or q0 is None:
+        q = solve(system, dict(q0 or {}), parameters=parameters)
+    else:
+        require_closed(system, q, parameters)
+    return q, _tree_velocity(system, q, v0, parameters)
+
+
+def _tree_velocity(
+    system: System, q: Vector, v0: Values, parameters: Mapping[str, float] | None
+) -> Vector:
+    """The smallest independent velocities that give the joints named in v0 theirs, and all others.
+
+    Raises:
+        ModelError: no motion of the loops has these velocities.
+    """
+    p = [system.parameter_values(parameters)] if system.parameters else []
+    G = np.array(reduction_matrix(system)(q, *p))
+    wanted = np.array(system.velocity(v0))
+    names = [speed.name for speed in system.speeds]
+    named = v0 is None or isinstance(v0, Mapping)
+    rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
+    v_a = np.linalg.lstsq(G[rows], wanted[rows], rcond=None)[0]
+    v: Vector = G @ v_a
+    if not np.allclose(v[rows], wanted[rows], rtol=1e-6, atol=1e-9):
+        told = ", ".join(f"{names[k]} = {wanted[k]:g}" for k in rows)
+        raise ModelError(
+            f"{system.name}: the loops allow no motion with the velocities {told};"
+            " give those of independent joints: " + ", ".join(names[k] for k in system.active)
+        )
+    return v

@@ -1,0 +1,250 @@
+"""Drive lines: which coordinate every flange turns with, and the mechanism that this leaves.
+
+Flanges that are connected turn together, and rigid gears between them only multiply the angle: all
+of them have one coordinate. It is that of a joint, where one is among them, else the angle of an
+inertia, which becomes a revolute link on the base. Inertias are moved to the coordinate through
+the squares of the ratios, elastic parts become forces on coordinates. A rotor has the energy of
+its spin relative to its housing alone.
+
+Source: Spong 1987, for this assumption.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from copy import copy
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from mbs.assembly.drive_rules import check_flanges, inertia_missing, ring_of_gears, same_shaft
+from mbs.components import (
+    Component,
+    Coupling,
+    IdealGear,
+    Joint,
+    Mechanism,
+    Point,
+    Revolute,
+    ShaftInertia,
+)
+from mbs.components.drive_elastic import ShaftForce
+from mbs.components.drive_flange import Flange, Flanged
+from mbs.components.drive_motor import Device
+from mbs.components.rigid_body import Mount
+from mbs.errors import AssemblyError
+from mbs.expressions import Expression, Number, Scalar, expression, to_float
+
+Key = tuple[str, str]
+"""A flange, by the name of its component and its port."""
+
+_ZERO, _ONE = Number(0.0), Number(1.0)
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """How a flange turns: `factor` times the coordinate."""
+
+    coordinate: str
+    factor: Expression
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DriveLine:
+    """A mechanism without flanges, and what became of them.
+
+    Attributes:
+        mechanism: with joints, couplings and forces in their place.
+        turns: of every flange.
+        parts: of the drive line, in the order added.
+        links: for each coordinate that is no joint's, the part whose angle it is.
+    """
+
+    mechanism: Mechanism
+    turns: Mapping[Key, Turn]
+    parts: tuple[Flanged, ...]
+    links: Mapping[str, str]
+
+
+def drive_line(mechanism: Mechanism) -> DriveLine:
+    """The mechanism with its drive lines lowered to joints, couplings and forces.
+
+    Raises:
+        AssemblyError: a flange is connected to nothing, or to one that moves otherwise; a shaft
+            has no inertia; gears lock each other.
+    """
+    parts = tuple(c for c in mechanism.components.values() if isinstance(c, Flanged))
+    if not parts and not mechanism.shafts:
+        return DriveLine(mechanism, {}, (), {})
+    check_flanges(mechanism, parts)
+    leads, turns = _turns(mechanism, parts)
+    changed: dict[str, Joint] = {}
+    for name, lead in leads.items():
+        mine = [part for part in parts if turns[part.flanges[0].key].coordinate == name]
+        changed[name] = _driven(mechanism, name, lead, mine, turns)
+    links = {n: lead.owner.name for n, lead in leads.items() if not isinstance(lead.owner, Joint)}
+    return DriveLine(_lowered(mechanism, changed, turns), turns, parts, links)
+
+
+def _turns(
+    mechanism: Mechanism, parts: tuple[Flanged, ...]
+) -> tuple[dict[str, Flange], dict[Key, Turn]]:
+    """The flange that leads each rigid group, by the name of its coordinate, and all turns."""
+    ties = _ties(mechanism, parts)
+    values = {p.name: p.default for p in mechanism.parameters() if p.default is not None}
+    leads: dict[str, Flange] = {}
+    turns: dict[Key, Turn] = {}
+    for name, lead in _candidates(mechanism, parts):
+        if lead.key in turns:
+            continue
+        leads[name] = lead
+        turns[lead.key] = Turn(name, _ONE)
+        queue = deque([lead.key])
+        while queue:
+            key = queue.popleft()
+            for other, factor in ties.get(key, ()):
+                turn = Turn(name, times(factor, turns[key].factor))
+                if other not in turns:
+                    turns[other] = turn
+                    queue.append(other)
+                elif not _equal(turns[other].factor, turn.factor, values):
+                    raise ring_of_gears(mechanism, other, turns[other].factor, turn.factor)
+    loose = [flange for part in parts for flange in part.flanges if flange.key not in turns]
+    if loose:
+        raise inertia_missing(mechanism, loose)
+    return leads, turns
+
+
+def _candidates(mechanism: Mechanism, parts: tuple[Flanged, ...]) -> Iterator[tuple[str, Flange]]:
+    """Flanges whose angle may be the coordinate of a group, the best ones first."""
+    used = {flange.owner.name for pair in mechanism.shafts for flange in pair}
+    joints = [joint for joint in mechanism.joints() if joint.name in used]
+    for joint in sorted(joints, key=lambda joint: joint.actuated is False):
+        yield joint.name, joint.flange
+    for part in parts:
+        if isinstance(part, ShaftInertia) and part.own_inertia != _ZERO:
+            yield part.name, part.flange_a
+    for part in parts:
+        if isinstance(part, Device) and part.own_inertia != _ZERO:
+            yield f"{part.name}.rotor", part.flange
+
+
+def _ties(
+    mechanism: Mechanism, parts: tuple[Flanged, ...]
+) -> dict[Key, list[tuple[Key, Expression]]]:
+    """For each flange those that turn with it, and how often for one turn of it."""
+    ties: dict[Key, list[tuple[Key, Expression]]] = {}
+
+    def tie(a: Flange, b: Flange, ratio: Expression) -> None:
+        ties.setdefault(a.key, []).append((b.key, _ONE if ratio == _ONE else 1 / ratio))
+        ties.setdefault(b.key, []).append((a.key, ratio))
+
+    for a, b in mechanism.shafts:
+        tie(a, b, _ONE)
+    for part in parts:
+        if isinstance(part, ShaftInertia):
+            tie(part.flange_a, part.flange_b, _ONE)
+        elif isinstance(part, IdealGear):
+            tie(part.flange_a, part.flange_b, expression(part.ratio))
+    return ties
+
+
+def times(a: Scalar, b: Scalar) -> Expression:
+    """The product, without factors of one and zero."""
+    x, y = expression(a), expression(b)
+    if _ZERO in (x, y):
+        return _ZERO
+    return y if x == _ONE else x if y == _ONE else x * y
+
+
+def _plus(a: Expression, b: Expression) -> Expression:
+    return b if a == _ZERO else a if b == _ZERO else a + b
+
+
+def _equal(a: Expression, b: Expression, values: Mapping[str, float]) -> bool:
+    x, y = to_float(a, values), to_float(b, values)
+    if x is None or y is None:
+        return a == b
+    return abs(x - y) <= _ROUNDING * abs(x)
+
+
+def _driven(
+    mechanism: Mechanism,
+    name: str,
+    lead: Flange,
+    parts: Iterable[Flanged],
+    turns: Mapping[Key, Turn],
+) -> Joint:
+    """The joint that leads a group, with the inertias and motors of the group."""
+    devices = [part for part in parts if isinstance(part, Device)]
+    total: Expression = _ZERO
+    for part in parts:
+        factor = turns[part.flanges[0].key].factor
+        total = _plus(total, times(times(factor, factor), part.own_inertia))
+    if not isinstance(lead.owner, Joint):
+        return Revolute(name, axis="z", actuated=bool(devices), Ia=total)
+    joint = lead.owner
+    if devices and joint.actuated is False:
+        raise AssemblyError(
+            f"{mechanism.name}: joint {name!r} is said to be actuated=False, but"
+            f" {type(devices[0]).__name__} {devices[0].name!r} drives it; leave actuated out"
+        )
+    inertia = _plus(expression(joint.Ia), total)
+    return replace(joint, actuated=joint.actuated or bool(devices), Ia=inertia)
+
+
+def _lowered(
+    mechanism: Mechanism, changed: Mapping[str, Joint], turns: Mapping[Key, Turn]
+) -> Mechanism:
+    """The mechanism with the joints that lead, couplings to the others, and forces."""
+    result = _with_joints(mechanism, changed)
+    joints = {joint.name: joint for joint in mechanism.joints()}
+    for joint in joints.values():
+        turn = turns.get((joint.name, ""))
+        if turn is not None and turn.coordinate != joint.name:
+            name = f"{turn.coordinate}-{joint.name}"
+            row = (_ZERO, turn.factor)
+            result.add(Coupling(name, joint.name, turn.coordinate, row))
+    for force in mechanism.components.values():
+        if isinstance(force, ShaftForce):
+            result.components[force.name] = replace(force, levers=_levers(mechanism, force, turns))
+    for name, joint in changed.items():
+        if name not in joints:
+            result.components.pop(name, None)
+            shaft = result.add(Mount(f"{name}.shaft"))
+            result.connect(result.world, joint, shaft)
+    return result
+
+
+def _with_joints(mechanism: Mechanism, joints: Mapping[str, Joint]) -> Mechanism:
+    """A copy of the mechanism in which these joints stand for those of the same name."""
+
+    def point(old: Point) -> Point:
+        is_joint = isinstance(old.owner, Joint)
+        return replace(old, owner=joints.get(old.owner.name, old.owner)) if is_joint else old
+
+    def component(old: Component) -> Component:
+        if isinstance(old, Joint):
+            return joints.get(old.name, old)
+        values = {f.name: getattr(old, f.name) for f in fields(old)}
+        moved: dict[str, Any] = {n: point(v) for n, v in values.items() if isinstance(v, Point)}
+        return replace(old, **moved) if moved else old
+
+    result = copy(mechanism)
+    result.components = {name: component(c) for name, c in mechanism.components.items()}
+    result.connections = [(point(a), point(b)) for a, b in mechanism.connections]
+    result.frames = {name: point(p) for name, p in mechanism.frames.items()}
+    return result
+
+
+def _levers(
+    mechanism: Mechanism, part: ShaftForce, turns: Mapping[Key, Turn]
+) -> tuple[tuple[str, Expression], ...]:
+    levers = []
+    for flange, share in part.shares:
+        turn = turns[flange.key]
+        levers.append((turn.coordinate, times(share, turn.factor)))
+    if len({coordinate for coordinate, _ in levers}) < len(levers):
+        raise same_shaft(mechanism, part)
+    return tuple(levers)

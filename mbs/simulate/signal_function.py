@@ -1,0 +1,130 @@
+"""Signals that drive a simulation, written as functions of time, positions and velocities."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+
+from mbs.assembly import System
+from mbs.errors import ModelError
+from mbs.messages import quoted
+
+_LONGEST_REASON = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """What a user gives to drive a simulation with.
+
+    Attributes:
+        name: of the argument.
+        noun: what its values are.
+        elements: the name of every value.
+    """
+
+    name: str
+    noun: str
+    elements: Sequence[str]
+
+
+def signal_function(
+    system: System, signal: Signal, given: SX | Function | Callable[[Any, Any, Any], Any]
+) -> Function:
+    """`f(t, q, v, p)` -> the values of the signal, (n, 1).
+
+    Args:
+        system: open or closed.
+        signal: what it is, for messages.
+        given: the values, or a function of (t, q, v) that returns them.
+
+    Raises:
+        ModelError: the function cannot be traced, or there are too few or too many values.
+    """
+    t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
+    values = given if isinstance(given, SX) else _traced(system, signal, given, (t, q, v))
+    size = len(signal.elements)
+    if values.numel() != size:
+        raise ModelError(
+            f"{system.name}: {signal.name} has {values.numel()} values, the system has {size}:"
+            f" {', '.join(signal.elements)}"
+        )
+    inputs = [t, q, v, system.p]
+    result = Function(signal.name, inputs, [casadi.densify(values)], {"allow_free": True})
+    if result.has_free():
+        raise ModelError(
+            f"{system.name}: {signal.name}(t, q, v) holds the symbols"
+            f" {', '.join(result.get_free())}; make it of t, q, v and numbers"
+        )
+    return result
+
+
+def _traced(
+    system: System, signal: Signal, function: Callable[..., Any], point: tuple[SX, SX, SX]
+) -> SX:
+    """The values as an expression of t, q and v."""
+    _check_inputs(system, signal, function, point)
+    try:
+        values = function(*point)
+    except Exception as error:
+        raise ModelError(
+            f"{system.name}: {signal.name}(t, q, v) could not be traced with CasADi symbols"
+            f" ({_reason(error)}); build it from CasADi operations, such as casadi.sin and"
+            " casadi.if_else"
+        ) from error
+    try:
+        result = _column(values)
+    except Exception:
+        result = None
+    if result is None or (not casadi.symvar(result) and not casadi.evalf(result).is_regular()):
+        raise ModelError(
+            f"{system.name}: {signal.name}(t, q, v) returns {quoted(values)}; return"
+            f" {len(signal.elements)} {signal.noun}, finite numbers or CasADi expressions of t, q"
+            " and v"
+        )
+    return result
+
+
+def _column(values: Any) -> SX:
+    if isinstance(values, np.ndarray):
+        values = list(values.ravel())
+    if isinstance(values, (list, tuple)):
+        return SX(casadi.vertcat(*values))
+    return casadi.vec(SX(values))
+
+
+def _check_inputs(
+    system: System, signal: Signal, function: Callable[..., Any], point: tuple[SX, SX, SX]
+) -> None:
+    if isinstance(function, Function):
+        sizes = [function.numel_in(k) for k in range(function.n_in())]
+        wanted = [symbol.numel() for symbol in point]
+        if sizes != wanted or function.n_out() != 1:
+            raise ModelError(
+                f"{system.name}: {signal.name} has inputs of sizes {sizes} and {function.n_out()}"
+                f" outputs; give a Function of (t, q, v), of sizes {wanted}, with one output"
+            )
+        return
+    try:
+        inspect.signature(function).bind(*point)
+    except TypeError:
+        raise ModelError(
+            f"{system.name}: {signal.name} does not take three arguments; give a function of"
+            " (t, q, v)"
+        ) from None
+    except ValueError:  # no signature is known: the call will tell
+        return
+
+
+def _reason(error: Exception) -> str:
+    """The first sentence of an error; CasADi adds lists of prototypes and places in its code."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    text = lines[0] if lines else type(error).__name__
+    if text.startswith("Wrong number or type of arguments"):
+        text = "an operation of CasADi was given what it does not take"
+    return text[:_LONGEST_REASON]

@@ -1,0 +1,46 @@
+"""Components that know where they are: on points of bodies, or on a joint by its name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+from mbs.components.component import Component, Point
+from mbs.components.rigid_body import RigidBody
+from mbs.errors import DescriptionError
+from mbs.messages import quoted
+
+P = TypeVar("P", bound="OnPoints")
+
+
+@dataclass(frozen=True, slots=True)
+class OnPoints(Component):
+    """A component that is added, not connected, and names the points that it belongs to."""
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """Where it is."""
+        return ()
+
+    def scoped(self: P, prefix: str) -> P:
+        """The same component inside a mechanism that is placed in another one."""
+        inner = Component.scoped(self, prefix)
+        changed: dict[str, Any] = {}
+        for f in fields(self):
+            point = getattr(inner, f.name)
+            if isinstance(point, Point):
+                owner = Component(f"{prefix}.{getattr(self, f.name).owner.name}")
+                changed[f.name] = replace(point, owner=owner)
+        return replace(inner, **changed)
+
+    def _take_point(self, name: str) -> None:
+        """Turn the body or point that a user gave into a point."""
+        value = getattr(self, name)
+        if isinstance(value, RigidBody):
+            value = value.frame
+        if not isinstance(value, Point):
+            raise DescriptionError(
+                f"{self.name}: {name} is {quoted(value)}; give a body, body.at(...) or"
+                " joint.frame_a"
+            )
+        object.__setattr__(self, name, value)

@@ -1,0 +1,184 @@
+"""What sensors have in common, and sensors on points: positions, velocities, accelerations.
+
+A sensor is a component that knows where it is: `m.add(AbsoluteSensor("tip", arm.right))`. It takes
+no part in the motion; `mbs.models.measurements` says what it reads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from mbs.components.component import Component, Point
+from mbs.components.on_points import OnPoints
+from mbs.errors import DescriptionError
+from mbs.messages import did_you_mean, quoted
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Something that a sensor reads.
+
+    Attributes:
+        name: short, as it ends the name of an output.
+        unit: of each element.
+        shape: rows and columns.
+    """
+
+    name: str
+    unit: str
+    shape: tuple[int, int] = (1, 1)
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """The ends of the names of its elements, column by column; empty for a scalar."""
+        rows, columns = self.shape
+        if (rows, columns) == (1, 1):
+            return ("",)
+        if columns == 1:
+            return tuple("xyz"[:rows])
+        return tuple(f"{r}{c}" for c in "xyz"[:columns] for r in "xyz"[:rows])
+
+
+_VECTOR = (3, 1)
+_MOTION = (
+    Quantity("p", "m", _VECTOR),
+    Quantity("R", "1", (3, 3)),
+    Quantity("v", "m/s", _VECTOR),
+    Quantity("w", "rad/s", _VECTOR),
+    Quantity("a", "m/s2", _VECTOR),
+    Quantity("wd", "rad/s2", _VECTOR),
+)
+_DISTANCE = (Quantity("L", "m"), Quantity("Ld", "m/s"))
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor(OnPoints):
+    """A component that reads something and changes nothing."""
+
+    @property
+    def measured(self) -> tuple[Quantity, ...]:
+        """What it reads; what depends on the joint that it is on, the assembly finds out."""
+        raise NotImplementedError
+
+    def _check_axes(self, allowed: tuple[str, ...], meaning: str) -> None:
+        axes = getattr(self, "axes", None)
+        if axes not in allowed:
+            raise DescriptionError(f"{self.name}: axes is {quoted(axes)}; use {meaning}")
+
+
+@dataclass(frozen=True, slots=True)
+class MotionSensor(Sensor):
+    """A sensor of position, orientation, velocities and accelerations of a frame."""
+
+    @property
+    def measured(self) -> tuple[Quantity, ...]:
+        """Those that were asked for."""
+        wanted = getattr(self, "quantities", ())
+        return tuple(quantity for quantity in _MOTION if quantity.name in wanted)
+
+    def _check_quantities(self) -> None:
+        given = getattr(self, "quantities", None)
+        known = [quantity.name for quantity in _MOTION]
+        if given is None:
+            given = tuple(known)
+        if isinstance(given, str) or not hasattr(given, "__iter__") or not list(given):
+            raise DescriptionError(
+                f"{self.name}: quantities is {quoted(given)}; give some of {', '.join(known)}"
+            )
+        for name in given:
+            if name not in known:
+                raise DescriptionError(
+                    f"{self.name}: there is no quantity {quoted(name)}; {did_you_mean(name, known)}"
+                )
+        object.__setattr__(self, "quantities", tuple(given))
+
+
+@dataclass(frozen=True, slots=True)
+class AbsoluteSensor(MotionSensor):
+    """How a point moves in the world.
+
+    Position p, velocity v, angular velocity w, acceleration a, angular acceleration wd, as an
+    observer at rest sees them, and orientation R, whose columns are the axes of the point. Gravity
+    has no part in a.
+
+    Attributes:
+        point: of a body, or a body for its reference frame.
+        axes: in which vectors are: "world", or "body" for those of the point.
+        quantities: those to read, some of p, R, v, w, a, wd; all of them when left out.
+    """
+
+    point: Any
+    axes: str = "world"
+    quantities: Any = None
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        self._take_point("point")
+        self._check_axes(
+            ("world", "body"), "'world', or 'body' for those of the point, which turn with it"
+        )
+        self._check_quantities()
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The one point."""
+        return (self.point,)
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeSensor(MotionSensor):
+    """How a frame b moves for an observer who moves and turns with a frame a.
+
+    Position p of b, velocity v and acceleration a as that observer sees them, angular velocity w
+    and its rate wd for him, and orientation R, whose columns are the axes of b in a.
+
+    Attributes:
+        a, b: points of bodies, or bodies for their reference frames.
+        axes: in which vectors are: "a", "b" or "world".
+        quantities: those to read, some of p, R, v, w, a, wd; all of them when left out.
+    """
+
+    a: Any
+    b: Any
+    axes: str = "a"
+    quantities: Any = None
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        self._take_point("a")
+        self._take_point("b")
+        self._check_axes(("a", "b", "world"), "'a', 'b' or 'world'")
+        self._check_quantities()
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The two frames."""
+        return (self.a, self.b)
+
+
+@dataclass(frozen=True, slots=True)
+class DistanceSensor(Sensor):
+    """Distance L between two points and its rate Ld; where they coincide the rate is zero.
+
+    Attributes:
+        a, b: the points, or bodies for their reference frames.
+    """
+
+    a: Any
+    b: Any
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        self._take_point("a")
+        self._take_point("b")
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The two points."""
+        return (self.a, self.b)
+
+    @property
+    def measured(self) -> tuple[Quantity, ...]:
+        """Distance and rate."""
+        return _DISTANCE

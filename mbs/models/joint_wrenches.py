@@ -1,0 +1,146 @@
+"""Forces and moments that joints transmit: constraint forces, and what drives the joint."""
+
+from __future__ import annotations
+
+import casadi
+from casadi import SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.joint_rows import JointRow
+from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.tree import Tree
+from mbs.loops.cut_wrenches import cut_wrenches, on_links
+from mbs.loops.velocity import independent_constraint_rows
+from mbs.models.inverse_dynamics import tree_efforts
+from mbs.models.surroundings import Surroundings, exerted, surroundings
+from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
+from mbs.models.weld_wrenches import weld_wrench
+from mbs.recursions.route import relative_pose
+from mbs.recursions.transmitted import inertial_loads, summed, transmitted
+from mbs.solvers.saddle import solve_saddle
+from mbs.solvers.small_linear import solve_square
+from mbs.spatial import Pose, Wrench, cross
+
+
+def joint_wrenches(
+    system: System,
+    coordinates: str = "independent",
+    *,
+    f_ext: bool = False,
+    moving_base: bool = False,
+) -> Function:
+    """``joint_wrenches(q, v, a) -> F``: the wrench that every joint transmits.
+
+    A column [force; moment] is what the body of frame_a exerts on the body of frame_b through the
+    joint: about the origin of frame_b and in its axes. The body of frame_a gets the opposite. The
+    column holds everything that acts in the joint: constraint forces, motor, rotor inertia,
+    friction, spring and stops, and the effort that a coupling puts on its coordinates. Force
+    elements between points act beside the joints. A Fixed joint transmits what the part of the link
+    on its one side needs.
+
+    In a closed system the efforts of the joints decide how the loops share the load. With
+    independent coordinates the independent joints have the efforts that the motion needs and the
+    others none; with tree coordinates the input tau gives them all. Along closure rows that were
+    dropped (`system.loops[..].dropped`) rigid bodies do not determine the forces; the wrenches are
+    those with zero there.
+
+    Source: Khalil & Creusot 1997, eq. 15-19 and 22; Haug 1989 for cut joints.
+
+    Args:
+        system: open or closed; q must close the loops.
+        coordinates: of a closed system, "independent" for joint_wrenches(q, v_a, a_a) -> F, or
+            "tree" for joint_wrenches(q, v, a, tau) -> F, where tau fits the motion, as that of
+            `direct_dynamics` does.
+        f_ext: as for `inverse_dynamics`.
+        moving_base: as for `inverse_dynamics`.
+
+    Returns:
+        Function of q (nq, 1), v, a and tau (m, 1), f_ext, v_0, a_0, R_0; F (6, joints), a column
+        for each row of `system.joints` [N, N m].
+    """
+    require_system(system)
+    check_coordinates(system, coordinates)
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        inputs, a, tau = motion_inputs(system, s)
+        around = surroundings(system, f_ext, moving_base)
+        wrenches = wrenches_of_joints(system, s, a, tau, around)
+        F = casadi.horzcat(*(casadi.vertcat(*wrench) for wrench in wrenches))
+        return [*inputs, *around.inputs], [("F", F)]
+
+    key = ("joint_wrenches", f_ext, moving_base, coordinates)
+    return model_function(system, key, build)
+
+
+def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None]:
+    """Inputs that give a motion and its efforts, accelerations of the tree, and efforts of it.
+
+    The efforts (nv, 1) are an input with tree coordinates of a closed system, else None.
+    """
+    name, a = s.input("a")
+    inputs = [("q", s.q), ("v" + s.suffix, s.v), (name, a)]
+    tau = None
+    if system.is_closed and s.reduction is None:
+        tau = SX.sym("tau", system.nv)
+        inputs.append(("tau", tau))
+    return inputs, s.tree_acceleration(a), tau
+
+
+def wrenches_of_joints(
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+) -> list[Wrench]:
+    """For every row of `system.joints` its wrench about and in frame_b.
+
+    Args:
+        system: open or closed.
+        s: its symbols.
+        a: (nv, 1) accelerations of the tree.
+        tau: (nv, 1) efforts of the tree; None where the independent joints have all of them.
+        around: what acts from outside.
+    """
+    cut: dict[str, Wrench] = {}
+    loads = [
+        inertial_loads(system.tree, s.poses, s.v_tree, a, around.base),
+        exerted(system, around, s.poses, s.q, s.v_tree),
+    ]
+    if system.is_closed:
+        cut = cut_wrenches(system, s.q, _closure_efforts(system, s, a, tau, around))
+        loads.append(on_links(system, s.q, cut))
+    carried = transmitted(system.tree, s.poses, summed(*loads))
+    between = {
+        joint.name: cut[joint.name] if joint.cut else _at_frame_b(system.tree, s.q, joint, carried)
+        for joint in system.joints
+        if joint.part is None
+    }
+    return [
+        between[joint.name]
+        if joint.part is None
+        else weld_wrench(system, s, a, around, joint, between)
+        for joint in system.joints
+    ]
+
+
+def _closure_efforts(
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+) -> SX:
+    """(r, 1) efforts of the independent rows: J' lam is what the motors leave of the efforts."""
+    closure = system.closure
+    assert closure is not None
+    J = independent_constraint_rows(system, s.q)
+    needed = tree_efforts(system, s, a, around)
+    if tau is None:
+        passive = list(closure.passive)
+        return solve_square(J[:, passive].T, needed[passive])
+    rest = SX.zeros(J.shape[0])
+    return solve_saddle(SX.eye(system.nv), J, tau - needed, rest, 1.0)[1]
+
+
+def _at_frame_b(tree: Tree, q: SX, joint: JointRow, carried: list[Wrench]) -> Wrench:
+    """The wrench that a joint of the tree transmits, on the body of frame_b."""
+    link = max(joint.frame_a[0], joint.frame_b[0])
+    f, m = carried[link]
+    T = relative_pose(tree, q, (link, Pose.identity()), joint.frame_b)
+    sign = 1 if link == joint.frame_b[0] else -1
+    force = sign * casadi.mtimes(T.R.T, f)
+    return force, sign * casadi.mtimes(T.R.T, m - cross(T.p, f))

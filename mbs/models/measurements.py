@@ -1,0 +1,194 @@
+"""What the sensors of a mechanism read, as a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi
+from casadi import SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.sensors import AttachedSensor
+from mbs.components.forces import RelativeMotion
+from mbs.components.forces_line import regular_length
+from mbs.components.sensors import (
+    AbsoluteSensor,
+    DistanceSensor,
+    RelativeSensor,
+    Sensor,
+)
+from mbs.components.sensors_joint import JointSensor, PowerSensor, WrenchSensor
+from mbs.errors import ModelError
+from mbs.models.cut_coordinates import cut_coordinate
+from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
+from mbs.models.surroundings import surroundings
+from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
+from mbs.recursions.accelerations import Acceleration, link_accelerations, resting_base
+from mbs.recursions.frame_motion import (
+    BASE,
+    Frame,
+    frame_velocity,
+    relative_acceleration,
+    relative_motion,
+)
+from mbs.recursions.route import relative_pose
+from mbs.recursions.velocities import Velocity, link_velocities
+from mbs.spatial import Wrench, zeros
+
+Readings = dict[str, SX]
+"""What a sensor reads, by the names of its quantities."""
+
+
+def measurements(system: System, coordinates: str = "independent") -> Function:
+    """``measurements(q, v, a) -> tip_p, tip_v, ...``: what the sensors read.
+
+    An output for every quantity of every sensor, in the order of `system.sensors`, named after both
+    as `AttachedSensor.outputs` does: tip_p for the position of the sensor tip, arm_tip_p for that
+    of arm.tip.
+
+    Args:
+        system: open or closed, with sensors; q must close the loops.
+        coordinates: of a closed system, "independent" for measurements(q, v_a, a_a), or "tree"
+            for measurements(q, v, a, tau), where tau fits the motion; see `joint_wrenches`.
+
+    Returns:
+        Function of q (nq, 1), v, a and tau (m, 1); vectors (3, 1), orientations (3, 3), numbers.
+
+    Raises:
+        ModelError: the system has no sensors.
+    """
+    require_system(system)
+    check_coordinates(system, coordinates)
+    if not system.sensors:
+        raise ModelError(
+            f"{system.name}: there is no sensor; add one to the mechanism, such as"
+            " AbsoluteSensor('tip', body)"
+        )
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        inputs, a, tau = motion_inputs(system, s)
+        state = _observed(system, s, a, tau)
+        outputs: list[tuple[str, SX]] = []
+        for attached in system.sensors:
+            read = _READ[type(attached.sensor)](state, attached)
+            outputs += [(name, read[quantity.name]) for name, quantity in attached.outputs]
+        return inputs, outputs
+
+    return model_function(system, ("measurements", coordinates), build)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Observed:
+    """A motion that sensors read.
+
+    Attributes:
+        system: whose motion it is.
+        s: its symbols.
+        a: (nv, 1) accelerations of the tree.
+        velocities, accelerations: of the links, each in its frame, gravity left out.
+        wrenches: of the joints, about and in frame_b; empty where no sensor needs them.
+    """
+
+    system: System
+    s: ModelSymbols
+    a: SX
+    velocities: list[Velocity]
+    accelerations: list[Acceleration]
+    wrenches: list[Wrench]
+
+    def turned(self, axes: Frame, home: Frame, vectors: Readings) -> Readings:
+        """Vectors given in the axes of a frame in those of another one."""
+        R = relative_pose(self.system.tree, self.s.q, axes, home).R
+        return {name: casadi.mtimes(R, vector) for name, vector in vectors.items()}
+
+
+def _observed(system: System, s: ModelSymbols, a: SX, tau: SX | None) -> _Observed:
+    transmits = any(attached.joint is not None for attached in system.sensors)
+    wrenches = wrenches_of_joints(system, s, a, tau, surroundings(system)) if transmits else []
+    return _Observed(
+        system,
+        s,
+        a,
+        link_velocities(system.tree, s.poses, s.v_tree),
+        link_accelerations(system.tree, s.poses, s.v_tree, a, resting_base(zeros())),
+        wrenches,
+    )
+
+
+def _motion(state: _Observed, a: Frame, b: Frame) -> RelativeMotion:
+    return relative_motion(state.system.tree, a, b, state.s.q, state.velocities)
+
+
+def _frame_motion(state: _Observed, a: Frame, b: Frame, axes: Frame) -> Readings:
+    """How b moves, seen from a, its vectors in the given axes."""
+    motion = _motion(state, a, b)
+    rates = relative_acceleration(motion, a, b, state.accelerations)
+    vectors = {"p": motion.p, "v": motion.V, "w": motion.w, "a": rates.A, "wd": rates.wd}
+    turned = vectors if axes is a else state.turned(axes, a, vectors)
+    return {**turned, "R": motion.R}
+
+
+def _absolute(state: _Observed, attached: AttachedSensor) -> Readings:
+    (frame,) = attached.frames
+    axes = getattr(attached.sensor, "axes", "world")
+    return _frame_motion(state, BASE, frame, frame if axes == "body" else BASE)
+
+
+def _relative(state: _Observed, attached: AttachedSensor) -> Readings:
+    a, b = attached.frames
+    return _frame_motion(state, a, b, _axes(attached))
+
+
+def _axes(attached: AttachedSensor) -> Frame:
+    """The frame in whose axes a sensor between two frames reads."""
+    a, b = attached.frames
+    return {"a": a, "b": b, "world": BASE}[getattr(attached.sensor, "axes", "b")]
+
+
+def _distance(state: _Observed, attached: AttachedSensor) -> Readings:
+    motion = _motion(state, *attached.frames)
+    L = regular_length(motion.p)
+    return {"L": L, "Ld": casadi.dot(motion.p, motion.V) / L}
+
+
+def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
+    system, s, name = state.system, state.s, attached.coordinate
+    if name in [row.name for row in system.cut_coordinates]:
+        q, v, a = cut_coordinate(system, s, state.a, name)
+        return {"q": q, "v": v, "a": a}
+    read: Readings = {}
+    for number, row in enumerate(system.coordinates):
+        if row.name == name:
+            read["q"] = s.q[number]
+    for number, row in enumerate(system.speeds):
+        if row.name == name:
+            read |= {"v": s.v_tree[number], "a": state.a[number]}
+    return read
+
+
+def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:
+    assert attached.joint is not None
+    f, m = state.wrenches[attached.joint]
+    axes, home = _axes(attached), attached.frames[1]
+    vectors = {"f": f, "m": m}
+    return vectors if axes is home else state.turned(axes, home, vectors)
+
+
+def _power(state: _Observed, attached: AttachedSensor) -> Readings:
+    assert attached.joint is not None
+    f, m = state.wrenches[attached.joint]
+    V, w = frame_velocity(attached.frames[1], state.velocities)
+    return {"P": casadi.dot(f, V) + casadi.dot(m, w)}
+
+
+_READ: dict[type[Sensor], Callable[[_Observed, AttachedSensor], Readings]] = {
+    AbsoluteSensor: _absolute,
+    RelativeSensor: _relative,
+    DistanceSensor: _distance,
+    JointSensor: _coordinate,
+    WrenchSensor: _transmitted,
+    PowerSensor: _power,
+}

@@ -1,0 +1,238 @@
+"""Closed loops: mbs against exudyn and MuJoCo in one process and in turns, and its own limits.
+
+    python benchmarks/loops.py [--cases n1,bricard] [--rounds 5] [--output table.md]
+    python benchmarks/loops.py --build          # seconds to build N = 1, 10, 40 windows
+    python benchmarks/loops.py --long           # 1000 s of a four-bar
+
+A time is the shortest of several runs of the integration alone, of models that are built already;
+each round runs every contender. The error is the rms over outputs of (y - y_ref) / max(|y_ref|,
+1e-3), the measure of the benchmark library. A ratio compares a peer with the loosest tolerance of
+mbs whose error is not larger.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from exudyn_twins import ExudynTwin
+from loops_cases import CASES, Case, Made, made, outputs, plain_of, run
+from loops_references import rms_error
+from mujoco_twins import MujocoTwin
+
+Array = np.ndarray[Any, Any]
+TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+SHOWN = (1e-6, 1e-9)
+"""Tolerances with columns of their own."""
+TARGET = 20
+PEERS = ("exudyn", "mujoco")
+_SHARE = 0.1
+"""Seconds that a contender may take in a round, when one run takes less."""
+
+
+@dataclass
+class Contender:
+    """A way to compute a motion: `setting` is a tolerance or a step [s]."""
+
+    who: str
+    setting: float
+    call: Callable[[], Array]
+    error: float
+    best: float
+
+    def round(self) -> None:
+        """Run it, more than once when it is quick."""
+        for _ in range(max(1, min(50, round(_SHARE / self.best)))):
+            self.best = min(self.best, _seconds(self.call)[0])
+
+
+@dataclass
+class Row:
+    """What was measured of a case."""
+
+    case: Case
+    seconds: dict[str, float]
+    contenders: list[Contender]
+
+    def of(self, who: str) -> list[Contender]:
+        """The contenders of mbs or of a peer."""
+        return [c for c in self.contenders if c.who == who]
+
+    def ratio(self, peer: Contender) -> tuple[float, float] | None:
+        """How many times longer a peer takes, and the tolerance of mbs that is as good."""
+        for own in self.of("mbs"):
+            if own.error <= peer.error:
+                return peer.best / own.best, own.setting
+        return None
+
+
+def main() -> None:
+    """Measure and print."""
+    arguments = _arguments()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["MBS_CACHE_DIR"] = folder  # so that compiling is measured
+        if arguments.build:
+            text = build_table()
+        elif arguments.long:
+            text = long_run()
+        else:
+            names = arguments.cases.split(",")
+            text = tables([measured(CASES[name], arguments.rounds) for name in names])
+    if arguments.output:
+        with open(arguments.output, "w", encoding="utf-8") as file:
+            file.write(text)
+    print(text)
+
+
+def measured(case: Case, rounds: int) -> Row:
+    """A case: everything built, every motion compared with the reference, then timed in turns."""
+    own = made(case)
+    row = Row(case, own.seconds, contenders(case, own))
+    for _ in range(rounds):
+        for contender in row.contenders:
+            contender.round()
+    for c in row.contenders:
+        told = f"{c.who} {c.setting:.3g}: error {c.error:.1e}, {c.best:.3g} s"
+        print(f"{case.name}: {told}", file=sys.stderr)
+    return row
+
+
+def contenders(case: Case, own: Made) -> list[Contender]:
+    """mbs at some tolerances and the peers at some steps, each run once."""
+    reference = case.reference(case.times)
+    numbers = plain_of(case, own)
+    exudyn, mujoco = ExudynTwin(numbers), MujocoTwin(numbers)
+    found = []
+
+    def add(who: str, setting: float, call: Callable[[], Array], places: Any) -> None:
+        seconds, result = _seconds(call)
+        error = rms_error(places(result), reference)
+        found.append(Contender(who, setting, call, error, seconds))
+
+    for tolerance in TOLERANCES:
+        call = run(case, own, tolerance, case.times)
+        add("mbs", tolerance, call, lambda states: outputs(case, own.system, states))
+    for who, steps, twin in (
+        ("exudyn", case.steps.exudyn, exudyn),
+        ("mujoco", case.steps.mujoco, mujoco),
+    ):
+        for step in steps:
+            call = _bound(twin, step, case)
+            add(who, step, call, lambda raw, twin=twin: twin.places(raw)[:, case.axes])
+    return found
+
+
+def _bound(twin: ExudynTwin | MujocoTwin, step: float, case: Case) -> Callable[[], Array]:
+    return lambda: twin.run(step, case.seconds, case.rows)
+
+
+def tables(rows: Sequence[Row]) -> str:
+    """The comparison, one row a mechanism, and every run, as Markdown."""
+    head = ["mechanism", "build s", "compile s"]
+    head += [f"mbs {tolerance:.0e}: error, ms" for tolerance in SHOWN]
+    head += [cell for peer in PEERS for cell in (f"{peer}: step, error, ms", "ratio")]
+    lines = []
+    for row in rows:
+        build = sum(row.seconds.values()) - row.seconds["compile"]
+        cells = [row.case.name, f"{build:.2f}", f"{row.seconds['compile']:.2f}"]
+        cells += [_figures(c) for c in row.of("mbs") if c.setting in SHOWN]
+        for peer in PEERS:
+            best = min(row.of(peer), key=lambda c: (row.ratio(c) or (np.inf,))[0])
+            cells += [f"{best.setting:g} s, {_figures(best)}", _ratio(row, best)]
+        lines.append(cells)
+    every = [_run_cells(row, c) for row in rows for c in row.contenders]
+    names = ["mechanism", "who", "tolerance or step", "error", "ms", "ratio (mbs at)"]
+    return f"{_table(head, lines)}\n{_table(names, every)}"
+
+
+def _run_cells(row: Row, c: Contender) -> list[str]:
+    ratio = "" if c.who == "mbs" else _ratio(row, c)
+    return [row.case.name, c.who, f"{c.setting:g}", f"{c.error:.1e}", _ms(c), ratio]
+
+
+def _figures(c: Contender) -> str:
+    return f"{c.error:.1e}, {_ms(c)}"
+
+
+def _ms(c: Contender) -> str:
+    ms = c.best * 1e3
+    return f"{ms:.0f}" if ms >= 100 else f"{ms:.3g}"
+
+
+def _ratio(row: Row, peer: Contender) -> str:
+    found = row.ratio(peer)
+    if found is None:
+        return "mbs is less accurate"
+    missed = "" if found[0] >= TARGET else ", missed"
+    return f"{found[0]:.0f} ({found[1]:.0e}{missed})"
+
+
+def build_table() -> str:
+    """Seconds from the description to machine code, and of the processor where others share it."""
+    lines = []
+    for name in ("n1", "n10", "n40"):
+        case, before = CASES[name], sum(os.times()[:4])
+        own = made(case)
+        spent = sum(os.times()[:4]) - before
+        rhs, project = own.state.rhs, own.state.project
+        size = f"{rhs.n_instructions()} + {project.n_instructions() if project else 0}"
+        parts = [f"{seconds:.2f}" for seconds in own.seconds.values()]
+        total = sum(own.seconds.values())
+        lines.append([case.name, *parts, f"{total:.1f}", f"{spent:.1f}", size])
+    head = ["mechanism", *(f"{k} s" for k in own.seconds), "total s", "of CPU s", "operations"]
+    return _table(head, lines)
+
+
+def long_run(seconds: float = 1000.0, tolerance: float = 1e-9) -> str:
+    """A four-bar for a long time, through the singular postures: what drifts, in a table."""
+    case = CASES["n1"]
+    own = made(case)
+    times = np.linspace(0.0, seconds, round(10 * seconds) + 1)
+    spent, states = _seconds(run(case, own, tolerance, times))
+    observed = own.state.observe.map(len(times))(times.reshape(1, -1), states.T, [])
+    *_, E, U, openness = (np.array(value).ravel() for value in observed)
+    energy = E + U
+    names = [coordinate.name for coordinate in own.system.coordinates]
+    a0, b0, a1 = (states[:, names.index(name)] for name in ("a0", "b0", "a1"))
+    apart = max(np.max(np.abs(a0 - a1)), np.max(np.abs(a0 + b0)))
+    drift = np.max(np.abs(energy - energy[0]))
+    lines = [
+        ["time", f"{spent:.3g} s for {seconds:g} s"],
+        ["largest closure residual", f"{np.max(openness):.1e}"],
+        ["energy drift", f"{drift:.1e} J, {drift / np.ptp(U):.1e} of the {np.ptp(U):.3g} J"],
+        ["off the parallelogram branch", f"{apart:.1e} rad"],
+        ["turns", f"{abs(a0[-1] - a0[0]) / (2 * np.pi):.1f}"],
+    ]
+    return _table(["1000 s of a four-bar at 1e-9", ""], lines)
+
+
+def _table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    rows = [head, ["---"] * len(head), *lines]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows) + "\n"
+
+
+def _seconds(call: Callable[[], Any]) -> tuple[float, Any]:
+    start = time.perf_counter()
+    result = call()
+    return time.perf_counter() - start, result
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--cases", default=",".join(CASES))
+    parser.add_argument("--rounds", type=int, default=5, help="turns of the contenders")
+    parser.add_argument("--build", action="store_true", help="time building alone")
+    parser.add_argument("--long", action="store_true", help="1000 s of a four-bar")
+    parser.add_argument("--output", help="Markdown file to write")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

@@ -6,6 +6,7 @@
     ├── AssemblyError         the components do not form a mechanism
     ├── LoopError             a closed loop has no usable posture
     │   ├── NoClosedForm      a loop is solved by iteration only
+    │   ├── SingularPosture   the independent joints cannot lead the others there
     │   └── Unclosable        no posture closes the loop
     ├── ModelError            a model was asked for that the system does not have
     ├── SolverError           a numerical method could not go on
@@ -34,6 +35,10 @@ class AssemblyError(MbsError, ValueError):
 
 class LoopError(MbsError):
     """A closed loop has no usable posture."""
+
+
+class SingularPosture(LoopError):
+    """A posture at which the independent joints do not determine how the others move."""
 
 
 class NoClosedForm(LoopError):

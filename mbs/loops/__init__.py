@@ -1,6 +1,7 @@
 """Closed loops: closure equations, their independent rows, postures, reduction."""
 
 from mbs.loops.closure import closure
+from mbs.loops.examine import PostureState, examine
 from mbs.loops.function import function
 from mbs.loops.modes import Mode, modes
 from mbs.loops.posture import solve
@@ -9,8 +10,10 @@ from mbs.loops.velocity import closure_jacobian
 
 __all__ = [
     "Mode",
+    "PostureState",
     "closure",
     "closure_jacobian",
+    "examine",
     "function",
     "modes",
     "reduction_matrix",

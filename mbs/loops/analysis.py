@@ -7,7 +7,8 @@ posture where rows that are independent elsewhere coincide.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from casadi import SX, Function
@@ -16,9 +17,10 @@ from numpy.typing import NDArray
 from mbs.assembly import Closure, LoopRow, System
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.closing import Closing, closure_parameters
-from mbs.loops.closure import closure_rows, labelled_rows
+from mbs.loops.closure import labelled_rows
 from mbs.loops.posture import closed_posture
-from mbs.loops.velocity import velocity_rows
+from mbs.loops.rolling import SLIPS, rolling_discs
+from mbs.loops.velocity import constraint_rows
 from mbs.solvers.rank import independent_rows, rank
 
 Matrix = NDArray[np.float64]
@@ -32,43 +34,46 @@ _GAP = 1e-5
 square root of its tolerance away from a singular posture, where they are not smaller."""
 
 
-def analysed(system: System, guess: Mapping[str, float]) -> System:
+def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
     """The system with its loops closed at a posture, and what they constrain.
 
     Args:
         system: with open loops.
         guess: approximate positions by coordinate name; where the posture next to them is
             singular, a regular one nearby is taken.
+        chosen: numbers of velocities that the user wants independent, beside those of motors.
 
     Raises:
         Unclosable: no posture closes the loops.
-        AssemblyError: the motors do not fit the mobility.
+        AssemblyError: the motors and chosen velocities do not fit the mobility.
     """
     p = closure_parameters(system)
     posture = _assembled(system, guess, p)
-    postures = [posture, *_others(system, posture, p)]
+    nearby = Closing(system, p).nearby(posture, _REACH, _TRIES, _SEED)
+    postures = [posture, *islice(nearby, _POSTURES)]
     J = _jacobian(system)
     jacobians = [np.array(J(q, p)) for q in postures]
     ranks = _ranks(jacobians)
     generic = max(ranks)
     posture = postures[ranks.index(generic)]
     regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
-    rows = independent_rows(regular, generic)
-    active = _independent_velocities(system, regular, system.nv - generic)
     labels = _labels(system)
-    count = sum(len(names) for names in labels)
+    kept = _kept_rows(regular, sum(len(rows) for rows, _ in labels), generic)
+    active = _independent_velocities(system, chosen, regular, system.nv - generic)
     closure = Closure(
-        rows=tuple(rows),
+        rows=kept.positions,
+        slips=kept.slips,
         active=tuple(active),
         passive=tuple(k for k in range(system.nv) if k not in active),
-        gruebler=system.nv - count,
+        free=_free_positions(regular, kept, active),
+        gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
         residual=float(np.max(np.abs(Closing(system, p).rows(posture)[0]))),
     )
     return replace(
         system,
         posture=tuple(float(x) for x in posture),
         closure=closure,
-        loops=_with_rows(system.loops, labels, set(rows)),
+        loops=_with_rows(system.loops, labels, kept),
         _cache={},
     )
 
@@ -88,20 +93,6 @@ def _names(system: System) -> list[str]:
     return [coordinate.name for coordinate in system.coordinates]
 
 
-def _others(system: System, posture: Matrix, p: Matrix) -> list[Matrix]:
-    """Further closed postures around the assembled one."""
-    rng = np.random.default_rng(_SEED)
-    found: list[Matrix] = []
-    for _ in range(_TRIES):
-        start = posture + rng.uniform(-_REACH, _REACH, posture.shape)
-        closed = Closing(system, p).nearest(start)
-        if closed.is_closed:
-            found.append(closed.q)
-        if len(found) == _POSTURES:
-            break
-    return found
-
-
 def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
     """Rank of each, small values measured by the largest of all: a whole Jacobian may vanish."""
     values = [np.linalg.svd(matrix, compute_uv=False) for matrix in jacobians]
@@ -109,51 +100,93 @@ def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
     return [int(np.sum(row > _GAP * largest)) for row in values]
 
 
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """Numbers of independent rows: of positions, and of velocities alone, each from zero."""
+
+    positions: tuple[int, ...]
+    slips: tuple[int, ...]
+
+
+def _kept_rows(jacobians: Sequence[Matrix], positions: int, count: int) -> _Kept:
+    """The independent rows at regular postures, rows of positions before those of velocities.
+
+    Args:
+        jacobians: (m, nv) each, the first rows those of positions.
+        positions: how many of them are.
+        count: rank of all.
+    """
+    holonomic = [J[:positions] for J in jacobians]
+    rows = independent_rows(holonomic, max(_ranks(holonomic), default=0) if positions else 0)
+    every = independent_rows(jacobians, count, tuple(rows))
+    return _Kept(tuple(rows), tuple(k - positions for k in every if k >= positions))
+
+
+def _free_positions(
+    jacobians: Sequence[Matrix], kept: _Kept, active: Sequence[int]
+) -> tuple[int, ...]:
+    """Velocities whose positions may be chosen: the active ones, then what only slips hold."""
+    if not kept.slips:
+        return tuple(active)
+    size = jacobians[0].shape[1] - len(kept.positions)
+    free = [_null_space(J[list(kept.positions)], size) for J in jacobians]
+    return tuple(independent_rows(free, size, tuple(active)))
+
+
 def _independent_velocities(
-    system: System, jacobians: Sequence[Matrix], mobility: int
+    system: System, chosen: tuple[int, ...], jacobians: Sequence[Matrix], mobility: int
 ) -> list[int]:
-    """The motors first, then the velocities that see the remaining mobility best."""
+    """The chosen and the motors, then the velocities that see the remaining mobility best."""
     if mobility == 0:
         raise AssemblyError(
             f"{system.name}: the loops leave no motion (mobility 0); take a joint's constraint away"
         )
     motors = [k for k, speed in enumerate(system.speeds) if speed.actuated]
-    names = ", ".join(system.speeds[k].name for k in motors)
-    if len(motors) > mobility:
+    first = list(dict.fromkeys([*chosen, *motors]))
+    names = ", ".join(system.speeds[k].name for k in first)
+    what, do = ("actuated or active", "name") if chosen else ("actuated", "actuate")
+    if len(first) > mobility:
         raise AssemblyError(
-            f"{system.name}: {len(motors)} velocities are actuated ({names}) but the mobility is"
-            f" {mobility}; actuate {mobility} at most"
+            f"{system.name}: {len(first)} velocities are {what} ({names}) but the mobility is"
+            f" {mobility}; {do} {mobility} at most"
         )
     free = [_null_space(J, mobility) for J in jacobians]
-    if motors and max(rank(N[motors], _GAP) for N in free) < len(motors):
+    if first and max(rank(N[first], _GAP) for N in free) < len(first):
         raise AssemblyError(
-            f"{system.name}: the actuated velocities {names} depend on each other through the"
-            " loops; actuate joints that can move independently"
+            f"{system.name}: the {what} velocities {names} depend on each other through the"
+            f" loops; {do} joints that can move independently"
         )
-    return independent_rows(free, mobility, tuple(motors))
+    return independent_rows(free, mobility, tuple(first))
 
 
 def _null_space(J: Matrix, mobility: int) -> Matrix:
     return np.array(np.linalg.svd(J)[2][-mobility:].T)
 
 
-def _labels(system: System) -> list[list[str]]:
-    q = SX.sym("q", system.nq)
-    return [[label for label, _ in rows] for _, rows in labelled_rows(system, q)]
+_Labels = list[tuple[list[str], tuple[str, ...]]]
+"""For each loop its rows of positions and its rows of velocities alone."""
 
 
-def _with_rows(
-    loops: Sequence[LoopRow], labels: Sequence[Sequence[str]], kept: set[int]
-) -> tuple[LoopRow, ...]:
-    result, number = [], 0
-    for loop, names in zip(loops, labels, strict=True):
-        dropped = tuple(n for k, n in enumerate(names, start=number) if k not in kept)
-        result.append(replace(loop, rows=tuple(names), dropped=dropped))
-        number += len(names)
+def _labels(system: System) -> _Labels:
+    rolling = [disc.name for _, disc in rolling_discs(system)]
+    return [
+        ([label for label, _ in rows], SLIPS if name in rolling else ())
+        for name, rows in labelled_rows(system, SX.sym("q", system.nq))
+    ]
+
+
+def _with_rows(loops: Sequence[LoopRow], labels: _Labels, kept: _Kept) -> tuple[LoopRow, ...]:
+    result = []
+    row = slip = 0
+    for loop, (names, slips) in zip(loops, labels, strict=True):
+        dropped = [n for k, n in enumerate(names, start=row) if k not in kept.positions]
+        dropped += [n for k, n in enumerate(slips, start=slip) if k not in kept.slips]
+        result.append(replace(loop, rows=(*names, *slips), dropped=tuple(dropped)))
+        row, slip = row + len(names), slip + len(slips)
     return tuple(result)
 
 
 def _jacobian(system: System) -> Function:
     """`J(q, p)`, every row."""
     q = SX.sym("q", system.nq)
-    return Function("J", [q, system.p], [velocity_rows(system, q, closure_rows(system, q))])
+    return Function("J", [q, system.p], [constraint_rows(system, q)])

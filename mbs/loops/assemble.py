@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from mbs.assembly import System
@@ -13,24 +13,45 @@ from mbs.loops.analysis import analysed
 from mbs.messages import did_you_mean
 
 
-def assemble(mechanism: Mechanism, guess: Mapping[str, float]) -> System:
+def assemble(
+    mechanism: Mechanism, guess: Mapping[str, float], active: Sequence[str] = ()
+) -> System:
     """The frozen System of a mechanism.
 
     Args:
         mechanism: components and connections.
         guess: approximate positions by coordinate name, where loops are closed near to.
+        active: velocities that are to be independent where there are loops.
 
     Raises:
         AssemblyError: the components do not form a mechanism, or a guess names no coordinate.
         Unclosable: no posture closes the loops.
     """
-    system = open_system(mechanism, guess)
+    system = open_system(mechanism, (*guess, *active))
     _check_guess(system, guess)
+    chosen = _chosen(system, active)
     if system.cuts or system.couplings:
-        return analysed(system, guess)
+        return analysed(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}
     return replace(system, posture=tuple(system.position(start)), _cache={})
+
+
+def _chosen(system: System, active: Sequence[str]) -> tuple[int, ...]:
+    """The numbers of the velocities that the user named."""
+    names = [speed.name for speed in system.speeds]
+    for name in active:
+        if name in [coordinate.name for coordinate in system.cut_coordinates]:
+            raise AssemblyError(
+                f"{system.name}: {name} cannot be independent, since its joint is cut to open a"
+                " loop; cut another joint of the loop"
+            )
+        if name not in names:
+            raise AssemblyError(
+                f"{system.name}: active names {name!r}, which is no velocity;"
+                f" {did_you_mean(name, names)}"
+            )
+    return tuple(dict.fromkeys(names.index(name) for name in active))
 
 
 def _check_guess(system: System, guess: Mapping[str, float]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -11,7 +11,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.rates import quaternion_slices
+from mbs.assembly.rates import norm_rows
 from mbs.loops.closure import closure_rows, facing, labelled_rows
 from mbs.solvers.gauss_newton import gauss_newton
 
@@ -68,8 +68,26 @@ class Closing:
 
         root = gauss_newton(residual, start[self.free], tolerance=TOLERANCE)
         found = _replaced(start, self.free, root.x)
-        faces = bool(np.all(np.array(self._functions()[1](found, self.p)) > 0))
-        return Closed(found, root.residual, root.converged and faces)
+        return Closed(found, root.residual, root.converged and self.faces(found))
+
+    def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
+        """Closed postures that Gauss-Newton reaches from random ones around q (nq,).
+
+        Args:
+            q: around which they are taken.
+            reach: largest difference of a position at the start [rad or m].
+            tries: how many starts are taken at most.
+            seed: of the random numbers.
+        """
+        rng = np.random.default_rng(seed)
+        for _ in range(tries):
+            closed = self.nearest(q + rng.uniform(-reach, reach, q.shape))
+            if closed.is_closed:
+                yield closed.q
+
+    def faces(self, q: Vector) -> bool:
+        """Whether no axis of a closing joint is opposed at q (nq,)."""
+        return bool(np.all(np.array(self._functions()[1](q, self.p)) > 0))
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""
@@ -116,8 +134,7 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
 
 def _functions(system: System) -> tuple[Function, Function]:
     q = SX.sym("q", system.nq)
-    norms = [casadi.sumsqr(q[part]) - 1 for part in quaternion_slices(system.tree)]
-    r = casadi.densify(casadi.vertcat(closure_rows(system, q), *norms))
+    r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
     J = casadi.densify(casadi.jacobian(r, q))
     equations = Function("equations", [q, system.p], [r, J])
     return equations, Function("facing", [q, system.p], [facing(system, q)])

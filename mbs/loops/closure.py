@@ -28,10 +28,13 @@ from mbs.components import (
     Prismatic,
     Revolute,
     Rod,
+    RollingDisc,
     Spherical,
     Universal,
 )
+from mbs.errors import ModelError
 from mbs.expressions import to_sx
+from mbs.loops.rolling import contact, pose_on_plane, radius_of
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, align_z
 
@@ -60,15 +63,19 @@ def closure_rows(system: System, q: SX) -> SX:
     return casadi.densify(casadi.vertcat(*values)) if values else SX(0, 1)
 
 
+def independent_closure(system: System, q: SX) -> SX:
+    """(r, 1) the closure rows that the analysis kept, at the symbols q."""
+    if system.closure is None:
+        raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
+    return closure_rows(system, q)[list(system.closure.rows)]
+
+
 def labelled_rows(system: System, q: SX) -> list[tuple[str, Rows]]:
     """For each loop and coupling its name and its rows."""
     cuts = [(cut.edge.joint.name, _cut_rows(system, q, cut)) for cut in system.cuts]
     couplings = []
     for coupling in system.couplings:
-        x = q[coupling.driver]
-        value = q[coupling.driven] - sum(
-            (c * x**k for k, c in enumerate(coupling.coefficients)), SX(0)
-        )
+        value = q[coupling.driven] - coupling.value(q[coupling.driver])
         couplings.append((coupling.name, [("coordinate", value)]))
     return cuts + couplings
 
@@ -105,20 +112,19 @@ def _between(system: System, q: SX, cut: Cut) -> Pose:
 
 
 def _cut_rows(system: System, q: SX, cut: Cut) -> Rows:
-    pose = _between(system, q, cut)
     joint = cut.edge.joint
+    if isinstance(joint, RollingDisc):
+        on_plane = pose_on_plane(system, q, cut, joint)
+        return [("force normal", contact(on_plane, joint, radius_of(system, joint)).height)]
+    pose = _between(system, q, cut)
     if cut.welded:
         return [*_position(pose, "xyz"), *_orientation(pose)]
     if isinstance(joint, Rod):
-        return _rod(pose, to_sx(joint.length, _symbols(system)))
+        return _rod(pose, to_sx(joint.length, system.symbol_table))
     axis = getattr(joint, "axis", (0.0, 0.0, 1.0))
     inside = Pose.turned(align_z(np.array(axis)))
     along = inside.inverse() @ pose @ inside
     return _ROWS[type(joint)](along, joint)
-
-
-def _symbols(system: System) -> dict[str, SX]:
-    return {parameter.name: system.p[k] for k, parameter in enumerate(system.parameters)}
 
 
 def _rod(pose: Pose, length: SX) -> Rows:

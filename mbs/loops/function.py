@@ -11,9 +11,15 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function
 from mbs.errors import ModelError, Unclosable
-from mbs.loops.closed_form.plan import Stage, plan
+from mbs.loops.closed_form.places import extent, independent_places
+from mbs.loops.closed_form.plan import plan
+from mbs.loops.closed_form.stage import Stage
 from mbs.loops.closing import Vector, closure_parameters
-from mbs.loops.independent import Given, independent_names, independent_positions
+from mbs.loops.independent import (
+    Given,
+    independent_names,
+    independent_positions,
+)
 from mbs.loops.reach import reachable
 from mbs.messages import did_you_mean, quoted
 
@@ -49,7 +55,7 @@ class LoopFunction(ModelFunction):
             p = np.array(DM(given.get("p", [])), dtype=float).ravel()
         except (ModelError, NotImplementedError, TypeError, ValueError):
             return None
-        sizes = len(self.system.active), len(self.system.parameters)
+        sizes = len(self.system.free), len(self.system.parameters)
         fits = (q_a.size, p.size) == sizes
         return (q_a, p) if fits and np.all(np.isfinite(q_a)) and np.all(np.isfinite(p)) else None
 
@@ -64,7 +70,8 @@ class LoopFunction(ModelFunction):
 def function(system: System, branch: Branch = None) -> Function:
     """``loops(q_a) -> q``: the posture for positions of the independent joints, without iteration.
 
-    It can be differentiated as often as one likes. Angles are within half a turn of zero.
+    It can be differentiated as often as one likes. Angles that a loop gives are
+    within half a turn of zero.
 
     Args:
         system: the assembled mechanism.
@@ -84,7 +91,7 @@ def function(system: System, branch: Branch = None) -> Function:
     ways = _ways(system, stages, branch)
 
     def build() -> tuple[Named, Named]:
-        q_a = SX.sym("q_a", len(system.active))
+        q_a = SX.sym("q_a", len(system.free))
         return [("q_a", q_a)], [("q", _posture(system, stages, ways, q_a))]
 
     def make() -> Function:
@@ -112,11 +119,11 @@ def posture_on(
 
 
 def _posture(system: System, stages: Sequence[Stage], ways: Sequence[int], q_a: SX) -> SX:
-    q = SX.zeros(system.nq)
-    q[list(system.active)] = q_a
+    q = SX.zeros(extent(system))
+    q[independent_places(system)] = q_a
     for stage, way in zip(stages, ways, strict=True):
         q[list(stage.places)] = stage.values(q, system.p)[:, way]
-    return q
+    return q[: system.nq]
 
 
 def _ways(system: System, stages: Sequence[Stage], branch: Branch) -> tuple[int, ...]:

@@ -6,14 +6,15 @@ from collections.abc import Mapping, Sequence
 
 from mbs.assembly import System
 from mbs.errors import ModelError
+from mbs.loops.closed_form.places import independent_places
 from mbs.messages import quoted
 
 Given = Mapping[str, float] | Sequence[float] | None
 
 
 def independent_names(system: System) -> list[str]:
-    """The independent joints in the order of `system.active`."""
-    return [system.speeds[k].name for k in system.active]
+    """The independent joints in the order of `system.free`."""
+    return [system.speeds[k].name for k in system.free]
 
 
 def fixed_positions(system: System, values: Given) -> dict[str, float]:
@@ -46,11 +47,17 @@ def independent_positions(system: System, values: Given) -> list[float]:
         ModelError: another joint is named, or a value is not finite.
     """
     fixed, names = fixed_positions(system, values), independent_names(system)
-    whole = system.position(fixed)
+    places = dict(zip(names, independent_places(system), strict=True))
+    spins = {name: x for name, x in fixed.items() if places.get(name, 0) >= system.nq}
+    whole = system.position({name: x for name, x in fixed.items() if name not in spins})
+    spun = system.velocity(spins)
     for name in fixed:
         if name not in names:
             raise ModelError(
                 f"{system.name}: {name} follows from the loops once a branch is named; give"
                 f" positions of the independent joints {', '.join(names)}"
             )
-    return [whole[k] for k in system.active]
+    return [
+        whole[place] if place < system.nq else spun[k]
+        for k, place in zip(system.free, places.values(), strict=True)
+    ]

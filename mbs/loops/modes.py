@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.errors import LoopError
-from mbs.loops.closed_form.plan import Stage, plan
+from mbs.loops.closed_form.places import extent, independent_places
+from mbs.loops.closed_form.plan import plan
+from mbs.loops.closed_form.stage import Stage
 from mbs.loops.closing import Closing, Vector, closure_parameters
-from mbs.loops.closure import facing
 from mbs.loops.independent import Given, independent_positions
 
 _OPEN = 1e-10
@@ -26,7 +26,8 @@ class Mode:
     """One way to assemble a mechanism.
 
     Attributes:
-        q: (nq) the posture [rad or m], angles within half a turn of zero.
+        q: (nq) the posture [rad or m], angles that a loop gives are within half a turn
+            of zero.
         branch: what tells it from the others, such as ("j3:+",); one label for each loop that
             closes in two ways.
         residual: largest closure row there.
@@ -51,7 +52,7 @@ def modes(
     Args:
         system: the assembled mechanism.
         q_active: positions of the independent joints, by name or in the order of
-            `system.active`; those left out stay as in the assembled posture.
+            `system.free`; those left out stay as in the assembled posture.
         parameters: values of symbols, the others at their defaults.
 
     Raises:
@@ -66,11 +67,11 @@ def modes(
             f"{system.name}: {count} branches are too many to list; name one in mbs.loops.solve"
         )
     p = closure_parameters(system, parameters)
-    start = np.zeros(system.nq)
-    start[list(system.active)] = independent_positions(system, q_active)
+    start = np.zeros(extent(system))
+    start[independent_places(system)] = independent_positions(system, q_active)
     found: list[Mode] = []
     for q, branch in _postures(stages, start, p, ()):
-        mode = _checked(system, q, branch, p)
+        mode = _checked(system, q[: system.nq], branch, p)
         if mode is not None and not any(_same(mode, other) for other in found):
             found.append(mode)
     return found
@@ -95,21 +96,11 @@ def _postures(
 def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> Mode | None:
     residual = 0.0
     if system.is_closed:
-        rows, _ = Closing(system, p).rows(q)
-        residual = float(np.max(np.abs(rows), initial=0.0))
-        cosines = np.array(_facing(system)(q, p))
-        if residual > _OPEN or not np.all(cosines > 0):
+        closing = Closing(system, p)
+        residual = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
+        if residual > _OPEN or not closing.faces(q):
             return None
     return Mode(tuple(float(x) for x in q), branch, residual)
-
-
-def _facing(system: System) -> Function:
-    def build() -> Function:
-        q = SX.sym("q", system.nq)
-        return Function("facing", [q, system.p], [facing(system, q)])
-
-    function: Function = system.cached("facing", build)
-    return function
 
 
 def _same(mode: Mode, other: Mode) -> bool:

@@ -6,9 +6,8 @@ from casadi import DM, MX, SX, Function
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.loops.closing import closure_parameters
-from mbs.loops.closure import closure_rows, facing
+from mbs.loops.closure import closure_rows, facing, independent_closure
 from mbs.loops.continuation import LARGEST_MOVE
-from mbs.loops.reduction import independent_closure
 
 _STAGES = 128
 _OPEN = 1e-9
@@ -30,13 +29,13 @@ def follow_active(system: System) -> Function:
     """
 
     def build() -> Function:
-        assert system.closure is not None
         if system.nq != system.nv:
             raise ModelError(
                 f"{system.name}: the loops contain a quaternion joint, so positions cannot be"
                 " followed by those of independent joints; use a posture of mbs.loops.solve"
             )
-        active, passive = list(system.closure.active), list(system.closure.passive)
+        active = list(system.free)
+        passive = [k for k in range(system.nv) if k not in active]
         q_a, p = MX.sym("q_a", len(active)), MX.sym("p", system.p.numel())
         q_start = DM([system.posture[k] for k in active])
         p_start = DM(closure_parameters(system))

@@ -37,7 +37,7 @@ def solve(
 
     Args:
         system: the assembled mechanism.
-        q_active: positions of the independent joints in the order of `system.active`, those left
+        q_active: positions of the independent joints in the order of `system.free`, those left
             out staying as in the assembled posture; or positions of any joints by name.
         guess: approximate positions of other joints, which choose the branch.
         branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names

@@ -8,6 +8,7 @@ import numpy as np
 from casadi import Function
 
 from mbs.assembly import System
+from mbs.loops.closed_form.places import independent_places
 from mbs.loops.closing import Vector
 
 _POINTS = 721
@@ -26,14 +27,16 @@ def reachable(system: System, loops: Function, q_a: Vector, p: Vector) -> str:
         p: (np,) parameters.
     """
     texts = []
-    for number, k in enumerate(system.active):
+    for number, k in enumerate(independent_places(system)):
+        if k >= system.nq:
+            continue
         is_reached = _test(loops, q_a, p, number)
         intervals = _intervals(is_reached, *_span(system, k, q_a[number], is_reached))
         unit = system.coordinates[k].unit
         if intervals:
             ranges = " or ".join(f"{low:.4g} to {high:.4g}" for low, high in intervals)
             texts.append(f"{system.coordinates[k].name} can be {ranges} {unit}")
-    held = ", the other positions as they are" if texts and len(system.active) > 1 else ""
+    held = ", the other positions as they are" if texts and len(system.free) > 1 else ""
     return "; ".join(texts) + held if texts else "change several positions, the branch or lengths"
 
 

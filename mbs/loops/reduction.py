@@ -8,13 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi
-from casadi import SX, Function
+from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.errors import ModelError
-from mbs.loops.closure import closure_rows
-from mbs.loops.velocity import acceleration_bias, velocity_rows
+from mbs.loops.examine import require_led
+from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.solvers.small_linear import solve_square
 from mbs.spatial import zeros
 
@@ -46,15 +45,7 @@ def reduction_matrix(system: System) -> Function:
         q = SX.sym("q", system.nq)
         return [("q", q)], [("G", reduction(system, q).G)]
 
-    return model_function(system, ("reduction_matrix",), build)
-
-
-def independent_closure(system: System, q: SX) -> SX:
-    """(r, 1) the closure rows that the analysis kept, at the symbols q."""
-    if system.closure is None:
-        raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
-    rows = closure_rows(system, q)
-    return rows[list(system.closure.rows)]
+    return model_function(system, ("reduction_matrix",), build, require_led)
 
 
 def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
@@ -66,21 +57,25 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
         v_a: (m, 1) independent velocities, or None when gamma is not wanted.
     """
     closure = system.closure
-    phi = independent_closure(system, q)
+    J = independent_constraint_rows(system, q)
     assert closure is not None
     active, passive = list(closure.active), list(closure.passive)
-    J = velocity_rows(system, q, phi)
     J_p, J_a = J[:, passive], J[:, active]
     W = -solve_square(J_p, J_a)
-    G = zeros(system.nv, len(active))
-    for column, k in enumerate(active):
-        G[k, column] = SX(1)
-    G[passive, :] = W
+    G = tree_rows(system, W, SX(DM.eye(len(active))))
     if v_a is None:
         return Reduction(G, None)
     v = casadi.densify(casadi.mtimes(G, v_a))
     speed = SX.sym("v", system.nv)
     psi = casadi.substitute(acceleration_bias(system, q, speed, J), speed, v)
-    gamma = zeros(system.nv)
-    gamma[passive] = -solve_square(J_p, psi)
-    return Reduction(G, gamma)
+    return Reduction(G, tree_rows(system, -solve_square(J_p, psi), zeros(len(active))))
+
+
+def tree_rows(system: System, passive: SX, active: SX) -> SX:
+    """(nv, m) rows in the order of the velocities, from those of the passive and active ones."""
+    closure = system.closure
+    assert closure is not None
+    rows = zeros(system.nv, active.shape[1])
+    rows[list(closure.active), :] = active
+    rows[list(closure.passive), :] = passive
+    return rows

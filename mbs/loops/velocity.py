@@ -1,4 +1,6 @@
-"""Velocity and acceleration of the closure: J(q) v = 0 and J a + psi = 0.
+"""Velocities and accelerations that loops allow: J(q) v = 0 and J a + psi = 0.
+
+The rows of J are those of the closure, then those of rolling discs, which bind velocities alone.
 
 Source: Khalil & Creusot 1997, eq. 11 and 14.
 """
@@ -9,7 +11,8 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.rates import position_rate
-from mbs.loops.closure import closure_rows
+from mbs.loops.closure import closure_rows, independent_closure
+from mbs.loops.rolling import slip_rows
 
 
 def closure_jacobian(system: System) -> Function:
@@ -21,9 +24,25 @@ def closure_jacobian(system: System) -> Function:
 
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        return [("q", q)], [("J", velocity_rows(system, q, closure_rows(system, q)))]
+        return [("q", q)], [("J", constraint_rows(system, q))]
 
     return model_function(system, ("closure_jacobian",), build)
+
+
+def constraint_rows(system: System, q: SX) -> SX:
+    """J (m, nv), every row, at the symbols q."""
+    slips = [rows for _, rows in slip_rows(system, q)]
+    return casadi.vertcat(velocity_rows(system, q, closure_rows(system, q)), *slips)
+
+
+def independent_constraint_rows(system: System, q: SX) -> SX:
+    """J (r, nv), the rows that the analysis kept, at the symbols q."""
+    J = velocity_rows(system, q, independent_closure(system, q))
+    assert system.closure is not None
+    if not system.closure.slips:
+        return J
+    slips = casadi.vertcat(*(rows for _, rows in slip_rows(system, q)))
+    return casadi.vertcat(J, slips[list(system.closure.slips), :])
 
 
 def velocity_rows(system: System, q: SX, phi: SX) -> SX:

@@ -1,0 +1,149 @@
+"""What a posture is worth: whether it closes the loops, and how freely it moves there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.errors import ModelError, SingularPosture, Unclosable
+from mbs.loops.closing import closure_parameters
+from mbs.loops.closure import closure_rows
+from mbs.loops.velocity import constraint_rows, independent_constraint_rows
+
+Vector = NDArray[np.float64]
+
+OPEN = 1e-6
+"""Largest closure row of a posture that counts as closed [m or 1]."""
+_FLAT = 1e-8
+"""Singular values below this part of the largest count as zero."""
+_LED = 1e-14
+"""Squared sine between rows of the passive joints below which these follow no longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class PostureState:
+    """A posture of a system with loops.
+
+    Attributes:
+        residual: largest closure row [m or 1].
+        mobility: number of independent velocities at this posture.
+        generic: the same at postures that are not singular.
+        leads: 1 where the independent joints lead the others well, 0 where they cannot: the
+            smallest squared sine between a row of the passive joints and the rows before it.
+    """
+
+    residual: float
+    mobility: int
+    generic: int
+    leads: float
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the loops are closed."""
+        return self.residual <= OPEN
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the mechanism can move in more ways here, as where two branches meet."""
+        return self.mobility > self.generic
+
+    @property
+    def is_led(self) -> bool:
+        """Whether the independent joints determine how the others move."""
+        return self.leads > _LED
+
+
+def examine(
+    system: System, q: Sequence[float], *, parameters: Mapping[str, float] | None = None
+) -> PostureState:
+    """How a posture closes the loops of a system, and whether it is singular.
+
+    Args:
+        system: with closed loops.
+        q: (nq,) positions [rad or m].
+        parameters: values of symbols, the others at their defaults.
+
+    Raises:
+        ModelError: the system is an open chain, or q does not fit it.
+    """
+    require_system(system)
+    if system.closure is None:
+        raise ModelError(f"{system.name}: an open chain has no loops that could be examined")
+    position = np.array(system.position(q))
+    p = closure_parameters(system, parameters)
+    residual, leads = (float(x) for x in _health(system)(position, p))
+    J = np.array(_rows(system)(position, p))
+    values = np.linalg.svd(J, compute_uv=False)
+    largest = max(float(np.max(values, initial=0.0)), 1e-30)
+    rank = int(np.sum(values > _FLAT * largest))
+    return PostureState(residual, system.nv - rank, system.closure.mobility, leads)
+
+
+def require_led(system: System, q: Vector, p: Vector) -> None:
+    """Refuse a posture at which models in the independent joints have no sense.
+
+    Args:
+        system: with closed loops.
+        q: (nq,) positions.
+        p: (np,) parameters.
+
+    Raises:
+        Unclosable: the posture leaves the loops open.
+        SingularPosture: the independent joints do not determine how the others move.
+    """
+    residual, leads = (float(x) for x in _health(system)(q, p))
+    if residual > OPEN:
+        raise Unclosable(
+            f"{system.name}: q leaves the loops open by {residual:.3g}; take a posture of"
+            " mbs.loops.solve"
+        )
+    if leads <= _LED:
+        names = ", ".join(system.speeds[k].name for k in system.active)
+        raise SingularPosture(
+            f"{system.name}: the posture is singular, {names} cannot lead the other joints there;"
+            " take another posture, other independent joints (assemble(active=...)), or"
+            ' coordinates="tree"'
+        )
+
+
+def _health(system: System) -> Function:
+    """`health(q, p) -> residual, leads`."""
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        assert system.closure is not None
+        residual = casadi.mmax(casadi.fabs(casadi.vertcat(0, closure_rows(system, q))))
+        J = independent_constraint_rows(system, q)[:, list(system.closure.passive)]
+        return Function("health", [q, system.p], [residual, _independence(J)], {"cse": True})
+
+    function: Function = system.cached("posture health", build)
+    return function
+
+
+def _independence(J: SX) -> SX:
+    """The smallest squared sine of the angle between a row of J and the rows before it.
+
+    A row counts as long as the rows are on average, at least: it may also vanish by itself.
+    """
+    if J.shape[0] == 0:
+        return SX(1)
+    squares = casadi.sum2(J * J)
+    least = casadi.fmax(squares, casadi.sum1(squares) / squares.numel())
+    D, _, order = casadi.ldl(casadi.sparsify(casadi.mtimes(J, J.T)))
+    return casadi.mmin(D / least[order])
+
+
+def _rows(system: System) -> Function:
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        return Function("rows", [q, system.p], [constraint_rows(system, q)])
+
+    function: Function = system.cached("constraint rows", build)
+    return function

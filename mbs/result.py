@@ -29,6 +29,9 @@ _QUANTITIES = {
     "N": "force",
     "N.m": "torque",
     "J": "energy",
+    "A": "current",
+    "V": "voltage",
+    "W": "power",
 }
 
 

@@ -45,7 +45,15 @@ _UNITS = (
     Unit("N.s/m", {"kg": 1, "s": -1}),
     Unit("N.m.s/rad", {"kg": 1, "m": 2, "s": -1, "rad": -1}),
     Unit("J", {"kg": 1, "m": 2, "s": -2}),
+    Unit("W", {"kg": 1, "m": 2, "s": -3}),
     Unit("1/s", {"s": -1}),
+    Unit("A", {"A": 1}),
+    Unit("A/s", {"A": 1, "s": -1}),
+    Unit("V", {"kg": 1, "m": 2, "s": -3, "A": -1}),
+    Unit("ohm", {"kg": 1, "m": 2, "s": -3, "A": -2}),
+    Unit("H", {"kg": 1, "m": 2, "s": -2, "A": -2}),
+    Unit("N.m/A", {"kg": 1, "m": 2, "s": -2, "A": -1}),
+    Unit("N.m/rad", {"kg": 1, "m": 2, "s": -2, "rad": -1}),
 )
 
 UNITS: Mapping[str, Unit] = MappingProxyType({unit.name: unit for unit in _UNITS})

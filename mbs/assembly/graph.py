@@ -75,7 +75,7 @@ def connection_graph(
     Raises:
         AssemblyError: something is not connected, or welds contradict each other.
     """
-    joints = {joint.name for joint in mechanism.joints() if not _is_weld(mechanism, joint)}
+    joints = {joint.name for joint in mechanism.joints() if not is_weld(mechanism, joint)}
     if not joints:
         raise AssemblyError(
             f"{mechanism.name}: there is no joint that moves; connect bodies by joints"
@@ -102,7 +102,7 @@ def connection_graph(
 def _check_transmissions(mechanism: Mechanism) -> None:
     """Refuse a gear, rack or screw between coordinates that do not turn or slide as it needs."""
     motions = {
-        f"{joint.name}.{freedom.suffix}" if freedom.suffix else joint.name: freedom.motion
+        freedom.coordinate_of(joint.name): freedom.motion
         for joint in mechanism.joints()
         for freedom in joint.freedoms
     }
@@ -129,7 +129,8 @@ def inertia_of(node: Node, mechanism: Mechanism, symbols: Mapping[str, SX]) -> I
     return total
 
 
-def _is_weld(mechanism: Mechanism, joint: Joint) -> bool:
+def is_weld(mechanism: Mechanism, joint: Joint) -> bool:
+    """Whether a joint makes one rigid body of what it connects."""
     return isinstance(joint, Fixed) and joint.name not in mechanism.cuts
 
 
@@ -156,7 +157,7 @@ def _welds(mechanism: Mechanism, symbols: Mapping[str, SX]) -> dict[Port, list[t
         pose = a.placement.pose(symbols) @ b.placement.pose(symbols).inverse()
         weld((a.owner.name, a.port), (b.owner.name, b.port), pose)
     for joint in mechanism.joints():
-        if _is_weld(mechanism, joint):
+        if is_weld(mechanism, joint):
             weld((joint.name, "a"), (joint.name, "b"), Pose.identity())
     return welds
 

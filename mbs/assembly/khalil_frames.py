@@ -99,7 +99,7 @@ def khalil_frames(
     base = {0: Pose.identity()}
     stubs: dict[int, int] = {}
     for branch in (*spanning.branches, *_kept(spanning)):
-        last, pose = _extend(drafts, base, home[branch.parent], branch, symbols)
+        last, pose = _extend(drafts, base, home[branch.parent], branch)
         if branch.child < 0:
             stubs[id(branch.edge)] = last
             drafts[last].nodes[-1] = pose
@@ -145,7 +145,6 @@ def _extend(
     base: dict[int, Pose],
     parent: int,
     branch: Branch,
-    symbols: Mapping[str, SX],
 ) -> tuple[int, Pose]:
     """Add the links of one joint; the last of them, and the pose of the child node in it."""
     edge = branch.edge
@@ -162,11 +161,9 @@ def _extend(
                 drafts[parent].fixed_frame = True
         else:
             placement = _settled(drafts, parent, Khalil.of_pose(here @ aligned))
-        suffix = f".{freedom.suffix}" if freedom.suffix else ""
-        name = edge.joint.name + suffix
         drafts.append(
             _Draft(
-                name,
+                freedom.coordinate_of(edge.joint.name),
                 edge.joint.name,
                 parent,
                 freedom.motion,

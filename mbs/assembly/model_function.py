@@ -17,6 +17,9 @@ from mbs.messages import quoted
 Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""
 
+PostureCheck = Callable[[System, Any, Any], None]
+"""Raises an error where positions q (nq,) and parameters p (np,) make no posture for a model."""
+
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
 
@@ -30,11 +33,16 @@ class ModelFunction(Function):
     """
 
     def __init__(
-        self, function: Function, system: System, annotate: Callable[[], Function] | None = None
+        self,
+        function: Function,
+        system: System,
+        annotate: Callable[[], Function] | None = None,
+        check: PostureCheck | None = None,
     ) -> None:
         Function.__init__(self, function)
         self._system = system
         self._annotate = annotate
+        self._check_posture = check
 
     @property
     def system(self) -> System:
@@ -55,6 +63,7 @@ class ModelFunction(Function):
         given = self._given(args, kwargs)
         for name, value in given.items():
             self._check(name, value)
+        self._require_posture(given)
         try:
             outputs = Function.__call__(self, *map(_matrix, given.values()))
         except (RuntimeError, NotImplementedError, TypeError, ValueError) as error:
@@ -134,6 +143,18 @@ class ModelFunction(Function):
         known = f": {elements}" if elements else ""
         raise ModelError(f"{self._title}: {name} has {rows} values, it needs {wanted}{known}")
 
+    def _require_posture(self, given: dict[str, Any]) -> None:
+        """Refuse a posture in numbers at which the model has no sense."""
+        q, p = given.get("q"), given.get("p", [])
+        if self._check_posture is None or any(isinstance(x, (SX, MX)) for x in (q, p)):
+            return
+        try:
+            position, parameters = (np.array(DM(_matrix(x)), dtype=float) for x in (q, p))
+        except (NotImplementedError, TypeError, ValueError):
+            return  # a list of symbols
+        if position.size == self._system.nq:
+            self._check_posture(self._system, position.ravel(), parameters.ravel())
+
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)
         if all(isinstance(o, (SX, MX)) or DM(o).is_regular() for o in every):
@@ -175,6 +196,7 @@ def model_function(
     system: System,
     key: tuple[Any, ...],
     build: Callable[[], tuple[Named, Named] | tuple[Named, Named, Named]],
+    check: PostureCheck | None = None,
 ) -> Function:
     """The model of a system under this key, built the first time it is asked for.
 
@@ -184,6 +206,7 @@ def model_function(
         build: gives the named inputs and outputs on CasADi symbols and, where there are any, the
             named scalars between them. When the system has parameters they become the last
             input p.
+        check: what refuses positions q given in numbers.
 
     Raises:
         ModelError: `system` is not a System.
@@ -201,7 +224,7 @@ def model_function(
             return Function(str(key[0]), [x for _, x in every], values, *names, options)
 
         annotate = (lambda: function([*outputs, *between[0]])) if between else None
-        return ModelFunction(function(outputs), system, annotate)
+        return ModelFunction(function(outputs), system, annotate, check)
 
     function: Function = system.cached(key, make)
     return function
@@ -231,12 +254,15 @@ def require_system(system: object) -> None:
 
 def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
     q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
-    active = [system.speeds[k].name for k in system.active]
+    free = [system.speeds[k].name for k in system.free]
     units = {"v": _SAME_UNIT, "a": ACCELERATION_UNIT, "tau": EFFORT_UNIT}
     result = {"q": q, "p": [(parameter.name, parameter.unit) for parameter in system.parameters]}
-    result["q_a"] = [row for row in q if row[0] in active]
+    result["q_a"] = [row for row in q if row[0] in free]
     for name, unit in units.items():
         every = [(speed.name, unit[speed.unit]) for speed in system.speeds]
         result[name] = every
         result[f"{name}_a"] = [every[k] for k in system.active]
+    result["z"] = [state for device in system.devices for state in device.states]
+    result["u"] = [device.input for device in system.devices]
+    result["y"] = [output for device in system.devices for output in device.outputs]
     return result

@@ -7,9 +7,14 @@ from collections.abc import Collection, Mapping, Sequence
 import casadi
 from casadi import SX
 
+from mbs.assembly.attached import attached_forces, force_elements
+from mbs.assembly.drive_line import drive_line
+from mbs.assembly.drive_tables import attached_devices, shaft_rows
 from mbs.assembly.graph import Graph, connection_graph
+from mbs.assembly.joint_rows import joint_rows
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
 from mbs.assembly.rates import zero_position
+from mbs.assembly.sensors import attached_sensors
 from mbs.assembly.spanning_tree import spanning_tree
 from mbs.assembly.system import CoordinateCoupling, System
 from mbs.assembly.tables import (
@@ -17,8 +22,6 @@ from mbs.assembly.tables import (
     Coordinate,
     LoopRow,
     Places,
-    attached_forces,
-    force_elements,
     position_coordinates,
     velocity_coordinates,
 )
@@ -43,14 +46,19 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     known = {p.name: p.default for p in parameters if p.default is not None}
     for component in mechanism.components.values():
         component.check_values(known)
+    line = drive_line(mechanism)
+    mechanism = line.mechanism
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
     coupled = [name for c in mechanism.couplings() for name in (c.driven, c.driver)]
-    pushed = [force.coordinate for force in force_elements(mechanism) if force.coordinate]
-    wanted = (*guessed, *coupled, *pushed)
-    keep = {name for joint in mechanism.joints() for name in _owners(joint, wanted)}
+    pushed = [name for force in force_elements(mechanism) for name, _ in force.levers]
     spanning = spanning_tree(
-        mechanism.name, graph, keep=keep, cut=mechanism.cuts, given_order=mechanism.keep_order
+        mechanism.name,
+        graph,
+        need=_owners(mechanism, (*coupled, *pushed)),
+        keep=_owners(mechanism, guessed),
+        cut=mechanism.cuts,
+        given_order=mechanism.keep_order,
     )
     framed = khalil_frames(mechanism, graph, spanning, symbols)
     _check_placements(framed, symbols, _trial_values(parameters))
@@ -65,6 +73,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     _check_names(mechanism, coordinates)
     speeds = velocity_coordinates(moved, actuated)
     places, cut = _places(graph, framed), _cut_coordinates(framed.cuts)
+    joints_found = joint_rows(mechanism, places, framed.cuts, symbols)
     return System(
         name=mechanism.name,
         source=mechanism.source,
@@ -82,6 +91,12 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         loops=_loop_rows(mechanism, framed),
         posture=tuple(zero_position(framed.tree)),
         forces=attached_forces(mechanism, places, (coordinates, speeds, cut), symbols),
+        joints=joints_found,
+        sensors=attached_sensors(
+            mechanism, places, joints_found, (coordinates, speeds, cut), symbols
+        ),
+        shafts=shaft_rows(line, symbols),
+        devices=attached_devices(line, speeds, symbols),
     )
 
 
@@ -121,11 +136,14 @@ def _check_names(mechanism: Mechanism, coordinates: Sequence[Coordinate]) -> Non
         )
 
 
-def _owners(joint: Joint, guessed: Collection[str]) -> list[str]:
-    """The joint's name, once for each of its coordinates that is named."""
-    return [
-        joint.name for name in guessed if name == joint.name or name.startswith(f"{joint.name}.")
-    ]
+def _owners(mechanism: Mechanism, coordinates: Collection[str]) -> set[str]:
+    """The joints that have one of these coordinates."""
+    return {
+        joint.name
+        for joint in mechanism.joints()
+        for name in coordinates
+        if name == joint.name or name.startswith(f"{joint.name}.")
+    }
 
 
 def _is_actuated(joint: Joint, in_loops: set[str]) -> bool:
@@ -148,7 +166,7 @@ def _looped_joints(framed: Framed) -> set[str]:
 def _driven_joints(mechanism: Mechanism) -> set[str]:
     """The joints that follow another one through a coupling."""
     driven = [coupling.driven for coupling in mechanism.couplings()]
-    return {name for joint in mechanism.joints() for name in _owners(joint, driven)}
+    return _owners(mechanism, driven)
 
 
 def _loop_rows(mechanism: Mechanism, framed: Framed) -> tuple[LoopRow, ...]:
@@ -173,7 +191,7 @@ def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
         joint = cut.edge.joint
         if not cut.welded:
             for freedom in joint.freedoms:
-                name = f"{joint.name}.{freedom.suffix}" if freedom.suffix else joint.name
+                name = freedom.coordinate_of(joint.name)
                 rows.extend(
                     position_coordinates([(freedom.motion, name, joint)], [False], cut=True)
                 )

@@ -33,6 +33,12 @@ def quaternion_slices(tree: Tree) -> list[slice]:
     ]
 
 
+def norm_rows(tree: Tree, q: SX) -> SX:
+    """(k, 1) squared length less one of every quaternion in the positions q, (nq, 1)."""
+    rows = [casadi.sumsqr(q[part]) - 1 for part in quaternion_slices(tree)]
+    return casadi.vertcat(*rows) if rows else SX(0, 1)
+
+
 def normalised(tree: Tree, q: SX) -> SX:
     """The positions with their quaternions brought back to unit length."""
     result = SX(q)

@@ -9,12 +9,14 @@ if TYPE_CHECKING:
 
 
 def report(system: System) -> str:
-    """Tree, cut joints, mobility, dropped rows and whether the cut forces are unique."""
-    return "\n".join([*_tree(system), *_loops(system), *_parameters(system)])
+    """Tree, cut joints, mobility, dropped rows, whether the cut forces are unique, what acts."""
+    every = [*_tree(system), *_loops(system), *_parameters(system), *_acting(system)]
+    return "\n".join(every)
 
 
 def _tree(system: System) -> list[str]:
     links = system.tree.links
+    without = {row.coordinate: "a shaft of a drive line" for row in system.shafts if row.own}
     lines = [
         f"{system.name}: {_count(len(links), 'moving link')} in a tree,"
         f" {_count(system.nq, 'position')} q and {_count(system.nv, 'velocity')} v."
@@ -22,7 +24,7 @@ def _tree(system: System) -> list[str]:
     for number, link in enumerate(links, start=1):
         carried = [row.name for row in system.bodies if row.link == number]
         before = "the base" if link.antecedent < 0 else f"link {link.antecedent + 1}"
-        what = ", ".join(carried) if carried else "a frame without a body"
+        what = ", ".join(carried) if carried else without.get(link.name, "a frame without a body")
         lines.append(
             f"  link {number}: {link.motion.value} {link.name} from {before} carries {what}"
         )
@@ -67,6 +69,17 @@ def _parameters(system: System) -> list[str]:
         for p in system.parameters
     )
     return [f"Parameters: {values}."]
+
+
+def _acting(system: System) -> list[str]:
+    """Parts of drive lines, force elements, sensors: a sentence for each."""
+    driving = {device.name for device in system.devices}
+    return [
+        *(row.sentence for row in system.shafts if row.name not in driving),
+        *(force.sentence for force in system.forces),
+        *(device.sentence for device in system.devices),
+        *(sensor.sentence for sensor in system.sensors),
+    ]
 
 
 def _count(number: int, noun: str) -> str:

@@ -39,6 +39,7 @@ def spanning_tree(
     name: str,
     graph: Graph,
     *,
+    need: Collection[str] = (),
     keep: Collection[str] = (),
     cut: Collection[str] = (),
     given_order: bool = False,
@@ -46,13 +47,15 @@ def spanning_tree(
     """A spanning tree that keeps driven joints, cuts the freest passive ones, and stays shallow.
 
     Prim's algorithm from the world: among the joints that reach a new body, the one that is
-    least wanted as a cut comes first (driven or guessed before passive, few freedoms before
-    many), then the one nearest to the base, which keeps loops short. Constraints, which place
-    nothing, are always cut.
+    least wanted as a cut comes first (one whose coordinate something else refers to, then driven
+    or guessed ones, then passive ones; few freedoms before many), then the one nearest to the
+    base, which keeps loops short. A driven joint that is cut keeps its coordinate all the same.
+    Constraints, which place nothing, are always cut.
 
     Args:
         name: of the mechanism, for messages.
         graph: nodes and joints.
+        need: joints whose coordinates couplings and forces refer to.
         keep: joints that a user guessed a position for.
         cut: joints that the description itself cuts.
         given_order: number links in the order of the joints instead of depth-first.
@@ -60,7 +63,7 @@ def spanning_tree(
     Raises:
         AssemblyError: a body cannot be reached from the world, or only by a joint to be cut.
     """
-    chosen = _prim(graph, set(keep), set(cut))
+    chosen = _prim(graph, set(need), set(keep), set(cut))
     reached = {0} | {edge.a for edge in chosen} | {edge.b for edge in chosen}
     for number in range(len(graph.nodes)):
         if number not in reached:
@@ -91,17 +94,18 @@ def _unreached(name: str, graph: Graph, number: int) -> str:
     return f"{where}; connect it, or connect it to the world by a Free joint"
 
 
-def _prim(graph: Graph, keep: set[str], cut: set[str]) -> list[Edge]:
+def _prim(graph: Graph, need: set[str], keep: set[str], cut: set[str]) -> list[Edge]:
     depth = {0: 0}
     chosen: list[Edge] = []
-    queue: list[tuple[tuple[bool, bool, int, int, int], int]] = []
+    queue: list[tuple[tuple[bool, bool, bool, int, int, int], int]] = []
 
     def offer(node: int) -> None:
         for number, edge in enumerate(graph.edges):
             joint = edge.joint
             if joint.places and node in (edge.a, edge.b):
                 passive = not (joint.carries_effort or joint.name in keep)
-                key = (joint.name in cut, passive, joint.nv, depth[node], number)
+                unneeded = joint.name not in need
+                key = (joint.name in cut, unneeded, passive, joint.nv, depth[node], number)
                 heapq.heappush(queue, (key, number))
 
     offer(0)

@@ -12,18 +12,14 @@ import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
+from mbs.assembly.attached import AttachedForce
+from mbs.assembly.drive_tables import AttachedDevice, ShaftRow
+from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.rates import position_rate
 from mbs.assembly.report import report
-from mbs.assembly.tables import (
-    AttachedForce,
-    BodyRow,
-    Closure,
-    Coordinate,
-    LinkRow,
-    LoopRow,
-    link_rows,
-)
+from mbs.assembly.sensors import AttachedSensor
+from mbs.assembly.tables import BodyRow, Closure, Coordinate, LinkRow, LoopRow, link_rows
 from mbs.assembly.tree import Tree
 from mbs.errors import ModelError
 from mbs.expressions import Parameter
@@ -49,6 +45,10 @@ class CoordinateCoupling:
     driver: int
     coefficients: tuple[SX, ...]
 
+    def value(self, driver: SX) -> SX:
+        """The driven coordinate for a position of the driver."""
+        return sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class System:
@@ -72,6 +72,10 @@ class System:
         posture: a position q that closes the loops, or all zero.
         closure: how the loops constrain velocities; None for an open chain.
         forces: springs, dampers and other force elements.
+        joints: every joint and constraint, those of the tree and those that were cut.
+        sensors: what reads the motion and changes nothing.
+        shafts: inertias and rigid gears of drive lines, and the coordinates that they turn with.
+        devices: motors and torques that drive shafts, with states and inputs of their own.
     """
 
     name: str
@@ -91,6 +95,10 @@ class System:
     posture: tuple[float, ...]
     closure: Closure | None = None
     forces: tuple[AttachedForce, ...] = ()
+    joints: tuple[JointRow, ...] = ()
+    sensors: tuple[AttachedSensor, ...] = ()
+    shafts: tuple[ShaftRow, ...] = ()
+    devices: tuple[AttachedDevice, ...] = ()
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -124,13 +132,26 @@ class System:
         return self.closure.active if self.closure else tuple(range(self.nv))
 
     @property
+    def free(self) -> tuple[int, ...]:
+        """Numbers of the velocities whose positions may be chosen.
+
+        These are the independent ones, and what rolling discs alone hold.
+        """
+        return self.closure.free if self.closure else tuple(range(self.nv))
+
+    @property
+    def symbol_table(self) -> dict[str, SX]:
+        """The symbol of every parameter by its name."""
+        return {parameter.name: self.p[k] for k, parameter in enumerate(self.parameters)}
+
+    @property
     def p_default(self) -> list[float]:
         """The defaults of the parameters; NaN for a symbol without value."""
         return [float("nan") if p.default is None else p.default for p in self.parameters]
 
     def report(self) -> str:
         """What was assembled, in plain sentences."""
-        return "\n".join([report(self), *(force.sentence for force in self.forces)])
+        return report(self)
 
     def qdot(self, q: Any, v: Any) -> Any:
         """(nq, 1) time derivative of q; it differs from v for quaternion joints only.
@@ -263,15 +284,14 @@ class System:
                 )
         result = []
         for parameter in self.parameters:
-            value = given.get(parameter.name, parameter.default)
-            if value is None and needed is not None and parameter.name not in needed:
-                value = math.nan
-            elif value is None:
+            name = parameter.name
+            value = given.get(name, parameter.default)
+            if value is None and (needed is None or name in needed):
                 raise ModelError(
-                    f"{self.name}: parameter {parameter.name!r} has no value; give it a default"
+                    f"{self.name}: parameter {name!r} has no value; give it a default"
                     " where the mechanism is described, or a value in the call"
                 )
-            else:
-                value = self._number(value, f"parameter {parameter.name}")
-            result.append(value)
+            if value is not None and name in given:
+                value = self._number(value, f"parameter {name}")
+            result.append(math.nan if value is None else value)
         return result

@@ -8,11 +8,8 @@ from dataclasses import dataclass
 from casadi import SX
 
 from mbs.assembly.tree import Tree
-from mbs.components import Component, ForceElement, Joint, Mechanism, Point
-from mbs.components.forces import JointForce
+from mbs.components import Joint
 from mbs.components.motion import Motion
-from mbs.errors import AssemblyError
-from mbs.messages import did_you_mean
 from mbs.spatial import Pose
 
 Places = Mapping[tuple[str, str], tuple[int, Pose]]
@@ -131,15 +128,20 @@ class Closure:
 
     Attributes:
         rows: numbers of the independent closure rows.
+        slips: numbers of the independent rows of rolling discs, which bind velocities alone.
         active: numbers of the independent velocities.
         passive: numbers of the velocities that follow from them.
+        free: numbers of the velocities whose positions may be chosen: the active ones, and what
+            rolling discs alone hold.
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
         residual: largest closure residual at the assembled posture.
     """
 
     rows: tuple[int, ...]
+    slips: tuple[int, ...]
     active: tuple[int, ...]
     passive: tuple[int, ...]
+    free: tuple[int, ...]
     gruebler: int
     residual: float
 
@@ -147,32 +149,6 @@ class Closure:
     def mobility(self) -> int:
         """Number of independent velocities."""
         return len(self.active)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AttachedForce:
-    """A force element and where it acts.
-
-    Attributes:
-        element: its description.
-        frames: link (-1 for the base) and pose in the link's frame, of each of its points.
-        position: number in q of its coordinate, None where it has none.
-        velocity: number in v of its coordinate, None where it acts on points.
-        symbols: CasADi symbol of every parameter.
-        where: the components that it acts on, in words.
-    """
-
-    element: ForceElement
-    frames: tuple[tuple[int, Pose], ...]
-    position: int | None
-    velocity: int | None
-    symbols: Mapping[str, SX]
-    where: str
-
-    @property
-    def sentence(self) -> str:
-        """What it is and where it acts."""
-        return f"{type(self.element).__name__} {self.element.name} acts {self.where}."
 
 
 def link_rows(tree: Tree) -> tuple[LinkRow, ...]:
@@ -213,88 +189,3 @@ def _coordinates(
             bounded = interval if unit in ("rad", "m") and not suffix else None
             rows.append(Coordinate(full, kind, unit, joint.name, driven, cut, bounded))
     return tuple(rows)
-
-
-_Rows = Sequence[Coordinate]
-
-
-def force_elements(mechanism: Mechanism) -> list[ForceElement]:
-    """Every spring, damper and so on, in the order added."""
-    return [c for c in mechanism.components.values() if isinstance(c, ForceElement)]
-
-
-def attached_forces(
-    mechanism: Mechanism,
-    places: Places,
-    tables: tuple[_Rows, ...],
-    symbols: Mapping[str, SX],
-) -> tuple[AttachedForce, ...]:
-    """Every force element with the links of its points, or the numbers of its coordinate.
-
-    Args:
-        mechanism: the components.
-        places: where bodies and joints are.
-        tables: the coordinates of q, of v, and of cut joints.
-        symbols: CasADi symbol of every parameter.
-
-    Raises:
-        AssemblyError: one acts on nothing that is there, or on nothing that moves.
-    """
-    forces = force_elements(mechanism)
-    return tuple(_attached(mechanism, force, places, tables, symbols) for force in forces)
-
-
-def _attached(
-    mechanism: Mechanism,
-    force: ForceElement,
-    places: Places,
-    tables: tuple[_Rows, ...],
-    symbols: Mapping[str, SX],
-) -> AttachedForce:
-    if isinstance(force, JointForce):
-        position, velocity = _coordinate_of(force, *tables)
-        return AttachedForce(force, (), position, velocity, symbols, f"on {force.joint}")
-    frames = []
-    for point in force.points:
-        _require_part(mechanism, force, point)
-        link, pose = places[point.owner.name, point.port]
-        frames.append((link, pose @ point.placement.pose(symbols)))
-    links, names = {link for link, _ in frames}, [point.owner.name for point in force.points]
-    if links == {-1} or (len(links) == 1 and len(frames) > 1):
-        still = "does not move" if links == {-1} else "is one rigid body"
-        raise AssemblyError(
-            f"{force.name}: what it acts on, {' and '.join(names)}, {still}, so that the"
-            f" {type(force).__name__} does nothing; let it act on another body"
-        )
-    where = f"between {' and '.join(names)}" if len(names) > 1 else f"on {names[0]}"
-    return AttachedForce(force, tuple(frames), None, None, symbols, where)
-
-
-def _require_part(mechanism: Mechanism, force: ForceElement, point: Point) -> None:
-    """Refuse a point of something that is not in the mechanism."""
-    known, is_nested = mechanism.components.get(point.owner.name), type(point.owner) is Component
-    if known is None or not (is_nested or known is point.owner):
-        raise AssemblyError(
-            f"{force.name}: it acts on {point.owner.name!r}, which is not part of"
-            f" {mechanism.name}; add that component, or take a point of one that is in it"
-        )
-
-
-def _coordinate_of(
-    force: JointForce, coordinates: _Rows, speeds: _Rows, cut: _Rows
-) -> tuple[int | None, int]:
-    """Where the coordinate of a force stands in q and in v."""
-    q, v = ([row.name for row in table] for table in (coordinates, speeds))
-    known = [name for name in v if name in q or not force.needs_position]
-    if force.joint not in known and force.joint in [coordinate.name for coordinate in cut]:
-        raise AssemblyError(
-            f"{force.name}: the joint of {force.joint!r} is cut to open a loop, so that a"
-            f" {type(force).__name__} cannot act on it; give that joint some friction Fv of its"
-            " own, which keeps it in the tree"
-        )
-    if force.joint not in known:
-        raise AssemblyError(
-            f"{force.name}: there is no coordinate {force.joint!r} in the tree that a"
-            f" {type(force).__name__} can act on; {did_you_mean(force.joint, known)}"
-        )
-    return (q.index(force.joint) if force.joint in q else None), v.index(force.joint)

@@ -9,6 +9,10 @@ from mbs.components.constraints import (
     Rod,
 )
 from mbs.components.coupling import Coupling
+from mbs.components.drive_elastic import ElasticGear, ElasticShaft, ShaftDamper
+from mbs.components.drive_flange import Flange
+from mbs.components.drive_motor import DCMotor, TorqueSource
+from mbs.components.drive_shafts import IdealGear, ShaftInertia
 from mbs.components.forces import ForceElement
 from mbs.components.forces_bushing import Bushing
 from mbs.components.forces_joint import JointFriction, JointStop
@@ -28,11 +32,15 @@ from mbs.components.joints import (
 from mbs.components.mechanism import Mechanism
 from mbs.components.placed import Placed
 from mbs.components.rigid_body import RigidBody, World
+from mbs.components.rolling import RollingDisc
 from mbs.components.rotor import Rotor
+from mbs.components.sensors import AbsoluteSensor, DistanceSensor, RelativeSensor, Sensor
+from mbs.components.sensors_joint import JointSensor, PowerSensor, WrenchSensor
 from mbs.components.solids import Box, Cylinder
 from mbs.components.transmissions import Gear, RackAndPinion, Screw
 
 __all__ = [
+    "AbsoluteSensor",
     "Attraction",
     "Body",
     "Box",
@@ -42,14 +50,21 @@ __all__ = [
     "Coupling",
     "Cylinder",
     "Cylindrical",
+    "DCMotor",
     "Damper",
+    "DistanceSensor",
+    "ElasticGear",
+    "ElasticShaft",
     "Fixed",
+    "Flange",
     "Force",
     "ForceElement",
     "Free",
     "Gear",
+    "IdealGear",
     "Joint",
     "JointFriction",
+    "JointSensor",
     "JointStop",
     "KhalilBody",
     "Mechanism",
@@ -59,16 +74,24 @@ __all__ = [
     "PointMass",
     "PointOnLine",
     "PointOnPlane",
+    "PowerSensor",
     "Prismatic",
     "RackAndPinion",
+    "RelativeSensor",
     "Revolute",
     "RigidBody",
     "Rod",
+    "RollingDisc",
     "Rotor",
     "Screw",
+    "Sensor",
+    "ShaftDamper",
+    "ShaftInertia",
     "Spherical",
     "Spring",
     "Torque",
+    "TorqueSource",
     "Universal",
     "World",
+    "WrenchSensor",
 ]

@@ -6,19 +6,18 @@ law is written once, on CasADi scalars; the recursions know where its points are
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from casadi import SX
 
 from mbs.components.component import Component, Point
+from mbs.components.on_points import OnPoints
 from mbs.components.placement import SymbolTable
-from mbs.components.rigid_body import RigidBody
 from mbs.errors import DescriptionError
-from mbs.expressions import Number, to_float
+from mbs.expressions import Number, Scalar, to_float
 from mbs.messages import quoted
 
-F = TypeVar("F", bound="ForceElement")
 J = TypeVar("J", bound="JointForce")
 
 
@@ -57,41 +56,13 @@ class Pull:
 
 
 @dataclass(frozen=True, slots=True)
-class ForceElement(Component):
+class ForceElement(OnPoints):
     """A component that acts on others without constraining them."""
 
     @property
-    def points(self) -> tuple[Point, ...]:
-        """Where it acts."""
+    def levers(self) -> tuple[tuple[str, Scalar], ...]:
+        """The joint coordinates that it acts on, and how much of each; none for one on points."""
         return ()
-
-    @property
-    def coordinate(self) -> str:
-        """Name of the joint coordinate that it acts on, or nothing."""
-        return ""
-
-    def scoped(self: F, prefix: str) -> F:
-        """The same element inside a mechanism that is placed in another one."""
-        inner = Component.scoped(self, prefix)
-        changed: dict[str, Any] = {}
-        for f in fields(self):
-            point = getattr(inner, f.name)
-            if isinstance(point, Point):
-                owner = Component(f"{prefix}.{getattr(self, f.name).owner.name}")
-                changed[f.name] = replace(point, owner=owner)
-        return replace(inner, **changed)
-
-    def _take_point(self, name: str) -> None:
-        """Turn the body or point that a user gave into a point."""
-        value = getattr(self, name)
-        if isinstance(value, RigidBody):
-            value = value.frame
-        if not isinstance(value, Point):
-            raise DescriptionError(
-                f"{self.name}: {name} is {quoted(value)}; give a body, body.at(...) or"
-                " joint.frame_a"
-            )
-        object.__setattr__(self, name, value)
 
     def _require_magnitudes(self, *names: str) -> None:
         """Refuse numbers below zero in these fields."""
@@ -131,6 +102,11 @@ class PairForce(ForceElement):
     a: Any
     b: Any
 
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        self._take_point("a")
+        self._take_point("b")
+
     @property
     def points(self) -> tuple[Point, ...]:
         """The two points."""
@@ -146,7 +122,25 @@ class PairForce(ForceElement):
 
 
 @dataclass(frozen=True, slots=True)
-class JointForce(ForceElement):
+class CoordinateForce(ForceElement):
+    """An element that acts on x, the sum of some joint coordinates, each times its lever."""
+
+    def effort(self, x: SX | None, rate: SX, symbols: SymbolTable) -> SX:
+        """What x needs of effort to overcome it [N m or N]; every coordinate its lever times it."""
+        raise NotImplementedError
+
+    def energy(self, x: SX | None, symbols: SymbolTable) -> SX:
+        """Elastic energy stored in it [J]."""
+        raise NotImplementedError
+
+    @property
+    def needs_position(self) -> bool:
+        """Whether the coordinates must be positions, which those of a ball joint are not."""
+        return False
+
+
+@dataclass(frozen=True, slots=True)
+class JointForce(CoordinateForce):
     """An element that acts along a coordinate of a joint.
 
     Attributes:
@@ -155,31 +149,19 @@ class JointForce(ForceElement):
 
     joint: str
 
-    @property
-    def coordinate(self) -> str:
-        """The name of the coordinate."""
-        return self.joint
-
-    def scoped(self: J, prefix: str) -> J:
-        """The same element inside a mechanism that is placed in another one."""
-        return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
-
-    def _require_joint(self) -> None:
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
         if not isinstance(self.joint, str) or not self.joint:
             raise DescriptionError(
                 f"{self.name}: joint is {quoted(self.joint)}; give the name of a coordinate, such"
                 " as 'j1' or 'slide.s'"
             )
 
-    def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
-        """What the joint needs of effort to overcome it [N m or N]."""
-        raise NotImplementedError
-
-    def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
-        """Elastic energy stored in it [J]."""
-        raise NotImplementedError
-
     @property
-    def needs_position(self) -> bool:
-        """Whether the coordinate must be a position, which those of a ball joint are not."""
-        return False
+    def levers(self) -> tuple[tuple[str, Scalar], ...]:
+        """The coordinate itself."""
+        return ((self.joint, Number(1.0)),)
+
+    def scoped(self: J, prefix: str) -> J:
+        """The same element inside a mechanism that is placed in another one."""
+        return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")

@@ -11,7 +11,6 @@ from typing import Any
 import casadi
 from casadi import SX
 
-from mbs.components.component import Component
 from mbs.components.forces import PairForce, Pull, RelativeMotion
 from mbs.components.inertia_rules import three
 from mbs.components.placement import SymbolTable
@@ -44,9 +43,7 @@ class Bushing(PairForce):
     angular_damping: Any = 0.0
 
     def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._take_point("a")
-        self._take_point("b")
+        PairForce.__post_init__(self)
         for name in _STRENGTHS:
             given = getattr(self, name)
             alike = isinstance(given, str) or not hasattr(given, "__iter__")

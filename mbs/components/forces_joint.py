@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.components.component import Component
 from mbs.components.forces import JointForce
 from mbs.components.placement import SymbolTable
 from mbs.errors import DescriptionError
@@ -36,8 +35,7 @@ class JointStop(JointForce):
     width: Scalar
 
     def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._require_joint()
+        JointForce.__post_init__(self)
         sides = [name for name in ("lower", "upper") if getattr(self, name) is not None]
         if not sides:
             raise DescriptionError(
@@ -119,8 +117,7 @@ class JointFriction(JointForce):
     width: Scalar = 1e-3
 
     def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._require_joint()
+        JointForce.__post_init__(self)
         self._normalise("coulomb", "stribeck", "velocity", "viscous", "width")
         self._require_magnitudes("coulomb", "stribeck", "viscous")
         self._require_positive("velocity", "width")

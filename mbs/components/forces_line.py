@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.components.component import Component
 from mbs.components.forces import PairForce, Pull, RelativeMotion
 from mbs.components.placement import SymbolTable
 from mbs.expressions import Scalar, to_sx
@@ -38,17 +37,18 @@ class LineForce(PairForce):
 
     def pull(self, motion: RelativeMotion, symbols: SymbolTable) -> Pull:
         """The tension, towards b."""
-        length = _length(motion.p)
+        length = regular_length(motion.p)
         along = motion.p / length
         rate = casadi.dot(along, motion.V)
         return Pull(along * self.tension(length, rate, symbols), zeros(), zeros())
 
     def energy(self, motion: RelativeMotion, symbols: SymbolTable) -> SX:
         """The potential of the distance."""
-        return self.potential(_length(motion.p), symbols)
+        return self.potential(regular_length(motion.p), symbols)
 
 
-def _length(p: SX) -> SX:
+def regular_length(p: SX) -> SX:
+    """Length of a vector (3, 1), regular where it is zero."""
     return casadi.sqrt(casadi.dot(p, p) + SHORTEST**2)
 
 
@@ -67,9 +67,7 @@ class Spring(LineForce):
     damping: Scalar = 0.0
 
     def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._take_point("a")
-        self._take_point("b")
+        PairForce.__post_init__(self)
         self._normalise("stiffness", "length", "damping")
         self._require_magnitudes("stiffness", "length", "damping")
         self._require_effect("stiffness", "damping")
@@ -96,9 +94,7 @@ class Damper(LineForce):
     damping: Scalar
 
     def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._take_point("a")
-        self._take_point("b")
+        PairForce.__post_init__(self)
         self._normalise("damping")
         self._require_magnitudes("damping")
         self._require_effect("damping")
@@ -125,9 +121,7 @@ class Attraction(LineForce):
     strength: Scalar
 
     def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._take_point("a")
-        self._take_point("b")
+        PairForce.__post_init__(self)
         self._normalise("strength")
         self._require_effect("strength")
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from mbs.components.axes import in_plane, unit_axis
 from mbs.components.component import Component, Point
+from mbs.components.drive_flange import Flange
 from mbs.components.motion import Freedom, Motion
 from mbs.components.rotor import Rotor
 from mbs.errors import DescriptionError
@@ -92,6 +93,16 @@ class Joint(Component):
     def frame_b(self) -> Point:
         """The frame that the joint moves."""
         return Point(self, "b")
+
+    @property
+    def flange(self) -> Flange:
+        """Where a drive line turns it, or pushes it where it is prismatic."""
+        if self.nv != 1 or len(self.freedoms) != 1:
+            raise DescriptionError(
+                f"{self.name}: a {type(self).__name__} joint has no flange, since it has not one"
+                " position that a drive line could move; take one of a Revolute or Prismatic joint"
+            )
+        return Flange(self)
 
     @property
     def nv(self) -> int:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar, overload
 
 from mbs.components.component import Component, Point
 from mbs.components.coupling import Coupling
+from mbs.components.drive_flange import Flange, flange_pair
 from mbs.components.joints import Joint
-from mbs.components.placed import Placed, moved
-from mbs.components.rigid_body import Mount, RigidBody, World
+from mbs.components.placed import Placed, place
+from mbs.components.rigid_body import RigidBody, World
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
 from mbs.messages import quoted
@@ -52,6 +52,7 @@ class Mechanism:
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
         self.connections: list[tuple[Point, Point]] = []
+        self.shafts: list[tuple[Flange, Flange]] = []
         self.frames: dict[str, Point] = {}
         self.values: dict[str, Parameter] = {}
         for symbol, value in (parameters or {}).items():
@@ -79,7 +80,7 @@ class Mechanism:
             DescriptionError: the name is taken.
         """
         if isinstance(component, Mechanism):
-            return self._place(component, name or component.name)
+            return place(self, component, name or component.name)
         if not isinstance(component, Component):
             raise DescriptionError(
                 f"{self.name}: {quoted(component)} is no component; add a body, a joint, a coupling"
@@ -101,18 +102,22 @@ class Mechanism:
 
     def connect(
         self,
-        a: Point | RigidBody,
-        joint_or_point: Joint | Point | RigidBody,
+        a: Point | RigidBody | Flange,
+        joint_or_point: Joint | Point | RigidBody | Flange,
         b: Point | RigidBody | None = None,
     ) -> None:
-        """Put a joint between two points, or weld two points together.
+        """Put a joint between two points, weld two points together, or connect two flanges.
 
         `connect(a, joint, b)` puts the joint's frame_a on a and its frame_b on b;
         `connect(a, b)` makes the two frames coincide. A frame of a joint is a point as well.
+        Flanges that are connected turn together; parts of drive lines need not be added first.
 
         Raises:
             DescriptionError: a component is unknown here, or the joint is connected already.
         """
+        if isinstance(a, Flange) or isinstance(joint_or_point, Flange):
+            self._join(flange_pair(self.name, a, joint_or_point, b))
+            return
         if isinstance(joint_or_point, Joint):
             if b is None:
                 raise DescriptionError(
@@ -151,16 +156,21 @@ class Mechanism:
             )
         self.cuts.append(joint.name)
 
-    def assemble(self, guess: Mapping[str, float] | None = None) -> System:
+    def assemble(
+        self, guess: Mapping[str, float] | None = None, active: Sequence[str] = ()
+    ) -> System:
         """The frozen `System` of this mechanism: tree, cut joints, equations.
 
         Args:
             guess: approximate joint positions by coordinate name [rad or m], where the loops are
                 to be closed near to; it is laid over the guess of the mechanism itself, and what
                 neither names starts at zero.
+            active: names of velocities that are to be independent in a system with loops, beside
+                those of the motors; the others are proposed by pivoting.
 
         Raises:
-            AssemblyError: the components do not form a mechanism.
+            AssemblyError: the components do not form a mechanism, or motors and active velocities
+                do not fit its mobility.
             Unclosable: no posture closes the loops.
         """
         from mbs.loops.assemble import assemble  # the one call upwards, see docs/decisions.md
@@ -169,7 +179,11 @@ class Mechanism:
             raise DescriptionError(
                 f"{self.name}: guess is {quoted(guess)}; give a dict of names to positions"
             )
-        return assemble(self, {**self.guess, **(guess or {})})
+        if isinstance(active, str):
+            raise DescriptionError(
+                f"{self.name}: active is the text {active!r}; give a list of names, [{active!r}]"
+            )
+        return assemble(self, {**self.guess, **(guess or {})}, active)
 
     def __repr__(self) -> str:
         bodies, joints = len(list(self.bodies())), len(list(self.joints()))
@@ -197,7 +211,7 @@ class Mechanism:
                 two different values.
         """
         found: dict[str, Parameter] = {}
-        for parameter in self._used_parameters():
+        for parameter in self.used_parameters():
             known = found.setdefault(parameter.name, parameter)
             if known.default is None:
                 found[parameter.name] = parameter
@@ -216,7 +230,8 @@ class Mechanism:
             found[name] = replace(found[name], default=value.default)
         return tuple(found.values())
 
-    def _used_parameters(self) -> Iterator[Parameter]:
+    def used_parameters(self) -> Iterator[Parameter]:
+        """Every symbol of components and places, as often as it is used."""
         for component in self.components.values():
             for value in component.expressions():
                 yield from parameters_of(value)
@@ -249,48 +264,18 @@ class Mechanism:
                 )
         self.connections.append((a, b))
 
+    def _join(self, flanges: tuple[Flange, Flange]) -> None:
+        for flange in flanges:
+            if self.components.get(flange.owner.name) is not flange.owner:
+                self.add(flange.owner)
+        self.shafts.append(flanges)
+
     def _is_used(self, point: Point) -> bool:
         return any(
             p.owner is point.owner and p.port == point.port
             for pair in self.connections
             for p in pair
         )
-
-    def _place(self, inner: Mechanism, name: str) -> Placed:
-        scope = Component(name).name
-        if inner is self:
-            raise DescriptionError(
-                f"{self.name}: a mechanism cannot be added to itself; add it to another one"
-            )
-        if any(inner._used_parameters()) and not _SCOPE.fullmatch(scope):
-            raise DescriptionError(
-                f"{self.name}: {scope!r} cannot stand before the names of parameters; write"
-                " add(mechanism, name=...) with letters, digits and underscores"
-            )
-        if any(taken == scope or taken.startswith(f"{scope}.") for taken in self.components):
-            raise DescriptionError(f"{self.name}: two components are named {scope!r}; rename one")
-        placed: dict[str, Component] = {}
-        for component in inner.components.values():
-            if component is inner.world:
-                base = Mount(f"{scope}.{component.name}")
-                placed[component.name] = self.add(base)
-            else:
-                placed[component.name] = self.add(component.scoped(scope))
-        self.connections.extend(
-            (moved(a, placed, scope), moved(b, placed, scope)) for a, b in inner.connections
-        )
-        for frame, point in inner.frames.items():
-            self.frames[f"{scope}.{frame}"] = moved(point, placed, scope)
-        self.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
-        self.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
-        used = {parameter.name for parameter in self._used_parameters()}
-        for symbol, value in inner.values.items():
-            if (scoped := f"{scope}.{symbol}") in used:  # not what only its gravity used
-                self.values[scoped] = replace(value, name=scoped)
-        return Placed(self, scope)
-
-
-_SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
 
 
 def _what(value: object) -> str:

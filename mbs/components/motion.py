@@ -38,3 +38,7 @@ class Freedom:
     motion: Motion
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     suffix: str = ""
+
+    def coordinate_of(self, joint: str) -> str:
+        """Name of its coordinate in a joint of this name, which has a suffix beside others."""
+        return f"{joint}.{self.suffix}" if self.suffix else joint

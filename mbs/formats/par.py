@@ -25,7 +25,7 @@ from mbs.formats.par_file import (
     ParFile,
 )
 from mbs.formats.par_variable import split_variable
-from mbs.formats.rows import DRIVE, CutRow, FrameRow, InertiaRow
+from mbs.formats.rows import DRIVE, GEOMETRY, CutRow, FrameRow, InertiaRow
 from mbs.formats.table import RobotTable
 
 
@@ -109,7 +109,7 @@ def _frame(
     sigma = file.integer("sigma", texts["sigma"])
     values: dict[str, Any] = {
         key: expression(texts[key], f"{file.where(key)} of frame {j}")
-        for key in ("gamma", "b", "alpha", "d", "theta", "r")
+        for key in GEOMETRY
         if key in texts
     }
     key = {0: "theta", 1: "r"}.get(sigma)

@@ -57,7 +57,7 @@ def _lines(table: RobotTable) -> Iterator[str]:
     yield _vector("sigma", (row.sigma for row in table.frames))
     yield _vector("mu", _motors(table))
     for key in _GEOMETRY:
-        yield _vector(key, (_cell(table, key, j, row) for j, row in enumerate(table.frames, 1)))
+        yield _vector(key, (_cell(key, j, row) for j, row in enumerate(table.frames, 1)))
     yield "\n(* Dynamic parameters and external forces *)"
     bodies = {body.frame: body for body in table.bodies}
     for key, name in BODY_KEYS.items():
@@ -121,7 +121,7 @@ def _kind(table: RobotTable) -> int:
     return int(any(row.antecedent != j for j, row in enumerate(table.frames)))
 
 
-def _cell(table: RobotTable, key: str, j: int, row: FrameRow) -> str:
+def _cell(key: str, j: int, row: FrameRow) -> str:
     text = _text(getattr(row, key))
     moved, prefix = _VARIABLE.get(row.sigma, ("", ""))
     if key != moved:

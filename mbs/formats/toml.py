@@ -103,12 +103,11 @@ def _frame(row: Mapping[str, Any], where: str) -> FrameRow:
     _check_keys(row, _FRAME, where)
     if "antecedent" not in row:
         raise DescriptionError(f"{where}: the antecedent is missing; give 0 or an earlier frame")
-    limits = row.get("limits")
     return FrameRow(
         antecedent=row["antecedent"],
         sigma=_sigma(row, where),
         actuated=_actuated(row, where),
-        limits=limits if limits is None or not isinstance(limits, list) else tuple(limits),
+        limits=row.get("limits"),
         name=_text(row, "name", where),
         **{key: row[key] for key in GEOMETRY if key in row},
     )

@@ -1,24 +1,31 @@
 """Model builders: a System in, a casadi.Function with named inputs and outputs out."""
 
+from mbs.models.dae import Dae, dae
 from mbs.models.derivatives import (
     direct_dynamics_derivatives,
     inverse_dynamics_derivatives,
 )
+from mbs.models.devices import devices
 from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
 from mbs.models.energy import energy
 from mbs.models.geometry import direct_geometry, transform
 from mbs.models.implicit_jacobian import with_implicit_jacobian
 from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
 from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, jacobian_determinant
+from mbs.models.joint_wrenches import joint_wrenches
 from mbs.models.kinematics import jacobian
 from mbs.models.lagrange import lagrange
 from mbs.models.link_motion import jacobian_dot_velocity, link_accelerations, link_velocities
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
+from mbs.models.measurements import measurements
 from mbs.models.singularities import singularities
 
 __all__ = [
+    "Dae",
     "acceleration_closure",
     "bias",
+    "dae",
+    "devices",
     "direct_dynamics",
     "direct_dynamics_derivatives",
     "direct_geometry",
@@ -32,9 +39,11 @@ __all__ = [
     "jacobian",
     "jacobian_determinant",
     "jacobian_dot_velocity",
+    "joint_wrenches",
     "lagrange",
     "link_accelerations",
     "link_velocities",
+    "measurements",
     "singularities",
     "transform",
     "velocity_closure",

@@ -17,7 +17,7 @@ from mbs.assembly.model_function import (
 )
 from mbs.errors import ModelError
 from mbs.messages import quoted
-from mbs.models.direct_dynamics import direct_dynamics
+from mbs.models.direct_dynamics import require_inertia
 from mbs.models.slopes import (
     Blocks,
     accelerations_by_ad,
@@ -26,8 +26,14 @@ from mbs.models.slopes import (
     efforts_by_recursion,
 )
 from mbs.models.staged_accelerations import staged_accelerations
-from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
-from mbs.operations import count
+from mbs.models.symbols import (
+    ModelSymbols,
+    check_coordinates,
+    is_reduced,
+    posture_check,
+    symbols_of,
+)
+from mbs.operations.counts import cheapest
 
 _COMPARED = 6
 """Velocities up to which both methods are built and their operations counted."""
@@ -82,9 +88,10 @@ def inverse_dynamics_derivatives(
             return inputs, _outputs("tau" + s.suffix, s, names, blocks, tau)
 
         key = ("idm_derivatives", chosen, coordinates, names)
-        return model_function(system, key, symbols)
+        return model_function(system, key, symbols, posture_check(system, coordinates))
 
-    return _chosen(system, ("idm_derivatives", coordinates, names), method, build, "analytical")
+    candidates = ("ad",) if is_reduced(system, coordinates) else _compared(system, "analytical")
+    return _chosen(system, ("idm_derivatives", coordinates, names), method, build, candidates)
 
 
 def direct_dynamics_derivatives(
@@ -127,7 +134,7 @@ def direct_dynamics_derivatives(
             " casadi.jacobian for those of the tree"
         )
     _check_method(system, coordinates, method, ("auto", "ad", "implicit"))
-    direct_dynamics(system, coordinates=coordinates)
+    require_inertia(system)
 
     def build(chosen: str) -> Function:
         def symbols() -> tuple[Named, Named]:
@@ -142,9 +149,10 @@ def direct_dynamics_derivatives(
         if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
             staged: Function = system.cached(key, lambda: _staged(system, names))
             return staged
-        return model_function(system, key, symbols)
+        return model_function(system, key, symbols, posture_check(system, coordinates))
 
-    return _chosen(system, ("ddm_derivatives", coordinates, names), method, build, "implicit")
+    candidates = ("implicit",) if system.is_closed else _compared(system, "implicit")
+    return _chosen(system, ("ddm_derivatives", coordinates, names), method, build, candidates)
 
 
 def _staged(system: System, names: tuple[str, ...]) -> Function:
@@ -169,7 +177,7 @@ def _checked(
         raise ModelError(f"{system.name}: with_respect_to is {given!r}; name each input once")
     if "p" in given and not system.parameters:
         raise ModelError(f"{system.name}: it has no parameters; leave 'p' out of with_respect_to")
-    if "p" in given and system.is_closed and coordinates != "tree":
+    if "p" in given and is_reduced(system, coordinates):
         raise ModelError(
             f"{system.name}: when a parameter changes, q no longer closes the loops; leave 'p' out"
             " of with_respect_to"
@@ -181,11 +189,16 @@ def _check_method(system: System, coordinates: str, method: str, known: tuple[st
     if method not in known:
         words = ", ".join(map(repr, known))
         raise ModelError(f"{system.name}: method is {quoted(method)}; use one of {words}")
-    if method == "analytical" and system.is_closed and coordinates != "tree":
+    if method == "analytical" and is_reduced(system, coordinates):
         raise ModelError(
             f"{system.name}: method 'analytical' is for trees and this system has loops; use 'ad'"
             " or coordinates='tree'"
         )
+
+
+def _compared(system: System, recursive: str) -> tuple[str, ...]:
+    """The recursive method, and the differentiated one while it may win."""
+    return (recursive,) if system.nv > _COMPARED else (recursive, "ad")
 
 
 def _chosen(
@@ -193,20 +206,14 @@ def _chosen(
     key: tuple[object, ...],
     method: str,
     build: Callable[[str], Function],
-    recursive: str,
+    candidates: tuple[str, ...],
 ) -> Function:
-    """The model by a method, or the one of fewer operations."""
+    """The model by a method, or of the candidates the one of fewer operations."""
     if method != "auto":
         return build(method)
-
-    def cheapest() -> Function:
-        if system.is_closed and "independent" in key:
-            return build("ad" if recursive == "analytical" else recursive)
-        if system.nv > _COMPARED:
-            return build(recursive)
-        return min(build(recursive), build("ad"), key=lambda model: count(model).price)
-
-    function: Function = system.cached(("cheapest", *key), cheapest)
+    function: Function = system.cached(
+        ("cheapest", *key), lambda: cheapest(*map(build, candidates))
+    )
     return function
 
 

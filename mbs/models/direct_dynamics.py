@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import casadi
 import numpy as np
 from casadi import SX, Function
@@ -12,24 +10,28 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.rates import normalised
 from mbs.errors import ModelError
-from mbs.loops.reduction import independent_closure
-from mbs.loops.velocity import acceleration_bias, velocity_rows
+from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.messages import quoted
 from mbs.models.inverse_dynamics import own_efforts, tree_efforts
 from mbs.models.surroundings import Surroundings, exerted, surroundings
-from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
-from mbs.operations import count
+from mbs.models.symbols import (
+    ModelSymbols,
+    check_coordinates,
+    posture_check,
+    solution_order,
+    symbols_of,
+)
+from mbs.operations.counts import cheapest
 from mbs.recursions.articulated_body import articulated_accelerations, inertia_pivots
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.poses import link_poses
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
 from mbs.solvers.rank import rank
-from mbs.solvers.small_linear import solve_symmetric
+from mbs.solvers.saddle import solve_saddle
 
 _METHODS = ("auto", "articulated", "composite")
 _ARTICULATED = 260  # operations that articulated bodies take at most for one more velocity
 _SEED = 20260103
-_SINGULAR = 1e-12
 _VANISHING = 1e-12
 
 
@@ -51,7 +53,9 @@ def inertia_matrix(system: System, coordinates: str = "independent") -> Function
         A = s.reduced_matrix(tree_inertia(system.tree, s.poses))
         return [("q", s.q)], [("A" + s.suffix, A)]
 
-    return model_function(system, ("inertia", coordinates), build)
+    return model_function(
+        system, ("inertia", coordinates), build, posture_check(system, coordinates)
+    )
 
 
 def direct_dynamics(
@@ -94,7 +98,7 @@ def direct_dynamics(
     require_system(system)
     check_coordinates(system, coordinates)
     _check_method(system, method)
-    _require_inertia(system)
+    require_inertia(system)
 
     def model(method: str) -> Function:
         return _model(system, method, coordinates, f_ext, moving_base)
@@ -102,8 +106,8 @@ def direct_dynamics(
     if method != "auto":
         return model(method)
     key = ("cheapest ddm", coordinates, f_ext, moving_base)
-    cheapest: Function = system.cached(key, lambda: _cheapest(system, model))
-    return cheapest
+    found: Function = system.cached(key, lambda: cheapest(*map(model, _candidates(system))))
+    return found
 
 
 def _check_method(system: System, method: str) -> None:
@@ -118,13 +122,11 @@ def _check_method(system: System, method: str) -> None:
         )
 
 
-def _cheapest(system: System, model: Callable[[str], Function]) -> Function:
+def _candidates(system: System) -> tuple[str, ...]:
+    """Methods one of which takes the fewest operations."""
     if system.is_closed:
-        return model("composite")
-    articulated = model("articulated")
-    if not _composite_may_win(system):
-        return articulated
-    return min(model("composite"), articulated, key=lambda model: count(model).price)
+        return ("composite",)
+    return ("composite", "articulated") if _composite_may_win(system) else ("articulated",)
 
 
 def _composite_may_win(system: System) -> bool:
@@ -151,7 +153,12 @@ def _model(
         accelerations = _articulated if method == "articulated" else _composite
         return inputs, [("a" + s.suffix, accelerations(system, s, tau, around))]
 
-    return model_function(system, ("ddm", method, coordinates, f_ext, moving_base), build)
+    return model_function(
+        system,
+        ("ddm", method, coordinates, f_ext, moving_base),
+        build,
+        posture_check(system, coordinates),
+    )
 
 
 def _articulated(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:
@@ -163,32 +170,18 @@ def _articulated(system: System, s: ModelSymbols, tau: SX, around: Surroundings)
 def _composite(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -> SX:
     A = tree_inertia(system.tree, s.poses)
     H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around))
-    if s.reduction is None:
-        return solve_tree(A, tau - H, velocity_antecedents(system.tree))
-    return solve_tree(s.reduced_matrix(A), tau - H, list(range(-1, s.size - 1)))
+    return solve_tree(s.reduced_matrix(A), tau - H, solution_order(system, s))
 
 
 def _tree_accelerations(
     system: System, s: ModelSymbols, tau: SX, around: Surroundings
 ) -> tuple[SX, SX]:
-    """Accelerations of the tree and efforts of the closure, massless links included.
-
-    K = A + c J'J is regular where A alone is not; then a Schur complement gives the efforts, kept
-    finite where rows become dependent, and one refinement restores the digits that this costs.
-    """
+    """Accelerations of the tree and efforts of the closure rows, massless links included."""
     A = tree_inertia(system.tree, s.poses)
     H = tree_efforts(system, s, SX.zeros(system.nv), around)
-    J = velocity_rows(system, s.q, independent_closure(system, s.q))
+    J = independent_constraint_rows(system, s.q)
     psi = acceleration_bias(system, s.q, s.v, J)
-    c = _penalty(system)
-    K = A + c * casadi.mtimes(J.T, J)
-    free = solve_symmetric(K, casadi.horzcat(tau - H - c * casadi.mtimes(J.T, psi), J.T))
-    a, Y = free[:, 0], free[:, 1:]
-    S = casadi.mtimes(J, Y) + _SINGULAR / c * SX.eye(J.shape[0])
-    lam = solve_symmetric(S, -psi - casadi.mtimes(J, a))
-    a = a + casadi.mtimes(Y, lam)
-    correction = solve_symmetric(S, -psi - casadi.mtimes(J, a))
-    return a + casadi.mtimes(Y, correction), lam + correction
+    return solve_saddle(A, J, tau - H, -psi, _penalty(system))
 
 
 def _penalty(system: System) -> float:
@@ -199,8 +192,12 @@ def _penalty(system: System) -> float:
     return float(max(np.trace(A), 1e-6)) / system.nv
 
 
-def _require_inertia(system: System) -> None:
-    """Refuse a chain in which some velocity moves no inertia."""
+def require_inertia(system: System) -> None:
+    """Refuse a chain in which some velocity moves no inertia.
+
+    Raises:
+        ModelError: which velocity, and what to give mass to.
+    """
 
     def check() -> bool:
         if any(p.default is None for p in system.parameters):

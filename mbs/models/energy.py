@@ -6,7 +6,7 @@ from casadi import Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.models.symbols import symbols_of
+from mbs.models.symbols import posture_check, symbols_of
 from mbs.recursions.energy import kinetic_energy, potential_energy
 from mbs.recursions.force_elements import element_energy
 from mbs.recursions.joint_efforts import spring_energy
@@ -36,4 +36,6 @@ def energy(system: System, coordinates: str = "independent") -> Function:
         U = potential_energy(system.tree, s.poses) + elastic
         return [("q", s.q), ("v" + s.suffix, s.v)], [("E", E), ("U", U)]
 
-    return model_function(system, ("energy", coordinates), build)
+    return model_function(
+        system, ("energy", coordinates), build, posture_check(system, coordinates)
+    )

@@ -16,6 +16,7 @@ from mbs.assembly.model_function import (
 from mbs.errors import NoClosedForm
 from mbs.loops.function import function as closed_form
 from mbs.loops.numeric import follow_active
+from mbs.models.composition import outputs_of
 from mbs.recursions.route import cheapest_pose
 
 
@@ -36,6 +37,12 @@ def transform(system: System, frame: str | int, relative_to: str | int = "base")
         ModelError: there is no such frame.
     """
     require_system(system)
+    return _pose(system, ("transform", frame, relative_to), frame, relative_to)
+
+
+def _pose(
+    system: System, key: tuple[str | int, ...], frame: str | int, relative_to: str | int
+) -> Function:
     target, reference = system.frame(frame), system.frame(relative_to)
 
     def build() -> tuple[Named, Named]:
@@ -43,7 +50,7 @@ def transform(system: System, frame: str | int, relative_to: str | int = "base")
         pose = cheapest_pose(system.tree, q, system.p, reference, target)
         return [("q", q)], [("T", pose.matrix)]
 
-    return model_function(system, ("transform", frame, relative_to), build)
+    return model_function(system, key, build)
 
 
 def terminal_frame(system: System) -> str | int:
@@ -54,7 +61,11 @@ def terminal_frame(system: System) -> str | int:
     named = system.named_frames
     if "tool" in named:
         return "tool"
-    return named[0] if len(named) == 1 else len(system.tree.links)
+    if len(named) == 1:
+        return named[0]
+    shafts = {shaft.coordinate for shaft in system.shafts if shaft.own}
+    links = [row.number for row in system.links if row.name not in shafts]
+    return links[-1] if links else len(system.tree.links)
 
 
 def direct_geometry(system: System, frame: str | int | None = None) -> Function:
@@ -80,14 +91,7 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
     name = terminal_frame(system) if frame is None else frame
     if system.is_closed:
         return _closed_geometry(system, name, transform(system, name))
-    target, base = system.frame(name), system.frame("base")
-
-    def build() -> tuple[Named, Named]:
-        q = SX.sym("q", system.nq)
-        pose = cheapest_pose(system.tree, q, system.p, base, target)
-        return [("q", q)], [("T", pose.matrix)]
-
-    return model_function(system, ("dgm", name), build)
+    return _pose(system, ("dgm", name), name, "base")
 
 
 def _closed_geometry(system: System, name: str | int, pose: Function) -> Function:
@@ -97,9 +101,9 @@ def _closed_geometry(system: System, name: str | int, pose: Function) -> Functio
         return _followed_geometry(system, name, pose)
 
     def build() -> tuple[Named, Named]:
-        q_a = SX.sym("q_a", len(system.active))
-        p = [system.p] if system.parameters else []
-        return [("q_a", q_a)], [("T", pose.call([loops.call([q_a, *p])[0], *p])[0])]
+        q_a = SX.sym("q_a", len(system.free))
+        (q,) = outputs_of(system, loops, q_a)
+        return [("q_a", q_a)], [("T", outputs_of(system, pose, q)[0])]
 
     return model_function(system, ("dgm", name), build)
 
@@ -107,7 +111,7 @@ def _closed_geometry(system: System, name: str | int, pose: Function) -> Functio
 def _followed_geometry(system: System, name: str | int, pose: Function) -> Function:
     def make() -> Function:
         follow = follow_active(system)
-        inputs = [MX.sym("q_a", len(system.active))]
+        inputs = [MX.sym("q_a", len(system.free))]
         if system.parameters:
             inputs.append(MX.sym("p", len(system.parameters)))
         q = follow(inputs[0], inputs[1] if system.parameters else DM(0, 1))

@@ -8,7 +8,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.models.surroundings import Surroundings, exerted, surroundings
-from mbs.models.symbols import ModelSymbols, symbols_of
+from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
 from mbs.recursions.accelerations import resting_base
 from mbs.recursions.force_elements import coordinate_efforts, element_efforts
 from mbs.recursions.joint_efforts import joint_efforts, spring_effort
@@ -50,7 +50,9 @@ def inverse_dynamics(
         inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, a), *around.inputs]
         return inputs, [("tau" + s.suffix, tau)], names
 
-    return model_function(system, ("idm", f_ext, moving_base, coordinates), build)
+    return model_function(
+        system, ("idm", f_ext, moving_base, coordinates), build, posture_check(system, coordinates)
+    )
 
 
 def bias(
@@ -78,7 +80,9 @@ def bias(
         inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), *around.inputs]
         return inputs, [("H" + s.suffix, H)], names
 
-    return model_function(system, ("bias", moving_base, coordinates), build)
+    return model_function(
+        system, ("bias", moving_base, coordinates), build, posture_check(system, coordinates)
+    )
 
 
 def gravity_effort(
@@ -109,7 +113,9 @@ def gravity_effort(
         Q = s.reduced_effort(tree_gravity(system, s, turned))
         return [("q", s.q), *extra], [("Q" + s.suffix, Q)]
 
-    return model_function(system, ("gravity", moving_base, coordinates), build)
+    return model_function(
+        system, ("gravity", moving_base, coordinates), build, posture_check(system, coordinates)
+    )
 
 
 def _efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -> tuple[SX, Named]:

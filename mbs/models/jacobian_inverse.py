@@ -50,7 +50,7 @@ def inverse_jacobian(
         q, square = chosen.regular(system)
         return [("q", q)], [("J_inv", square.inverse())]
 
-    return model_function(system, ("inverse_jacobian", chosen), build)
+    return model_function(system, ("inverse_jacobian", chosen), build, chosen.check)
 
 
 def inverse_kinematics(
@@ -90,7 +90,7 @@ def inverse_kinematics(
         v = solve_blocks(square.B, square.blocks, square.seen(twist))
         return [("q", q), ("twist", twist)], [("v_of_columns", v)]
 
-    return model_function(system, ("ikm", chosen), build)
+    return model_function(system, ("ikm", chosen), build, chosen.check)
 
 
 def jacobian_determinant(

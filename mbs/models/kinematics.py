@@ -10,7 +10,7 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.reduction import reduction
 from mbs.messages import quoted
-from mbs.models.symbols import check_coordinates
+from mbs.models.symbols import check_coordinates, is_reduced, posture_check
 from mbs.recursions.jacobian import Target
 from mbs.recursions.renaud import cheapest_jacobian, renaud
 
@@ -75,14 +75,19 @@ def jacobian(
                 f"{system.name}: an intermediate frame or a reference was given; they belong to"
                 " form='renaud'"
             )
-        return model_function(system, ("jacobian", frame, expressed_in, coordinates), full)
+        return model_function(
+            system,
+            ("jacobian", frame, expressed_in, coordinates),
+            full,
+            posture_check(system, coordinates),
+        )
     key = ("jacobian_renaud", frame, expressed_in, coordinates, intermediate, reference)
-    return model_function(system, key, factors)
+    return model_function(system, key, factors, posture_check(system, coordinates))
 
 
 def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
     """A Jacobian of the tree as one of the velocities that are input: J G in a closed system."""
-    if system.is_closed and coordinates == "independent":
+    if is_reduced(system, coordinates):
         return casadi.mtimes(J, reduction(system, q).G)
     return J
 

@@ -11,8 +11,8 @@ from mbs.assembly.rates import position_rate
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.models.inverse_dynamics import static_efforts, tree_gravity
-from mbs.models.symbols import ModelSymbols, symbols_of
-from mbs.operations import count
+from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
+from mbs.operations.counts import cheapest
 from mbs.recursions.augmented_body import LagrangeForm, lagrange_form
 from mbs.recursions.christoffel import christoffel
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
@@ -51,7 +51,10 @@ def lagrange(system: System, method: str = "auto", coordinates: str = "independe
             f"{system.name}: method is {quoted(method)}; use one of {', '.join(_METHODS)}"
         )
     if method == "auto":
-        return _cheapest(system, coordinates)
+        found: Function = system.cached(
+            ("cheapest lagrange", coordinates), lambda: _cheapest(system, coordinates)
+        )
+        return found
     return _model(system, method, coordinates)
 
 
@@ -59,9 +62,7 @@ def _cheapest(system: System, coordinates: str) -> Function:
     renaud = _model(system, "renaud", coordinates)
     if system.nv > _SHORT or system.nq > system.nv:
         return renaud
-    return min(
-        renaud, _model(system, "christoffel", coordinates), key=lambda model: count(model).price
-    )
+    return cheapest(renaud, _model(system, "christoffel", coordinates))
 
 
 def _model(system: System, method: str, coordinates: str) -> Function:
@@ -77,7 +78,9 @@ def _model(system: System, method: str, coordinates: str) -> Function:
         outputs = (("A", s.reduced_matrix(form.A)), ("B", B), ("Q", Q))
         return [("q", s.q), ("v" + s.suffix, s.v)], [(n + s.suffix, x) for n, x in outputs]
 
-    return model_function(system, ("lagrange", method, coordinates), build)
+    return model_function(
+        system, ("lagrange", method, coordinates), build, posture_check(system, coordinates)
+    )
 
 
 def _by_renaud(system: System, s: ModelSymbols) -> LagrangeForm:

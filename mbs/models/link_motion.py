@@ -7,7 +7,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
-from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
+from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
 from mbs.recursions.accelerations import Acceleration, moving_base, resting_base
 from mbs.recursions.accelerations import link_accelerations as tree_accelerations
 from mbs.recursions.route import expressed
@@ -45,7 +45,12 @@ def link_velocities(
         extra: Named = [("v_0", v_0)] if moving_base else []
         return [*_state(s), *extra], [("V", casadi.horzcat(*columns))]
 
-    return model_function(system, ("link_velocities", moving_base, coordinates), build)
+    return model_function(
+        system,
+        ("link_velocities", moving_base, coordinates),
+        build,
+        posture_check(system, coordinates),
+    )
 
 
 def link_accelerations(
@@ -77,7 +82,12 @@ def link_accelerations(
         columns = [casadi.vertcat(link.vd, link.wd) for link in motions]
         return [*_state(s), (name, a), *extra], [("Vd", casadi.horzcat(*columns))]
 
-    return model_function(system, ("link_accelerations", moving_base, coordinates), build)
+    return model_function(
+        system,
+        ("link_accelerations", moving_base, coordinates),
+        build,
+        posture_check(system, coordinates),
+    )
 
 
 def jacobian_dot_velocity(
@@ -126,7 +136,7 @@ def jacobian_dot_velocity(
         return [*_state(s), *extra], [("jpqp", casadi.vertcat(*parts))]
 
     key = ("jpqp", frame, expressed_in, moving_base, coordinates)
-    return model_function(system, key, build)
+    return model_function(system, key, build, posture_check(system, coordinates))
 
 
 def _state(s: ModelSymbols) -> Named:

@@ -14,8 +14,8 @@ from mbs.assembly.rates import position_rate
 from mbs.components import Free, Spherical, Universal
 from mbs.components.motion import Motion
 from mbs.errors import ModelError
-from mbs.loops.reduction import independent_closure
-from mbs.loops.velocity import acceleration_bias, velocity_rows
+from mbs.loops.reduction import tree_rows
+from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.symbols import symbols_of
 from mbs.recursions.route import relative_pose
 from mbs.solvers.small_linear import solve_square
@@ -57,7 +57,7 @@ def velocity_closure(system: System) -> Function:
             ("Wpc", C[:, passive]),
             ("Wc", -SX(DM.eye(C.shape[0]))),
             ("W", W),
-            ("G", _whole(system, W)),
+            ("G", tree_rows(system, W, SX(DM.eye(len(active))))),
         ]
         return [("q", q)], outputs
 
@@ -96,9 +96,10 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
         J, r = rows.tree, rows.tree.shape[0]
         W = -solve_square(J[:, rows.passive], J[:, rows.active])
         J_dot = _rate(system, J, s.q, speed)
-        turned = casadi.mtimes(J_dot, _whole(system, W))
+        still = zeros(len(rows.active), len(rows.active))
+        turned = casadi.mtimes(J_dot, tree_rows(system, W, SX(DM.eye(len(rows.active)))))
         W_dot = -solve_square(J[:, rows.passive], turned)
-        G_dot = _whole(system, W_dot, moving=False)
+        G_dot = tree_rows(system, W_dot, still)
         values = casadi.substitute([bias, G_dot], [speed], [s.v_tree])
         outputs = [("Psi", values[0][:r]), ("Phi", values[0][r:]), ("G_dot", values[1])]
         return [("q", s.q), (f"v{s.suffix}", s.v)], outputs
@@ -134,13 +135,13 @@ def _loop_rows(system: System, q: SX) -> _Rows:
     _require_loops(system)
     closure = system.closure
     assert closure is not None
-    J = velocity_rows(system, q, independent_closure(system, q))
-    cut = [_cut_velocities(system, q, cut) for cut in system.cuts if not cut.welded]
+    J = independent_constraint_rows(system, q)
+    cut = [cut_velocities(system, q, cut) for cut in system.cuts if not cut.welded]
     C = casadi.vertcat(*cut) if cut else SX(0, system.nv)
     return _Rows(J, casadi.densify(C), list(closure.active), list(closure.passive))
 
 
-def _cut_velocities(system: System, q: SX, cut: Cut) -> SX:
+def cut_velocities(system: System, q: SX, cut: Cut) -> SX:
     """(c, nv) velocities of the freedoms of one cut joint, as rows on those of the tree."""
     ends = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
     pose = relative_pose(system.tree, q, *ends)
@@ -174,15 +175,3 @@ def _rate(system: System, matrix: SX, q: SX, v: SX) -> SX:
     """Rate of a matrix of q along the velocities v."""
     rate = casadi.jtimes(casadi.vec(matrix), q, position_rate(system.tree, q, v))
     return casadi.reshape(rate, *matrix.shape)
-
-
-def _whole(system: System, W: SX, *, moving: bool = True) -> SX:
-    """(nv, m) W in its passive rows; in the active rows the identity, or zero for a rate."""
-    closure = system.closure
-    assert closure is not None
-    G = zeros(system.nv, len(closure.active))
-    if moving:
-        for column, k in enumerate(closure.active):
-            G[k, column] = SX(1)
-    G[list(closure.passive), :] = W
-    return G

@@ -12,11 +12,12 @@ import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.rates import normalised, position_rate, quaternion_slices
+from mbs.assembly.rates import norm_rows, normalised, position_rate, quaternion_slices
 from mbs.errors import ModelError
-from mbs.loops.closure import closure_rows, facing
-from mbs.loops.reduction import independent_closure, reduction
+from mbs.loops.closure import closure_rows, facing, independent_closure
+from mbs.loops.reduction import reduction
 from mbs.models.composition import dense_function, outputs_of
+from mbs.models.devices import device_equations, state_count
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.geometry import terminal_frame
 from mbs.recursions.route import relative_pose
@@ -28,15 +29,15 @@ _NORM_RATE = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MinimalState:
-    """State x = [q_a; v_a] of the independent joints, with dependent positions z.
+    """State x = [q_a; v_a; states of devices], with dependent positions z.
 
     Attributes:
         positions: numbers in q of the first part of x.
         dependents: numbers in q of z.
-        inputs: numbers in v of the efforts u.
+        inputs: numbers in v of the efforts that u starts with; the inputs of devices follow.
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`, y = [accelerations of x; positions z, velocities
             and accelerations of the dependent joints; origin (3) and orientation (9, by rows) of
-            the terminal frame].
+            the terminal frame; outputs of devices].
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
     """
 
@@ -54,42 +55,46 @@ def minimal_state(system: System) -> MinimalState:
         ModelError: an independent velocity of a loop belongs to a quaternion joint, so that no
             position stands for it.
     """
-    positions = _active_positions(system)
+    positions = _free_positions(system)
     dependents = tuple(k for k in range(system.nq) if k not in positions)
-    driven = tuple(k for k in system.active if system.speeds[k].actuated)
-    t, u = SX.sym("t"), SX.sym("u", len(driven))
-    x, z = SX.sym("x", len(positions) + len(system.active)), SX.sym("z", len(dependents))
-    q, v_a = SX.zeros(system.nq), x[len(positions) :]
-    q[list(positions)], q[list(dependents)] = x[: len(positions)], z
-    tau = SX.zeros(len(system.active))
+    by_devices = [device.velocity for device in system.devices]
+    motors = [k for k in system.active if system.speeds[k].actuated]
+    driven = tuple(k for k in motors if k not in by_devices)
+    t, u = SX.sym("t"), SX.sym("u", len(driven) + len(by_devices))
+    nq, n = len(positions), len(positions) + len(system.active)
+    x, z = SX.sym("x", n + state_count(system)), SX.sym("z", len(dependents))
+    q, v, v_a = SX.zeros(system.nq), SX.zeros(system.nv), x[nq:n]
+    q[list(positions)], q[list(dependents)], v[list(system.active)] = x[:nq], z, v_a
+    efforts, rates, shown = device_equations(system, v, x[n:], u[len(driven) :])
     for column, k in enumerate(driven):
-        tau[system.active.index(k)] = u[column]
+        efforts[k] = u[column]
+    tau = efforts[list(system.active)]
     unit = q if system.is_closed else normalised(system.tree, q)
     (a,) = outputs_of(system, direct_dynamics(system), unit, v_a, tau)
-    rate = v_a if system.is_closed else _steadied_rate(system, q, v_a)
     rest = _dependent_motion(system, q, v_a, a) if system.is_closed else []
-    outputs = [casadi.vertcat(rate, a), casadi.vertcat(a, z, *rest, _terminal_pose(system, unit))]
+    rate = _free_rate(system, v_a, rest[0]) if rest else _steadied_rate(system, q, v_a)
+    y = casadi.vertcat(a, z, *rest, _terminal_pose(system, unit), shown)
     return MinimalState(
         positions=positions,
         dependents=dependents,
         inputs=driven,
-        rhs=dense_function("rhs", [t, x, z, u, system.p], outputs),
+        rhs=dense_function("rhs", [t, x, z, u, system.p], [casadi.vertcat(rate, a, rates), y]),
         closure=_closure_step(system, q, x, z) if dependents else None,
     )
 
 
-def _active_positions(system: System) -> tuple[int, ...]:
+def _free_positions(system: System) -> tuple[int, ...]:
     if not system.is_closed:
         return tuple(range(system.nq))
     names = [coordinate.name for coordinate in system.coordinates]
-    missing = [system.speeds[k].name for k in system.active if system.speeds[k].name not in names]
+    missing = [system.speeds[k].name for k in system.free if system.speeds[k].name not in names]
     if missing:
         raise ModelError(
             f"{system.name}: {', '.join(missing)} of a quaternion joint would be independent, which"
             " has no position of its own; replace a ball joint of a rod that can spin by a"
             " Universal, or actuate other joints of the loop"
         )
-    return tuple(names.index(system.speeds[k].name) for k in system.active)
+    return tuple(names.index(system.speeds[k].name) for k in system.free)
 
 
 def _steadied_rate(system: System, q: SX, v: SX) -> SX:
@@ -99,6 +104,14 @@ def _steadied_rate(system: System, q: SX, v: SX) -> SX:
     for part in quaternion_slices(system.tree):
         rate[part] = raw[part] + _NORM_RATE * (1 - casadi.sumsqr(q[part])) * q[part]
     return rate
+
+
+def _free_rate(system: System, v_a: SX, v_passive: SX) -> SX:
+    """The rate of the free positions, in a system of joints whose positions match velocities."""
+    v = SX.zeros(system.nv)
+    assert system.closure is not None
+    v[list(system.closure.active)], v[list(system.closure.passive)] = v_a, v_passive
+    return v[list(system.free)]
 
 
 def _dependent_motion(system: System, q: SX, v_a: SX, a_a: SX) -> list[SX]:
@@ -123,9 +136,9 @@ def _terminal_pose(system: System, q: SX) -> SX:
 
 def _closure_step(system: System, q: SX, x: SX, z: SX) -> Function:
     symbols = SX.sym("q", system.nq)
-    norms = [casadi.sumsqr(symbols[part]) - 1 for part in quaternion_slices(system.tree)]
-    kept = casadi.vertcat(independent_closure(system, symbols), *norms)
-    every = casadi.vertcat(closure_rows(system, symbols), *norms)
+    norms = norm_rows(system.tree, symbols)
+    kept = casadi.vertcat(independent_closure(system, symbols), norms)
+    every = casadi.vertcat(closure_rows(system, symbols), norms)
     kept, every = casadi.substitute([kept, every], [symbols], [q])
     z_next = z - solve_square(casadi.jacobian(kept, z), kept)
     cosines = casadi.substitute(facing(system, symbols), symbols, q)
@@ -137,7 +150,8 @@ def _closure_step(system: System, q: SX, x: SX, z: SX) -> Function:
 def consistent_start(system: System, state: MinimalState) -> tuple[list[float], list[float]]:
     """State x and dependents z of the assembled posture at rest."""
     posture = np.array(system.posture)
-    x = [*posture[list(state.positions)], *([0.0] * len(system.active))]
+    rest = [0.0] * (len(system.active) + state_count(system))
+    x = [*posture[list(state.positions)], *rest]
     return [float(value) for value in x], [
         float(value) for value in posture[list(state.dependents)]
     ]

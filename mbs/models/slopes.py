@@ -13,21 +13,17 @@ from casadi import SX
 
 from mbs.assembly import System
 from mbs.assembly.rates import position_rate
+from mbs.models.composition import outputs_of
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.surroundings import surroundings
-from mbs.models.symbols import ModelSymbols
+from mbs.models.symbols import ModelSymbols, solution_order
 from mbs.recursions.accelerations import resting_base
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.joint_efforts import joint_efforts
 from mbs.recursions.newton_euler_derivatives import newton_euler_derivatives
-from mbs.recursions.tree_factorization import (
-    TreeFactor,
-    factorized,
-    substituted,
-    velocity_antecedents,
-)
+from mbs.recursions.tree_factorization import TreeFactor, factorized, substituted
 
 Blocks = dict[str, SX]
 """Derivatives by the name of the input that they are taken with respect to."""
@@ -86,13 +82,6 @@ def implicit_formula(
     return factor, a, dict(zip(names, map(casadi.densify, minus), strict=True))
 
 
-def solution_order(system: System, s: ModelSymbols) -> list[int]:
-    """For each velocity that is input, the one before it in A; see `factorized`."""
-    if s.reduction is None:
-        return velocity_antecedents(system.tree)
-    return list(range(-1, s.size - 1))
-
-
 def accelerations_by_efforts(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
@@ -111,8 +100,7 @@ def accelerations_by_ad(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
     """The same by differentiating the direct model."""
-    arguments = [s.q, s.v, tau, *([system.p] if system.parameters else [])]
-    a = SX(direct_dynamics(system).call(arguments)[0])
+    a = outputs_of(system, direct_dynamics(system), s.q, s.v, tau)[0]
     blocks = {
         "q": _along_motion(system, s, a),
         "v": casadi.jacobian(a, s.v),

@@ -9,11 +9,12 @@ from typing import Any
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.model_function import Named, PostureCheck, model_function, require_system
 from mbs.errors import ModelError
+from mbs.loops.examine import require_led
 from mbs.loops.reduction import reduction
 from mbs.messages import did_you_mean, quoted
-from mbs.models.symbols import check_coordinates
+from mbs.models.symbols import check_coordinates, is_reduced
 from mbs.recursions.jacobian import Target
 from mbs.recursions.square_jacobian import SquareJacobian, square_jacobian
 
@@ -39,6 +40,11 @@ class Selection:
     columns: tuple[int, ...]
     reduced: bool
     names: tuple[str, ...]
+
+    @property
+    def check(self) -> PostureCheck | None:
+        """What refuses the postures that functions of the matrix cannot take."""
+        return require_led if self.reduced else None
 
     def of(self, system: System) -> tuple[SX, SquareJacobian]:
         """Symbols q, (nq, 1), and the matrix at them in blocks; formed once."""
@@ -76,7 +82,7 @@ class Selection:
             q, square = self.of(system)
             return [("q", q)], [("det", square.determinant())]
 
-        return model_function(system, ("determinant", self), build)
+        return model_function(system, ("determinant", self), build, self.check)
 
 
 def selection(
@@ -97,7 +103,7 @@ def selection(
     check_coordinates(system, coordinates)
     link, _ = system.frame(frame)
     system.frame(expressed_in)
-    reduced = system.is_closed and coordinates == "independent"
+    reduced = is_reduced(system, coordinates)
     speeds = system.active if reduced else range(system.nv)
     names = [system.speeds[k].name for k in speeds]
     if columns is None:

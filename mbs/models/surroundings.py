@@ -11,9 +11,8 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named
 from mbs.recursions.accelerations import Acceleration, moving_base, resting_base
 from mbs.recursions.force_elements import element_wrenches
-from mbs.recursions.newton_euler import Wrench, add_wrenches
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import cross
+from mbs.spatial import Wrench, add_wrenches, cross
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +46,7 @@ def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Su
     base, external = resting_base(gravity), dict[int, Wrench]()
     if f_ext:
         wrenches = SX.sym("f_ext", 6, len(system.bodies))
-        external = _on_links(system, wrenches)
+        external = wrenches_on_links(system, wrenches)
         inputs.append(("f_ext", wrenches))
     if moves:
         v_0, a_0, R_0 = SX.sym("v_0", 6), SX.sym("a_0", 6), SX.sym("R_0", 3, 3)
@@ -79,7 +78,7 @@ def _add(wrenches: dict[int, Wrench], link: int, wrench: Wrench) -> None:
     wrenches[link] = wrench if before is None else add_wrenches(before, wrench)
 
 
-def _on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
+def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
     """The wrenches of bodies, (6, bodies) in their frames, brought to the frames of their links."""
     result: dict[int, Wrench] = {}
     for column, row in enumerate(system.bodies):

@@ -8,9 +8,12 @@ import casadi
 from casadi import SX
 
 from mbs.assembly import System
+from mbs.assembly.model_function import PostureCheck, require_system
 from mbs.errors import ModelError
+from mbs.loops.examine import require_led
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.poses import LinkPose, link_poses
+from mbs.recursions.tree_factorization import velocity_antecedents
 
 COORDINATES = ("independent", "tree")
 
@@ -64,6 +67,15 @@ class ModelSymbols:
         return label, SX.sym(label, self.size)
 
 
+def posture_check(system: System, coordinates: str) -> PostureCheck | None:
+    """What refuses the postures that a model in these coordinates cannot take.
+
+    Those of a reduced model close the loops, and its independent joints lead the others there.
+    """
+    require_system(system)
+    return require_led if is_reduced(system, coordinates) else None
+
+
 def check_coordinates(system: System, coordinates: str) -> None:
     """Refuse a word that names no coordinates.
 
@@ -74,6 +86,11 @@ def check_coordinates(system: System, coordinates: str) -> None:
         raise ModelError(
             f"{system.name}: coordinates is {coordinates!r}; use 'independent' or 'tree'"
         )
+
+
+def is_reduced(system: System, coordinates: str) -> bool:
+    """Whether these are the coordinates of the independent joints of a closed system."""
+    return system.is_closed and coordinates == "independent"
 
 
 def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols:
@@ -89,9 +106,16 @@ def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols
     check_coordinates(system, coordinates)
     q = SX.sym("q", system.nq)
     poses = link_poses(system.tree, q)
-    if not system.is_closed or coordinates == "tree":
+    if not is_reduced(system, coordinates):
         v = SX.sym("v", system.nv)
         return ModelSymbols(q, v, v, "", None, poses)
     v = SX.sym("v_a", len(system.active))
     reduced = reduction(system, q, v)
     return ModelSymbols(q, v, casadi.mtimes(reduced.G, v), "_a", reduced, poses)
+
+
+def solution_order(system: System, s: ModelSymbols) -> list[int]:
+    """For each velocity that is input, the one before it in A; see `factorized`."""
+    if s.reduction is None:
+        return velocity_antecedents(system.tree)
+    return list(range(-1, s.size - 1))

@@ -96,6 +96,11 @@ def count(function: Function, parameters: Iterable[str] = ("p",)) -> Count:
     return count_graph(graph_of(function), parameters)
 
 
+def cheapest(*models: Function) -> Function:
+    """Of Functions that compute the same, the one with the lowest `price`; the first of equals."""
+    return models[0] if len(models) == 1 else min(models, key=lambda model: count(model).price)
+
+
 def count_graph(graph: Graph, parameters: Iterable[str] = ("p",)) -> Count:
     """The operations of a graph; see `count`."""
     alive, fixed = graph.live(), graph.fixed_by(parameters)

@@ -18,12 +18,22 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
 from mbs.recursions.accelerations import Acceleration, link_accelerations
 from mbs.recursions.articulated_inertia import ArticulatedInertia, Drive, Pivot
-from mbs.recursions.newton_euler import Wrench, inertial_wrench
+from mbs.recursions.newton_euler import inertial_wrench
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
 from mbs.recursions.rotors import rotor_efforts, rotor_moments
 from mbs.recursions.sliding import slid
-from mbs.spatial import Displacement, Inertia, PseudoInertia, cross, is_zero, zeros
+from mbs.spatial import (
+    Displacement,
+    Inertia,
+    PseudoInertia,
+    Wrench,
+    body_through,
+    cross,
+    is_zero,
+    wrench_through,
+    zeros,
+)
 
 _DIRECTIONS = {
     Motion.REVOLUTE: (5,),
@@ -85,24 +95,22 @@ def articulated_accelerations(
         base: motion of the base; see `resting_base`.
         external: for some links the wrench that they exert on their environment.
     """
-    moved, inertias = poses, [link.inertia for link in tree.links]
-    bodies = [PseudoInertia.of(inertia) for inertia in inertias]
+    inertias = [link.inertia for link in tree.links]
     if not external:
-        rests = is_zero(base.w)
-        moved, inertias = slid(tree, poses, inertias, base_rests=rests)
-        _, bodies = slid(tree, poses, bodies, base_rests=rests)
+        poses, inertias = slid(tree, poses, inertias, base_rests=is_zero(base.w))
+    bodies = [PseudoInertia.of(inertia) for inertia in inertias]
     still = SX.zeros(tree.nv)
-    motions = link_accelerations(tree, moved, v, still, base)
+    motions = link_accelerations(tree, poses, v, still, base)
     wrenches = [
         casadi.vertcat(*inertial_wrench(body, motion))
-        for body, motion in zip(regrouped(tree, moved, bodies), motions, strict=True)
+        for body, motion in zip(regrouped(tree, poses, bodies), motions, strict=True)
     ]
     for j, wrench in external.items():
         wrenches[j] += casadi.vertcat(*wrench)
     for carrier, moment in rotor_moments(tree, v, still, motions).items():
         wrenches[carrier] += casadi.vertcat(zeros(), moment)
     left = efforts - rotor_efforts(tree, still, motions, base)
-    return _solution(tree, _eliminations(tree, moved, inertias), wrenches, left)
+    return _solution(tree, _eliminations(tree, poses, inertias), wrenches, left)
 
 
 def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
@@ -121,9 +129,7 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
         for number, direction in zip(_numbers(link), _DIRECTIONS[link.motion], strict=True):
             locked[number] = Pivot.of(whole, direction, drive).size
         if link.antecedent >= 0:
-            for step in reversed(poses[j].steps):
-                body = step.body(body)
-            rigid[link.antecedent] += body
+            rigid[link.antecedent] += body_through(poses[j].steps, body)
     return free, locked
 
 
@@ -155,9 +161,7 @@ def _eliminations(
             body = body.without(pivots[-1])
         result.append(Elimination(inner, outer, tuple(pivots)))
         if link.antecedent >= 0:
-            for step in reversed(outer):
-                body = body.before(step)
-            articulated[link.antecedent] += body
+            articulated[link.antecedent] += body_through(outer, body)
     return result[::-1]
 
 
@@ -193,10 +197,7 @@ def _solution(tree: Tree, joints: list[Elimination], wrenches: Sequence[SX], eff
 
 
 def _moved_wrench(steps: Sequence[Displacement], wrench: SX) -> SX:
-    f, m = wrench[:3], wrench[3:]
-    for step in reversed(steps):
-        f, m = step.wrench(f, m)
-    return casadi.vertcat(f, m)
+    return casadi.vertcat(*wrench_through(steps, wrench[:3], wrench[3:]))
 
 
 def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:

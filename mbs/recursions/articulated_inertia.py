@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.spatial import Displacement, Inertia, Rotation, Screw, skew, zeros
+from mbs.spatial import Inertia, Rotation, skew, zeros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,16 +62,6 @@ class ArticulatedInertia:
         J[h, axis] += t * old[k, axis]
         J[h, k], J[axis, k], J[axis, h] = J[k, h], J[k, axis], J[h, axis]
         return ArticulatedInertia(M, H, J)
-
-    def before(self, step: Displacement) -> ArticulatedInertia:
-        """The body, given about and in the frame behind a displacement, seen from before it."""
-        body = self.turned(step.turn)
-        if isinstance(step, Screw):
-            return body.slid(step.axis, step.t)
-        p = step.point(zeros())
-        for axis in range(3):
-            body = body.slid(axis, p[axis])
-        return body
 
     def column(self, direction: int) -> SX:
         """(6, 1) wrench for a unit acceleration along one direction of a twist."""

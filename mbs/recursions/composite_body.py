@@ -5,7 +5,6 @@ Source: Walker & Orin 1982; Khalil, Bennis & Gautier 1990; Khalil & Creusot 1997
 
 from __future__ import annotations
 
-import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
@@ -15,7 +14,7 @@ from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
 from mbs.recursions.rotors import momentum_on
 from mbs.recursions.sliding import slid
-from mbs.spatial import Displacement, Inertia, cross, zeros
+from mbs.spatial import Wrench, body_through, wrench_through, zeros
 
 
 def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
@@ -35,11 +34,11 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
         else:
             steps = pose.steps
         for column, (linear, angular) in enumerate(unit_motions(link.motion)):
-            f, m = _momentum(body, linear, angular)
+            f, m = body.momentum(linear, angular)
             spin = _at_seat(pose, link.motion, momentum_on(link, j))
             m = m + spin
             A[link.v, link.v.start + column] = effort(link.motion, f, m)
-            f_i, m_i = _through(steps, f, m)
+            f_i, m_i = wrench_through(steps, f, m)
             m_i = m_i + momentum_on(link, link.antecedent)
             _fill_ancestors(A, tree, poses, j, column, (f_i, m_i))
         for k in range(link.v.start, link.v.stop):
@@ -47,9 +46,7 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
         if link.rotor is not None:
             A[link.v, link.v] += link.rotor.seen_at_joint + effort(link.motion, zeros(), spin)
         if link.antecedent >= 0:
-            for step in reversed(steps):
-                body = step.body(body)
-            composite[link.antecedent] += body
+            composite[link.antecedent] += body_through(steps, body)
     return A
 
 
@@ -58,14 +55,8 @@ def _at_seat(pose: LinkPose, motion: Motion, vector: SX) -> SX:
     return pose.motion[0].turn.apply(vector) if motion.nv == 1 else vector
 
 
-def _through(steps: tuple[Displacement, ...], f: SX, m: SX) -> tuple[SX, SX]:
-    for step in reversed(steps):
-        f, m = step.wrench(f, m)
-    return f, m
-
-
 def _fill_ancestors(
-    A: SX, tree: Tree, poses: list[LinkPose], j: int, column: int, wrench: tuple[SX, SX]
+    A: SX, tree: Tree, poses: list[LinkPose], j: int, column: int, wrench: Wrench
 ) -> None:
     """The efforts at the ancestors of link j of a wrench on its antecedent, in column and row."""
     k = tree.links[j].v.start + column
@@ -77,11 +68,3 @@ def _fill_ancestors(
         A[k, link.v] = entries.T
         wrench = poses[i].wrench(*wrench)
         i = link.antecedent
-
-
-def _momentum(body: Inertia, linear: SX, angular: SX) -> tuple[SX, SX]:
-    """Linear and angular momentum about the origin, of a velocity in the same frame."""
-    return (
-        body.m * linear + cross(angular, body.ms),
-        casadi.mtimes(body.J, angular) + cross(body.ms, linear),
-    )

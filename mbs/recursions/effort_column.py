@@ -13,9 +13,8 @@ from casadi import SX
 from mbs.assembly.tree import CarriedRotor
 from mbs.recursions.joint_axes import Drift, JointAxes, Step
 from mbs.recursions.joint_lines import Line
-from mbs.recursions.newton_euler import Wrench, add_wrenches
 from mbs.recursions.subtree_motion import SubtreeMotion
-from mbs.spatial import Rotation, cross
+from mbs.spatial import Rotation, Wrench, add_wrenches, cross
 
 
 @dataclass(frozen=True, slots=True, eq=False)

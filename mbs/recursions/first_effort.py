@@ -13,9 +13,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.motion import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Rotation, cross, vector
-
-Wrench = tuple[SX, SX]
+from mbs.spatial import Rotation, Wrench, cross, vector
 
 
 def runs_behind(tree: Tree, poses: list[LinkPose]) -> dict[int, list[int]]:

@@ -5,28 +5,31 @@ Source: Khalil & Creusot 1997, eq. 15-20, for how wrenches on links become joint
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import casadi
 from casadi import SX
 
-from mbs.assembly.tables import AttachedForce
+from mbs.assembly.attached import AttachedForce
 from mbs.assembly.tree import Tree
-from mbs.components.forces import JointForce, PairForce, RelativeMotion
+from mbs.components.forces import CoordinateForce, PairForce, RelativeMotion
 from mbs.components.forces_source import Source
+from mbs.recursions.frame_motion import BASE, Frame, relative_motion
 from mbs.recursions.motion import effort
-from mbs.recursions.newton_euler import Wrench
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.route import relative_pose
+from mbs.recursions.transmitted import transmitted
 from mbs.recursions.velocities import Velocity, link_velocities
-from mbs.spatial import Pose, cross, zeros
-
-_BASE = (-1, Pose.identity())
-_Frame = tuple[int, Pose]
+from mbs.spatial import Wrench, cross, zeros
 
 
 def element_wrenches(
-    tree: Tree, forces: Sequence[AttachedForce], poses: list[LinkPose], q: SX, v: SX
+    tree: Tree,
+    forces: Sequence[AttachedForce],
+    poses: list[LinkPose],
+    q: SX,
+    v: SX,
+    held: Container[tuple[str, str]] | None = None,
 ) -> dict[int, Wrench]:
     """For some links, the wrench that they exert on force elements, about and in their frames.
 
@@ -36,6 +39,8 @@ def element_wrenches(
         poses: each with respect to its antecedent.
         q: (nq, 1) positions.
         v: (nv, 1) velocities.
+        held: points, by component and port, whose wrenches alone count, those on the base (-1)
+            too; without it all on moving links.
     """
     on_points = [force for force in forces if force.frames]
     if not on_points:
@@ -43,8 +48,9 @@ def element_wrenches(
     moving = link_velocities(tree, poses, v)
     result: dict[int, Wrench] = {}
     for force in on_points:
-        for (link, pose), (f, m) in _on_frames(tree, force, q, moving):
-            if link >= 0:
+        acting = zip(force.element.points, _on_frames(tree, force, q, moving), strict=True)
+        for point, ((link, pose), (f, m)) in acting:
+            if link >= 0 if held is None else (point.owner.name, point.port) in held:
                 turned = casadi.mtimes(pose.R, f)
                 moment = casadi.mtimes(pose.R, m) + cross(pose.p, turned)
                 before = result.get(link, (zeros(), zeros()))
@@ -53,13 +59,14 @@ def element_wrenches(
 
 
 def coordinate_efforts(tree: Tree, forces: Sequence[AttachedForce], q: SX, v: SX) -> SX:
-    """(nv, 1) what joints need of effort to overcome stops and friction [N m or N]."""
+    """(nv, 1) what joints need of effort to overcome stops, friction, elastic shafts."""
     total = SX.zeros(tree.nv)
     for force in forces:
-        if isinstance(force.element, JointForce):
-            assert force.velocity is not None
-            own = force.element.effort(_position(force, q), v[force.velocity], force.symbols)
-            total[force.velocity] += own
+        if isinstance(force.element, CoordinateForce):
+            rate = sum((lever.factor * v[lever.velocity] for lever in force.levers), SX(0))
+            own = force.element.effort(_position(force, q), rate, force.symbols)
+            for lever in force.levers:
+                total[lever.velocity] += lever.factor * own
     return total
 
 
@@ -78,7 +85,7 @@ def element_energy(tree: Tree, forces: Sequence[AttachedForce], q: SX) -> SX:
     """Energy stored in force elements [J]; dampers, friction and sources store nothing."""
     total = SX(0)
     for force in forces:
-        if isinstance(force.element, JointForce):
+        if isinstance(force.element, CoordinateForce):
             total += force.element.energy(_position(force, q), force.symbols)
         elif isinstance(force.element, PairForce):
             T = relative_pose(tree, q, *force.frames)
@@ -88,51 +95,33 @@ def element_energy(tree: Tree, forces: Sequence[AttachedForce], q: SX) -> SX:
 
 
 def _position(force: AttachedForce, q: SX) -> SX | None:
-    return None if force.position is None else q[force.position]
+    """What an element on coordinates acts on, None where one of them is no position."""
+    total = SX(0)
+    for lever in force.levers:
+        if lever.position is None:
+            return None
+        total += lever.factor * q[lever.position]
+    return total
 
 
 def _on_frames(
     tree: Tree, force: AttachedForce, q: SX, moving: list[Velocity]
-) -> list[tuple[_Frame, Wrench]]:
+) -> list[tuple[Frame, Wrench]]:
     """What an element does to each of its frames: force and moment about it, in its axes."""
     if isinstance(force.element, Source):
         (frame,) = force.frames
-        R = relative_pose(tree, q, _BASE, frame).R
+        R = relative_pose(tree, q, BASE, frame).R
         return [(frame, force.element.wrench(R, force.symbols))]
     assert isinstance(force.element, PairForce)
     a, b = force.frames
-    motion = _relative_motion(tree, a, b, q, moving)
+    motion = relative_motion(tree, a, b, q, moving)
     pull = force.element.pull(motion, force.symbols)
     opposite = casadi.mtimes(motion.R.T, -pull.force), casadi.mtimes(motion.R.T, pull.moment_b)
     return [(a, (pull.force, pull.moment_a)), (b, opposite)]
 
 
-def _relative_motion(
-    tree: Tree, a: _Frame, b: _Frame, q: SX, moving: list[Velocity]
-) -> RelativeMotion:
-    T = relative_pose(tree, q, a, b)
-    V_a, w_a = _velocity(a, moving)
-    V_b, w_b = _velocity(b, moving)
-    V = casadi.mtimes(T.R, V_b) - V_a - cross(w_a, T.p)
-    return RelativeMotion(T.p, T.R, V, casadi.mtimes(T.R, w_b) - w_a)
-
-
-def _velocity(frame: _Frame, moving: list[Velocity]) -> tuple[SX, SX]:
-    """Linear and angular velocity of a frame, in its axes."""
-    link, pose = frame
-    if link < 0:
-        return zeros(), zeros()
-    V, w = moving[link].V, moving[link].w
-    return casadi.mtimes(pose.R.T, V + cross(w, pose.p)), casadi.mtimes(pose.R.T, w)
-
-
 def _transmitted(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:
     """(nv, 1) efforts along the motions that transmit wrenches of links to the base."""
-    carried = [wrenches.get(j, (zeros(), zeros())) for j in range(len(tree.links))]
-    for j in reversed(range(len(tree.links))):
-        i = tree.links[j].antecedent
-        if i >= 0:
-            f, m = poses[j].wrench(*carried[j])
-            carried[i] = carried[i][0] + f, carried[i][1] + m
+    carried = transmitted(tree, poses, wrenches)
     efforts = (effort(link.motion, f, m) for link, (f, m) in zip(tree.links, carried, strict=True))
     return casadi.vertcat(*efforts)

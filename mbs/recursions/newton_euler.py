@@ -19,10 +19,7 @@ from mbs.recursions.regrouping import regrouped
 from mbs.recursions.rotation_rate import moment_of_rotation
 from mbs.recursions.rotors import rotor_efforts, rotor_moments
 from mbs.recursions.sliding import slid
-from mbs.spatial import PseudoInertia, cross, is_zero
-
-Wrench = tuple[SX, SX]
-"""Force (3, 1) and moment (3, 1) about the origin of a frame, in that frame [N, N m]."""
+from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,11 +86,6 @@ def newton_euler(
         efforts[i] = loads[i][1][2] + moment_of_run(tree, poses, members, loads, along)
     spin = rotor_efforts(tree, a, motions, base)
     return Dynamics(motions, own, wrenches, casadi.vertcat(*efforts) + spin)
-
-
-def add_wrenches(a: Wrench, b: Wrench) -> Wrench:
-    """The sum of two wrenches about one point."""
-    return a[0] + b[0], a[1] + b[1]
 
 
 def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:

@@ -19,8 +19,11 @@ from mbs.spatial import (
     Pose,
     Rotation,
     Screw,
+    Wrench,
     axis_turn,
+    origin,
     quaternion_rotation,
+    wrench_through,
     zeros,
 )
 
@@ -51,17 +54,17 @@ class LinkPose:
     @property
     def foot(self) -> SX:
         """(3, 1) origin of the seat in frame i [m]."""
-        return _origin(self.seat)
+        return origin(self.seat)
 
     @property
     def p(self) -> SX:
         """(3, 1) origin of frame j in frame i [m]."""
-        return _origin(self.steps)
+        return origin(self.steps)
 
     @property
     def height(self) -> SX:
         """Distance of the frame from its seat, along the axis of the joint [m]."""
-        return _origin(self.motion)[2]
+        return origin(self.motion)[2]
 
     @property
     def matrix(self) -> SX:
@@ -89,11 +92,9 @@ class LinkPose:
             vector = step.turn.apply_inverse(vector)
         return vector
 
-    def wrench(self, f: SX, m: SX) -> tuple[SX, SX]:
+    def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of j, in j, about the origin of i and in its axes."""
-        for step in reversed(self.steps):
-            f, m = step.wrench(f, m)
-        return f, m
+        return wrench_through(self.steps, f, m)
 
     def after(self, pose: Pose) -> Pose:
         """Frame j seen from the frame in which frame i has this pose."""
@@ -101,13 +102,6 @@ class LinkPose:
         for step in self.steps:
             rows = casadi.horzcat(*(step.turn.apply_inverse(rows[:, k]) for k in range(3)))
         return Pose(rows.T, pose.p + casadi.mtimes(pose.R, self.p))
-
-
-def _origin(steps: tuple[Displacement, ...]) -> SX:
-    p = zeros()
-    for step in reversed(steps):
-        p = step.point(p)
-    return p
 
 
 def link_poses(tree: Tree, q: SX) -> list[LinkPose]:

@@ -15,7 +15,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.motion import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Body, Inertia, Screw, elements, exact_sum
+from mbs.spatial import Body, Inertia, Screw, body_through, elements, exact_sum
 
 
 def regrouped(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]:
@@ -57,9 +57,7 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
     screw = pose.motion[0]
     if isinstance(screw, Screw):
         body = body.slid(2, screw.t)
-    for step in reversed(pose.seat):
-        body = step.body(body)
-    return body
+    return body_through(pose.seat, body)
 
 
 def _joined(body: Body, part: Body) -> Body:

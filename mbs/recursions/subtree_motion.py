@@ -15,8 +15,8 @@ from mbs.assembly.tree import Tree
 from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.joint_axes import Drift, JointAxes, Step
 from mbs.recursions.joint_lines import Twist
-from mbs.recursions.newton_euler import Wrench, inertial_wrench
-from mbs.spatial import Displacement, Inertia, PseudoInertia, Rotation, cross, skew, zeros
+from mbs.recursions.newton_euler import inertial_wrench
+from mbs.spatial import Inertia, PseudoInertia, Rotation, Wrench, cross, skew, zeros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,14 +56,10 @@ class SubtreeMotion:
             moment: (3, 1) moment that their spin takes.
         """
         twice = 2 * motion.w
-        S = pseudo.S
-        J = casadi.densify(-S)
-        for k in range(3):
-            J[k, k] = S[(k + 1) % 3, (k + 1) % 3] + S[(k + 2) % 3, (k + 2) % 3]
         f, m = inertial_wrench(pseudo, motion)
         return SubtreeMotion(
-            Inertia(J, pseudo.ms, pseudo.m),
-            -casadi.mtimes(skew(twice), S) - skew(spin),
+            pseudo.inertia(),
+            -casadi.mtimes(skew(twice), pseudo.S) - skew(spin),
             cross(twice, pseudo.ms),
             f,
             m + moment,
@@ -111,13 +107,11 @@ class SubtreeMotion:
         """Seen from the other end of a step."""
         if isinstance(step, Drift):
             return self.drifting(step.twice)
-        return _displaced(self, step)
+        return step.body(self)
 
     def wrench_of(self, twist: Twist) -> Wrench:
         """Momentum for a velocity; force and moment for an acceleration."""
-        t, s, body = twist.linear, twist.angular, self.body
-        f = body.m * t + cross(s, body.ms)
-        return f, casadi.mtimes(body.J, s) + cross(body.ms, t)
+        return self.body.momentum(twist.linear, twist.angular)
 
     def wrench_of_spin(self, s: SX) -> Wrench:
         """What an angular velocity added to all of them adds to the wrench."""
@@ -131,13 +125,6 @@ class SubtreeMotion:
     def spin_of(self, unit: Twist) -> SX:
         """(3, 1) times an angular velocity: the effort that it adds along a unit motion."""
         return casadi.mtimes(self.K.T, unit.angular) + cross(self.n, unit.linear)
-
-
-def _displaced(motion: SubtreeMotion, step: Displacement) -> SubtreeMotion:
-    moved, p = motion.turned(step.turn), step.point(zeros())
-    for axis in range(3):
-        moved = moved.slid(axis, p[axis])
-    return moved
 
 
 def subtree_motions(

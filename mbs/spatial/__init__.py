@@ -8,11 +8,20 @@ from mbs.spatial.angles import sin_cos
 from mbs.spatial.inertia import Inertia
 from mbs.spatial.khalil import Khalil
 from mbs.spatial.pose import Pose
-from mbs.spatial.pseudo_inertia import PseudoInertia
+from mbs.spatial.pseudo_inertia import Body, PseudoInertia
 from mbs.spatial.quaternion import quaternion_rate, quaternion_rotation
 from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, align_z, axis_turn
-from mbs.spatial.screw import Body, Displacement, FreeDisplacement, Screw
+from mbs.spatial.screw import (
+    Displacement,
+    FreeDisplacement,
+    Movable,
+    Screw,
+    body_through,
+    origin,
+    wrench_through,
+)
 from mbs.spatial.vectors import cross, elements, exact_sum, is_zero, skew, snapped, vector, zeros
+from mbs.spatial.wrench import Wrench, add_wrenches
 
 __all__ = [
     "Body",
@@ -21,22 +30,28 @@ __all__ = [
     "Inertia",
     "Khalil",
     "MatrixTurn",
+    "Movable",
     "Pose",
     "PseudoInertia",
     "Rotation",
     "Screw",
     "Turn",
+    "Wrench",
+    "add_wrenches",
     "align_z",
     "axis_turn",
+    "body_through",
     "cross",
     "elements",
     "exact_sum",
     "is_zero",
+    "origin",
     "quaternion_rate",
     "quaternion_rotation",
     "sin_cos",
     "skew",
     "snapped",
     "vector",
+    "wrench_through",
     "zeros",
 ]

@@ -8,7 +8,7 @@ import casadi
 from casadi import SX
 
 from mbs.spatial.rotation import Rotation
-from mbs.spatial.vectors import exact_sum, skew, zeros
+from mbs.spatial.vectors import cross, exact_sum, skew, zeros
 
 TEN_PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Names of the inertial parameters, in the order of Khalil & Kleinfinger 1986."""
@@ -59,6 +59,18 @@ class Inertia:
     def __add__(self, other: Inertia) -> Inertia:
         """Two bodies welded together, in one frame."""
         return Inertia(self.J + other.J, self.ms + other.ms, self.m + other.m)
+
+    def momentum(self, linear: SX, angular: SX) -> tuple[SX, SX]:
+        """(3, 1) each, linear and angular momentum about the origin, of a velocity of the body.
+
+        Args:
+            linear: (3, 1) of the origin, in the same frame.
+            angular: (3, 1) in the same frame.
+        """
+        return (
+            self.m * linear + cross(angular, self.ms),
+            casadi.mtimes(self.J, angular) + cross(self.ms, linear),
+        )
 
     def seen_from(self, R: Rotation, p: SX) -> Inertia:
         """The same body about the origin of frame i and in its axes.

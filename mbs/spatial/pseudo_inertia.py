@@ -9,6 +9,7 @@ Source: Balafoutis, Patel & Misra 1988 (Euler's tensor of a body).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import casadi
 from casadi import SX
@@ -41,6 +42,15 @@ class PseudoInertia:
             m, n = (k + 1) % 3, (k + 2) % 3
             S[k, k] = 0.5 * exact_sum(J[m, m] + J[n, n], -J[k, k])
         return PseudoInertia(S, inertia.ms, inertia.m)
+
+    def inertia(self) -> Inertia:
+        """With the inertia tensor: J = tr(S) - S."""
+        S = self.S
+        J = casadi.densify(-S)
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            J[k, k] = S[m, m] + S[n, n]
+        return Inertia(J, self.ms, self.m)
 
     def __add__(self, other: PseudoInertia) -> PseudoInertia:
         """Two bodies welded together, in one frame."""
@@ -78,3 +88,7 @@ class PseudoInertia:
     def massive(self) -> tuple[PseudoInertia, PseudoInertia]:
         """Two bodies that make this one: the first has no mass, the second M alone."""
         return PseudoInertia(self.S, self.ms, SX(0)), PseudoInertia(zeros(3, 3), zeros(), self.m)
+
+
+Body = TypeVar("Body", Inertia, PseudoInertia)
+"""A rigid body in either form of its ten parameters."""

@@ -6,18 +6,28 @@ inertia is moved through one for a handful of multiplications, where a pose woul
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol, Self, TypeVar
 
 from casadi import SX
 
-from mbs.spatial.inertia import Inertia
-from mbs.spatial.pseudo_inertia import PseudoInertia
 from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, axis_turn
-from mbs.spatial.vectors import cross, is_zero
+from mbs.spatial.vectors import cross, is_zero, zeros
+from mbs.spatial.wrench import Wrench
 
-Body = TypeVar("Body", Inertia, PseudoInertia)
-"""A rigid body in either form of its ten parameters."""
+
+class Movable(Protocol):
+    """What is given about and in a frame: an inertia, or what is moved like one."""
+
+    def turned(self, R: Rotation) -> Self:
+        """The same about the same point in the axes of frame i."""
+
+    def slid(self, axis: int, t: SX) -> Self:
+        """The same displaced by t [m] along a coordinate axis."""
+
+
+Thing = TypeVar("Thing", bound=Movable)
 
 
 class Displacement(Protocol):
@@ -30,11 +40,11 @@ class Displacement(Protocol):
     def point(self, r: SX) -> SX:
         """A point of frame j, (3, 1), in frame i [m]."""
 
-    def wrench(self, f: SX, m: SX) -> tuple[SX, SX]:
+    def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
 
-    def body(self, inertia: Body) -> Body:
-        """A body given about and in frame j, about and in frame i."""
+    def body(self, thing: Thing) -> Thing:
+        """What is given about and in frame j, such as an inertia, about and in frame i."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +75,7 @@ class Screw:
         moved[self.axis] += self.t
         return moved
 
-    def wrench(self, f: SX, m: SX) -> tuple[SX, SX]:
+    def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
         f, m = self.turn.apply(f), SX(self.turn.apply(m))
         if not self.t.is_zero():
@@ -74,9 +84,9 @@ class Screw:
             m[h] += self.t * f[k]
         return f, m
 
-    def body(self, inertia: Body) -> Body:
-        """A body given about and in frame j, about and in frame i."""
-        return inertia.turned(self.turn).slid(self.axis, self.t)
+    def body(self, thing: Thing) -> Thing:
+        """What is given about and in frame j, such as an inertia, about and in frame i."""
+        return thing.turned(self.turn).slid(self.axis, self.t)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,14 +105,36 @@ class FreeDisplacement:
         """A point of frame j, (3, 1), in frame i [m]."""
         return self.p + self.turn.apply(r)
 
-    def wrench(self, f: SX, m: SX) -> tuple[SX, SX]:
+    def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
         f, m = self.turn.apply(f), self.turn.apply(m)
         return f, m if is_zero(self.p) else m + cross(self.p, f)
 
-    def body(self, inertia: Body) -> Body:
-        """A body given about and in frame j, about and in frame i."""
-        moved = inertia.turned(self.turn)
+    def body(self, thing: Thing) -> Thing:
+        """What is given about and in frame j, such as an inertia, about and in frame i."""
+        moved = thing.turned(self.turn)
         for axis in range(3):
             moved = moved.slid(axis, self.p[axis])
         return moved
+
+
+def origin(steps: Sequence[Displacement]) -> SX:
+    """(3, 1) where the last frame of successive displacements stands in the first [m]."""
+    p = zeros()
+    for step in reversed(steps):
+        p = step.point(p)
+    return p
+
+
+def wrench_through(steps: Sequence[Displacement], f: SX, m: SX) -> Wrench:
+    """Force and moment in the last frame of successive displacements, about and in the first."""
+    for step in reversed(steps):
+        f, m = step.wrench(f, m)
+    return f, m
+
+
+def body_through(steps: Sequence[Displacement], thing: Thing) -> Thing:
+    """What is given about and in the last frame of successive displacements, in the first."""
+    for step in reversed(steps):
+        thing = step.body(thing)
+    return thing

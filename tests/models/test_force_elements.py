@@ -156,7 +156,7 @@ def damped(seed, system, q, v):
     for force in system.forces:
         law = force.element
         if isinstance(law, JointFriction):
-            u = v[force.velocity]
+            u = v[force.levers[0].velocity]
             total += u * (2 + np.exp(-((u / 0.1) ** 2))) * np.tanh(u / 0.1)
         elif isinstance(law, (Damper, Spring, Bushing)):
             p, V, w_rate = relative(system, force.frames, q, v)

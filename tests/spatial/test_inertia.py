@@ -67,6 +67,18 @@ def test_about_the_centre_of_mass():
     assert_is(made, masses, points)
 
 
+def test_momentum_of_a_moving_body():
+    rng = np.random.default_rng(12)
+    masses, points = cloud(rng)
+    V, w = rng.uniform(-1, 1, (2, 3))
+    linear, angular = inertia_of(masses, points).momentum(SX(DM(V)), SX(DM(w)))
+    each = masses[:, None] * (V + np.cross(w, points))
+    np.testing.assert_allclose(DM(linear).full().ravel(), each.sum(0), atol=1e-13)
+    np.testing.assert_allclose(
+        DM(angular).full().ravel(), np.cross(points, each).sum(0), atol=1e-13
+    )
+
+
 def test_symbolic_mass_and_centre():
     m, c = SX.sym("m"), SX.sym("c", 3)
     made = Inertia.about_com(m, c, SX(DM(np.diag([1.0, 2, 2.5]))))

@@ -46,6 +46,15 @@ def test_from_the_inertia_tensor(seed):
     np.testing.assert_allclose(written(PseudoInertia.of(inertia)), P, atol=1e-14)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_to_the_inertia_tensor(seed):
+    P = moments(*cloud(seed))
+    inertia = body_of(*cloud(seed)).inertia()
+    np.testing.assert_allclose(numeric(inertia.J), tensor(P), atol=1e-14)
+    np.testing.assert_allclose(numeric(inertia.ms), P[:3, 3], atol=1e-14)
+    assert float(inertia.m) == pytest.approx(P[3, 3])
+
+
 def test_a_flat_body_has_exact_zeros():
     made = PseudoInertia.of(Inertia(SX(DM(np.diag([0.1, 0.2, 0.3]))), SX.zeros(3), SX(1)))
     assert made.S[2, 2].is_zero()

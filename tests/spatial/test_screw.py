@@ -5,7 +5,16 @@ import pytest
 from casadi import DM, SX
 from support.random_trees import random_rotation
 
-from mbs.spatial import FreeDisplacement, Inertia, MatrixTurn, PseudoInertia, Screw
+from mbs.spatial import (
+    FreeDisplacement,
+    Inertia,
+    MatrixTurn,
+    PseudoInertia,
+    Screw,
+    body_through,
+    origin,
+    wrench_through,
+)
 
 ANGLES = (0.0, 0.7, np.pi / 2, -np.pi / 2, np.pi, -np.pi)
 
@@ -94,3 +103,22 @@ def test_bodies(rng):
         S = numeric(pseudo.S)
         got = spatial_inertia(np.trace(S) * np.eye(3) - S, numeric(pseudo.ms), float(pseudo.m))
         np.testing.assert_allclose(got, expected, atol=2e-14)
+
+
+def test_successive_displacements(rng):
+    every = list(displacements())
+    for chosen in ([], [3], [30, 2, -1], [-3, 17, 8, 25]):
+        steps = [every[k][0] for k in chosen]
+        R, p = np.eye(3), np.zeros(3)
+        for k in chosen:
+            R, p = R @ every[k][1], p + R @ every[k][2]
+        np.testing.assert_allclose(numeric(origin(steps)), p, atol=1e-15)
+        f, m = rng.standard_normal((2, 3))
+        X = force_transform(R, p)
+        moved = wrench_through(steps, sx(f), sx(m))
+        expected = X @ np.concatenate([f, m])
+        np.testing.assert_allclose(np.concatenate([*map(numeric, moved)]), expected, atol=4e-15)
+        J, ms = np.diag([1.0, 1.5, 2.0]), rng.standard_normal(3)
+        body = body_through(steps, Inertia(sx(J), sx(ms), SX(1.2)))
+        got = spatial_inertia(numeric(body.J), numeric(body.ms), float(body.m))
+        np.testing.assert_allclose(got, X @ spatial_inertia(J, ms, 1.2) @ X.T, atol=2e-14)

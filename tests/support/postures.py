@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from mbs.assembly.rates import quaternion_slices
+from mbs.loops.closed_form.places import independent_places
 from mbs.loops.closing import Closing, closure_parameters
 
 
 def searched(system, q_a, starts=150, seed=0, reach=3.5):
     """All postures with these independent positions that random starts lead to."""
     rng = np.random.default_rng(seed)
-    closing = Closing(system, closure_parameters(system), system.active)
+    places = independent_places(system)
+    closing = Closing(system, closure_parameters(system), tuple(places))
     found = []
     for _ in range(starts):
         q = rng.uniform(-reach, reach, system.nq)
-        q[list(system.active)] = q_a
+        q[places] = q_a
         closed = closing.nearest(q)
         if closed.is_closed and not any(same(system, closed.q, other) for other in found):
             found.append(closed.q)
@@ -22,13 +25,16 @@ def searched(system, q_a, starts=150, seed=0, reach=3.5):
 
 
 def same(system, q, other, tolerance=1e-5):
-    """Whether two postures agree, angles up to whole turns."""
+    """Whether two postures agree, angles up to whole turns, quaternions up to their sign."""
     gap = np.subtract(q, other)
     turns = [coordinate.unit == "rad" for coordinate in system.coordinates]
     gap[turns] = np.remainder(gap[turns] + np.pi, 2 * np.pi) - np.pi
+    for part in quaternion_slices(system.tree):
+        opposite = np.add(q[part], other[part])
+        gap[part] = min(gap[part], opposite, key=lambda x: np.abs(x).max())
     return np.abs(gap).max(initial=0.0) < tolerance
 
 
 def active(system, q=None):
     """The positions of the independent joints at a posture, the assembled one if none is given."""
-    return np.array(system.posture if q is None else q)[list(system.active)]
+    return np.array(system.posture if q is None else q)[independent_places(system)]

@@ -10,7 +10,8 @@ from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.loops.closing import Vector
 from mbs.loops.posture import require_closed, solve
-from mbs.loops.reduction import reduction_matrix
+from mbs.loops.velocity import closure_jacobian
+from mbs.solvers.rank import null_space
 
 Values = Mapping[str, float] | Sequence[float] | None
 
@@ -46,19 +47,19 @@ def start(
 def _tree_velocity(
     system: System, q: Vector, v0: Values, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """The smallest independent velocities that give the joints named in v0 theirs, and all others.
+    """The smallest velocities that keep the loops closed and give the joints named in v0 theirs.
 
     Raises:
         ModelError: no motion of the loops has these velocities.
     """
     p = [system.parameter_values(parameters)] if system.parameters else []
-    G = np.array(reduction_matrix(system)(q, *p))
+    J = np.array(closure_jacobian(system)(q, *p))
+    free = null_space(J)
     wanted = np.array(system.velocity(v0))
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
-    v_a = np.linalg.lstsq(G[rows], wanted[rows], rcond=None)[0]
-    v: Vector = G @ v_a
+    v: Vector = free @ np.linalg.lstsq(free[rows], wanted[rows], rcond=None)[0]
     if not np.allclose(v[rows], wanted[rows], rtol=1e-6, atol=1e-9):
         told = ", ".join(f"{names[k]} = {wanted[k]:g}" for k in rows)
         raise ModelError(

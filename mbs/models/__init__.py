@@ -9,6 +9,7 @@ from mbs.models.devices import devices
 from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
 from mbs.models.energy import energy
 from mbs.models.geometry import direct_geometry, transform
+from mbs.models.hybrid_dynamics import hybrid_dynamics
 from mbs.models.implicit_jacobian import with_implicit_jacobian
 from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
 from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, jacobian_determinant
@@ -31,6 +32,7 @@ __all__ = [
     "direct_geometry",
     "energy",
     "gravity_effort",
+    "hybrid_dynamics",
     "inertia_matrix",
     "inverse_dynamics",
     "inverse_dynamics_derivatives",

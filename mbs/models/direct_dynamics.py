@@ -10,8 +10,8 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.rates import normalised
 from mbs.errors import ModelError
-from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.messages import quoted
+from mbs.models.constrained_accelerations import constrained_accelerations
 from mbs.models.inverse_dynamics import own_efforts, tree_efforts
 from mbs.models.surroundings import Surroundings, exerted, surroundings
 from mbs.models.symbols import (
@@ -27,7 +27,6 @@ from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.poses import link_poses
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
 from mbs.solvers.rank import rank
-from mbs.solvers.saddle import solve_saddle
 
 _METHODS = ("auto", "articulated", "composite")
 _ARTICULATED = 260  # operations that articulated bodies take at most for one more velocity
@@ -148,7 +147,7 @@ def _model(
         around = surroundings(system, f_ext, moving_base)
         inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, tau), *around.inputs]
         if in_tree:
-            a, lam = _tree_accelerations(system, s, tau, around)
+            a, lam, _ = constrained_accelerations(system, s, tau, around)
             return inputs, [("a", a), ("lam", lam)]
         accelerations = _articulated if method == "articulated" else _composite
         return inputs, [("a" + s.suffix, accelerations(system, s, tau, around))]
@@ -171,25 +170,6 @@ def _composite(system: System, s: ModelSymbols, tau: SX, around: Surroundings) -
     A = tree_inertia(system.tree, s.poses)
     H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around))
     return solve_tree(s.reduced_matrix(A), tau - H, solution_order(system, s))
-
-
-def _tree_accelerations(
-    system: System, s: ModelSymbols, tau: SX, around: Surroundings
-) -> tuple[SX, SX]:
-    """Accelerations of the tree and efforts of the closure rows, massless links included."""
-    A = tree_inertia(system.tree, s.poses)
-    H = tree_efforts(system, s, SX.zeros(system.nv), around)
-    J = independent_constraint_rows(system, s.q)
-    psi = acceleration_bias(system, s.q, s.v, J)
-    return solve_saddle(A, J, tau - H, -psi, _penalty(system))
-
-
-def _penalty(system: System) -> float:
-    """A constant that makes c J'J as large as A at the assembled posture."""
-    if any(p.default is None for p in system.parameters):
-        return 1.0
-    A = np.array(inertia_matrix(system, "tree")(list(system.posture)))
-    return float(max(np.trace(A), 1e-6)) / system.nv
 
 
 def require_inertia(system: System) -> None:

@@ -16,6 +16,7 @@ from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.effort import Effort, effort_function
 from mbs.simulate.inputs import device_columns, device_states, input_function
+from mbs.simulate.motion import Motion, prescribed_motions, started
 from mbs.simulate.progress import progress
 from mbs.simulate.sensor_columns import sensor_columns
 from mbs.solvers import integrate
@@ -32,6 +33,7 @@ def run(
     q0: Values = None,
     v0: Values = None,
     tau: Effort = None,
+    motion: Motion = None,
     u: Effort = None,
     z0: Values = None,
     parameters: Mapping[str, float] | None = None,
@@ -55,13 +57,17 @@ def run(
             they may be of any joints, and the others follow.
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
             of CasADi operations that returns (nv, 1) efforts, or a casadi.Function of (t, q, v).
+        motion: laws of time for coordinates that drives move: by name such as "j1.q" a position,
+            "j1.v" a velocity, "j1.a" an acceleration, each a number or a function of t made of
+            CasADi operations. The column `j1.tau` then holds what the drive needs, too.
         u: inputs of the devices of drive lines, such as voltages: constants by the name of the
             device, or a function of (t, q, v) as for tau; zero when left out. What the devices
             deliver is added to tau.
         z0: states of devices at the start by name, such as `motor.i`, the others zero.
         parameters: values of symbols, the others at their defaults.
         step: time between the rows of the result [s]; it does not change the accuracy.
-        tolerance: relative and absolute tolerance of the error of one integration step.
+        tolerance: what the error of the motion should stay near [rad, m, rad/s or m/s]. A step
+            may err by a twentieth of it, and by a thousandth relative to large coordinates.
         method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit
             RODAS5P for stiff systems.
         quiet: no progress bar.
@@ -84,9 +90,12 @@ def run(
     tolerance = positive(tolerance, "tolerance", system.name)
     steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
     p = system.parameter_values(parameters)
-    state = full_state(system, effort_function(system, tau), input_function(system, u))
-    x0 = np.concatenate([*start(system, q0, v0, parameters), device_states(system, z0)])
+    motions = prescribed_motions(system, motion)
+    state = full_state(system, effort_function(system, tau), input_function(system, u), motions)
+    given = started(system, motions, q0, v0)
+    x0 = np.concatenate([*start(system, *given, parameters), device_states(system, z0)])
     times = np.linspace(0.0, duration, steps + 1)
+    rtol, atol = step_tolerances(tolerance)
     with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
         x = integrate(
             state.rhs,
@@ -95,11 +104,16 @@ def run(
             p=p,
             project=state.project,
             method=method,
-            rtol=tolerance,
-            atol=tolerance,
+            rtol=rtol,
+            atol=atol,
             progress=reached,
         )
     return _result(system, state, times, x, p)
+
+
+def step_tolerances(tolerance: float) -> tuple[float, float]:
+    """Relative and absolute tolerance of a step for that of a motion, kept above rounding."""
+    return max(1e-3 * tolerance, 1e-14), max(0.05 * tolerance, 1e-13)
 
 
 def _result(system: System, state: FullState, times: Array, x: Array, p: Sequence[float]) -> Result:

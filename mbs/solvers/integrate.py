@@ -41,7 +41,7 @@ def integrate(
         x0: (nx,) state at the first time; it is projected too.
         times: (m,) s, increasing; the first one is the initial time.
         p: (np,) parameters; none by default.
-        project: `project(x, p) -> (x, residual)`, one Newton step onto the constraints with the
+        project: `project(t, x, p) -> (x, residual)`, one Newton step onto the constraints with the
             largest residual; it is repeated after each step until the residual is below 1e-12.
         method: "dopri5", Dormand and Prince's explicit pair; or "rodas", the linearly implicit
             RODAS5P for stiff equations, which uses the exact Jacobian of rhs.

@@ -86,10 +86,10 @@ def _projection(problem: Problem, p: Array) -> Projection | None:
     if step is None:
         return None
 
-    def onto(_t: float, x: Array) -> Array:
+    def onto(t: float, x: Array) -> Array:
         for _ in range(ITERATIONS):
             try:
-                moved, residual = step(x, p)
+                moved, residual = step(t, x, p)
             except RuntimeError as error:
                 raise Failure("projection") from error
             x = _vector(moved)

@@ -23,7 +23,7 @@ class Equations:
         rhs: `mbs_rhs(t, x, p) -> xdot`.
         jacobian: `mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t)`; None when the method is
             explicit.
-        project: `mbs_project(x, p) -> (x, residual)`; None without constraints.
+        project: `mbs_project(t, x, p) -> (x, residual)`; None without constraints.
         indicators: `mbs_indicators(t, x, p) -> g`; None, as the next two, without events.
         rates: `mbs_rates(t, x, p) -> dg/dt` along the motion.
         jump: `mbs_jump(t, x, p, fired) -> (x, modes)`.
@@ -82,7 +82,7 @@ def equations(
 
     Args:
         rhs: `rhs(t, x, p) -> xdot`.
-        project: `project(x, p) -> (x, residual)`, or None.
+        project: `project(t, x, p) -> (x, residual)`, or None.
         method: one of METHODS.
         events: None when there are none.
 
@@ -108,7 +108,7 @@ def equations(
     if method == "rodas":
         f_xt = [casadi.jacobian(slope, v) for v in (x, t)]
         jacobian = _dense("mbs_jacobian", txp, *f_xt)
-    g = None if project is None else _projection(project, x, p)
+    g = None if project is None else _projection(project, txp)
     if events is None:
         return Equations(f, jacobian, g)
     return Equations(f, jacobian, g, *_event_functions(events, txp, slope))
@@ -122,12 +122,16 @@ def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Fu
     return casadi.Function(name, inputs, [casadi.densify(value) for value in outputs])
 
 
-def _projection(project: casadi.Function, x: casadi.MX, p: casadi.MX) -> casadi.Function:
-    n = x.numel()
-    if project.n_out() != 2 or project.numel_in(0) != n or project.numel_out(0) != n:
-        raise ModelError(f"{project}: a projection is project(x, p) -> (x, residual), x ({n},)")
-    outputs = project(*[x, p][: project.n_in()])
-    return _dense("mbs_project", [x, p], *map(casadi.vec, outputs))
+def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Function:
+    sizes = [symbol.numel() for symbol in txp]
+    given = [project.numel_in(k) for k in range(project.n_in())]
+    fits = len(given) in (2, 3) and given == sizes[: len(given)]
+    if not fits or project.n_out() != 2 or project.numel_out(0) != sizes[1]:
+        raise ModelError(
+            f"{project}: a projection is project(t, x, p) -> (x, residual), x ({sizes[1]},)"
+        )
+    outputs = project(*txp[: len(given)])
+    return _dense("mbs_project", txp, *map(casadi.vec, outputs))
 
 
 def _event_functions(

@@ -23,6 +23,11 @@ def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
     return int(np.sum(values > gap * max(values[0], 1e-30)))
 
 
+def null_space(matrix: Matrix, gap: float = RELATIVE_GAP) -> Matrix:
+    """(n, n - rank) orthonormal columns that the matrix (m, n) takes to zero."""
+    return np.array(np.linalg.svd(matrix)[2][rank(matrix, gap) :].T)
+
+
 def independent_rows(
     matrices: Sequence[Matrix], count: int, first: tuple[int, ...] = ()
 ) -> list[int]:

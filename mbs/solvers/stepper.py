@@ -22,6 +22,8 @@ Projection = Callable[[float, Array], Array]
 EPSILON = float(np.finfo(float).eps)
 SAFETY, SHRINK, GROW, BETA = 0.9, 0.2, 10.0, 0.04
 NEAR_ZERO = 1e-10
+CALM, FORGET, CREEPING, LEAP_ERROR = 0.1, 0.95, 0.01, 100.0
+LEAPS = (1.0, 0.6, 1.6, 0.4, 2.5)
 MAX_STEPS = 100_000
 REASONS = {
     "steps": f"more than {MAX_STEPS} steps between two output times; ask for a looser tolerance "
@@ -59,6 +61,8 @@ class Stepper(ABC):
         slope: slope at the present state, or None when it is not known.
         last_step: length of the last step.
         last_end: time at its end.
+        calm_step: length of recent steps that were not short.
+        calm: time and state before the last of them, where a leap would start.
     """
 
     rhs: RightHandSide
@@ -73,6 +77,8 @@ class Stepper(ABC):
     since_output: int = 0
     last_step: float = 0.0
     last_end: float = 0.0
+    calm_step: float = 0.0
+    calm: tuple[float, Array] | None = None
     slope: Array | None = None
     dense: tuple[Array, ...] = ()
 
@@ -156,19 +162,56 @@ class Stepper(ABC):
             Failure: none can be accepted.
         """
         tried = 0
+        slope = self._opened(limit)
+        while True:
+            self.since_output += 1
+            tried += 1
+            if self.since_output > MAX_STEPS:
+                raise Failure("steps")
+            if self.h < CREEPING * self.calm_step:
+                if self._leap(limit):
+                    return tried
+                slope = self._opened(limit)
+            if self._try_step(slope, limit):
+                return tried
+
+    def _opened(self, limit: float) -> Array:
+        """The slope at the present state, and a step to try."""
         if self.slope is None:
             self.slope = self._slope(self.t, self.x)
             self._open(self.slope)
         if self.h <= 0.0:
             self.h = self._first_step(self.slope, limit - self.t)
         self.h = min(self.h, self.max_step)
-        while True:
-            self.since_output += 1
-            tried += 1
-            if self.since_output > MAX_STEPS:
-                raise Failure("steps")
-            if self._try_step(self.slope, limit):
-                return tried
+        return self.slope
+
+    def _remember(self, h: float) -> None:
+        """The state before a step of this length is where a leap would start."""
+        self.calm_step *= FORGET
+        if self.project is not None and h >= CALM * self.calm_step:
+            self.calm_step = max(h, self.calm_step)
+            self.calm = self.t, self.x
+
+    def _leap(self, limit: float) -> bool:
+        """From where steps were calm across what they creep up to; whether a step does it."""
+        assert self.calm is not None
+        t, x, wanted = self.t, self.x, self.h
+        (start, self.x), length = self.calm, self.calm_step
+        self.t, self.slope, self.calm_step = start, None, 0.0
+        for factor in LEAPS:
+            h = factor * length
+            if start + h <= t or start + h > limit:
+                continue
+            try:
+                y, difference = self._attempt(h, self._opened(limit))
+                if self._norm(difference, y) <= LEAP_ERROR:
+                    self._accept(y, start + h, h)
+                    self.h, self.error = length, 1e-4
+                    return True
+            except Failure:
+                continue
+        self.t, self.x, self.h, self.slope = t, x, wanted, None
+        return False
 
     def _try_step(self, slope: Array, limit: float) -> bool:
         cut = self.t + 1.01 * self.h >= limit
@@ -181,6 +224,7 @@ class Stepper(ABC):
             if not np.isfinite(error):
                 raise Failure("finite")
             if error <= 1.0:
+                self._remember(h)
                 self._accept(y, limit if cut else self.t + h, h)
                 self._lengthen(h, error, cut)
                 return True

@@ -24,7 +24,7 @@ def point_on_a_circle():
     rows = ca.vertcat(ca.dot(place, place) - 1, ca.dot(place, velocity))
     J = ca.jacobian(rows, x)
     step = x - J.T @ ca.solve(J @ J.T, rows)
-    return rhs, ca.Function("project", [x], [step, ca.norm_inf(rows)])
+    return rhs, ca.Function("project", [T, x], [step, ca.norm_inf(rows)])
 
 
 @BOTH
@@ -148,7 +148,7 @@ def test_not_a_number_is_never_returned(compiled):
 def test_a_projection_that_fails_is_reported(compiled):
     rhs, _ = point_on_a_circle()
     x = ca.SX.sym("x", 4)
-    bad = ca.Function("bad", [x], [x, 1.0])
+    bad = ca.Function("bad", [T, x], [x, 1.0])
     with pytest.raises(SolverError, match="projection onto the constraints does not converge"):
         integrate(rhs, [1, 0, 0, 0], [0, 1], project=bad, compiled=compiled)
 
@@ -156,7 +156,7 @@ def test_a_projection_that_fails_is_reported(compiled):
 @BOTH
 def test_a_wall_is_not_stepped_over(compiled):
     rhs = ca.Function("f", [T, X], [ca.vertcat(1, 0)])
-    wall = ca.Function("wall", [X], [X, ca.if_else(X[0] > 1, 1.0, 0.0)])
+    wall = ca.Function("wall", [T, X], [X, ca.if_else(X[0] > 1, 1.0, 0.0)])
     with pytest.raises(SolverError, match=r"t = (1|0\.9999\d+) s"):
         integrate(rhs, [0, 0], [0, 3], project=wall, compiled=compiled)
 
@@ -233,7 +233,7 @@ def test_sparse_outputs_and_interpreted_nodes(capfd):
         ({"x0": "ab"}, "'ab' are not numbers"),
         ({"rhs": ca.Function("f", [X], [X])}, r"rhs\(t, x, p\) -> xdot"),
         ({"rhs": ca.Function("f", [T, X, P], [X[0]])}, "1 slopes for 2 states"),
-        ({"project": ca.Function("g", [X], [X])}, r"project\(x, p\) -> \(x, residual\)"),
+        ({"project": ca.Function("g", [X], [X])}, r"project\(t, x, p\) -> \(x, residual\)"),
     ],
 )
 def test_arguments_that_do_not_fit(arguments, message):

@@ -220,7 +220,7 @@ def test_projection_after_the_jump(compiled):
     rhs = ca.Function("circle", [T, x, p], [ca.vertcat(velocity, -pull * place - ca.DM([0, 9.81]))])
     rows = ca.vertcat(ca.dot(place, place) - 1, ca.dot(place, velocity))
     J = ca.jacobian(rows, x)
-    step = ca.Function("onto", [x], [x - J.T @ ca.solve(J @ J.T, rows), ca.norm_inf(rows)])
+    step = ca.Function("onto", [T, x], [x - J.T @ ca.solve(J @ J.T, rows), ca.norm_inf(rows)])
     wall = ca.Function("wall", [T, x], [x[0]])
     jump = ca.Function("j", [T, x, p, fired], [ca.vertcat(place * 1.001, -velocity)])
     times = np.linspace(0, 3, 61)

@@ -241,7 +241,7 @@ def test_projection_after_each_step(compiled):
     f = ca.vertcat(velocity, -pull * place - ca.DM([0, 9.81]) - 100 * velocity)
     rows = ca.vertcat(ca.dot(place, place) - 1, ca.dot(place, velocity))
     J = ca.jacobian(rows, x)
-    onto = ca.Function("onto", [x], [x - J.T @ ca.solve(J @ J.T, rows), ca.norm_inf(rows)])
+    onto = ca.Function("onto", [T, x], [x - J.T @ ca.solve(J @ J.T, rows), ca.norm_inf(rows)])
     times = np.linspace(0, 20, 101)
     options = {"method": "rodas", "compiled": compiled, "rtol": 1e-8, "atol": 1e-8}
     found = integrate(ca.Function("f", [T, x], [f]), [1, 0, 0, 0], times, project=onto, **options)

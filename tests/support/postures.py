@@ -36,5 +36,9 @@ def same(system, q, other, tolerance=1e-5):
 
 
 def active(system, q=None):
-    """The positions of the independent joints at a posture, the assembled one if none is given."""
-    return np.array(system.posture if q is None else q)[independent_places(system)]
+    """The positions of the independent joints at a posture, the assembled one if none is given.
+
+    Rods that spin are as in the assembled posture.
+    """
+    whole = np.array(system.posture if q is None else q)
+    return np.array([whole[k] if k < system.nq else 0.0 for k in independent_places(system)])

@@ -1,7 +1,7 @@
 /* Integration of generated functions, as Python calls it.
  *
  * Compiled with mbs_rhs(t, x, p) -> xdot and, when these are defined,
- *   MBS_PROJECT  mbs_project(x, p) -> (x, residual), one Newton step onto the constraints
+ *   MBS_PROJECT  mbs_project(t, x, p) -> (x, residual), one Newton step onto the constraints
  *   MBS_RODAS    mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t); else Dormand and Prince
  *   MBS_EVENTS   mbs_indicators(t, x, p) and mbs_rates(t, x, p), as many values each, and
  *                mbs_jump(t, x, p, fired) -> (x, modes); the modes are the last of p
@@ -80,14 +80,9 @@ static int rhs(void *user, double t, const double *x, double *xdot) {
 static int project(void *user, double t, double *x) {
     driver *d = user;
     int k, i, n = d->solver.n;
-    (void)t;
     for (k = 0; k < ITERATIONS; k++) {
         double residual = 0.0, scale = 1.0;
-        d->arg[0] = x;
-        d->arg[1] = d->p;
-        d->res[0] = d->moved;
-        d->res[1] = &residual;
-        if (mbs_project(d->arg, d->res, d->iw, d->w, 0) || !isfinite(residual)) return 1;
+        if (call(d, mbs_project, t, x, d->moved, &residual) || !isfinite(residual)) return 1;
         memcpy(x, d->moved, sizeof(double) * (size_t)n);
         for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
         if (residual < TOLERANCE * scale) return 0;

@@ -5,10 +5,14 @@
 #include <string.h>
 
 /* places in memory */
-enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, SLOPE };
+enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, CALM_STEP, CALM_TIME, SLOPE };
 
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 10.0, BETA = 0.04;
 static const double NEAR_ZERO = 1e-10; /* part of the limit below which time counts as zero */
+
+/* Steps are calm while they are longer than a tenth of those before, which are forgotten slowly. */
+static const double CALM = 0.1, FORGET = 0.95, CREEPING = 0.01, LEAP_ERROR = 100.0;
+static const double LEAPS[] = {1.0, 0.6, 1.6, 0.4, 2.5};
 
 void stepper_init(stepper *s, int n, const stepper_method *method, stepper_rhs rhs, void *user,
                   double *memory, double *work) {
@@ -46,6 +50,8 @@ double stepper_wanted_step(const stepper *s) { return s->memory[STEP]; }
 double stepper_last_step(const stepper *s) { return s->memory[LAST_STEP]; }
 
 double *stepper_slope(const stepper *s) { return s->memory + SLOPE; }
+static double *calm_state(const stepper *s) { return s->memory + SLOPE + s->n; }
+static double *present_state(const stepper *s) { return s->memory + SLOPE + 2 * s->n; }
 double *stepper_trial(const stepper *s) { return s->work; }
 double *stepper_candidate(const stepper *s) { return s->work + s->n; }
 
@@ -124,6 +130,48 @@ static int open_step(stepper *s, const double *x, double limit) {
     return STEPPER_OK;
 }
 
+/* The state before a step of this length is where a leap would start. */
+static void remember(stepper *s, const double *x, double h) {
+    double *m = s->memory;
+    m[CALM_STEP] *= FORGET;
+    if (!s->project || h < CALM * m[CALM_STEP]) return;
+    m[CALM_STEP] = fmax(h, m[CALM_STEP]);
+    m[CALM_TIME] = m[TIME];
+    memcpy(calm_state(s), x, sizeof(double) * (size_t)s->n);
+}
+
+static void put(stepper *s, double *x, double t, const double *from) {
+    memcpy(x, from, sizeof(double) * (size_t)s->n);
+    s->memory[TIME] = t;
+    stepper_close(s, NULL);
+}
+
+/* From where steps were calm across what they creep up to; 0 where no step does it. */
+static int leap(stepper *s, double *x, double limit) {
+    double *m = s->memory, t = m[TIME], wanted = m[STEP], from = m[CALM_TIME], length = m[CALM_STEP];
+    size_t k;
+    memcpy(present_state(s), x, sizeof(double) * (size_t)s->n);
+    put(s, x, from, calm_state(s));
+    m[CALM_STEP] = 0.0;
+    for (k = 0; k < sizeof LEAPS / sizeof *LEAPS; k++) {
+        double h = LEAPS[k] * length;
+        if (from + h <= t || from + h > limit) continue;
+        s->steps++;
+        if (open_step(s, x, limit)) break;
+        if (!s->method->attempt(s, x, h) &&
+            norm(s, stepper_trial(s), x, stepper_candidate(s)) <= LEAP_ERROR &&
+            !accept(s, x, from + h, h)) {
+            m[STEP] = length;
+            m[ERROR] = 1e-4;
+            return 1;
+        }
+        s->rejected++;
+    }
+    put(s, x, t, present_state(s));
+    m[STEP] = wanted;
+    return 0;
+}
+
 /* One try of one step towards limit. STEPPER_MORE: accepted. STEPPER_OK: rejected, try again. */
 static int try_step(stepper *s, double *x, double limit) {
     double *m = s->memory, t = m[TIME], h = m[STEP], error = 0.0, factor;
@@ -136,6 +184,7 @@ static int try_step(stepper *s, double *x, double limit) {
         if (!isfinite(error)) status = STEPPER_NOT_FINITE;
     }
     if (!status && error <= 1.0) {
+        remember(s, x, h);
         status = accept(s, x, cut ? limit : t + h, h);
         if (!status) {
             factor = SAFETY * pow(m[ERROR], BETA) / pow(fmax(error, 1e-10), 0.2 - 0.75 * BETA);
@@ -155,6 +204,11 @@ int stepper_step(stepper *s, double *x, double limit) {
     int status = open_step(s, x, limit);
     while (!status) {
         if (s->since_output++ >= s->max_steps) return STEPPER_TOO_MANY_STEPS;
+        if (s->memory[STEP] < CREEPING * s->memory[CALM_STEP]) {
+            if (leap(s, x, limit)) return STEPPER_OK;
+            status = open_step(s, x, limit);
+            if (status) break;
+        }
         status = try_step(s, x, limit);
     }
     return status == STEPPER_MORE ? STEPPER_OK : status;

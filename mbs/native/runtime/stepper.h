@@ -7,13 +7,19 @@
  * Source: Hairer, Norsett and Wanner 1993, II.4 to II.6. Unlike their code, the step that error
  * control wants is remembered apart from the one that an end time cut short, and a projection
  * onto constraints may follow each accepted step.
+ *
+ * Constraints may become dependent in single states, where branches of motion meet. The motion
+ * is smooth there, but rounding beside the branch is magnified the more the closer a state comes,
+ * so that error control creeps up to such a state and never passes it. Steps that have become a
+ * hundred times shorter than those before are therefore undone, and one step of the former
+ * length leaps across.
  */
 #ifndef MBS_STEPPER_H
 #define MBS_STEPPER_H
 
 #include <stddef.h>
 
-#define STEPPER_MEMORY(n) (6 + (n))
+#define STEPPER_MEMORY(n) (8 + 3 * (n))
 
 enum {
     STEPPER_OK = 0,

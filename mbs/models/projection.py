@@ -1,0 +1,86 @@
+"""One Newton step of a state of the whole tree onto all that constrains it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi
+from casadi import DM, SX
+
+from mbs.assembly import System
+from mbs.assembly.rates import norm_rows, normalised
+from mbs.loops.closure import closure_rows, independent_closure
+from mbs.loops.velocity import independent_constraint_rows
+from mbs.models.prescribed import Prescribed
+
+_NEARLY_DEPENDENT = 1e-6
+"""Squared sine between a row and the rows before it below which it is left alone."""
+_ASLEEP = 1e-6
+"""What rows count in that case."""
+_NEVER = 1e300
+
+
+def projected(
+    system: System, q: SX, v: SX, motions: Sequence[Prescribed], t: SX
+) -> tuple[SX, SX, SX]:
+    """Positions and velocities one Newton step closer, and the largest row before the step.
+
+    The step is made on the independent rows of the loops: off the loops a dependent row is
+    almost, not exactly, dependent, and would turn rounding into motion. Close to a singular
+    posture the same holds for a row that the others nearly imply there: it is left alone, and
+    rows count little for as long. The largest row is that of all, dependent ones included.
+
+    Args:
+        system: open or closed.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities.
+        motions: what is prescribed.
+        t: time [s].
+
+    Returns:
+        q (nq, 1), v (nv, 1), and the largest row.
+    """
+    if not system.is_closed and not motions:
+        return normalised(system.tree, q), v, SX(0)
+    symbols = SX.sym("q", system.nq)
+    norms = norm_rows(system.tree, symbols)
+    laws = [motion.law(t) for motion in motions]
+    places = [
+        symbols[motion.position] - law[0]
+        for motion, law in zip(motions, laws, strict=True)
+        if motion.position is not None
+    ]
+    loops, every = SX(0, 1), SX(0, 1)
+    J = SX(0, system.nv)
+    if system.is_closed:
+        loops, every = independent_closure(system, symbols), closure_rows(system, symbols)
+        J = independent_constraint_rows(system, symbols)
+    r = casadi.vertcat(loops, norms, *places)
+    J_q = casadi.jacobian(r, symbols)
+    held = [(m.velocity, law[1]) for m, law in zip(motions, laws, strict=True) if m.holds_speed]
+    E = SX(DM.eye(system.nv))[[k for k, _ in held], :]
+    J = casadi.vertcat(J, E)
+    wanted = casadi.vertcat(SX(J.shape[0] - len(held), 1), *(speed for _, speed in held))
+    speed = casadi.mtimes(J, v) - wanted
+    step_q, _ = _shortest(J_q, r)
+    step_v, awake = _shortest(J, speed)
+    rows = casadi.vertcat(every, norms, *places, speed)
+    residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
+    values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])
+    return q - values[0], v - values[1], values[2]
+
+
+def _shortest(J: SX, r: SX) -> tuple[SX, SX]:
+    """The shortest step x with J x = r, by rows that are not nearly dependent, and whether all are.
+
+    A row counts as long as the rows are on average, at least: it may also vanish by itself.
+    """
+    if J.shape[0] == 0:
+        return SX.zeros(J.shape[1]), SX(1)
+    S = casadi.sparsify(casadi.mtimes(J, J.T))
+    D, LT, order = casadi.ldl(S)
+    squares = casadi.densify(casadi.diag(S))
+    least = casadi.fmax(squares, casadi.sum1(squares) / squares.numel())
+    independent = _NEARLY_DEPENDENT * least[order] < D
+    x = casadi.ldl_solve(casadi.densify(r), casadi.if_else(independent, D, _NEVER), LT, order)
+    return casadi.mtimes(J.T, casadi.densify(x)), casadi.mmin(independent)

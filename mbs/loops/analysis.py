@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbs.assembly import Closure, LoopRow, System
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.closing import Closing, closure_parameters
-from mbs.loops.closure import labelled_rows
+from mbs.loops.closure import row_labels
 from mbs.loops.posture import closed_posture
 from mbs.loops.rolling import SLIPS, rolling_discs
 from mbs.loops.velocity import constraint_rows
@@ -169,10 +169,7 @@ _Labels = list[tuple[list[str], tuple[str, ...]]]
 
 def _labels(system: System) -> _Labels:
     rolling = [disc.name for _, disc in rolling_discs(system)]
-    return [
-        ([label for label, _ in rows], SLIPS if name in rolling else ())
-        for name, rows in labelled_rows(system, SX.sym("q", system.nq))
-    ]
+    return [(rows, SLIPS if name in rolling else ()) for name, rows in row_labels(system)]
 
 
 def _with_rows(loops: Sequence[LoopRow], labels: _Labels, kept: _Kept) -> tuple[LoopRow, ...]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.rates import norm_rows
-from mbs.loops.closure import closure_rows, facing, labelled_rows
+from mbs.loops.closure import closure_rows, facing, row_labels
 from mbs.solvers.gauss_newton import gauss_newton
 
 Vector = NDArray[np.float64]
@@ -91,11 +91,7 @@ class Closing:
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""
-        labels = [
-            (name, label)
-            for name, rows in labelled_rows(self.system, SX.sym("q", self.system.nq))
-            for label, _ in rows
-        ]
+        labels = [(name, row) for name, rows in row_labels(self.system) for row in rows]
         gaps: dict[str, list[float]] = {}
         for (name, label), value in zip(labels, self.rows(q)[0], strict=False):
             gap = gaps.setdefault(name, [0.0, 0.0])

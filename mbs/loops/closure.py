@@ -59,8 +59,8 @@ def closure(system: System) -> Function:
 
 def closure_rows(system: System, q: SX) -> SX:
     """(m, 1) all closure rows at the positions q, (nq, 1)."""
-    values = [value for _, rows in labelled_rows(system, q) for _, value in rows]
-    return casadi.densify(casadi.vertcat(*values)) if values else SX(0, 1)
+    symbols, _, rows = _equations(system)
+    return casadi.substitute(rows, symbols, q)
 
 
 def independent_closure(system: System, q: SX) -> SX:
@@ -70,14 +70,28 @@ def independent_closure(system: System, q: SX) -> SX:
     return closure_rows(system, q)[list(system.closure.rows)]
 
 
-def labelled_rows(system: System, q: SX) -> list[tuple[str, Rows]]:
-    """For each loop and coupling its name and its rows."""
-    cuts = [(cut.edge.joint.name, _cut_rows(system, q, cut)) for cut in system.cuts]
-    couplings = []
-    for coupling in system.couplings:
-        value = q[coupling.driven] - coupling.value(q[coupling.driver])
-        couplings.append((coupling.name, [("coordinate", value)]))
-    return cuts + couplings
+def row_labels(system: System) -> list[tuple[str, list[str]]]:
+    """For each loop and coupling its name and what its rows are."""
+    return _equations(system)[1]
+
+
+def _equations(system: System) -> tuple[SX, list[tuple[str, list[str]]], SX]:
+    """Symbols q, the labels of the rows by loop, and all rows at the symbols; written once."""
+
+    def build() -> tuple[SX, list[tuple[str, list[str]]], SX]:
+        q = SX.sym("q", system.nq)
+        loops = [(cut.edge.joint.name, _cut_rows(system, q, cut)) for cut in system.cuts]
+        for coupling in system.couplings:
+            value = q[coupling.driven] - coupling.value(q[coupling.driver])
+            loops.append((coupling.name, [("coordinate", value)]))
+        labels = [(name, [label for label, _ in rows]) for name, rows in loops]
+        values = [value for _, rows in loops for _, value in rows]
+        return q, labels, casadi.densify(casadi.vertcat(SX(0, 1), *values))
+
+    equations: tuple[SX, list[tuple[str, list[str]]], SX] = system.cached(
+        "closure equations", build
+    )
+    return equations
 
 
 def facing(system: System, q: SX) -> SX:

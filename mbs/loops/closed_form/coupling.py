@@ -20,9 +20,7 @@ def coupled(coupling: CoordinateCoupling, known: Container[int], q: SX) -> Root 
     """
     terms = coupling.coefficients
     if coupling.driver in known:
-        x = q[coupling.driver]
-        value = sum((c * x**k for k, c in enumerate(terms)), SX(0))
-        return Root({"": {coupling.driven: value}})
+        return Root({"": {coupling.driven: coupling.value(q[coupling.driver])}})
     if coupling.driven not in known:
         return "both of its coordinates are unknown"
     if len(terms) != 2:

@@ -26,7 +26,7 @@ def parallelogram(ring: Ring, pivot: int) -> Root:
     X1 = ring.gaps[0].pose
     back = X1.inverse()
     g = in_plane(back.p)
-    Q = g - in_plane(back.p + back.R @ ring.gaps[0].pivots[pivot])
+    Q = g - in_plane((back @ ring.gaps[0].pivots[pivot]).p)
     mirrored = g * (2 * (Q.T @ g) / square(g)) - Q
     return Root(
         {

@@ -7,10 +7,9 @@ are known then.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi
-import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
@@ -21,46 +20,18 @@ from mbs.components.constraints import Constraint
 from mbs.errors import NoClosedForm
 from mbs.loops.closed_form.coupling import coupled
 from mbs.loops.closed_form.dispatch import closed_form
-from mbs.loops.closed_form.ring import loop_links, ring_of
+from mbs.loops.closed_form.distance import Span, spans
+from mbs.loops.closed_form.places import extent, independent_places
+from mbs.loops.closed_form.ring import Ring, loop_links, ring_of
 from mbs.loops.closed_form.root import Root
-from mbs.loops.closing import Closing, Vector, closure_parameters
-
-_NEAR = 1e-5
-_SEED = 20260104
-_MOVE = 0.2
-_TRIES = 8
-_CHECKS = 3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Stage:
-    """One loop, or one coupling, solved for its unknown positions.
-
-    Attributes:
-        name: of the cut joint or of the coupling.
-        places: numbers in q of what it gives.
-        labels: of the ways to close it; one empty label where there is a single way.
-        values: Function of q (nq, 1), of which known positions are used, and p; one row a
-            place, one column a way.
-        chosen: number of the way in which the system was assembled.
-    """
-
-    name: str
-    places: tuple[int, ...]
-    labels: tuple[str, ...]
-    values: Function
-    chosen: int = 0
-
-    def way_at(self, system: System, q: Vector, p: Vector) -> int | None:
-        """Which way leads to the closed posture q; None when none does."""
-        values = np.array(self.values(q, p))
-        turns = [system.coordinates[k].unit == "rad" for k in self.places]
-        for way in range(len(self.labels)):
-            gap = values[:, way] - q[list(self.places)]
-            gap[turns] = np.remainder(gap[turns] + np.pi, 2 * np.pi) - np.pi
-            if np.all(np.abs(gap) < _NEAR):
-                return way
-        return None
+from mbs.loops.closed_form.stage import Stage
+from mbs.loops.closed_form.survey import constants
+from mbs.loops.closed_form.trilateration import (
+    held_point,
+    independent_links,
+    slid_places,
+)
+from mbs.loops.closed_form.verified import verified
 
 
 def plan(system: System) -> tuple[Stage, ...]:
@@ -71,103 +42,128 @@ def plan(system: System) -> tuple[Stage, ...]:
         ModelError: `system` is not a System.
     """
     require_system(system)
-    stages: tuple[Stage, ...] = system.cached("closed form", lambda: _verified(system))
+
+    def build() -> tuple[Stage, ...]:
+        return verified(system, _ordered(system)) if system.closure else ()
+
+    stages: tuple[Stage, ...] = system.cached("closed form", build)
     return stages
 
 
-def _verified(system: System) -> tuple[Stage, ...]:
-    """The plan with the ways of the assembled posture, seen to hold at others as well."""
-    if system.closure is None:
-        return ()
-    p = closure_parameters(system)
-    posture = np.array(system.posture)
-    postures = [posture, *_nearby(system, posture, p)]
-    stages = []
-    for stage in _ordered(system):
-        ways = [stage.way_at(system, q, p) for q in postures]
-        first = ways[0]
-        if first is None or None in ways:
-            raise NoClosedForm(
-                f"{system.name}: the loop of {stage.name} does not close as the directions of its"
-                " axes suggest; use mbs.loops.solve without branch"
-            )
-        stages.append(_chosen(stage, first))
-    return tuple(stages)
+@dataclass(slots=True)
+class _Work:
+    """What is solved so far.
 
+    Attributes:
+        system: whose loops they are.
+        q: symbols of all positions.
+        values: the same, with numbers for positions that turned out not to change.
+        known: places of what is known.
+        stages: in their order.
+    """
 
-def _chosen(stage: Stage, way: int) -> Stage:
-    return Stage(stage.name, stage.places, stage.labels, stage.values, way)
+    system: System
+    q: SX
+    values: SX
+    known: set[int]
+    stages: list[Stage] = field(default_factory=list)
 
+    def take(self, stage: Stage) -> None:
+        """Count what a stage gives as known."""
+        self.stages.append(stage)
+        self.known |= set(stage.places)
+        if len(stage.labels) == 1:
+            p = self.system.p
+            found = constants(stage.values(self.q, p), self.q, p)
+            for place, number in zip(stage.places, found, strict=True):
+                if number is not None:
+                    self.values[place] = number
 
-def _nearby(system: System, posture: Vector, p: Vector) -> list[Vector]:
-    rng, found = np.random.default_rng(_SEED), list[Vector]()
-    for _ in range(_TRIES):
-        closed = Closing(system, p).nearest(posture + rng.uniform(-_MOVE, _MOVE, posture.shape))
-        if closed.is_closed:
-            found.append(closed.q)
-        if len(found) == _CHECKS:
-            break
-    return found
+    def ring(self, number: int) -> Ring:
+        """The loop of a cut joint."""
+        return ring_of(self.system, number, self.known, self.values)
 
 
 def _ordered(system: System) -> list[Stage]:
-    if system.nq != system.nv:
-        raise NoClosedForm(
-            f"{system.name}: a joint of the tree has a quaternion, which no closed form gives; use"
-            " mbs.loops.solve without branch"
-        )
-    known, q = set(system.active), SX.sym("q", system.nq)
+    q = SX.sym("q", extent(system))
+    work = _Work(system, q, SX(q), set(independent_places(system)))
     pending = list(range(len(system.cuts) + len(system.couplings)))
-    stages, reasons = list[Stage](), dict[int, str]()
+    reasons = dict[int, str]()
     while pending:
-        before, waiting = len(stages), list[int]()
+        before, waiting = len(work.stages), list[int]()
         for number in pending:
-            outcome = _attempt(system, number, known, q)
+            outcome = _attempt(work, number)
             while isinstance(outcome, Stage):
-                stages.append(outcome)
-                known |= set(outcome.places)
-                outcome = _attempt(system, number, known, q)
+                work.take(outcome)
+                outcome = _attempt(work, number)
             if outcome is not None:
                 waiting.append(number)
                 reasons[number] = outcome
-        if waiting and len(stages) == before:
-            raise NoClosedForm(_refusal(system, waiting, reasons))
+        if waiting and len(work.stages) == before:
+            held = _held(work, waiting)
+            if held is None:
+                raise NoClosedForm(_refusal(system, waiting, reasons))
+            work.take(held)
         pending = waiting
-    _require_all(system, known)
-    return stages
+    _require_all(system, work.known)
+    return work.stages
 
 
-def _attempt(system: System, number: int, known: set[int], q: SX) -> Stage | str | None:
+def _attempt(work: _Work, number: int) -> Stage | str | None:
     """A loop, or a coupling, solved with what is known; why not; None where nothing is unknown."""
+    system = work.system
     if number >= len(system.cuts):
-        coupling = system.couplings[number - len(system.cuts)]
-        return _coupling_stage(system, coupling, known, q)
+        return _coupling_stage(work, system.couplings[number - len(system.cuts)])
     cut = system.cuts[number]
     back, out = loop_links(system, cut)
-    if all(system.tree.links[k].q.start in known for k in (*back, *out)):
+    if all(system.tree.links[k].q.start in work.known for k in (*back, *out)):
         return None
     joint = cut.edge.joint
-    if isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod)):
+    if _is_bound(system, number):
         return f"a {type(joint).__name__} closes it"
-    root = closed_form(ring_of(system, cut, known, q), q, system.p)
-    return root if isinstance(root, str) else _stage(system, joint.name, root, q)
+    root = closed_form(work.ring(number), work.q, system.p)
+    return root if isinstance(root, str) else _stage(work, joint.name, root)
 
 
-def _coupling_stage(
-    system: System, coupling: CoordinateCoupling, known: set[int], q: SX
-) -> Stage | str | None:
-    if {coupling.driven, coupling.driver} <= known:
+def _held(work: _Work, waiting: Sequence[int]) -> Stage | None:
+    """Slides that several loops share and the rigid links in these hold, if there are such."""
+    system, groups = work.system, dict[frozenset[int], dict[int, Span]]()
+    for number in waiting:
+        if number < len(system.cuts) and not _is_bound(system, number):
+            for span in spans(work.ring(number), work.q, system.p):
+                places = slid_places(span)
+                if places:
+                    groups.setdefault(places, {}).setdefault(number, span)
+    for found in groups.values():
+        numbers = independent_links(found, work.q, system.p)
+        if numbers:
+            name = system.cuts[numbers[-1]].edge.joint.name
+            return _stage(work, name, held_point(name, [found[k] for k in numbers]))
+    return None
+
+
+def _is_bound(system: System, number: int) -> bool:
+    """Whether a loop is closed by what is not made of turns, slides and balls."""
+    joint = system.cuts[number].edge.joint
+    return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
+
+
+def _coupling_stage(work: _Work, coupling: CoordinateCoupling) -> Stage | str | None:
+    if {coupling.driven, coupling.driver} <= work.known:
         return None
-    root = coupled(coupling, known, q)
-    return root if isinstance(root, str) else _stage(system, coupling.name, root, q)
+    root = coupled(coupling, work.known, work.q)
+    return root if isinstance(root, str) else _stage(work, coupling.name, root)
 
 
-def _stage(system: System, name: str, root: Root, q: SX) -> Stage:
-    ways = list(root.ways.values())
+def _stage(work: _Work, name: str, root: Root) -> Stage:
+    arguments, ways = [work.q, work.system.p], list(root.ways.values())
     places = tuple(sorted(ways[0]))
     columns = [casadi.vertcat(*(way[place] for place in places)) for way in ways]
-    values = Function("ways", [q, system.p], [casadi.densify(casadi.horzcat(*columns))])
-    return Stage(name, places, tuple(root.ways), values)
+    values = Function("ways", arguments, [casadi.densify(casadi.horzcat(*columns))])
+    if root.spun is None:
+        return Stage(name, places, tuple(root.ways), values)
+    angle = Function("spin", arguments, [root.spun.angle])
+    return Stage(name, places, tuple(root.ways), values, (root.spun.place, angle))
 
 
 def _refusal(system: System, waiting: Sequence[int], reasons: dict[int, str]) -> str:

@@ -9,9 +9,10 @@ Source: Khalil & Creusot 1997, eq. 2.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
 
+import casadi
 import numpy as np
 from casadi import SX
 
@@ -20,8 +21,22 @@ from mbs.assembly.khalil_frames import Cut
 from mbs.components import PointOnLine, Rod, Spherical
 from mbs.components.motion import Freedom, Motion
 from mbs.expressions import to_sx
+from mbs.loops.closed_form.places import cut_places, spin_places
 from mbs.recursions.route import common_link
-from mbs.spatial import Pose, align_z, axis_turn, snapped, vector
+from mbs.spatial import Pose, align_z, axis_turn, quaternion_rotation, vector
+
+
+@dataclass(frozen=True, slots=True)
+class Spin:
+    """The known turn of a rod about its own line, where a ball of the tree carries it.
+
+    Attributes:
+        place: number of the angle among the positions.
+        rest: quaternion of the ball in the assembled posture.
+    """
+
+    place: int
+    rest: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +46,19 @@ class Unknown:
     Attributes:
         name: of the coordinate.
         motion: revolute or prismatic along its z axis; spherical turns in any way.
-        place: number in q, or None for a cut joint.
+        place: number in q, beyond the end of it for a cut joint (see `places`); None for a
+            ball whose position nothing asks for. Four numbers follow from there for a quaternion.
         sign: -1 where the way around the loop runs through the joint backwards.
+        cut: whether it belongs to the joint that closes the loop.
+        spin: of a ball between a rod that may spin and its antecedent.
     """
 
     name: str
     motion: Motion
     place: int | None
     sign: int
+    cut: bool = False
+    spin: Spin | None = None
 
     @property
     def turns(self) -> bool:
@@ -52,11 +72,11 @@ class Gap:
 
     Attributes:
         pose: of the next joint's frame, seen from the frame after the joint before.
-        pivots: (3, 1) points on the axes of known revolute joints on the way, seen likewise.
+        pivots: frames of the known revolute joints on the way, seen likewise.
     """
 
     pose: Pose = field(default_factory=Pose.identity)
-    pivots: tuple[SX, ...] = ()
+    pivots: tuple[Pose, ...] = ()
 
     def then(self, pose: Pose) -> Gap:
         """The way with one more piece at its end."""
@@ -64,13 +84,13 @@ class Gap:
 
     def after(self, gap: Gap) -> Gap:
         """The way with another one before it."""
-        seen = (snapped(gap.pose.p + gap.pose.R @ pivot) for pivot in self.pivots)
+        seen = (gap.pose @ pivot for pivot in self.pivots)
         return Gap(gap.pose @ self.pose, (*gap.pivots, *seen))
 
     def inverse(self) -> Gap:
         """The way back."""
         back = self.pose.inverse()
-        return Gap(back, tuple(snapped(back.p + back.R @ pivot) for pivot in self.pivots))
+        return Gap(back, tuple(back @ pivot for pivot in self.pivots))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,54 +158,66 @@ def loop_links(system: System, cut: Cut) -> tuple[list[int], list[int]]:
     return back[::-1], out
 
 
-def ring_of(system: System, cut: Cut, known: Container[int], q: SX) -> Ring:
-    """The loop of a cut joint, from its frame_a through the tree and the joint itself.
+def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
+    """The loop that a cut joint closes, from its frame_a through the tree and the joint itself.
 
     Args:
         system: whose loop it is.
-        cut: the joint.
+        number: of the cut joint.
         known: numbers in q of the positions that are known.
-        q: (nq, 1) symbols, of which the known ones are used.
+        q: (nq, 1) symbols followed by those of cut joints, of which the known ones are used.
     """
-    walk = _Walk()
+    walk, cut = _Walk(), system.cuts[number]
     back, out = loop_links(system, cut)
     walk.over(cut.pose_a.inverse())
     for k in back:
-        _pass(walk, system, k, -1, known, q)
+        _pass(walk, _unknown(system, k, -1), known, q)
         walk.over(system.tree.links[k].placement.pose().inverse())
     for k in out:
         walk.over(system.tree.links[k].placement.pose())
-        _pass(walk, system, k, 1, known, q)
+        _pass(walk, _unknown(system, k, 1), known, q)
     walk.over(cut.pose_b)
     if not cut.welded:
-        symbols = {p.name: system.p[k] for k, p in enumerate(system.parameters)}
-        _pass_cut(walk, cut, symbols)
+        _pass_cut(walk, system, number, known, q)
     return walk.ring()
 
 
-def _pass(walk: _Walk, system: System, k: int, sign: int, known: Container[int], q: SX) -> None:
-    """Through the joint of link k."""
+def _unknown(system: System, k: int, sign: int) -> Unknown:
     link = system.tree.links[k]
-    if link.q.start not in known or link.motion not in (Motion.REVOLUTE, Motion.PRISMATIC):
-        walk.through(Unknown(link.name, link.motion, link.q.start, sign))
-        return
-    position = q[link.q] if sign > 0 else -q[link.q]
-    if link.motion is Motion.PRISMATIC:
-        walk.over(Pose.moved(vector([0, 0, position])))
-        return
-    walk.gap = replace(walk.gap, pivots=(*walk.gap.pivots, walk.gap.pose.p))
-    walk.over(Pose.turned(axis_turn("z", position).matrix))
+    place = spin_places(system).get(link.q.start)
+    spin = None if place is None else Spin(place, system.posture[link.q])
+    return Unknown(link.name, link.motion, link.q.start, sign, spin=spin)
 
 
-def _pass_cut(walk: _Walk, cut: Cut, symbols: Mapping[str, SX]) -> None:
+def _pass(walk: _Walk, joint: Unknown, known: Container[int], q: SX) -> None:
+    """Through a joint; over it, where it is known."""
+    place = joint.place
+    if place is None or place not in known or joint.motion is Motion.FREE:
+        walk.through(joint)
+    elif joint.motion is Motion.SPHERICAL:
+        walk.over(_ball(q[place : place + 4], joint.sign))
+    elif joint.motion is Motion.PRISMATIC:
+        walk.over(Pose.moved(vector([0, 0, joint.sign * q[place]])))
+    else:
+        walk.gap = replace(walk.gap, pivots=(*walk.gap.pivots, walk.gap.pose))
+        walk.over(Pose.turned(axis_turn("z", joint.sign * q[place]).matrix))
+
+
+def _ball(quaternion: SX, sign: int) -> Pose:
+    pose = Pose.turned(quaternion_rotation(quaternion / casadi.norm_2(quaternion)))
+    return pose if sign > 0 else pose.inverse()
+
+
+def _pass_cut(walk: _Walk, system: System, number: int, known: Container[int], q: SX) -> None:
     """Back through the freedoms of the cut joint, from its frame_b to its frame_a."""
-    joint = cut.edge.joint
-    ball = Unknown(joint.name, Motion.SPHERICAL, None, -1)
+    joint = system.cuts[number].edge.joint
+    ball = Unknown(joint.name, Motion.SPHERICAL, None, -1, cut=True)
     freedoms = joint.freedoms
     if isinstance(joint, Spherical):
         walk.through(ball)
         return
     if isinstance(joint, Rod):
+        symbols = {p.name: system.p[k] for k, p in enumerate(system.parameters)}
         walk.through(ball)
         walk.over(Pose.moved(vector([to_sx(joint.length, symbols), 0, 0])))
         walk.through(ball)
@@ -193,9 +225,10 @@ def _pass_cut(walk: _Walk, cut: Cut, symbols: Mapping[str, SX]) -> None:
     if isinstance(joint, PointOnLine):
         walk.through(ball)
         freedoms = (Freedom(Motion.PRISMATIC, joint.axis),)
-    for freedom in reversed(freedoms):
+    first = cut_places(system)[number]
+    for k, freedom in reversed(list(enumerate(freedoms))):
         aligned = Pose.turned(align_z(np.array(freedom.axis)))
-        name = f"{joint.name}.{freedom.suffix}" if freedom.suffix else joint.name
+        name = freedom.coordinate_of(joint.name)
         walk.over(aligned)
-        walk.through(Unknown(name, freedom.motion, None, -1))
+        _pass(walk, Unknown(name, freedom.motion, first + k, -1, cut=True), known, q)
         walk.over(aligned.inverse())

@@ -1,4 +1,4 @@
-"""A loop of three unknown turns whose axes meet in one point: orientations alone.
+"""Three unknown turns from orientations alone.
 
 R_a X_2 R_b X_3 R_c = X_1': the element on the third row and column holds the middle angle alone,
 X cos t + Y sin t = Z. The sign says to which side of the plane of the two other axes the middle
@@ -17,7 +17,7 @@ from mbs.loops.closed_form.trigonometry import Angle, across, in_plane, root_ang
 
 
 def sphere(ring: Ring) -> Root:
-    """The two ways to close a spherical loop of three unknown turns.
+    """The two ways to close a loop of three unknown turns, as far as orientations go.
 
     Args:
         ring: its joints a, b, c; b is the one in the middle.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import casadi
 import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
@@ -55,14 +56,27 @@ def meeting_point(pose: Pose) -> tuple[SX, SX]:
 def axes_meet(pose: Pose, q: SX, p: SX) -> bool:
     """Whether the z axes of two frames meet in one point, whatever is known."""
     slope, offset = pose.R[0:2, 2], pose.p[0:2]
-    parallel = always_zero(slope, q, p)
-    return not parallel and always_zero(slope[0] * offset[1] - slope[1] * offset[0], q, p)
+    return not parallel(pose, q, p) and always_zero(
+        slope[0] * offset[1] - slope[1] * offset[0], q, p
+    )
+
+
+def parallel(pose: Pose, q: SX, p: SX) -> bool:
+    """Whether the z axes of two frames are parallel, whatever is known."""
+    return always_zero(pose.R[0:2, 2], q, p)
 
 
 def always_zero(values: SX, q: SX, p: SX) -> bool:
     """Whether every element is zero whatever the positions and parameters."""
     samples = [np.array(value).ravel() for (value,) in _evaluated([values], q, p)]
     return all(bool(np.all(np.abs(sample) < _CLOSE)) for sample in samples)
+
+
+def constants(values: SX, q: SX, p: SX) -> list[float | None]:
+    """Each element that is the same whatever the positions and parameters; None for the others."""
+    samples = np.array([np.array(value).ravel() for (value,) in _evaluated([values], q, p)])
+    same = np.all(np.abs(samples - samples[0]) < _CLOSE, axis=0)
+    return [float(x) if fixed else None for x, fixed in zip(samples[0], same, strict=True)]
 
 
 def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
@@ -75,11 +89,21 @@ def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
         return ring
     for k in reversed(range(len(ring.joints))):
         joint = ring.joints[k]
-        if joint.place is None and joint.motion is not Motion.SPHERICAL:
+        if joint.cut and joint.motion is not Motion.SPHERICAL:
             cosine = abs(_normal(samples[0], start, k)[2])
             idle = cosine < _CLOSE if joint.turns else cosine > 1 - _CLOSE
             if idle:
                 return ring.without(k)
+    return ring
+
+
+def with_elbow(ring: Ring, q: SX) -> Ring:
+    """The loop begun so that the joint in the middle has rigid links on both sides, if one has."""
+    for k in range(3):
+        begun = ring.rotated(k)
+        sides = casadi.vertcat(*(casadi.vec(gap.pose.matrix) for gap in begun.gaps[1:]))
+        if not casadi.depends_on(sides, q):
+            return begun
     return ring
 
 
@@ -97,13 +121,6 @@ def is_planar(ring: Ring, samples: list[list[Matrix]]) -> bool:
     return all(
         _fits(ring.joints[k % n].motion, _normal(gaps, start, k)) for gaps in samples for k in ends
     )
-
-
-def is_spherical(ring: Ring, samples: list[list[Matrix]]) -> bool:
-    """Whether three turns have axes that meet in one point, whatever the known joints do."""
-    if any(joint.motion is not Motion.REVOLUTE for joint in ring.joints):
-        return False
-    return all(_meet(gaps) for gaps in samples)
 
 
 def _first_turn(ring: Ring) -> int | None:
@@ -124,20 +141,3 @@ def _fits(motion: Motion, normal: Matrix) -> bool:
         return True
     cosine = abs(float(normal[2]))
     return cosine < _CLOSE if motion is Motion.PRISMATIC else cosine > 1 - _CLOSE
-
-
-def _meet(gaps: list[Matrix]) -> bool:
-    """Whether one point on the first axis is on all axes, and stays where it is.
-
-    The point lies z along the first axis; each gap takes it to another axis.
-    """
-    first, second = np.linalg.inv(gaps[1]), np.linalg.inv(gaps[2])
-    slope, offset = first[:3, 2], first[:3, 3]
-    if np.hypot(*slope[:2]) < _CLOSE:
-        return False
-    z = -float(slope[:2] @ offset[:2]) / float(slope[:2] @ slope[:2])
-    here = offset + z * slope
-    there = second[:3, :3] @ here + second[:3, 3]
-    back = np.linalg.inv(gaps[0]) @ np.append(there, 1.0)
-    seen = np.array([*here[:2], *there[:2], *(back[:3] - z * _Z)])
-    return bool(np.max(np.abs(seen)) < _CLOSE)

@@ -12,7 +12,7 @@ from support.postures import active, same
 from support.random_trees import random_body
 
 import mbs
-from mbs.components import Mechanism, Prismatic, Revolute, Spherical
+from mbs.components import Mechanism, Revolute
 from mbs.errors import LoopError, ModelError, NoClosedForm, Unclosable
 from mbs.loops import function, modes, solve
 
@@ -132,17 +132,6 @@ def test_loops_without_closed_form_say_why():
     with pytest.raises(NoClosedForm):
         solve(system, branch="j1:+")
     solve(system)
-
-
-def test_a_quaternion_in_the_tree_has_no_closed_form():
-    m = Mechanism("ball")
-    body = m.add(random_body(np.random.default_rng(0), "b"))
-    m.connect(m.world, Spherical("s"), body)
-    other = m.add(random_body(np.random.default_rng(1), "c"))
-    m.connect(m.world.at(1.0), Prismatic("p", axis="x"), other)
-    m.connect(body.at(0.5), Spherical("t"), other)
-    with pytest.raises(NoClosedForm, match="quaternion"):
-        modes(m.assemble())
 
 
 def test_what_is_no_system():

@@ -21,6 +21,7 @@ from mbs.models import transform
 from mbs.models.full_state import FullState, full_state
 from mbs.robots import andrews_squeezer, bricard, flyball_governor, n_four_bar, simple_pendulum
 from mbs.simulate.effort import effort_function
+from mbs.simulate.run import step_tolerances
 from mbs.solvers.compiled_run import library_of, run_compiled
 from mbs.solvers.problem import equations, problem
 
@@ -156,7 +157,7 @@ def made(case: Case) -> Made:
 def run(case: Case, of: Made, tolerance: float, times: Array) -> Callable[[], Array]:
     """The integration alone, (m, nq + nv) states at times."""
     functions = equations(of.state.rhs, of.state.project, case.method, None)
-    given = problem(functions, of.x0, times, None, (), (tolerance, tolerance), np.inf)
+    given = problem(functions, of.x0, times, None, (), step_tolerances(tolerance), np.inf)
     return lambda: run_compiled(of.library, given, None)[0]
 
 

@@ -45,6 +45,7 @@ class Result:
         units: name of a signal to the name of its unit, in the order of the columns.
         name: what was simulated.
         info: facts worth keeping with the numbers, such as the tolerance.
+        events: what happened at instants: time, s, the name of what it happened to, and words.
     """
 
     time: Array
@@ -52,6 +53,7 @@ class Result:
     units: Mapping[str, str]
     name: str = ""
     info: Mapping[str, object] = field(default_factory=dict)
+    events: tuple[tuple[float, str, str], ...] = ()
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)

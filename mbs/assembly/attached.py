@@ -54,7 +54,8 @@ class AttachedForce:
     @property
     def sentence(self) -> str:
         """What it is and where it acts."""
-        return f"{type(self.element).__name__} {self.element.name} acts {self.where}."
+        kind, name = type(self.element).__name__, self.element.name
+        return f"{kind} {name} acts {self.where}{self.element.scope}."
 
 
 def force_elements(mechanism: Mechanism) -> list[ForceElement]:

@@ -47,10 +47,10 @@ def spanning_tree(
     """A spanning tree that keeps driven joints, cuts the freest passive ones, and stays shallow.
 
     Prim's algorithm from the world: among the joints that reach a new body, the one that is
-    least wanted as a cut comes first (one whose coordinate something else refers to, then driven
-    or guessed ones, then passive ones; few freedoms before many), then the one nearest to the
-    base, which keeps loops short. A driven joint that is cut keeps its coordinate all the same.
-    Constraints, which place nothing, are always cut.
+    least wanted as a cut comes first, then the one with the fewest freedoms, then the one nearest
+    to the base, which keeps loops short. Least wanted is a passive joint whose coordinate
+    something refers to, then a driven or guessed one, then any other; a driven joint that is cut
+    keeps its coordinate. Constraints, which place nothing, are always cut.
 
     Args:
         name: of the mechanism, for messages.
@@ -97,15 +97,16 @@ def _unreached(name: str, graph: Graph, number: int) -> str:
 def _prim(graph: Graph, need: set[str], keep: set[str], cut: set[str]) -> list[Edge]:
     depth = {0: 0}
     chosen: list[Edge] = []
-    queue: list[tuple[tuple[bool, bool, bool, int, int, int], int]] = []
+    queue: list[tuple[tuple[bool, int, int, int, int], int]] = []
 
     def offer(node: int) -> None:
         for number, edge in enumerate(graph.edges):
             joint = edge.joint
             if joint.places and node in (edge.a, edge.b):
-                passive = not (joint.carries_effort or joint.name in keep)
-                unneeded = joint.name not in need
-                key = (joint.name in cut, unneeded, passive, joint.nv, depth[node], number)
+                driven = joint.carries_effort
+                wanted = driven or joint.name in need or joint.name in keep
+                rank = 0 if joint.name in need and not driven else 1 if wanted else 2
+                key = (joint.name in cut, rank, joint.nv, depth[node], number)
                 heapq.heappush(queue, (key, number))
 
     offer(0)

@@ -133,6 +133,8 @@ class Closure:
         passive: numbers of the velocities that follow from them.
         free: numbers of the velocities whose positions may be chosen: the active ones, and what
             rolling discs alone hold.
+        varies: whether the dropped rows follow from the kept ones in a way that changes with the
+            posture, so that other rows may be independent elsewhere.
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
         residual: largest closure residual at the assembled posture.
     """
@@ -142,6 +144,7 @@ class Closure:
     active: tuple[int, ...]
     passive: tuple[int, ...]
     free: tuple[int, ...]
+    varies: bool
     gruebler: int
     residual: float
 

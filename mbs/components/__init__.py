@@ -8,6 +8,7 @@ from mbs.components.constraints import (
     PointOnPlane,
     Rod,
 )
+from mbs.components.contacts_joint import CoulombFriction, RigidStop
 from mbs.components.coupling import Coupling
 from mbs.components.drive_elastic import ElasticGear, ElasticShaft, ShaftDamper
 from mbs.components.drive_flange import Flange
@@ -47,6 +48,7 @@ __all__ = [
     "Bushing",
     "Component",
     "ConstantVelocity",
+    "CoulombFriction",
     "Coupling",
     "Cylinder",
     "Cylindrical",
@@ -80,6 +82,7 @@ __all__ = [
     "RelativeSensor",
     "Revolute",
     "RigidBody",
+    "RigidStop",
     "Rod",
     "RollingDisc",
     "Rotor",

@@ -64,6 +64,11 @@ class ForceElement(OnPoints):
         """The joint coordinates that it acts on, and how much of each; none for one on points."""
         return ()
 
+    @property
+    def scope(self) -> str:
+        """Where it counts, in words; nothing for an element of all models."""
+        return ""
+
     def _require_magnitudes(self, *names: str) -> None:
         """Refuse numbers below zero in these fields."""
         for name in names:
@@ -161,6 +166,20 @@ class JointForce(CoordinateForce):
     def levers(self) -> tuple[tuple[str, Scalar], ...]:
         """The coordinate itself."""
         return ((self.joint, Number(1.0)),)
+
+    def _take_limits(self) -> None:
+        """Turn the fields lower and upper of a stop into expressions, checking them."""
+        sides = [name for name in ("lower", "upper") if getattr(self, name) is not None]
+        if not sides:
+            raise DescriptionError(
+                f"{self.name}: a stop has neither lower nor upper; give one limit or both"
+            )
+        self._normalise(*sides)
+        low, high = (to_float(getattr(self, s)) if s in sides else None for s in ("lower", "upper"))
+        if low is not None and high is not None and low >= high:
+            raise DescriptionError(
+                f"{self.name}: lower is {low:g} and upper is {high:g}; give them in order"
+            )
 
     def scoped(self: J, prefix: str) -> J:
         """The same element inside a mechanism that is placed in another one."""

@@ -9,8 +9,7 @@ from casadi import SX
 
 from mbs.components.forces import JointForce
 from mbs.components.placement import SymbolTable
-from mbs.errors import DescriptionError
-from mbs.expressions import Number, Scalar, to_float, to_sx
+from mbs.expressions import Number, Scalar, to_sx
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,19 +35,10 @@ class JointStop(JointForce):
 
     def __post_init__(self) -> None:
         JointForce.__post_init__(self)
-        sides = [name for name in ("lower", "upper") if getattr(self, name) is not None]
-        if not sides:
-            raise DescriptionError(
-                f"{self.name}: a stop has neither lower nor upper; give one limit or both"
-            )
-        self._normalise(*sides, "stiffness", "damping", "width")
+        self._take_limits()
+        self._normalise("stiffness", "damping", "width")
         self._require_magnitudes("damping")
         self._require_positive("stiffness", "width")
-        low, high = (to_float(getattr(self, s)) if s in sides else None for s in ("lower", "upper"))
-        if low is not None and high is not None and low >= high:
-            raise DescriptionError(
-                f"{self.name}: lower is {low:g} and upper is {high:g}; give them in order"
-            )
 
     @property
     def needs_position(self) -> bool:

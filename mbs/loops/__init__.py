@@ -4,13 +4,16 @@ from mbs.loops.closure import closure
 from mbs.loops.examine import PostureState, examine
 from mbs.loops.function import function
 from mbs.loops.modes import Mode, modes
+from mbs.loops.pose import solve_pose
 from mbs.loops.posture import solve
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
+from mbs.loops.working_modes import WorkingMode, working_modes
 
 __all__ = [
     "Mode",
     "PostureState",
+    "WorkingMode",
     "closure",
     "closure_jacobian",
     "examine",
@@ -18,4 +21,6 @@ __all__ = [
     "modes",
     "reduction_matrix",
     "solve",
+    "solve_pose",
+    "working_modes",
 ]

@@ -32,6 +32,7 @@ _REACH = 0.5
 _GAP = 1e-5
 """Singular values below this part of the largest count as zero: Gauss-Newton ends about the
 square root of its tolerance away from a singular posture, where they are not smaller."""
+_SAME_SHARE = 1e-6
 
 
 def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
@@ -58,7 +59,8 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
     posture = postures[ranks.index(generic)]
     regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
     labels = _labels(system)
-    kept = _kept_rows(regular, sum(len(rows) for rows, _ in labels), generic)
+    positions = sum(len(rows) for rows, _ in labels)
+    kept = _kept_rows(regular, positions, generic)
     active = _independent_velocities(system, chosen, regular, system.nv - generic)
     closure = Closure(
         rows=kept.positions,
@@ -66,6 +68,7 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
         active=tuple(active),
         passive=tuple(k for k in range(system.nv) if k not in active),
         free=_free_positions(regular, kept, active),
+        varies=_varies(regular, positions, kept),
         gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
         residual=float(np.max(np.abs(Closing(system, p).rows(posture)[0]))),
     )
@@ -120,6 +123,42 @@ def _kept_rows(jacobians: Sequence[Matrix], positions: int, count: int) -> _Kept
     rows = independent_rows(holonomic, max(_ranks(holonomic), default=0) if positions else 0)
     every = independent_rows(jacobians, count, tuple(rows))
     return _Kept(tuple(rows), tuple(k - positions for k in every if k >= positions))
+
+
+def _varies(jacobians: Sequence[Matrix], positions: int, kept: _Kept) -> bool:
+    """Whether dropped rows are other combinations of the kept ones at other postures."""
+    rows = [*kept.positions, *(positions + k for k in kept.slips)]
+    dropped = [k for k in range(len(jacobians[0])) if k not in rows]
+    if not dropped:
+        return False
+    shares = [J[dropped] @ np.linalg.pinv(J[rows]) for J in jacobians]
+    return (
+        max(float(np.max(np.abs(share - shares[0]), initial=0.0)) for share in shares) > _SAME_SHARE
+    )
+
+
+def rows_at(system: System, q: Matrix, p: Matrix) -> System:
+    """The same system with the rows that are most independent at one posture.
+
+    Args:
+        system: with closed loops.
+        q: (nq,) positions that close them.
+        p: (np,) parameters.
+    """
+    closure = system.closure
+    assert closure is not None
+    J = np.array(_jacobian(system)(q, p))
+    labels = _labels(system)
+    positions = sum(len(rows) for rows, _ in labels)
+    rows = independent_rows([J[:positions]], len(closure.rows))
+    every = independent_rows([J], len(closure.rows) + len(closure.slips), tuple(rows))
+    kept = _Kept(tuple(rows), tuple(k - positions for k in every if k >= positions))
+    return replace(
+        system,
+        closure=replace(closure, rows=kept.positions, slips=kept.slips),
+        loops=_with_rows(system.loops, labels, kept),
+        _cache={},
+    )
 
 
 def _free_positions(

@@ -17,6 +17,7 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import Named, model_function
+from mbs.assembly.rates import norm_rows
 from mbs.components import (
     ConstantVelocity,
     Cylindrical,
@@ -68,6 +69,25 @@ def independent_closure(system: System, q: SX) -> SX:
     if system.closure is None:
         raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
     return closure_rows(system, q)[list(system.closure.rows)]
+
+
+def square_closure(system: System, q: SX, passive: Sequence[int]) -> SX:
+    """As many equations as passive positions that are zero where the loops are closed.
+
+    They are the independent rows; where no choice of rows is independent everywhere, the slopes
+    of the sum of the squares of all rows.
+
+    Args:
+        system: with closed loops.
+        q: (nq, 1) symbols.
+        passive: numbers of the positions to be solved for.
+    """
+    norms = norm_rows(system.tree, q)
+    if system.closure is None or not system.closure.varies:
+        return casadi.vertcat(independent_closure(system, q), norms)
+    rows = casadi.vertcat(closure_rows(system, q), norms)
+    slopes = casadi.jacobian(rows, q)[:, list(passive)]
+    return casadi.densify(casadi.mtimes(slopes.T, rows))
 
 
 def row_labels(system: System) -> list[tuple[str, list[str]]]:

@@ -120,10 +120,29 @@ def _health(system: System) -> Function:
         q = SX.sym("q", system.nq)
         assert system.closure is not None
         residual = casadi.mmax(casadi.fabs(casadi.vertcat(0, closure_rows(system, q))))
-        J = independent_constraint_rows(system, q)[:, list(system.closure.passive)]
-        return Function("health", [q, system.p], [residual, _independence(J)], {"cse": True})
+        every = constraint_rows(system, q) if system.closure.varies else None
+        J = independent_constraint_rows(system, q) if every is None else every
+        J_p = J[:, list(system.closure.passive)]
+        leads = _independence(J_p if every is None else J_p.T)
+        return Function("health", [q, system.p], [residual, leads], {"cse": True})
 
     function: Function = system.cached("posture health", build)
+    return function
+
+
+def row_independence(system: System) -> Function:
+    """``independence(q, p)``: how independent the kept rows are, 1 well and 0 not at all.
+
+    It is the smallest squared sine between a row and the rows before it, passive and active
+    joints together.
+    """
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        value = _independence(independent_constraint_rows(system, q))
+        return Function("independence", [q, system.p], [value], {"cse": True})
+
+    function: Function = system.cached("row independence", build)
     return function
 
 

@@ -4,9 +4,10 @@ import casadi
 from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
-from mbs.errors import ModelError
+from mbs.errors import NoClosedForm
+from mbs.loops.closed_form.places import independent_places
 from mbs.loops.closing import closure_parameters
-from mbs.loops.closure import closure_rows, facing, independent_closure
+from mbs.loops.closure import closure_rows, facing, square_closure
 from mbs.loops.continuation import LARGEST_MOVE
 
 _STAGES = 128
@@ -25,17 +26,18 @@ def follow_active(system: System) -> Function:
         Function of q_a (m, 1) and p (np, 1); q (nq, 1).
 
     Raises:
-        ModelError: the loops contain quaternion joints, whose positions do not match velocities.
+        NoClosedForm: an independent velocity belongs to a quaternion, so that no position of q
+            stands for it.
     """
 
     def build() -> Function:
-        if system.nq != system.nv:
-            raise ModelError(
-                f"{system.name}: the loops contain a quaternion joint, so positions cannot be"
-                " followed by those of independent joints; use a posture of mbs.loops.solve"
+        active = independent_places(system)
+        if any(place >= system.nq for place in active):
+            raise NoClosedForm(
+                f"{system.name}: a rod spins about its line, which no position of q follows; use a"
+                " posture of mbs.loops.solve"
             )
-        active = list(system.free)
-        passive = [k for k in range(system.nv) if k not in active]
+        passive = [k for k in range(system.nq) if k not in active]
         q_a, p = MX.sym("q_a", len(active)), MX.sym("p", system.p.numel())
         q_start = DM([system.posture[k] for k in active])
         p_start = DM(closure_parameters(system))
@@ -68,7 +70,7 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
         SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
     )
     merged = _merged(system, active, passive)(z, q_a)
-    residual = casadi.substitute(independent_closure(system, q), q, merged)
+    residual = casadi.substitute(square_closure(system, q, passive), q, merged)
     equations = Function("phi", [z, q_a, system.p], [residual])
     options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}
     return casadi.rootfinder("newton", "fast_newton", equations, options)

@@ -88,7 +88,7 @@ def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -
         Unclosable: none was found; the message says by how much the loops stay open.
     """
     best: Closed | None = None
-    for q in _starts(start, closing.free, restarts):
+    for q in starts(start, closing.free, restarts):
         found = closing.nearest(q)
         if found.is_closed:
             return found.q
@@ -102,7 +102,7 @@ def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -
     )
 
 
-def _starts(first: Vector, free: list[int], restarts: int) -> Iterator[Vector]:
+def starts(first: Vector, free: list[int], restarts: int = _RESTARTS) -> Iterator[Vector]:
     """The guess, then guesses ever further away from it."""
     rng = np.random.default_rng(_SEED)
     yield first

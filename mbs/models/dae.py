@@ -17,6 +17,7 @@ from mbs.loops.closed_form.plan import plan
 from mbs.loops.closed_form.stage import ways_at
 from mbs.loops.start import Values, start
 from mbs.messages import quoted
+from mbs.models.contacts import require_no_contacts
 from mbs.models.dae_forms import (
     FORMS,
     Equations,
@@ -102,6 +103,7 @@ def dae(
         Unclosable: the loops cannot be closed at q0.
     """
     require_system(system)
+    require_no_contacts(system, "dae")
     if form not in FORMS:
         raise ModelError(f"{system.name}: form is {quoted(form)}; use one of {', '.join(FORMS)}")
     p = np.array(system.parameter_values(parameters), dtype=float)

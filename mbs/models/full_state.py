@@ -16,10 +16,12 @@ from mbs.assembly import System
 from mbs.assembly.rates import position_rate, quaternion_slices
 from mbs.loops.closure import closure_rows
 from mbs.models.composition import dense_function, outputs_of
+from mbs.models.contact_dynamics import ContactEquations, contact_equations
 from mbs.models.devices import device_equations, state_count
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.energy import energy
 from mbs.models.hybrid_dynamics import hybrid_dynamics
+from mbs.models.impacts import jump
 from mbs.models.prescribed import Prescribed
 from mbs.models.projection import projected
 
@@ -32,13 +34,17 @@ class FullState:
         rhs: `rhs(t, x, p) -> xdot`.
         project: `project(t, x, p) -> (x, residual)`, one Newton step onto loops, unit quaternions
             and prescribed motions, None where there is nothing to keep.
-        observe: `observe(t, x, p) -> a, tau, u, y, E, U, openness`, what a result shows beside x:
-            u and y are inputs and outputs of the devices, the last is the largest closure row.
+        observe: `observe(t, x, p) -> a, tau, u, y, held, E, U, openness`, what a result shows
+            beside x: u and y are inputs and outputs of the devices, `held` the efforts of rigid
+            stops and of dry friction, the last is the largest closure row.
+        events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
+            and dry friction, whose modes are then the last of p; None where there are none.
     """
 
     rhs: Function
     project: Function | None
     observe: Function
+    events: tuple[Function, Function] | None = None
 
 
 def full_state(
@@ -63,19 +69,46 @@ def full_state(
     u = SX.zeros(len(system.devices)) if inputs is None else SX(inputs(t, q, v, p))
     delivered, z_rate, y = device_equations(system, v, z, u)
     tau += delivered
-    a, tau = _accelerations(system, q, v, tau, motions, t)
+    contact = contact_equations(
+        system, q, v, tau, {motion.velocity: motion.law(t)[2] for motion in motions}
+    )
+    a, tau = (contact.a, contact.tau) if contact else _accelerations(system, q, v, tau, motions, t)
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
-    *kept, residual = projected(system, q, v, motions, t)
+    touch = (contact.contacts, contact.modes) if contact else None
+    *kept, residual = projected(system, q, v, motions, t, touch)
     rows = closure_rows(system, q)
     openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
     E, U = outputs_of(system, energy(system, "tree"), q, v)
-    observed = [a, tau, u, y, E, U, openness]
-    keeps = system.is_closed or motions or quaternion_slices(system.tree)
+    held = contact.efforts if contact else SX(0, 1)
+    observed = [a, tau, u, y, held, E, U, openness]
+    keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     moved = [casadi.vertcat(*kept, z), residual]
+    p = casadi.vertcat(p, contact.values) if contact else p
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
         project=dense_function("project", [t, x, p], moved) if keeps else None,
         observe=dense_function("observe", [t, x, p], observed),
+        events=_events(system, contact, [t, x, p], motions) if contact else None,
+    )
+
+
+def _events(
+    system: System, contact: ContactEquations, txp: list[SX], motions: Sequence[Prescribed]
+) -> tuple[Function, Function]:
+    """The functions of `FullState.events`."""
+    x, nq, n = txp[1], system.nq, system.nq + system.nv
+    fired = SX.sym("fired", contact.indicators.numel())
+    v, modes = jump(
+        system,
+        contact.contacts,
+        contact.modes,
+        (x[:nq], x[nq:n], fired),
+        tuple(motion.velocity for motion in motions),
+    )
+    after = casadi.vertcat(x[:nq], v, x[n:])
+    return (
+        dense_function("indicators", txp, [contact.indicators]),
+        dense_function("jump", [*txp, fired], [after, modes]),
     )
 
 

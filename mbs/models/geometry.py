@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import casadi
+import numpy as np
 from casadi import DM, MX, SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.model_function import (
-    ModelFunction,
-    Named,
-    default_in,
-    model_function,
-    require_system,
-)
-from mbs.errors import NoClosedForm
+from mbs.assembly.model_function import Named, default_in, model_function, require_system
+from mbs.errors import NoClosedForm, Unclosable
+from mbs.loops.function import LoopFunction
 from mbs.loops.function import function as closed_form
 from mbs.loops.numeric import follow_active
+from mbs.loops.posture import solve
 from mbs.models.composition import outputs_of
 from mbs.recursions.route import cheapest_pose
 
@@ -56,7 +54,8 @@ def _pose(
 def terminal_frame(system: System) -> str | int:
     """The frame that a robot is asked for when none is named.
 
-    It is the frame named "tool", else the only frame that was given a name, else the last link.
+    It is the frame named "tool", else the only frame that was given a name, else the last link at
+    the end of a chain that no loop goes through, else the last link.
     """
     named = system.named_frames
     if "tool" in named:
@@ -65,7 +64,17 @@ def terminal_frame(system: System) -> str | int:
         return named[0]
     shafts = {shaft.coordinate for shaft in system.shafts if shaft.own}
     links = [row.number for row in system.links if row.name not in shafts]
+    ends = _open_ends(system)
+    links = [number for number in links if number in ends] or links
     return links[-1] if links else len(system.tree.links)
+
+
+def _open_ends(system: System) -> set[int]:
+    """The numbers of the links that carry no other link and stand in no loop."""
+    tree = system.tree
+    inner = {link.antecedent for link in tree.links}
+    inner |= {k for cut in system.cuts for k in tree.path(cut.link_a) + tree.path(cut.link_b)}
+    return {k + 1 for k in range(len(tree.links)) if k not in inner}
 
 
 def direct_geometry(system: System, frame: str | int | None = None) -> Function:
@@ -73,7 +82,8 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
 
     For a closed system the input is q_a, the positions of the independent joints; the others
     follow on the branch of the assembled posture: in closed form where `mbs.loops.function` knows
-    one, else in small steps. Where that leads nowhere T is NaN, and a call with numbers is refused.
+    one, else in small steps. Where that leads nowhere T is NaN, and a call with numbers raises
+    Unclosable.
 
     Source: Khalil & Creusot 1997, section 3.1.
 
@@ -86,6 +96,7 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
 
     Raises:
         ModelError: there is no such frame.
+        NoClosedForm: a quaternion turns freely, so that q_a does not say how it stands.
     """
     require_system(system)
     name = terminal_frame(system) if frame is None else frame
@@ -105,7 +116,23 @@ def _closed_geometry(system: System, name: str | int, pose: Function) -> Functio
         (q,) = outputs_of(system, loops, q_a)
         return [("q_a", q_a)], [("T", outputs_of(system, pose, q)[0])]
 
-    return model_function(system, ("dgm", name), build)
+    def make() -> Function:
+        return LoopFunction(model_function(system, ("dgm", name), build), system)
+
+    function: Function = system.cached(("closed dgm", name), make)
+    return function
+
+
+class _FollowedGeometry(LoopFunction):
+    """The geometry of a system that is followed in steps; a refusal says where its branch ends."""
+
+    def _refusal(self, q_a: NDArray[np.float64], p: NDArray[np.float64]) -> str:
+        names = [parameter.name for parameter in self.system.parameters]
+        try:
+            solve(self.system, q_a.tolist(), parameters=dict(zip(names, p.tolist(), strict=True)))
+        except Unclosable as error:
+            return str(error)
+        return f"{self.system.name}: no posture of the assembled branch has these positions"
 
 
 def _followed_geometry(system: System, name: str | int, pose: Function) -> Function:
@@ -119,7 +146,7 @@ def _followed_geometry(system: System, name: str | int, pose: Function) -> Funct
         names = ["q_a", "p"][: len(inputs)]
         options = {"default_in": default_in(system, 1)}
         function = Function("dgm", inputs, [casadi.densify(T)], names, ["T"], options)
-        return ModelFunction(function, system)
+        return _FollowedGeometry(function, system)
 
     function: Function = system.cached(("dgm", name), make)
     return function

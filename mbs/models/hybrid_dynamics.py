@@ -69,20 +69,20 @@ def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
     numbers = tuple(names.index(name) for name in prescribed)
     if len(set(numbers)) < len(numbers):
         raise ModelError(f"{system.name}: a velocity is prescribed twice; name each once")
-    _require_free(system, numbers)
-    return numbers
-
-
-def _require_free(system: System, numbers: tuple[int, ...]) -> None:
-    """Refuse velocities that the loops tie to each other."""
-    if not system.is_closed:
-        return
-    p = [system.p_default] if system.parameters else []
-    J = np.array(closure_jacobian(system)(list(system.posture), *p))
-    E = np.eye(system.nv)[list(numbers)]
-    if rank(np.vstack([J, E])) < rank(J) + len(numbers):
+    if not are_independent(system, numbers):
         told = ", ".join(system.speeds[k].name for k in numbers)
         raise ModelError(
             f"{system.name}: {told} cannot all be prescribed, since the loops tie them (mobility"
             f" {len(system.active)}); prescribe joints that can move independently"
         )
+    return numbers
+
+
+def are_independent(system: System, numbers: tuple[int, ...]) -> bool:
+    """Whether the loops leave these velocities free of each other at the assembled posture."""
+    if not system.is_closed:
+        return True
+    p = [system.p_default] if system.parameters else []
+    J = np.array(closure_jacobian(system)(list(system.posture), *p))
+    E = np.eye(system.nv)[list(numbers)]
+    return rank(np.vstack([J, E])) == rank(J) + len(numbers)

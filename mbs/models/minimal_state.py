@@ -5,6 +5,7 @@ It is what an importer of an FMU expects: states that may be set freely, and no 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -14,7 +15,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.rates import norm_rows, normalised, position_rate, quaternion_slices
 from mbs.errors import ModelError
-from mbs.loops.closure import closure_rows, facing, independent_closure
+from mbs.loops.closure import closure_rows, facing, square_closure
 from mbs.loops.reduction import reduction
 from mbs.models.composition import dense_function, outputs_of
 from mbs.models.devices import device_equations, state_count
@@ -79,7 +80,7 @@ def minimal_state(system: System) -> MinimalState:
         dependents=dependents,
         inputs=driven,
         rhs=dense_function("rhs", [t, x, z, u, system.p], [casadi.vertcat(rate, a, rates), y]),
-        closure=_closure_step(system, q, x, z) if dependents else None,
+        closure=_closure_step(system, q, x, z, dependents) if dependents else None,
     )
 
 
@@ -134,10 +135,10 @@ def _terminal_pose(system: System, q: SX) -> SX:
     return casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
 
 
-def _closure_step(system: System, q: SX, x: SX, z: SX) -> Function:
+def _closure_step(system: System, q: SX, x: SX, z: SX, dependents: Sequence[int]) -> Function:
     symbols = SX.sym("q", system.nq)
     norms = norm_rows(system.tree, symbols)
-    kept = casadi.vertcat(independent_closure(system, symbols), norms)
+    kept = square_closure(system, symbols, dependents)
     every = casadi.vertcat(closure_rows(system, symbols), norms)
     kept, every = casadi.substitute([kept, every], [symbols], [q])
     z_next = z - solve_square(casadi.jacobian(kept, z), kept)

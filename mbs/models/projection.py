@@ -11,17 +11,25 @@ from mbs.assembly import System
 from mbs.assembly.rates import norm_rows, normalised
 from mbs.loops.closure import closure_rows, independent_closure
 from mbs.loops.velocity import independent_constraint_rows
+from mbs.models.contacts import Contacts, Modes
 from mbs.models.prescribed import Prescribed
 
 _NEARLY_DEPENDENT = 1e-6
 """Squared sine between a row and the rows before it below which it is left alone."""
 _ASLEEP = 1e-6
 """What rows count in that case."""
+_SHARED = 1e-4
+"""Square that is added to rows of contacts, which may depend on others: they converge as fast."""
 _NEVER = 1e300
 
 
 def projected(
-    system: System, q: SX, v: SX, motions: Sequence[Prescribed], t: SX
+    system: System,
+    q: SX,
+    v: SX,
+    motions: Sequence[Prescribed],
+    t: SX,
+    touch: tuple[Contacts, Modes] | None = None,
 ) -> tuple[SX, SX, SX]:
     """Positions and velocities one Newton step closer, and the largest row before the step.
 
@@ -36,11 +44,12 @@ def projected(
         v: (nv, 1) velocities.
         motions: what is prescribed.
         t: time [s].
+        touch: contacts and what they do; none when left out.
 
     Returns:
         q (nq, 1), v (nv, 1), and the largest row.
     """
-    if not system.is_closed and not motions:
+    if not system.is_closed and not motions and touch is None:
         return normalised(system.tree, q), v, SX(0)
     symbols = SX.sym("q", system.nq)
     norms = norm_rows(system.tree, symbols)
@@ -55,29 +64,53 @@ def projected(
     if system.is_closed:
         loops, every = independent_closure(system, symbols), closure_rows(system, symbols)
         J = independent_constraint_rows(system, symbols)
-    r = casadi.vertcat(loops, norms, *places)
+    distance, place_off, still, slide_off = _touched(system, symbols, v, touch)
+    r = casadi.vertcat(loops, norms, *places, distance)
     J_q = casadi.jacobian(r, symbols)
     held = [(m.velocity, law[1]) for m, law in zip(motions, laws, strict=True) if m.holds_speed]
     E = SX(DM.eye(system.nv))[[k for k, _ in held], :]
     J = casadi.vertcat(J, E)
     wanted = casadi.vertcat(SX(J.shape[0] - len(held), 1), *(speed for _, speed in held))
-    speed = casadi.mtimes(J, v) - wanted
-    step_q, _ = _shortest(J_q, r)
-    step_v, awake = _shortest(J, speed)
-    rows = casadi.vertcat(every, norms, *places, speed)
+    J = casadi.vertcat(J, casadi.jacobian(still, v))
+    speed = casadi.vertcat(casadi.mtimes(J[: wanted.numel(), :], v) - wanted, still)
+    step_q, _ = _shortest(J_q, r, place_off)
+    step_v, awake = _shortest(J, speed, slide_off)
+    rows = casadi.vertcat(every, norms, *places, distance, speed)
     residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
     values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])
     return q - values[0], v - values[1], values[2]
 
 
-def _shortest(J: SX, r: SX) -> tuple[SX, SX]:
+def _touched(
+    system: System, q: SX, v: SX, touch: tuple[Contacts, Modes] | None
+) -> tuple[SX, SX, SX, SX]:
+    """Rows of positions at stops, then of velocities that are held; each with its `_switched`."""
+    if touch is None:
+        return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
+    contacts, modes = touch
+    return (
+        contacts.distance(q, modes.place),
+        _switched(modes.place**2),
+        modes.held * contacts.velocity(v),
+        _switched(modes.held),
+    )
+
+
+def _switched(acting: SX) -> SX:
+    """What stands in for the squares of rows that vanish when they do not act."""
+    return casadi.if_else(acting, _SHARED, 1)
+
+
+def _shortest(J: SX, r: SX, off: SX) -> tuple[SX, SX]:
     """The shortest step x with J x = r, by rows that are not nearly dependent, and whether all are.
 
-    A row counts as long as the rows are on average, at least: it may also vanish by itself.
+    A row counts as long as the rows are on average, at least: it may also vanish by itself. The
+    last rows are switched; `off` is added to their squares.
     """
     if J.shape[0] == 0:
         return SX.zeros(J.shape[1]), SX(1)
-    S = casadi.sparsify(casadi.mtimes(J, J.T))
+    every = casadi.vertcat(SX(J.shape[0] - off.numel(), 1), off)
+    S = casadi.sparsify(casadi.mtimes(J, J.T)) + casadi.diag(every)
     D, LT, order = casadi.ldl(S)
     squares = casadi.densify(casadi.diag(S))
     least = casadi.fmax(squares, casadi.sum1(squares) / squares.numel())

@@ -22,7 +22,7 @@ def delta() -> Mechanism:
     angle lowers an arm. A pair of rods of 0.6 m, 0.08 m apart, leads from each elbow to the circle
     of 0.05 m radius on the platform, below the base. The rods have no mass of their own: of the
     0.12 kg of each pair two thirds are at the elbow and one third on the platform. It is assembled
-    with horizontal arms.
+    with horizontal arms. The frame `tool` is in the middle of the platform.
 
     Source: structure of Clavel 1988; masses of the forearms as in Codourey 1998. Lengths and
     masses are illustrative.
@@ -33,6 +33,7 @@ def delta() -> Mechanism:
     m.connect(m.world, Free("platform"), plate)
     ends = m.add(PointMass("forearm_ends", mass=_FOREARM_MASS))
     m.connect(plate, ends)
+    m.add_frame("tool", plate)
     for k in range(3):
         around = ("z", 2 * pi * k / 3)
         arm = m.add(Cylinder(f"arm{k + 1}", length=_ARM, radius=0.015, mass=0.3))

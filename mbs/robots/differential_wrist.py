@@ -19,7 +19,7 @@ def differential_wrist(ratio: float = 1.0) -> Mechanism:
     Args:
         ratio: teeth of a side gear over those of the tool's gear.
     """
-    m = Mechanism("differential_wrist", source=_SOURCE)
+    m = Mechanism("differential_wrist", source=_SOURCE, guess={"pitch": 0.0})
     carrier = m.add(Body("carrier", mass=1.2, com=(0.02, 0, 0), inertia=(2e-3, 2e-3, 2.5e-3)))
     tool = m.add(Body("tool", mass=0.8, com=(0.12, 0, 0.01), inertia=(6e-4, 3e-3, 3e-3)))
     m.connect(m.world, Revolute("pitch", axis="y", actuated=False), carrier)

@@ -14,7 +14,8 @@ def five_bar() -> Mechanism:
     """Five-bar linkage in a vertical plane: cranks q1, q3 driven, couplers q2, q4, cut joint q5.
 
     Cranks of 0.25 m turn about points 0.2 m apart, couplers of 0.35 m meet in the cut joint. It is
-    assembled symmetric, the cut joint above the ground. All values are illustrative.
+    assembled symmetric, the cut joint above the ground. The frame `tool` is in the cut joint, on
+    the coupler of the first crank. All values are illustrative.
     """
     frames = [
         frame(0, actuated=True),
@@ -34,6 +35,7 @@ def five_bar() -> Mechanism:
         )
     ]
     loops = [{"cut": [5, 6], "joint": "revolute"}]
-    return robot(
-        "five_bar", _SOURCE, frames, bodies, loop=loops, gravity=[0, -9.81, 0], guess=_GUESS
-    )
+    m = robot("five_bar", _SOURCE, frames, bodies, loop=loops, gravity=[0, -9.81, 0], guess=_GUESS)
+    coupler = next(body for body in m.bodies() if body.name == "link2")
+    m.add_frame("tool", coupler.at(_COUPLER))
+    return m

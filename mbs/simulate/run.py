@@ -11,15 +11,16 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.loops.start import Values, start
-from mbs.models.full_state import FullState, full_state
+from mbs.models.full_state import full_state
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
+from mbs.simulate.contacts import contact_columns, every_effort, require_contacts_possible, told
 from mbs.simulate.effort import Effort, effort_function
 from mbs.simulate.inputs import device_columns, device_states, input_function
+from mbs.simulate.legs import Leg, integrated
 from mbs.simulate.motion import Motion, prescribed_motions, started
 from mbs.simulate.progress import progress
 from mbs.simulate.sensor_columns import sensor_columns
-from mbs.solvers import integrate
 
 Array = NDArray[np.float64]
 
@@ -76,7 +77,8 @@ def run(
         A `Result` with, for every coordinate, `name.q`, `name.v`, `name.a`, `name.tau`, and
         `kinetic_energy`, `potential_energy`, `closure_residual`; for every device its input, its
         states and its outputs, such as `motor.voltage`, `motor.i`, `motor.tau`, `motor.w`; and
-        what every sensor reads, such as `tip.p.x`.
+        what every sensor reads, such as `tip.p.x`. A rigid stop or dry friction has `name.mode`
+        and `name.effort`, and `events` tells when they change.
 
     Raises:
         ModelError: `system` is no System, a name is unknown or has no motor, or an argument has the
@@ -91,24 +93,25 @@ def run(
     steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
     p = system.parameter_values(parameters)
     motions = prescribed_motions(system, motion)
-    state = full_state(system, effort_function(system, tau), input_function(system, u), motions)
+    require_contacts_possible(system, motions)
+    effort, inputs = effort_function(system, tau), input_function(system, u)
     given = started(system, motions, q0, v0)
     x0 = np.concatenate([*start(system, *given, parameters), device_states(system, z0)])
     times = np.linspace(0.0, duration, steps + 1)
     rtol, atol = step_tolerances(tolerance)
     with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
-        x = integrate(
-            state.rhs,
+        legs = integrated(
+            system,
+            lambda like: full_state(like, effort, inputs, motions),
             x0,
             times,
-            p=p,
-            project=state.project,
+            p,
             method=method,
             rtol=rtol,
             atol=atol,
             progress=reached,
         )
-    return _result(system, state, times, x, p)
+    return _result(system, legs, p)
 
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:
@@ -116,10 +119,11 @@ def step_tolerances(tolerance: float) -> tuple[float, float]:
     return max(1e-3 * tolerance, 1e-14), max(0.05 * tolerance, 1e-13)
 
 
-def _result(system: System, state: FullState, times: Array, x: Array, p: Sequence[float]) -> Result:
+def _result(system: System, legs: Sequence[Leg], p: Sequence[float]) -> Result:
+    times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     every = np.repeat(np.array(p, dtype=float).reshape(-1, 1), len(times), axis=1)
-    observed = state.observe.map(len(times))(times.reshape(1, -1), x.T, every)
-    a, tau, u, y, *scalars = (np.array(o).T for o in observed)
+    parts = [leg.observed(p) for leg in legs]
+    a, tau, u, y, held, *scalars = (np.vstack(rows) for rows in zip(*parts, strict=True))
     units: dict[str, str] = {}
     columns: list[Array] = []
 
@@ -139,7 +143,11 @@ def _result(system: System, state: FullState, times: Array, x: Array, p: Sequenc
         column(name, unit, values)
     motion = {"q": x[:, : system.nq].T, "v": x[:, system.nq : system.nq + system.nv].T}
     for name, unit, values in sensor_columns(
-        system, {**motion, "a": a.T, "tau": tau.T, "p": every}
+        system, {**motion, "a": a.T, "tau": every_effort(system, tau, held).T, "p": every}
     ):
         column(name, unit, values)
-    return Result(times, np.column_stack(columns), units, name=system.name)
+    contact = legs[0].contact
+    for name, unit, values in contact_columns(system, contact, held):
+        column(name, unit, values)
+    values = np.column_stack(columns)
+    return Result(times, values, units, name=system.name, events=told(system, contact))

@@ -16,8 +16,8 @@ from mbs.native import cached_library
 from mbs.native.compiled import generated, unwritten
 from mbs.native.compiler import flags_for
 from mbs.solvers.events import Event, fired_of
+from mbs.solvers.failures import failed
 from mbs.solvers.problem import Equations, Problem
-from mbs.solvers.stepper import failed
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]

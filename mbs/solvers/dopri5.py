@@ -52,7 +52,7 @@ class Dopri5(Stepper):
         return self.x, rise, bend, rise - h * self.k[6] - bend, h * combine(D, self.k)
 
     def _close(self, t: float, y: Array) -> Array | None:
-        return self.k[6] if self.project is None else self._slope(t, y)
+        return self._slope(t, y) if self.moved else self.k[6]
 
     def _interpolate(self, a: float) -> Array:
         b = 1.0 - a

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.solvers.events import fired_of
-from mbs.solvers.stepper import EPSILON, Array, Failure, Stepper, failed
+from mbs.solvers.failures import Failure, failed
+from mbs.solvers.stepper import EPSILON, Array, Stepper
 
 Flags = npt.NDArray[np.bool_]
 Values = Callable[[float, Array], Array]

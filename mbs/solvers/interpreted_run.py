@@ -9,9 +9,10 @@ import numpy.typing as npt
 from mbs.solvers.dopri5 import Dopri5
 from mbs.solvers.event_stepper import EventStepper, Flags
 from mbs.solvers.events import Event, fired_of
+from mbs.solvers.failures import Failure, failed
 from mbs.solvers.problem import Problem
 from mbs.solvers.rodas import Rodas
-from mbs.solvers.stepper import Failure, Projection, Stepper, failed
+from mbs.solvers.stepper import Projection, Stepper
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]

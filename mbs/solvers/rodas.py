@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbs.solvers.stepper import Array, Failure, Stepper, combine
+from mbs.solvers.failures import Failure
+from mbs.solvers.stepper import Array, Stepper, combine
 
 Jacobian = Callable[[float, Array], tuple[Array, Array]]
 """(t, x) -> d rhs / d x (n, n), d rhs / d t (n,)."""

@@ -1,4 +1,4 @@
-"""Symbolic solution of constrained equations: A x - J' y = b, J x = d.
+"""Symbolic solution of constrained equations: A x - J' y = b, J x + C y = d.
 
 The matrix of both is factorised as L D L' in an order that is fixed once: a row of J comes after
 the columns that it acts on, so that no pivot vanishes where A is positive definite and the rows
@@ -15,30 +15,49 @@ from casadi import SX, Sparsity
 
 _SINGULAR = 1e-12
 """What is added to J A^-1 J', relative to 1 / scale: finite where rows become dependent."""
+_SHARED = 1e-8
+"""Likewise for rows that are switched, which are dependent as a rule."""
 
 
-def solve_saddle(A: SX, J: SX, b: SX, d: SX, scale: float) -> tuple[SX, SX]:
-    """The x and y of A x - J' y = b, J x = d.
+def solve_saddle(
+    A: SX,
+    J: SX,
+    b: SX,
+    d: SX,
+    scale: float,
+    corner: SX | None = None,
+    penalty: float | None = None,
+) -> tuple[SX, SX]:
+    """The x and y of A x - J' y = b, J x + C y = d, with a diagonal C that is zero as a rule.
 
-    scale * J'J is added to A, which changes no solution and is regular where A alone is not, as
-    massless links make it. One refinement restores the digits that nearly dependent rows cost.
+    A multiple of J'J is added to A, which changes no solution and is regular where A alone is
+    not, as massless links make it. One refinement restores the digits that nearly dependent rows
+    cost.
+    A row with a structural element in C is a switch: it acts where that is zero, and does not where
+    that is positive and the row of J and d are zero. Switched rows that depend on others share
+    their y.
 
     Args:
-        A: (n, n) symmetric, positive definite where J x = 0.
+        A: (n, n) symmetric, positive definite where J x = 0, everywhere if the penalty is zero.
         J: (m, n) independent rows.
         b: (n, 1).
         d: (m, 1).
         scale: makes scale * J'J as large as A.
+        corner: (m, 1) the diagonal of C, sparse; the unit of its elements is that of 1 / scale.
+        penalty: how many times J'J is added to A; the scale when left out.
 
     Returns:
         x (n, 1) and y (m, 1).
     """
     n, m = J.shape[1], J.shape[0]
     J = casadi.sparsify(J)
-    weighted = scale * J.T
-    K = casadi.sparsify(A) + casadi.mtimes(weighted, J)
-    corner = -_SINGULAR / scale * SX.eye(m)
-    whole = casadi.vertcat(casadi.horzcat(K, J.T), casadi.horzcat(J, corner))
+    weighted = (scale if penalty is None else penalty) * J.T
+    K = casadi.sparsify(A) + casadi.sparsify(casadi.mtimes(weighted, J))
+    C = SX(m, 1) if corner is None else corner
+    last = SX(m, m)
+    for row in range(m):
+        last[row, row] = -C[row] - (_SHARED if C.sparsity().has_nz(row, 0) else _SINGULAR) / scale
+    whole = casadi.vertcat(casadi.horzcat(K, J.T), casadi.horzcat(J, last))
     order = elimination_order(whole.sparsity(), n)
     D, LT, _ = casadi.ldl(whole[order, order], False)
     places = [order.index(k) for k in range(n + m)]
@@ -48,7 +67,10 @@ def solve_saddle(A: SX, J: SX, b: SX, d: SX, scale: float) -> tuple[SX, SX]:
         return casadi.densify(ordered)[places]
 
     first = solve(casadi.vertcat(b + casadi.mtimes(weighted, d), d))
-    second = solve(casadi.vertcat(SX.zeros(n), d - casadi.mtimes(J, first[:n])))
+    missing = d - casadi.mtimes(J, first[:n])
+    if corner is not None:
+        missing += corner * first[n:]
+    second = solve(casadi.vertcat(SX.zeros(n), missing))
     found = first + second
     return found[:n], -found[n:]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mbs.errors import SolverError
+from mbs.solvers.failures import MAX_STEPS, Failure, failed
 
 Array = npt.NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]
@@ -23,28 +23,8 @@ EPSILON = float(np.finfo(float).eps)
 SAFETY, SHRINK, GROW, BETA = 0.9, 0.2, 10.0, 0.04
 NEAR_ZERO = 1e-10
 CALM, FORGET, CREEPING, LEAP_ERROR = 0.1, 0.95, 0.01, 100.0
-LEAPS = (1.0, 0.6, 1.6, 0.4, 2.5)
-MAX_STEPS = 100_000
-REASONS = {
-    "steps": f"more than {MAX_STEPS} steps between two output times; ask for a looser tolerance "
-    "or, when fast decays are in the system, for a method for stiff equations",
-    "small": "error control asks for a step below the rounding of time; "
-    "look for a singularity or a jump",
-    "rhs": "the right-hand side has no value there",
-    "projection": "the projection onto the constraints does not converge; "
-    "look for a singular posture",
-    "finite": "a value is not finite; look for a singularity",
-    "indicators": "an event indicator has no value there",
-    "jump": "the jump of an event has no value there",
-    "settle": "the events there do not settle, each jump asks for another one; "
-    "let the jump make the indicators positive, or zero and rising",
-    "standstill": "more than 100 events, and time hardly advances; "
-    "add a mode in which what repeats is at rest",
-}
-
-
-class Failure(Exception):
-    """An evaluation had no answer, so the step must be shortened."""
+UNMOVED = 0.01
+LEAPS = (0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.5)
 
 
 @dataclass(slots=True)
@@ -61,6 +41,7 @@ class Stepper(ABC):
         slope: slope at the present state, or None when it is not known.
         last_step: length of the last step.
         last_end: time at its end.
+        moved: whether the last projection moved the state, compared with the tolerances.
         calm_step: length of recent steps that were not short.
         calm: time and state before the last of them, where a leap would start.
     """
@@ -77,6 +58,7 @@ class Stepper(ABC):
     since_output: int = 0
     last_step: float = 0.0
     last_end: float = 0.0
+    moved: bool = False
     calm_step: float = 0.0
     calm: tuple[float, Array] | None = None
     slope: Array | None = None
@@ -151,6 +133,7 @@ class Stepper(ABC):
     def restart(self, x: Array) -> None:
         """Go on from another state at the present time, with a new first step."""
         self.x, self.slope, self.h, self.error = x, None, 0.0, 1e-4
+        self.calm_step = 0.0
 
     def step(self, limit: float) -> int:
         """Try steps towards limit until one is accepted.
@@ -193,25 +176,39 @@ class Stepper(ABC):
             self.calm = self.t, self.x
 
     def _leap(self, limit: float) -> bool:
-        """From where steps were calm across what they creep up to; whether a step does it."""
+        """From where steps were calm across what they creep up to, by the step of least error.
+
+        Returns:
+            whether a step does it.
+        """
         assert self.calm is not None
         t, x, wanted = self.t, self.x, self.h
         (start, self.x), length = self.calm, self.calm_step
         self.t, self.slope, self.calm_step = start, None, 0.0
-        for factor in LEAPS:
-            h = factor * length
-            if start + h <= t or start + h > limit:
-                continue
+        lengths = [factor * length for factor in LEAPS if t < start + factor * length <= limit]
+        errors = [self._leap_error(h, limit) for h in lengths]
+        least = min(errors, default=math.inf)
+        if least <= LEAP_ERROR:
+            h = lengths[errors.index(least)]
             try:
-                y, difference = self._attempt(h, self._opened(limit))
-                if self._norm(difference, y) <= LEAP_ERROR:
-                    self._accept(y, start + h, h)
-                    self.h, self.error = length, 1e-4
-                    return True
+                y, _ = self._attempt(h, self._opened(limit))
+                self._accept(y, start + h, h)
             except Failure:
-                continue
+                pass
+            else:
+                self.h, self.error = length, 1e-4
+                return True
         self.t, self.x, self.h, self.slope = t, x, wanted, None
         return False
+
+    def _leap_error(self, h: float, limit: float) -> float:
+        """The error of a step of this length, infinite where it cannot be made."""
+        try:
+            y, difference = self._attempt(h, self._opened(limit))
+        except Failure:
+            return math.inf
+        error = self._norm(difference, y)
+        return error if math.isfinite(error) else math.inf
 
     def _try_step(self, slope: Array, limit: float) -> bool:
         cut = self.t + 1.01 * self.h >= limit
@@ -237,8 +234,10 @@ class Stepper(ABC):
 
     def _accept(self, y: Array, t_new: float, h: float) -> None:
         dense = self._keep(h, y)
+        self.moved = False
         if self.project is not None:
-            y = self.project(t_new, y)
+            raw, y = y, self.project(t_new, y)
+            self.moved = self._norm(raw - y, y) > UNMOVED
         self.slope = self._close(t_new, y)
         self.dense = dense
         self.t, self.x, self.last_step, self.last_end = t_new, y, h, t_new
@@ -278,23 +277,6 @@ class Stepper(ABC):
         top = max(d1, d2)
         h1 = max(1e-6, h0 * 1e-3) if top <= 1e-15 else (0.01 / top) ** 0.2
         return float(min(100 * h0, h1, span))
-
-
-def failed(t: float, h: float, reason: str, fired: Sequence[int] = ()) -> SolverError:
-    """The error that says when, with which step and why an integration stopped.
-
-    Args:
-        t: time of the last accepted state, s.
-        h: step that was wanted next, s; 0 when there was none.
-        reason: a key of REASONS.
-        fired: numbers of the event indicators that are to blame.
-
-    Returns:
-        an error to raise.
-    """
-    step = f" with step {h:.3g} s" if h > 0 else ""
-    who = f"; indicators {', '.join(map(str, fired))}" if fired else ""
-    return SolverError(f"integration stopped at t = {t:.9g} s{step}: {REASONS[reason]}{who}")
 
 
 def combine(weights: Sequence[float], k: Sequence[Array]) -> Any:

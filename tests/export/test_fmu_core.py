@@ -375,7 +375,7 @@ def test_bytes_that_are_no_state_are_refused(fmu):
     wrong += [(flags + 4 * k, "=i", 2) for k in (2, 3, 4)]
     wrong += [(time, "=d", np.nan), (tolerance, "=d", np.inf), (tolerance, "=d", 0.0)]
     wrong += [(at, "=d", np.nan), (parameter, "=d", -1.0)]
-    wrong += [(len(blob) - 8 * k - 8, "=d", np.nan) for k in range(3, 7)]
+    wrong += [(len(blob) - 8 * k - 8, "=d", np.nan) for k in range(8, 12)]
     for place, form, value in wrong:
         torn = bytearray(blob)
         struct.pack_into(form, torn, place, value)

@@ -113,7 +113,12 @@ TABLES = (
 @pytest.mark.parametrize("name", TABLES)
 def test_catalogue_tables_survive(par, tmp_path, name, monkeypatch):
     tables = []
-    monkeypatch.setattr("mbs.robots.rows.to_mechanism", tables.append)
+
+    def seen(table):
+        tables.append(table)
+        return to_mechanism(table)
+
+    monkeypatch.setattr("mbs.robots.rows.to_mechanism", seen)
     catalogue()[name]()
     write_par(tables[0], tmp_path / "one.par")
     one = read_par(tmp_path / "one.par")

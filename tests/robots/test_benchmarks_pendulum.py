@@ -9,21 +9,14 @@ import mbs
 from mbs.errors import DescriptionError
 from mbs.robots import n_four_bar, simple_pendulum
 
-LIMITS = {1e-6: 0.05, 1e-9: 5e-5}
+LIMITS = {1e-6: 1e-4, 1e-9: 1e-6}
 """Of the library's measure, which accepts 1e-1 for a coarse and 1e-3 for a fine solution."""
-DISTANCE = {1e-6: 5e-4, 1e-9: 5e-7}
-"""Of the rms error of a place [m]."""
 SECONDS = 10.0
 G = 9.81
 
 
 def energy(result):
     return result["kinetic_energy"] + result["potential_energy"]
-
-
-def assert_close(place, reference, tolerance):
-    assert rms_error(place, reference) < LIMITS[tolerance]
-    assert np.sqrt(np.mean((place - reference) ** 2)) < DISTANCE[tolerance]
 
 
 def test_closed_forms_obey_the_pendulum_equation():
@@ -48,19 +41,24 @@ def test_pendulum(tolerance):
     assert theta[0] == pytest.approx(np.pi)
     place = np.column_stack([np.cos(theta), np.sin(theta)])
     reference = np.column_stack([-np.sin(fallen), -np.cos(fallen)])
-    assert_close(place, reference, tolerance)
+    assert rms_error(place, reference) < LIMITS[tolerance]
     assert np.ptp(energy(result)) < 1e3 * tolerance
     assert place[:, 0].max() > 0.9999
 
 
-@pytest.mark.parametrize("loops", [1, 2, 5])
+@pytest.fixture(scope="module", params=[1, 2, 5, 10, 40])
+def windows(request):
+    """The number of windows, and their system."""
+    return request.param, n_four_bar(request.param).assemble()
+
+
 @pytest.mark.parametrize("tolerance", LIMITS)
-def test_windows_whirl_through_every_singular_posture(loops, tolerance):
+def test_windows_whirl_through_every_singular_posture(windows, tolerance):
     """On the parallelogram branch the uprights turn together and the couplers only translate.
 
     Then T = (N + 1) phi'^2 / 6 + N phi'^2 / 2 and U = g sin(phi) ((N + 1) / 2 + N).
     """
-    system = n_four_bar(loops).assemble()
+    loops, system = windows
     assert system.closure.mobility == 1
     result = mbs.simulate.run(system, SECONDS, v0={"a0": -1.0}, tolerance=tolerance, quiet=True)
     rate = np.sqrt(G * ((loops + 1) / 2 + loops) / ((loops + 1) / 3 + loops))
@@ -69,11 +67,11 @@ def test_windows_whirl_through_every_singular_posture(loops, tolerance):
     assert np.sum(np.diff(np.sign(np.sin(phi))) != 0) >= 10  # all rods on one line
     top = np.column_stack([np.cos(result["a0.q"]), np.sin(result["a0.q"])])
     reference = np.column_stack([np.cos(phi), np.sin(phi)])
-    assert_close(top, reference, tolerance)
+    assert rms_error(top, reference) < LIMITS[tolerance]
     for k in range(1, loops + 1):
         np.testing.assert_allclose(result[f"a{k}.q"], result["a0.q"], atol=1e-11)
     assert np.ptp(energy(result)) < 2e3 * loops * tolerance
-    assert result["closure_residual"].max() < 1e-12
+    assert result["closure_residual"].max() < 1e-10
 
 
 @pytest.mark.parametrize("loops", [0, -1, 2.0, True, "3"])

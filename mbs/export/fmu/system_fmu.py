@@ -11,6 +11,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, Coordinate
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, State, Variable
 from mbs.export.fmu.pack import write_fmu
+from mbs.models.contacts import require_no_contacts
 from mbs.models.geometry import terminal_frame
 from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
 
@@ -65,6 +66,7 @@ def fmu_model(
     tolerance: float = 1e-8,
 ) -> FmuModel:
     """The description of a mechanism's FMU; arguments as for `fmu`."""
+    require_no_contacts(system, "the FMU")
     system.parameter_values()
     state = minimal_state(system)
     x, z = consistent_start(system, state)

@@ -9,7 +9,7 @@ import numpy as np
 from casadi import Function
 
 from mbs.assembly import System
-from mbs.assembly.rates import quaternion_slices
+from mbs.loops.alike import difference
 from mbs.loops.closed_form.places import extent, independent_places
 from mbs.loops.closing import Vector
 
@@ -78,10 +78,5 @@ def _followed(
 
 def _agree(system: System, places: Sequence[int], reached: Vector, q: Vector) -> bool:
     """Whether the positions of the tree are those of q, up to whole turns and signs."""
-    gap = reached[: system.nq] - q
-    turns = [coordinate.unit == "rad" for coordinate in system.coordinates]
-    gap[turns] = np.remainder(gap[turns] + np.pi, 2 * np.pi) - np.pi
-    for part in quaternion_slices(system.tree):
-        opposite = reached[part] + q[part]
-        gap[part] = min(gap[part], opposite, key=lambda x: float(np.abs(x).max()))
+    gap = difference(system, reached[: system.nq], q)
     return bool(np.all(np.abs(gap[[k for k in places if k < system.nq]]) < _NEAR))

@@ -12,7 +12,8 @@ static const double NEAR_ZERO = 1e-10; /* part of the limit below which time cou
 
 /* Steps are calm while they are longer than a tenth of those before, which are forgotten slowly. */
 static const double CALM = 0.1, FORGET = 0.95, CREEPING = 0.01, LEAP_ERROR = 100.0;
-static const double LEAPS[] = {1.0, 0.6, 1.6, 0.4, 2.5};
+static const double UNMOVED = 0.01; /* part of the tolerances that a move is not worth a slope */
+static const double LEAPS[] = {0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.5};
 
 void stepper_init(stepper *s, int n, const stepper_method *method, stepper_rhs rhs, void *user,
                   double *memory, double *work) {
@@ -37,6 +38,7 @@ void stepper_start(stepper *s, double t) {
 
 void stepper_restart(stepper *s) {
     s->memory[SLOPE_VALID] = 0.0;
+    s->memory[CALM_STEP] = 0.0;
     s->memory[ERROR] = 1e-4;
 }
 
@@ -100,15 +102,25 @@ static double first_step(stepper *s, const double *x, double span) {
     return fmin(fmin(100 * h0, h1), span);
 }
 
+static int project_candidate(stepper *s, const double *x, double t_new) {
+    double *y = stepper_candidate(s), *move = stepper_trial(s);
+    int i;
+    memcpy(move, y, sizeof(double) * (size_t)s->n);
+    if (s->project(s->user, t_new, y)) return STEPPER_PROJECTION_FAILED;
+    if (!stepper_all_finite(y, s->n)) return STEPPER_NOT_FINITE;
+    for (i = 0; i < s->n; i++) move[i] -= y[i];
+    s->moved = norm(s, move, x, y) > UNMOVED;
+    return STEPPER_OK;
+}
+
 /* Project the candidate and make it the state; the slope there opens the next step. */
 static int accept(stepper *s, double *x, double t_new, double h) {
     double *y = stepper_candidate(s);
-    int status;
+    int status = STEPPER_OK;
     s->method->keep(s, x, h);
-    if (s->project) {
-        if (s->project(s->user, t_new, y)) return STEPPER_PROJECTION_FAILED;
-        if (!stepper_all_finite(y, s->n)) return STEPPER_NOT_FINITE;
-    }
+    s->moved = 0;
+    if (s->project) status = project_candidate(s, x, t_new);
+    if (status) return status;
     status = s->method->close(s, t_new);
     if (status) return status;
     memcpy(x, y, sizeof(double) * (size_t)s->n);
@@ -146,26 +158,35 @@ static void put(stepper *s, double *x, double t, const double *from) {
     stepper_close(s, NULL);
 }
 
-/* From where steps were calm across what they creep up to; 0 where no step does it. */
+/* The error of a step of this length, infinite where it cannot be made. */
+static double leap_error(stepper *s, const double *x, double h) {
+    double error;
+    s->steps++;
+    s->rejected++;
+    if (s->method->attempt(s, x, h)) return HUGE_VAL;
+    error = norm(s, stepper_trial(s), x, stepper_candidate(s));
+    return isfinite(error) ? error : HUGE_VAL;
+}
+
+/* From where steps were calm across what they creep up to, by the step of the smallest error; 0
+ * where none does it. */
 static int leap(stepper *s, double *x, double limit) {
     double *m = s->memory, t = m[TIME], wanted = m[STEP], from = m[CALM_TIME], length = m[CALM_STEP];
+    double best = 0.0, least = LEAP_ERROR;
     size_t k;
     memcpy(present_state(s), x, sizeof(double) * (size_t)s->n);
     put(s, x, from, calm_state(s));
     m[CALM_STEP] = 0.0;
-    for (k = 0; k < sizeof LEAPS / sizeof *LEAPS; k++) {
-        double h = LEAPS[k] * length;
+    for (k = 0; k < sizeof LEAPS / sizeof *LEAPS && !open_step(s, x, limit); k++) {
+        double h = LEAPS[k] * length, error;
         if (from + h <= t || from + h > limit) continue;
-        s->steps++;
-        if (open_step(s, x, limit)) break;
-        if (!s->method->attempt(s, x, h) &&
-            norm(s, stepper_trial(s), x, stepper_candidate(s)) <= LEAP_ERROR &&
-            !accept(s, x, from + h, h)) {
-            m[STEP] = length;
-            m[ERROR] = 1e-4;
-            return 1;
-        }
-        s->rejected++;
+        error = leap_error(s, x, h);
+        if (error <= least) best = h, least = error;
+    }
+    if (best > 0.0 && leap_error(s, x, best) <= least && !accept(s, x, from + best, best)) {
+        m[STEP] = length;
+        m[ERROR] = 1e-4;
+        return 1;
     }
     put(s, x, t, present_state(s));
     m[STEP] = wanted;

@@ -62,6 +62,7 @@ struct stepper {
     long max_steps;
     double *memory, *work;
     long steps, rejected, since_output;
+    int moved; /* whether the last projection moved the candidate, compared with the tolerances */
 };
 
 /* What the init of a method calls. max_steps and h_max are then 100000 and infinite. */

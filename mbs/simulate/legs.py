@@ -1,0 +1,150 @@
+"""Integration in legs: over-constrained loops whose independent rows are chosen anew on the way.
+
+In a loop such as Bennett's, which rows of the closing joint are independent changes with the
+posture: no choice holds all the way round. A leg ends where its rows have lost most of their
+independence, and the next one begins there with rows that are chosen for that posture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.loops.analysis import rows_at
+from mbs.loops.examine import row_independence
+from mbs.models.full_state import FullState
+from mbs.simulate.contacts import ContactMotion, first_modes
+from mbs.solvers import Events, integrate, integrate_events
+
+Array = NDArray[np.float64]
+
+_LOST = 0.05
+"""Part of its independence at the start of a leg at which a leg ends."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leg:
+    """A part of a motion with one state equation.
+
+    Attributes:
+        state: its equations.
+        times: (m,) s.
+        x: (m, nx) states at these times.
+        contact: what rigid stops and dry friction do meanwhile, None where there are none.
+    """
+
+    state: FullState
+    times: Array
+    x: Array
+    contact: ContactMotion | None = None
+
+    @property
+    def without_start(self) -> Leg:
+        """The same without its first row, which belongs to the leg before."""
+        return Leg(self.state, self.times[1:], self.x[1:])
+
+    def observed(self, p: Sequence[float]) -> list[Array]:
+        """What the state equation observes, (m, ..) each."""
+        own = np.repeat(np.array(p, dtype=float).reshape(-1, 1), len(self.times), axis=1)
+        every = own if self.contact is None else np.vstack([own, self.contact.modes.T])
+        values = self.state.observe.map(len(self.times))(self.times.reshape(1, -1), self.x.T, every)
+        return [np.array(value).T for value in values]
+
+
+def integrated(
+    system: System,
+    equations: Callable[[System], FullState],
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    **options: Any,
+) -> list[Leg]:
+    """The motion at given times, in one leg for most systems.
+
+    Args:
+        system: open or closed.
+        equations: the state equation of a system that differs in its independent rows alone.
+        x0: (nx,) state at the first time.
+        times: (m,) s, increasing.
+        p: (np,) parameters.
+        options: of `integrate`.
+    """
+    if system.closure is None or not system.closure.varies:
+        state = equations(system)
+        if state.events is not None:
+            return [_with_contacts(system, state, x0, times, p, options)]
+        x = integrate(state.rhs, x0, times, p=p, project=state.project, **options)
+        return [Leg(state, times, x)]
+    legs: list[Leg] = []
+    left, lost = times, _LOST
+    while True:
+        leg, end, now = _leg(system, equations(system), x0, left, p, lost, options)
+        legs.append(leg if not legs else leg.without_start)
+        if end is None:
+            return legs
+        x0, left = now, left[left > end]
+        if not len(left):
+            return legs
+        left = np.concatenate([[end], left])
+        system, lost = _next(system, x0[: system.nq], np.array(p, dtype=float))
+
+
+def _with_contacts(
+    system: System,
+    state: FullState,
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    options: dict[str, Any],
+) -> Leg:
+    assert state.events is not None
+    first = first_modes(system, x0, p)
+    events = Events(*state.events, first)
+    motion = integrate_events(state.rhs, x0, times, events, p=p, project=state.project, **options)
+    return Leg(state, times, motion.x, ContactMotion(first, motion.modes, motion.events))
+
+
+def _leg(
+    system: System,
+    state: FullState,
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    least: float,
+    options: dict[str, Any],
+) -> tuple[Leg, float | None, Array]:
+    """One leg, the time of its end if it ends early, and the state there."""
+    n, n_p = len(x0), len(p)
+    t, x, pm, fired = (SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", 1)))
+    parameters, ended = pm[:n_p], pm[n_p]
+    rhs = Function("rhs", [t, x, pm], [(1 - ended) * state.rhs(t, x, parameters)])
+    assert state.project is not None
+    project = Function("project", [t, x, pm], list(state.project(t, x, parameters)))
+    left = row_independence(system)(x[: system.nq], parameters) - least
+    events = Events(
+        Function("lost", [t, x, pm], [casadi.if_else(ended, 1, left)]),
+        Function("end", [t, x, pm, fired], [x, SX(1)]),
+        [0.0],
+    )
+    motion = integrate_events(rhs, x0, times, events, p=p, project=project, **options)
+    if not motion.events:
+        return Leg(state, times, motion.x), None, motion.x[-1]
+    end = motion.events[0].time
+    kept = times <= end
+    return Leg(state, times[kept], motion.x[kept]), end, motion.x[-1]
+
+
+def _next(system: System, q: Array, p: Array) -> tuple[System, float]:
+    """The system with rows that suit a posture better, and the independence that ends its leg."""
+    better = rows_at(system, q, p)
+    old, new = (float(row_independence(s)(q, p)) for s in (system, better))
+    if new > 2 * old:
+        return better, _LOST * new
+    return system, _LOST * old

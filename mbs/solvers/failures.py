@@ -1,0 +1,44 @@
+"""Why an integration stops, in words."""
+
+from collections.abc import Sequence
+
+from mbs.errors import SolverError
+
+MAX_STEPS = 100_000
+REASONS = {
+    "steps": f"more than {MAX_STEPS} steps between two output times; ask for a looser tolerance "
+    "or, when fast decays are in the system, for a method for stiff equations",
+    "small": "error control asks for a step below the rounding of time; "
+    "look for a singularity or a jump",
+    "rhs": "the right-hand side has no value there",
+    "projection": "the projection onto the constraints does not converge; "
+    "look for a singular posture",
+    "finite": "a value is not finite; look for a singularity",
+    "indicators": "an event indicator has no value there",
+    "jump": "the jump of an event has no value there",
+    "settle": "the events there do not settle, each jump asks for another one; "
+    "let the jump make the indicators positive, or zero and rising",
+    "standstill": "more than 100 events, and time hardly advances; "
+    "add a mode in which what repeats is at rest",
+}
+
+
+class Failure(Exception):
+    """An evaluation had no answer, so the step must be shortened."""
+
+
+def failed(t: float, h: float, reason: str, fired: Sequence[int] = ()) -> SolverError:
+    """The error that says when, with which step and why an integration stopped.
+
+    Args:
+        t: time of the last accepted state, s.
+        h: step that was wanted next, s; 0 when there was none.
+        reason: a key of REASONS.
+        fired: numbers of the event indicators that are to blame.
+
+    Returns:
+        an error to raise.
+    """
+    step = f" with step {h:.3g} s" if h > 0 else ""
+    who = f"; indicators {', '.join(map(str, fired))}" if fired else ""
+    return SolverError(f"integration stopped at t = {t:.9g} s{step}: {REASONS[reason]}{who}")

@@ -54,11 +54,11 @@ def _pose(
 def terminal_frame(system: System) -> str | int:
     """The frame that a robot is asked for when none is named.
 
-    It is the frame named "tool", else the only frame that was given a name, else the last link at
-    the end of a chain that no loop goes through, else the last link.
+    It is the frame or body named "tool", else the only frame that was given a name, else the last
+    link at the end of a chain that no loop goes through, else the last link.
     """
     named = system.named_frames
-    if "tool" in named:
+    if "tool" in system.frames:
         return "tool"
     if len(named) == 1:
         return named[0]

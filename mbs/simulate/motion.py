@@ -12,6 +12,7 @@ from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.loops.start import Values
 from mbs.messages import did_you_mean, quoted
+from mbs.models.hybrid_dynamics import hybrid_dynamics
 from mbs.models.prescribed import Prescribed
 
 Motion = Mapping[str, float | Function | Callable[[Any], Any]] | None
@@ -26,7 +27,8 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
         motion: for each name a number, or a function of the time made of CasADi operations.
 
     Raises:
-        ModelError: a name is unknown, or a law is no function of time.
+        ModelError: a name is unknown, a law is no function of time, or the loops tie what is
+            prescribed.
     """
     if not isinstance(motion, Mapping | None):
         raise ModelError(
@@ -41,6 +43,8 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
                 f"{system.name}: motion prescribes {name} more than once; give its position, its"
                 " velocity or its acceleration"
             )
+    if found:
+        hybrid_dynamics(system, names)  # refuses what the loops tie
     return found
 
 

@@ -28,7 +28,7 @@ from loops_references import rms_error
 from mujoco_twins import MujocoTwin
 
 Array = np.ndarray[Any, Any]
-TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 SHOWN = (1e-6, 1e-9)
 """Tolerances with columns of their own."""
 TARGET = 20

@@ -40,6 +40,7 @@ Key = tuple[str, str]
 
 _ZERO, _ONE = Number(0.0), Number(1.0)
 _ROUNDING = 1e-12
+_GOLDEN = (5**0.5 - 1) / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ def _turns(
 ) -> tuple[dict[str, Flange], dict[Key, Turn]]:
     """The flange that leads each rigid group, by the name of its coordinate, and all turns."""
     ties = _ties(mechanism, parts)
-    values = {p.name: p.default for p in mechanism.parameters() if p.default is not None}
+    values = _generic(mechanism)
     leads: dict[str, Flange] = {}
     turns: dict[Key, Turn] = {}
     for name, lead in _candidates(mechanism, parts):
@@ -114,6 +115,14 @@ def _turns(
     if loose:
         raise inertia_missing(mechanism, loose)
     return leads, turns
+
+
+def _generic(mechanism: Mechanism) -> dict[str, float]:
+    """The values of parameters; for one without any a number that fulfils no rule by chance."""
+    return {
+        p.name: 1 + number * _GOLDEN % 1 if p.default is None else p.default
+        for number, p in enumerate(mechanism.parameters(), start=1)
+    }
 
 
 def _candidates(mechanism: Mechanism, parts: tuple[Flanged, ...]) -> Iterator[tuple[str, Flange]]:

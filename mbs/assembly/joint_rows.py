@@ -11,11 +11,9 @@ from casadi import SX
 from mbs.assembly.graph import Port, is_weld
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.tables import Places
+from mbs.assembly.tree import Frame
 from mbs.components import Joint, Mechanism, RigidBody
-from mbs.spatial import Inertia, MatrixTurn, Pose
-
-Frame = tuple[int, Pose]
-"""A link, -1 for the base, and a pose in its frame."""
+from mbs.spatial import Inertia, MatrixTurn
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ from casadi import DM, SX
 
 from mbs.assembly.graph import Edge, Graph, inertia_of
 from mbs.assembly.spanning_tree import Branch, SpanningTree
-from mbs.assembly.tree import CarriedRotor, Link, Tree
+from mbs.assembly.tree import CarriedRotor, Frame, Link, Tree
 from mbs.components import Mechanism
 from mbs.components.motion import Freedom, Motion
 from mbs.expressions import to_sx
@@ -50,6 +50,11 @@ class Cut:
     pose_a: Pose
     pose_b: Pose
     welded: bool
+
+    @property
+    def frames(self) -> tuple[Frame, Frame]:
+        """Frame_a and frame_b."""
+        return (self.link_a, self.pose_a), (self.link_b, self.pose_b)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

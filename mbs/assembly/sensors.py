@@ -9,15 +9,15 @@ from dataclasses import dataclass
 from casadi import SX
 
 from mbs.assembly.attached import require_part
-from mbs.assembly.joint_rows import Frame, JointRow
-from mbs.assembly.tables import ACCELERATION_UNIT, Coordinate, Places
+from mbs.assembly.joint_rows import JointRow
+from mbs.assembly.tables import ACCELERATION_UNIT, RATE_UNIT, Coordinate, Places
+from mbs.assembly.tree import Frame
 from mbs.components import Mechanism
 from mbs.components.sensors import AbsoluteSensor, Quantity, RelativeSensor, Sensor
 from mbs.components.sensors_joint import JointSensor, OnJoint
 from mbs.errors import AssemblyError
 from mbs.messages import did_you_mean
 
-_RATE = {"rad": "rad/s", "m": "m/s"}
 _INPUTS = ("q_a", "v_a", "a_a", "tau_a")
 """Names of inputs of models that could be those of a quantity as well."""
 
@@ -155,7 +155,7 @@ def _on_coordinate(sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...]
             f"{sensor.name}: there is no coordinate {name!r}; {did_you_mean(name, known)}"
         )
     quantities = [Quantity("q", table[name].unit) for table in (q, cut) if name in table]
-    rates = [v[name].unit] if name in v else [_RATE[cut[name].unit]] if name in cut else []
+    rates = [v[name].unit] if name in v else [RATE_UNIT[cut[name].unit]] if name in cut else []
     for unit in rates:
         quantities += [Quantity("v", unit), Quantity("a", ACCELERATION_UNIT[unit])]
     return AttachedSensor(sensor, (), name, None, tuple(quantities), name)

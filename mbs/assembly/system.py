@@ -133,10 +133,7 @@ class System:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Numbers of the velocities whose positions may be chosen.
-
-        These are the independent ones, and what rolling discs alone hold.
-        """
+        """Numbers of the velocities whose positions may be chosen: active, or held by discs."""
         return self.closure.free if self.closure else tuple(range(self.nv))
 
     @property
@@ -233,6 +230,11 @@ class System:
                 )
             return given
         for name, value in values.items():
+            if name in [coordinate.name for coordinate in self.cut_coordinates]:
+                raise ModelError(
+                    f"{self.name}: {name} has no {what} of its own, since its joint was cut to open"
+                    " a loop; name another joint, or cut another one with m.cut(joint)"
+                )
             if name not in names:
                 raise ModelError(
                     f"{self.name}: there is no coordinate {name!r}; " + did_you_mean(name, names)

@@ -36,6 +36,9 @@ _VELOCITIES = {
 EFFORT_UNIT = {"rad/s": "N.m", "m/s": "N"}
 """Unit of the effort that does work with a velocity of this unit."""
 
+RATE_UNIT = {"m": "m/s", "rad": "rad/s", "1": "1/s"}
+"""Unit of the rate of a position of this unit."""
+
 ACCELERATION_UNIT = {"rad/s": "rad/s2", "m/s": "m/s2"}
 """Unit of the rate of a velocity of this unit."""
 

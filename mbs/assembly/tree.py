@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from casadi import SX
 
 from mbs.components.motion import Motion
-from mbs.spatial import Inertia, Khalil
+from mbs.spatial import Inertia, Khalil, Pose
+
+Frame = tuple[int, Pose]
+"""A link, -1 for the base, and a pose in its frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -149,7 +149,9 @@ class Mechanism:
     def cut(self, joint: Joint) -> None:
         """Open the loop that this joint closes here, not where the assembly would choose."""
         if not isinstance(joint, Joint):
-            raise DescriptionError(f"{self.name}: {_what(joint)} is not a joint; cut a joint")
+            raise DescriptionError(
+                f"{self.name}: {_what(joint)} is not a joint; give the joint itself, not its name"
+            )
         if self.components.get(joint.name) is not joint:
             raise DescriptionError(
                 f"{self.name}: joint {joint.name!r} is not connected; connect it before the cut"

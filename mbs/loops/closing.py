@@ -19,6 +19,9 @@ Vector = NDArray[np.float64]
 
 TOLERANCE = 1e-12
 
+OPEN = 1e-6
+"""Largest closure row of a posture that counts as closed [m or 1]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closed:

@@ -122,7 +122,7 @@ def facing(system: System, q: SX) -> SX:
     """
     cosines: list[SX] = []
     for cut in system.cuts:
-        pose = _between(system, q, cut)
+        pose = relative_pose(system.tree, q, *cut.frames)
         joint = cut.edge.joint
         if cut.welded or isinstance(joint, (Fixed, Prismatic)):
             cosines.extend(pose.R[k, k] for k in range(3))
@@ -139,18 +139,12 @@ def _along(pose: Pose, axis: Sequence[float]) -> SX:
     return casadi.dot(z, casadi.mtimes(pose.R, z))
 
 
-def _between(system: System, q: SX, cut: Cut) -> Pose:
-    """Frame_b of a cut joint seen from its frame_a."""
-    a, b = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
-    return relative_pose(system.tree, q, a, b)
-
-
 def _cut_rows(system: System, q: SX, cut: Cut) -> Rows:
     joint = cut.edge.joint
     if isinstance(joint, RollingDisc):
         on_plane = pose_on_plane(system, q, cut, joint)
         return [("force normal", contact(on_plane, joint, radius_of(system, joint)).height)]
-    pose = _between(system, q, cut)
+    pose = relative_pose(system.tree, q, *cut.frames)
     if cut.welded:
         return [*_position(pose, "xyz"), *_orientation(pose)]
     if isinstance(joint, Rod):

@@ -17,7 +17,8 @@ from mbs.assembly import System
 from mbs.loops.closure import closure_rows
 from mbs.loops.rolling import contact, pose_on_plane, radius_of, rolling_discs
 from mbs.recursions.route import relative_pose
-from mbs.spatial import Pose, Wrench, add_wrenches, cross, skew, vector, zeros
+from mbs.recursions.transmitted import summed
+from mbs.spatial import Pose, Wrench, add_wrenches, carried, cross, skew, vector
 
 
 def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
@@ -26,18 +27,16 @@ def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
     Args:
         system: with closed loops.
         q: (nq, 1) symbols of positions that close the loops.
-        lam: (r, 1) efforts of the independent rows; those of the dropped ones are zero.
+        lam: (m, 1) efforts of all rows, those of rolling discs last.
     """
-    closure = system.closure
-    assert closure is not None
     small = [SX.sym(cut.edge.joint.name, 6) for cut in system.cuts]
     moved = tuple(
         replace(cut, pose_b=cut.pose_b @ _displaced(d))
         for cut, d in zip(system.cuts, small, strict=True)
     )
     rows = closure_rows(replace(system, cuts=moved, _cache={}), q)
-    kept = len(closure.rows)
-    work = casadi.dot(lam[:kept], rows[list(closure.rows)])
+    positions = rows.numel()
+    work = casadi.dot(lam[:positions], rows)
     every = casadi.vertcat(*small) if small else SX(0, 1)
     slopes = casadi.substitute(casadi.gradient(work, every), every, SX.zeros(every.numel()))
     parts = casadi.vertsplit(casadi.densify(slopes), 6) if small else []
@@ -45,7 +44,7 @@ def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
         cut.edge.joint.name: (part[:3], part[3:])
         for cut, part in zip(system.cuts, parts, strict=True)
     }
-    for name, wrench in _against_slip(system, q, lam[kept:]).items():
+    for name, wrench in _against_slip(system, q, lam[positions:]).items():
         result[name] = add_wrenches(result[name], wrench)
     return result
 
@@ -58,17 +57,14 @@ def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wr
         q: (nq, 1) positions.
         wrenches: as `cut_wrenches` gives them.
     """
-    result: dict[int, Wrench] = {}
+    exerted: list[dict[int, Wrench]] = []
     for cut in system.cuts:
-        f, m = wrenches[cut.edge.joint.name]
-        b = cut.link_b, cut.pose_b
         for link, sign in ((cut.link_a, 1), (cut.link_b, -1)):
             if link >= 0:
-                T = relative_pose(system.tree, q, (link, Pose.identity()), b)
-                force = sign * casadi.mtimes(T.R, f)
-                exerted = force, sign * casadi.mtimes(T.R, m) + cross(T.p, force)
-                result[link] = add_wrenches(result.get(link, (zeros(), zeros())), exerted)
-    return result
+                T = relative_pose(system.tree, q, (link, Pose.identity()), cut.frames[1])
+                f, m = carried(T, wrenches[cut.edge.joint.name])
+                exerted.append({link: (sign * f, sign * m)})
+    return summed(*exerted)
 
 
 def _displaced(d: SX) -> Pose:
@@ -78,14 +74,9 @@ def _displaced(d: SX) -> Pose:
 
 def _against_slip(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
     """What the rows of rolling discs, which bind velocities alone, do to the disc."""
-    closure = system.closure
-    assert closure is not None
     result: dict[str, Wrench] = {}
     for number, (cut, disc) in enumerate(rolling_discs(system)):
-        along = [
-            lam[closure.slips.index(k)] if k in closure.slips else SX(0)
-            for k in (2 * number, 2 * number + 1)
-        ]
+        along = [lam[2 * number], lam[2 * number + 1]]
         pose = pose_on_plane(system, q, cut, disc)
         f = vector([*along, 0])
         m = cross(contact(pose, disc, radius_of(system, disc)).point, f)

@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError, SingularPosture, Unclosable
-from mbs.loops.closing import closure_parameters
+from mbs.loops.closing import OPEN, closure_parameters
 from mbs.loops.closure import closure_rows
-from mbs.loops.velocity import constraint_rows, independent_constraint_rows
+from mbs.loops.scales import scales
+from mbs.loops.velocity import constraint_rows, independent_constraint_rows, kept_rows
+from mbs.solvers.rank import rank
 
 Vector = NDArray[np.float64]
 
-OPEN = 1e-6
-"""Largest closure row of a posture that counts as closed [m or 1]."""
-_FLAT = 1e-8
-"""Singular values below this part of the largest count as zero."""
 _LED = 1e-14
 """Squared sine between rows of the passive joints below which these follow no longer."""
 
@@ -80,10 +78,7 @@ def examine(
     p = closure_parameters(system, parameters)
     residual, leads = (float(x) for x in _health(system)(position, p))
     J = np.array(_rows(system)(position, p))
-    values = np.linalg.svd(J, compute_uv=False)
-    largest = max(float(np.max(values, initial=0.0)), 1e-30)
-    rank = int(np.sum(values > _FLAT * largest))
-    return PostureState(residual, system.nv - rank, system.closure.mobility, leads)
+    return PostureState(residual, system.nv - rank(J), system.closure.mobility, leads)
 
 
 def require_led(system: System, q: Vector, p: Vector) -> None:
@@ -122,7 +117,7 @@ def _health(system: System) -> Function:
         residual = casadi.mmax(casadi.fabs(casadi.vertcat(0, closure_rows(system, q))))
         every = constraint_rows(system, q) if system.closure.varies else None
         J = independent_constraint_rows(system, q) if every is None else every
-        J_p = J[:, list(system.closure.passive)]
+        J_p = _scaled(system, J, every is None)[:, list(system.closure.passive)]
         leads = _independence(J_p if every is None else J_p.T)
         return Function("health", [q, system.p], [residual, leads], {"cse": True})
 
@@ -139,30 +134,39 @@ def row_independence(system: System) -> Function:
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
-        value = _independence(independent_constraint_rows(system, q))
+        value = _independence(_scaled(system, independent_constraint_rows(system, q)))
         return Function("independence", [q, system.p], [value], {"cse": True})
 
     function: Function = system.cached("row independence", build)
     return function
 
 
+def _scaled(system: System, J: SX, kept: bool = True) -> SX:
+    """The kept rows, or all, in sizes that do not depend on units."""
+    found = scales(system)
+    rows = kept_rows(system) if kept else range(len(found.rows))
+    columns = found.columns([speed.unit for speed in system.speeds])
+    return (
+        J * casadi.DM(found.rows[list(rows)]) * casadi.repmat(casadi.DM(columns).T, J.shape[0], 1)
+    )
+
+
 def _independence(J: SX) -> SX:
     """The smallest squared sine of the angle between a row of J and the rows before it.
 
-    A row counts as long as the rows are on average, at least: it may also vanish by itself.
+    A row that is shorter than one counts as one long: it may also vanish by itself.
     """
     if J.shape[0] == 0:
         return SX(1)
-    squares = casadi.sum2(J * J)
-    least = casadi.fmax(squares, casadi.sum1(squares) / squares.numel())
+    squares = casadi.fmax(casadi.sum2(J * J), 1)
     D, _, order = casadi.ldl(casadi.sparsify(casadi.mtimes(J, J.T)))
-    return casadi.mmin(D / least[order])
+    return casadi.mmin(D / squares[order])
 
 
 def _rows(system: System) -> Function:
     def build() -> Function:
         q = SX.sym("q", system.nq)
-        return Function("rows", [q, system.p], [constraint_rows(system, q)])
+        return Function("rows", [q, system.p], [_scaled(system, constraint_rows(system, q), False)])
 
     function: Function = system.cached("constraint rows", build)
     return function

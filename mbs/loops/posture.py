@@ -9,7 +9,7 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import LoopError, ModelError, Unclosable
-from mbs.loops.closing import Closed, Closing, Vector, closure_parameters
+from mbs.loops.closing import OPEN, Closed, Closing, Vector, closure_parameters
 from mbs.loops.continuation import followed_posture
 from mbs.loops.function import posture_on
 from mbs.loops.independent import fixed_positions, independent_names
@@ -18,7 +18,6 @@ from mbs.messages import quoted
 _RESTARTS = 60
 _SEED = 20260101
 _LARGEST_ANGLE = np.pi
-_OPEN = 1e-6
 
 
 def solve(
@@ -123,7 +122,7 @@ def require_closed(
     """
     r, _ = Closing(system, closure_parameters(system, parameters)).rows(q)
     worst = float(np.max(np.abs(r), initial=0.0))
-    if worst > _OPEN:
+    if worst > OPEN:
         raise LoopError(
             f"{system.name}: the posture leaves the loops open by {worst:.3g};"
             " use mbs.loops.solve to get one that closes them"

@@ -14,13 +14,13 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from casadi import DM, SX
+from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
-from mbs.assembly.rates import position_rate
 from mbs.components import RollingDisc
 from mbs.expressions import to_sx
+from mbs.loops.cut_motion import cut_twist
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, align_z, cross
 
@@ -59,18 +59,29 @@ def contact(pose: Pose, disc: RollingDisc, radius: SX) -> Contact:
 def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
     """The joint, and the rows (2, nv) on the velocities of the tree, of every rolling disc."""
     v = SX.sym("v", system.nv)
-    rate = position_rate(system.tree, q, v)
     result = []
     for cut, disc in rolling_discs(system):
         pose = pose_on_plane(system, q, cut, disc)
-        V = casadi.jtimes(pose.p, q, rate)
-        R_dot = casadi.reshape(casadi.jtimes(casadi.vec(pose.R), q, rate), 3, 3)
-        spin = casadi.mtimes(R_dot, pose.R.T)
-        w = casadi.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
+        V, w = cut_twist(system, pose, q, v)
         touching = contact(pose, disc, radius_of(system, disc)).point
         slip = V + cross(w, touching)
         result.append((disc.name, casadi.jacobian(slip[:2], v)))
     return result
+
+
+def least_upright(system: System) -> Function:
+    """``upright(q, p)``: the smallest sine between a rolling disc and its plane."""
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        sines = []
+        for cut, disc in rolling_discs(system):
+            u = casadi.mtimes(pose_on_plane(system, q, cut, disc).R, SX(DM(list(disc.axis))))
+            sines.append(casadi.sqrt(u[0] * u[0] + u[1] * u[1]))
+        return Function("upright", [q, system.p], [casadi.mmin(casadi.vertcat(*sines))])
+
+    function: Function = system.cached("least upright", build)
+    return function
 
 
 def rolling_discs(system: System) -> Iterator[tuple[Cut, RollingDisc]]:
@@ -82,9 +93,8 @@ def rolling_discs(system: System) -> Iterator[tuple[Cut, RollingDisc]]:
 
 def pose_on_plane(system: System, q: SX, cut: Cut, disc: RollingDisc) -> Pose:
     """Frame_b of a rolling disc in axes at frame_a whose z is the normal of the plane."""
-    ends = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
     plane = Pose.turned(align_z(np.array(disc.normal)))
-    return plane.inverse() @ relative_pose(system.tree, q, *ends)
+    return plane.inverse() @ relative_pose(system.tree, q, *cut.frames)
 
 
 def radius_of(system: System, disc: RollingDisc) -> SX:

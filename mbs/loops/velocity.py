@@ -11,7 +11,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.rates import position_rate
-from mbs.loops.closure import closure_rows, independent_closure
+from mbs.loops.closure import closure_rows, independent_closure, row_labels
 from mbs.loops.rolling import slip_rows
 
 
@@ -43,6 +43,14 @@ def independent_constraint_rows(system: System, q: SX) -> SX:
         return J
     slips = casadi.vertcat(*(rows for _, rows in slip_rows(system, q)))
     return casadi.vertcat(J, slips[list(system.closure.slips), :])
+
+
+def kept_rows(system: System) -> list[int]:
+    """The numbers of the independent rows among all."""
+    closure = system.closure
+    assert closure is not None
+    positions = sum(len(rows) for _, rows in row_labels(system))
+    return [*closure.rows, *(positions + k for k in closure.slips)]
 
 
 def velocity_rows(system: System, q: SX, phi: SX) -> SX:

@@ -101,11 +101,11 @@ def inertia_size(system: System, A: SX, s: ModelSymbols) -> float:
         return 1.0
     trace = casadi.Function("trace", [s.q, system.p], [casadi.trace(A)])
     value = float(trace(np.array(system.posture), system.p_default))
-    return max(value, 1e-6) / system.nv
+    return value / system.nv if value > 0 else 1.0
 
 
 def every_velocity_moves_its_link(system: System) -> bool:
-    """Whether the inertia matrix of the tree is positive definite in every posture, as far as known.
+    """Whether the inertia matrix of the tree is known to be positive definite in every posture.
 
     It is where every link is a body, not one of grouped parameters, with inertia of its own
     against the velocity of its joint: what the links behind it add to a pivot is never negative.
@@ -114,6 +114,8 @@ def every_velocity_moves_its_link(system: System) -> bool:
     def check() -> bool:
         own = [casadi.vertcat(*_own_inertia(link)) for link in system.tree.links]
         tensors = [link.inertia.J for link in system.tree.links]
+        if casadi.depends_on(casadi.vertcat(*own), system.p):
+            return False  # a parameter may be set to zero
         values = casadi.Function("own", [system.p], [casadi.vertcat(*own), *tensors])
         least, *matrices = (np.array(x) for x in values.call([system.p_default]))
         bodies = all(np.all(np.isfinite(J)) and _is_tensor(J) for J in matrices)

@@ -50,6 +50,8 @@ class Modes:
 class Contacts:
     """The coordinates with contacts: element j of a vector (k, 1) belongs to the j-th of them.
 
+    They are in the order of v.
+
     Attributes:
         names: of the coordinates.
         velocities: numbers in v.
@@ -177,7 +179,7 @@ def require_undriven(system: System, contacts: Contacts, motions: Sequence[Presc
 
 def _contacts(system: System) -> Contacts:
     acting = [force for force in system.forces if isinstance(force.element, JointContact)]
-    velocities = tuple(dict.fromkeys(force.levers[0].velocity for force in acting))
+    velocities = tuple(sorted({force.levers[0].velocity for force in acting}))
     stops = tuple(_only(system, acting, number, RigidStop) for number in velocities)
     frictions = tuple(_only(system, acting, number, CoulombFriction) for number in velocities)
     lower, upper = _column(stops, "lower"), _column(stops, "upper")

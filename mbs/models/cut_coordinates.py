@@ -30,9 +30,9 @@ def cut_coordinate(system: System, s: ModelSymbols, a: SX, name: str) -> tuple[S
     """
     row = next(row for row in system.cut_coordinates if row.name == name)
     cut = next(cut for cut in system.cuts if cut.edge.joint.name == row.joint)
-    suffix = name.removeprefix(row.joint).removeprefix(".")
-    number = [freedom.suffix for freedom in cut.edge.joint.freedoms].index(suffix)
-    pose = relative_pose(system.tree, s.q, (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b))
+    freedoms = cut.edge.joint.freedoms
+    number = [freedom.coordinate_of(row.joint) for freedom in freedoms].index(name)
+    pose = relative_pose(system.tree, s.q, *cut.frames)
     C = cut_velocities(system, s.q, cut)[number, :]
     speed = SX.sym("v", system.nv)
     bias = casadi.substitute(acceleration_bias(system, s.q, speed, C), speed, s.v_tree)

@@ -85,7 +85,8 @@ def dae(
 
     In an open chain the last four are the same: z = a, of index 1. d(alg)/d(z) of "index1" is
     regular where the rows are independent; in the others it is once `alg` has been differentiated
-    index - 1 times.
+    index - 1 times. Of a joint or shaft that a device drives u has the effort, such as j.tau;
+    currents and voltages of devices are not part of the equations.
 
     Source: Gear, Leimkuhler and Gupta 1985; Brenan, Campbell and Petzold 1996.
 

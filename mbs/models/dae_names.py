@@ -6,14 +6,13 @@ from collections.abc import Mapping
 
 from mbs.assembly import System
 from mbs.assembly.rates import quaternion_slices
-from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT
 from mbs.loops.rolling import SLIPS
 from mbs.models.dae_forms import motors
 
 Elements = tuple[tuple[str, str], ...]
 """Name and unit of each element of a vector."""
 
-_RATE = {"m": "m/s", "rad": "rad/s", "1": "1/s"}
 _RATE_OF_RATE = {"m": "m/s2", "rad": "rad/s2", "1": "1/s2"}
 _EFFORT = {"m": "N", "rad": "N.m", "1": "N.m"}
 
@@ -46,14 +45,14 @@ def elements_of(system: System, form: str) -> Mapping[str, Elements]:
         x, invariants = explicit[form]
         return {**fixed, "x": x, "z": (), "alg": (), "invariants": invariants}
     rows = phi + slips
-    speeds = _of("der", rows, _RATE)
+    speeds = _of("der", rows, RATE_UNIT)
     kept = {
         "index1": _of("der(der", rows, _RATE_OF_RATE, "))"),
         "index2": speeds,
-        "index3": phi + _of("der", slips, _RATE),
+        "index3": phi + _of("der", slips, RATE_UNIT),
         "ggl": phi + speeds,
     }[form]
-    mu = _of("mu", phi, dict.fromkeys(_RATE, "1")) if form == "ggl" else ()
+    mu = _of("mu", phi, dict.fromkeys(RATE_UNIT, "1")) if form == "ggl" else ()
     return {
         **fixed,
         "x": q + v,

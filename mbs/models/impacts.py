@@ -15,6 +15,8 @@ from mbs.recursions.composite_body import inertia_matrix
 
 _PULL = 1e-9
 """Part of all impulses below which a pull is rounding."""
+_ROUNDS = 8
+"""How often at most a wall that pulls is left out, or another one taken in."""
 
 
 def impact(system: System, prescribed: tuple[int, ...]) -> Function:
@@ -103,7 +105,10 @@ def _unilateral(
     """Velocities that impulses of walls change, and the walls that take part.
 
     A wall that would have to pull takes no part, unless what it touches would leave it slower than
-    the slowest rebound: several contacts could go on pushing each other off for ever.
+    the slowest rebound: several contacts could go on pushing each other off for ever. Where very
+    many walls act on each other, what still approaches one meets it again.
+
+    Source: Murty 1974, which wall to leave out or take in next.
 
     Args:
         system: open or closed.
@@ -124,8 +129,15 @@ def _unilateral(
         dv, P = outputs_of(system, function, q, *given)
         return dv, P[m:]
 
-    P = after(wall**2)[1]
-    pushes = wall**2 * (wall * P <= _PULL * casadi.sum1(casadi.fabs(P)))
-    leaving = -wall * contacts.velocity(v + after(pushes)[0])
-    part = casadi.fmax(pushes, wall**2 * (leaving <= contacts.rest_speed))
+    part = there = wall**2
+    stops = sum(stop is not None for stop in contacts.stops)
+    for _ in range(min(2 * (stops - 1), _ROUNDS)):
+        dv, P = after(part)
+        pulls = part * (wall * P > _PULL * casadi.sum1(casadi.fabs(P)))
+        enters = (there - part) * (wall * (contacts.velocity(dv) - change) > CREEP)
+        wrong = pulls + enters
+        first = wrong * (casadi.cumsum(wrong) == 1)
+        part = part + first * (1 - 2 * part)
+    leaving = -wall * contacts.velocity(v + after(part)[0])
+    part = casadi.fmax(part, there * (leaving <= contacts.rest_speed))
     return after(part)[0], part

@@ -10,16 +10,16 @@ from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import Tree
 from mbs.loops.cut_wrenches import cut_wrenches, on_links
-from mbs.loops.velocity import independent_constraint_rows
+from mbs.loops.velocity import constraint_rows, kept_rows
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.surroundings import Surroundings, exerted, surroundings
-from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
+from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
 from mbs.models.weld_wrenches import weld_wrench
 from mbs.recursions.route import relative_pose
 from mbs.recursions.transmitted import inertial_loads, summed, transmitted
 from mbs.solvers.saddle import solve_saddle
 from mbs.solvers.small_linear import solve_square
-from mbs.spatial import Pose, Wrench, cross
+from mbs.spatial import Pose, Wrench, carried
 
 
 def joint_wrenches(
@@ -42,7 +42,8 @@ def joint_wrenches(
     independent coordinates the independent joints have the efforts that the motion needs and the
     others none; with tree coordinates the input tau gives them all. Along closure rows that were
     dropped (`system.loops[..].dropped`) rigid bodies do not determine the forces; the wrenches are
-    those with zero there.
+    those with zero there. In over-constrained loops whose independent rows change with the posture
+    (`system.closure.varies`) they are those with the smallest efforts of rows.
 
     Source: Khalil & Creusot 1997, eq. 15-19 and 22; Haug 1989 for cut joints.
 
@@ -70,7 +71,7 @@ def joint_wrenches(
         return [*inputs, *around.inputs], [("F", F)]
 
     key = ("joint_wrenches", f_ext, moving_base, coordinates)
-    return model_function(system, key, build)
+    return model_function(system, key, build, posture_check(system, coordinates))
 
 
 def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None]:
@@ -107,9 +108,9 @@ def wrenches_of_joints(
     if system.is_closed:
         cut = cut_wrenches(system, s.q, _closure_efforts(system, s, a, tau, around))
         loads.append(on_links(system, s.q, cut))
-    carried = transmitted(system.tree, s.poses, summed(*loads))
+    through = transmitted(system.tree, s.poses, summed(*loads))
     between = {
-        joint.name: cut[joint.name] if joint.cut else _at_frame_b(system.tree, s.q, joint, carried)
+        joint.name: cut[joint.name] if joint.cut else _at_frame_b(system.tree, s.q, joint, through)
         for joint in system.joints
         if joint.part is None
     }
@@ -124,23 +125,33 @@ def wrenches_of_joints(
 def _closure_efforts(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
 ) -> SX:
-    """(r, 1) efforts of the independent rows: J' lam is what the motors leave of the efforts."""
+    """(m, 1) efforts of all rows: J' lam is what the motors leave of the efforts.
+
+    Those of dropped rows are zero. Where no choice of rows holds everywhere, they are as small as
+    can be together.
+    """
     closure = system.closure
     assert closure is not None
-    J = independent_constraint_rows(system, s.q)
-    needed = tree_efforts(system, s, a, around)
+    needed, passive = tree_efforts(system, s, a, around), list(closure.passive)
+    every = constraint_rows(system, s.q)
+    if closure.varies:
+        J_p, left = every[:, passive], needed if tau is None else needed - tau
+        square = casadi.mtimes(J_p.T, J_p)
+        return casadi.densify(casadi.mtimes(J_p, solve_square(square, left[passive])))
+    kept, lam = kept_rows(system), SX.zeros(every.shape[0])
+    J = every[kept, :]
     if tau is None:
-        passive = list(closure.passive)
-        return solve_square(J[:, passive].T, needed[passive])
-    rest = SX.zeros(J.shape[0])
-    return solve_saddle(SX.eye(system.nv), J, tau - needed, rest, 1.0)[1]
+        lam[kept] = solve_square(J[:, passive].T, needed[passive])
+    else:
+        rest = SX.zeros(len(kept))
+        lam[kept] = solve_saddle(SX.eye(system.nv), J, tau - needed, rest, 1.0)[1]
+    return lam
 
 
-def _at_frame_b(tree: Tree, q: SX, joint: JointRow, carried: list[Wrench]) -> Wrench:
+def _at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wrench:
     """The wrench that a joint of the tree transmits, on the body of frame_b."""
     link = max(joint.frame_a[0], joint.frame_b[0])
-    f, m = carried[link]
-    T = relative_pose(tree, q, (link, Pose.identity()), joint.frame_b)
+    T = relative_pose(tree, q, joint.frame_b, (link, Pose.identity()))
+    f, m = carried(T, through[link])
     sign = 1 if link == joint.frame_b[0] else -1
-    force = sign * casadi.mtimes(T.R.T, f)
-    return force, sign * casadi.mtimes(T.R.T, m - cross(T.p, f))
+    return sign * f, sign * m

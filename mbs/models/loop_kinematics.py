@@ -14,8 +14,14 @@ from mbs.assembly.rates import position_rate
 from mbs.components import Free, Spherical, Universal
 from mbs.components.motion import Motion
 from mbs.errors import ModelError
-from mbs.loops.reduction import tree_rows
-from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
+from mbs.loops.cut_motion import cut_twist
+from mbs.loops.examine import require_led
+from mbs.loops.reduction import reduction, tree_rows
+from mbs.loops.velocity import (
+    acceleration_bias,
+    constraint_rows,
+    independent_constraint_rows,
+)
 from mbs.models.symbols import symbols_of
 from mbs.recursions.route import relative_pose
 from mbs.solvers.small_linear import solve_square
@@ -49,19 +55,19 @@ def velocity_closure(system: System) -> Function:
         q = SX.sym("q", system.nq)
         rows = _loop_rows(system, q)
         J, C, active, passive = rows.tree, rows.cut, rows.active, rows.passive
-        W = -solve_square(J[:, passive], J[:, active])
+        G = reduction(system, q).G
         outputs = [
             ("Wa", J[:, active]),
             ("Wp", J[:, passive]),
             ("Wac", C[:, active]),
             ("Wpc", C[:, passive]),
             ("Wc", -SX(DM.eye(C.shape[0]))),
-            ("W", W),
-            ("G", tree_rows(system, W, SX(DM.eye(len(active))))),
+            ("W", G[passive, :]),
+            ("G", G),
         ]
         return [("q", q)], outputs
 
-    return model_function(system, ("velocity_closure",), build)
+    return model_function(system, ("velocity_closure",), build, require_led)
 
 
 def acceleration_closure(system: System, coordinates: str = "independent") -> Function:
@@ -94,17 +100,17 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
         both = casadi.vertcat(rows.tree, rows.cut)
         bias = acceleration_bias(system, s.q, speed, both)
         J, r = rows.tree, rows.tree.shape[0]
-        W = -solve_square(J[:, rows.passive], J[:, rows.active])
-        J_dot = _rate(system, J, s.q, speed)
+        every = constraint_rows(system, s.q) if _varies(system) else J
+        mixed = every[:, rows.passive].T if _varies(system) else SX(DM.eye(r))
         still = zeros(len(rows.active), len(rows.active))
-        turned = casadi.mtimes(J_dot, tree_rows(system, W, SX(DM.eye(len(rows.active)))))
-        W_dot = -solve_square(J[:, rows.passive], turned)
-        G_dot = tree_rows(system, W_dot, still)
+        turned = casadi.mtimes(_rate(system, every, s.q, speed), reduction(system, s.q).G)
+        square = casadi.mtimes(mixed, every[:, rows.passive])
+        G_dot = tree_rows(system, -solve_square(square, casadi.mtimes(mixed, turned)), still)
         values = casadi.substitute([bias, G_dot], [speed], [s.v_tree])
         outputs = [("Psi", values[0][:r]), ("Phi", values[0][r:]), ("G_dot", values[1])]
         return [("q", s.q), (f"v{s.suffix}", s.v)], outputs
 
-    return model_function(system, ("acceleration_closure", coordinates), build)
+    return model_function(system, ("acceleration_closure", coordinates), build, require_led)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,6 +127,11 @@ class _Rows:
     cut: SX
     active: list[int]
     passive: list[int]
+
+
+def _varies(system: System) -> bool:
+    """Whether all rows are needed, by least squares, to hold in every posture."""
+    return system.closure is not None and system.closure.varies
 
 
 def _require_loops(system: System) -> None:
@@ -143,15 +154,9 @@ def _loop_rows(system: System, q: SX) -> _Rows:
 
 def cut_velocities(system: System, q: SX, cut: Cut) -> SX:
     """(c, nv) velocities of the freedoms of one cut joint, as rows on those of the tree."""
-    ends = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
-    pose = relative_pose(system.tree, q, *ends)
+    pose = relative_pose(system.tree, q, *cut.frames)
     v = SX.sym("v", system.nv)
-    rate = position_rate(system.tree, q, v)
-    V = casadi.jtimes(pose.p, q, rate)
-    R_dot = casadi.reshape(casadi.jtimes(casadi.vec(pose.R), q, rate), 3, 3)
-    spin = casadi.mtimes(R_dot, pose.R.T)
-    w = casadi.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
-    values = _freedom_velocities(cut, pose, V, w)
+    values = _freedom_velocities(cut, pose, *cut_twist(system, pose, q, v))
     return casadi.jacobian(casadi.vertcat(*values), v) if values else SX(0, system.nv)
 
 

@@ -11,6 +11,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.sensors import AttachedSensor
+from mbs.assembly.tree import Frame
 from mbs.components.forces import RelativeMotion
 from mbs.components.forces_line import regular_length
 from mbs.components.sensors import (
@@ -24,11 +25,10 @@ from mbs.errors import ModelError
 from mbs.models.cut_coordinates import cut_coordinate
 from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
 from mbs.models.surroundings import surroundings
-from mbs.models.symbols import ModelSymbols, check_coordinates, symbols_of
+from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
 from mbs.recursions.accelerations import Acceleration, link_accelerations, resting_base
 from mbs.recursions.frame_motion import (
     BASE,
-    Frame,
     frame_velocity,
     relative_acceleration,
     relative_motion,
@@ -77,7 +77,8 @@ def measurements(system: System, coordinates: str = "independent") -> Function:
             outputs += [(name, read[quantity.name]) for name, quantity in attached.outputs]
         return inputs, outputs
 
-    return model_function(system, ("measurements", coordinates), build)
+    check = posture_check(system, coordinates)
+    return model_function(system, ("measurements", coordinates), build, check)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

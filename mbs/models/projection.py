@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import casadi
+import numpy as np
 from casadi import DM, SX
+from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.rates import norm_rows, normalised
 from mbs.loops.closure import closure_rows, independent_closure
-from mbs.loops.velocity import independent_constraint_rows
+from mbs.loops.scales import scales
+from mbs.loops.velocity import independent_constraint_rows, kept_rows
 from mbs.models.contacts import Contacts, Modes
 from mbs.models.prescribed import Prescribed
+
+Array = NDArray[np.float64]
 
 _NEARLY_DEPENDENT = 1e-6
 """Squared sine between a row and the rows before it below which it is left alone."""
@@ -73,8 +78,13 @@ def projected(
     wanted = casadi.vertcat(SX(J.shape[0] - len(held), 1), *(speed for _, speed in held))
     J = casadi.vertcat(J, casadi.jacobian(still, v))
     speed = casadi.vertcat(casadi.mtimes(J[: wanted.numel(), :], v) - wanted, still)
-    step_q, _ = _shortest(J_q, r, place_off)
-    step_v, awake = _shortest(J, speed, slide_off)
+    first = _row_scales(system)
+    units = ([c.unit for c in system.coordinates], [c.unit for c in system.speeds])
+    columns = [
+        scales(system).columns(unit) if system.is_closed else np.ones(len(unit)) for unit in units
+    ]
+    step_q, _ = _shortest(J_q, r, place_off, first[: loops.numel()], columns[0])
+    step_v, awake = _shortest(J, speed, slide_off, first, columns[1])
     rows = casadi.vertcat(every, norms, *places, distance, speed)
     residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
     values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])
@@ -101,19 +111,35 @@ def _switched(acting: SX) -> SX:
     return casadi.if_else(acting, _SHARED, 1)
 
 
-def _shortest(J: SX, r: SX, off: SX) -> tuple[SX, SX]:
-    """The shortest step x with J x = r, by rows that are not nearly dependent, and whether all are.
+def _row_scales(system: System) -> Array:
+    """What the independent rows of the loops are multiplied by."""
+    return scales(system).rows[kept_rows(system)] if system.is_closed else np.empty(0)
 
-    A row counts as long as the rows are on average, at least: it may also vanish by itself. The
-    last rows are switched; `off` is added to their squares.
+
+def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, SX]:
+    """A short step x with J x = r, by rows that are not nearly dependent, and whether all are.
+
+    Args:
+        J: rows of loops, then rows on one coordinate each; the last ones are switched.
+        r: what the rows are to become.
+        off: what is added to the squares of the switched rows.
+        first: scales of the rows of the loops; other rows are of unit length.
+        columns: scales of the columns.
     """
     if J.shape[0] == 0:
         return SX.zeros(J.shape[1]), SX(1)
+    rows = DM([*first, *(_unit(J[k, :], columns) for k in range(len(first), J.shape[0]))])
+    B = rows * casadi.mtimes(J, casadi.diag(DM(columns)))
     every = casadi.vertcat(SX(J.shape[0] - off.numel(), 1), off)
-    S = casadi.sparsify(casadi.mtimes(J, J.T)) + casadi.diag(every)
+    S = casadi.sparsify(casadi.mtimes(B, B.T)) + casadi.diag(every)
     D, LT, order = casadi.ldl(S)
-    squares = casadi.densify(casadi.diag(S))
-    least = casadi.fmax(squares, casadi.sum1(squares) / squares.numel())
-    independent = _NEARLY_DEPENDENT * least[order] < D
-    x = casadi.ldl_solve(casadi.densify(r), casadi.if_else(independent, D, _NEVER), LT, order)
-    return casadi.mtimes(J.T, casadi.densify(x)), casadi.mmin(independent)
+    squares = casadi.fmax(casadi.densify(casadi.diag(S)), 1)
+    independent = _NEARLY_DEPENDENT * squares[order] < D
+    x = casadi.ldl_solve(rows * r, casadi.if_else(independent, D, _NEVER), LT, order)
+    return DM(columns) * casadi.mtimes(B.T, casadi.densify(x)), casadi.mmin(independent)
+
+
+def _unit(row: SX, columns: Array) -> float:
+    """The scale of a row on one coordinate, or on a quaternion."""
+    places = casadi.sparsify(row).sparsity().get_triplet()[1]
+    return 1 / float(columns[places[0]]) if places else 1.0

@@ -12,7 +12,8 @@ from mbs.assembly.model_function import Named
 from mbs.recursions.accelerations import Acceleration, moving_base, resting_base
 from mbs.recursions.force_elements import element_wrenches
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Wrench, add_wrenches, cross
+from mbs.recursions.transmitted import summed
+from mbs.spatial import Wrench, carried
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,23 +68,13 @@ def exerted(
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
     """
-    result = dict(around.external)
-    for link, wrench in element_wrenches(system.tree, system.forces, poses, q, v).items():
-        _add(result, link, wrench)
-    return result
-
-
-def _add(wrenches: dict[int, Wrench], link: int, wrench: Wrench) -> None:
-    before = wrenches.get(link)
-    wrenches[link] = wrench if before is None else add_wrenches(before, wrench)
+    return summed(around.external, element_wrenches(system.tree, system.forces, poses, q, v))
 
 
 def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
     """The wrenches of bodies, (6, bodies) in their frames, brought to the frames of their links."""
-    result: dict[int, Wrench] = {}
+    exerted: list[dict[int, Wrench]] = []
     for column, row in enumerate(system.bodies):
         link, pose = system.frames[row.name]
-        f = casadi.mtimes(pose.R, wrenches[0:3, column])
-        m = casadi.mtimes(pose.R, wrenches[3:6, column]) + cross(pose.p, f)
-        _add(result, link, (f, m))
-    return result
+        exerted.append({link: carried(pose, (wrenches[0:3, column], wrenches[3:6, column]))})
+    return summed(*exerted)

@@ -13,7 +13,7 @@ from mbs.recursions.accelerations import Acceleration, link_accelerations
 from mbs.recursions.force_elements import element_wrenches
 from mbs.recursions.newton_euler import inertial_wrench
 from mbs.recursions.route import relative_pose
-from mbs.spatial import Pose, PseudoInertia, Wrench, add_wrenches, cross, zeros
+from mbs.spatial import Pose, PseudoInertia, Wrench, add_wrenches, carried, cross, zeros
 
 
 def weld_wrench(
@@ -54,17 +54,16 @@ def weld_wrench(
     for wrench in exerted:
         if wrench is not None:
             total = add_wrenches(total, wrench)
-    f, m = total
-    moved = casadi.mtimes(pose.R.T, f), casadi.mtimes(pose.R.T, m - cross(pose.p, f))
-    return part.sign * moved[0], part.sign * moved[1]
+    f, m = carried(pose.inverse(), total)
+    return part.sign * f, part.sign * m
 
 
 def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench: Wrench) -> Wrench:
     """What the body of frame_a or frame_b, `side`, exerts on a joint, in the frame of its link."""
     T = relative_pose(system.tree, q, (link, Pose.identity()), row.frame_b)
     sign = 1 if side == "a" else -1
-    force = sign * casadi.mtimes(T.R, wrench[0])
-    return force, sign * casadi.mtimes(T.R, wrench[1]) + cross(T.p, force)
+    f, m = carried(T, wrench)
+    return sign * f, sign * m
 
 
 def _outside(system: System, part: Part, around: Surroundings) -> dict[int, Wrench]:

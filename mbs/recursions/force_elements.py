@@ -11,16 +11,16 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.attached import AttachedForce
-from mbs.assembly.tree import Tree
+from mbs.assembly.tree import Frame, Tree
 from mbs.components.forces import CoordinateForce, PairForce, RelativeMotion
 from mbs.components.forces_source import Source
-from mbs.recursions.frame_motion import BASE, Frame, relative_motion
+from mbs.recursions.frame_motion import BASE, relative_motion
 from mbs.recursions.motion import effort
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.route import relative_pose
-from mbs.recursions.transmitted import transmitted
+from mbs.recursions.transmitted import summed, transmitted
 from mbs.recursions.velocities import Velocity, link_velocities
-from mbs.spatial import Wrench, cross, zeros
+from mbs.spatial import Wrench, carried, zeros
 
 
 def element_wrenches(
@@ -46,16 +46,14 @@ def element_wrenches(
     if not on_points:
         return {}
     moving = link_velocities(tree, poses, v)
-    result: dict[int, Wrench] = {}
+    exerted: list[dict[int, Wrench]] = []
     for force in on_points:
         acting = zip(force.element.points, _on_frames(tree, force, q, moving), strict=True)
-        for point, ((link, pose), (f, m)) in acting:
+        for point, ((link, pose), wrench) in acting:
             if link >= 0 if held is None else (point.owner.name, point.port) in held:
-                turned = casadi.mtimes(pose.R, f)
-                moment = casadi.mtimes(pose.R, m) + cross(pose.p, turned)
-                before = result.get(link, (zeros(), zeros()))
-                result[link] = (before[0] - turned, before[1] - moment)
-    return result
+                f, m = carried(pose, wrench)
+                exerted.append({link: (-f, -m)})
+    return summed(*exerted)
 
 
 def coordinate_efforts(tree: Tree, forces: Sequence[AttachedForce], q: SX, v: SX) -> SX:

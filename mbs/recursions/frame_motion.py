@@ -10,15 +10,12 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.assembly.tree import Tree
+from mbs.assembly.tree import Frame, Tree
 from mbs.components.forces import RelativeMotion
 from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.route import relative_pose
 from mbs.recursions.velocities import Velocity
 from mbs.spatial import Pose, cross, zeros
-
-Frame = tuple[int, Pose]
-"""A link, -1 for the base, and a pose in its frame."""
 
 BASE: Frame = (-1, Pose.identity())
 """The frame of the base."""

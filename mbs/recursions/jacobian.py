@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import casadi
 from casadi import SX
 
-from mbs.assembly.tree import Tree
+from mbs.assembly.tree import Frame, Tree
 from mbs.recursions.motion import unit_motions
 from mbs.recursions.route import (
     JointAt,
@@ -31,9 +31,6 @@ from mbs.recursions.route import (
     way_to,
 )
 from mbs.spatial import Pose, Rotation, cross, is_zero, zeros
-
-Frame = tuple[int, Pose]
-"""A link, -1 for the base, and the pose of a frame in it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,9 +13,9 @@ import numpy as np
 from casadi import Function
 from numpy.typing import NDArray
 
-from mbs.assembly.tree import Tree
+from mbs.assembly.tree import Frame, Tree
 from mbs.components.motion import Motion
-from mbs.recursions.jacobian import Frame, Target, jacobian, outlook
+from mbs.recursions.jacobian import Target, jacobian, outlook
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose
 

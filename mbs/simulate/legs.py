@@ -17,8 +17,10 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
+from mbs.errors import SolverError
 from mbs.loops.analysis import rows_at
 from mbs.loops.examine import row_independence
+from mbs.loops.rolling import least_upright, rolling_discs
 from mbs.models.full_state import FullState
 from mbs.simulate.contacts import ContactMotion, first_modes
 from mbs.solvers import Events, integrate, integrate_events
@@ -27,6 +29,11 @@ Array = NDArray[np.float64]
 
 _LOST = 0.05
 """Part of its independence at the start of a leg at which a leg ends."""
+_SINGULAR = 1e-6
+_REGAINED = 1e-3
+"""Independence below which a posture is singular for all rows, and above which it is passed."""
+_FLAT = 1e-3
+"""Sine of the angle between a rolling disc and its plane at which it counts as flat."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,24 +83,66 @@ def integrated(
         p: (np,) parameters.
         options: of `integrate`.
     """
-    if system.closure is None or not system.closure.varies:
-        state = equations(system)
-        if state.events is not None:
-            return [_with_contacts(system, state, x0, times, p, options)]
-        x = integrate(state.rhs, x0, times, p=p, project=state.project, **options)
-        return [Leg(state, times, x)]
-    legs: list[Leg] = []
-    left, lost = times, _LOST
-    while True:
-        leg, end, now = _leg(system, equations(system), x0, left, p, lost, options)
-        legs.append(leg if not legs else leg.without_start)
+    if system.closure is not None and system.closure.varies:
+        return _with_other_rows(system, equations, x0, times, p, options)
+    state = equations(system)
+    if state.events is not None:
+        return [_with_contacts(system, state, x0, times, p, options)]
+    discs = [disc.name for _, disc in rolling_discs(system)]
+    if discs:
+        upright = Limit(least_upright(system), 1, _FLAT)
+        leg, end, _ = _leg(system, state, x0, times, p, upright, options)
         if end is None:
-            return legs
-        x0, left = now, left[left > end]
+            return [leg]
+        raise SolverError(
+            f"{system.name}: {' or '.join(discs)} lies flat on its plane at t = {end:.6g} s, where"
+            " no single point of a disc touches; end the run before, or keep it upright"
+        )
+    x = integrate(state.rhs, x0, times, p=p, project=state.project, **options)
+    return [Leg(state, times, x)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limit:
+    """Where a leg ends: a measure of the posture falls below a level, or rises above it.
+
+    Attributes:
+        measure: `measure(q, p)`.
+        sign: 1 for a fall, -1 for a rise.
+        level: of the measure.
+    """
+
+    measure: Function
+    sign: int
+    level: float
+
+
+def _with_other_rows(
+    system: System,
+    equations: Callable[[System], FullState],
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    options: dict[str, Any],
+) -> list[Leg]:
+    """Legs of an over-constrained system, each with rows that suit its first posture."""
+    legs: list[Leg] = []
+    left, limit = times, _limit(system, x0[: system.nq], np.array(p, dtype=float))
+    known: dict[tuple[int, ...], tuple[System, FullState]] = {}
+    while True:
+        assert system.closure is not None
+        rows = (*system.closure.rows, -1, *system.closure.slips)
+        if rows not in known:
+            known[rows] = system, equations(system)
+        system, state = known[rows]
+        leg, end, now = _leg(system, state, x0, left, p, limit, options)
+        legs.append(leg if not legs else leg.without_start)
+        x0 = now
+        left = left[left > end] if end is not None else left[:0]
         if not len(left):
             return legs
         left = np.concatenate([[end], left])
-        system, lost = _next(system, x0[: system.nq], np.array(p, dtype=float))
+        system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
 
 
 def _with_contacts(
@@ -117,7 +166,7 @@ def _leg(
     x0: Array,
     times: Array,
     p: Sequence[float],
-    least: float,
+    limit: Limit,
     options: dict[str, Any],
 ) -> tuple[Leg, float | None, Array]:
     """One leg, the time of its end if it ends early, and the state there."""
@@ -126,8 +175,10 @@ def _leg(
     parameters, ended = pm[:n_p], pm[n_p]
     rhs = Function("rhs", [t, x, pm], [(1 - ended) * state.rhs(t, x, parameters)])
     assert state.project is not None
-    project = Function("project", [t, x, pm], list(state.project(t, x, parameters)))
-    left = row_independence(system)(x[: system.nq], parameters) - least
+    moved, residual = state.project(t, x, parameters)
+    kept = [casadi.if_else(ended, x, moved), casadi.if_else(ended, 0, residual)]
+    project = Function("project", [t, x, pm], kept)
+    left = limit.sign * (limit.measure(x[: system.nq], parameters) - limit.level)
     events = Events(
         Function("lost", [t, x, pm], [casadi.if_else(ended, 1, left)]),
         Function("end", [t, x, pm, fired], [x, SX(1)]),
@@ -137,14 +188,20 @@ def _leg(
     if not motion.events:
         return Leg(state, times, motion.x), None, motion.x[-1]
     end = motion.events[0].time
-    kept = times <= end
-    return Leg(state, times[kept], motion.x[kept]), end, motion.x[-1]
+    before = times <= end
+    return Leg(state, times[before], motion.x[before]), end, motion.x[-1]
 
 
-def _next(system: System, q: Array, p: Array) -> tuple[System, float]:
-    """The system with rows that suit a posture better, and the independence that ends its leg."""
+def _next(system: System, q: Array, p: Array) -> tuple[System, Limit]:
+    """The system with rows that suit a posture better, and where its leg ends."""
     better = rows_at(system, q, p)
-    old, new = (float(row_independence(s)(q, p)) for s in (system, better))
-    if new > 2 * old:
-        return better, _LOST * new
-    return system, _LOST * old
+    old, new = (float(row_independence(one)(q, p)) for one in (system, better))
+    chosen = better if new > 2 * old else system
+    return chosen, _limit(chosen, q, p)
+
+
+def _limit(system: System, q: Array, p: Array) -> Limit:
+    """Where the rows have lost most of their independence, or, if all rows have, regained some."""
+    measure = row_independence(system)
+    now = float(measure(q, p))
+    return Limit(measure, -1, _REGAINED) if now < _SINGULAR else Limit(measure, 1, _LOST * now)

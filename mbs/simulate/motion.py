@@ -14,6 +14,7 @@ from mbs.loops.start import Values
 from mbs.messages import did_you_mean, quoted
 from mbs.models.hybrid_dynamics import hybrid_dynamics
 from mbs.models.prescribed import Prescribed
+from mbs.simulate.signal_function import untraceable
 
 Motion = Mapping[str, float | Function | Callable[[Any], Any]] | None
 _KINDS = ("q", "v", "a")
@@ -106,16 +107,27 @@ def _prescribed(system: System, name: str, law: Any) -> Prescribed:
 
 def _value(system: System, name: str, law: Any, t: SX) -> SX:
     """The law as one scalar expression of the time."""
+    given = law
+    if callable(law):
+        try:
+            given = law(t)
+        except Exception as error:
+            raise untraceable(system, f"the motion of {name}", error) from error
     try:
-        value = SX(law(t) if callable(law) else law)
+        value = SX(given)
     except Exception:
         value = SX(0, 0)
-    constant = value.numel() == 1 and not casadi.symvar(value)
-    if constant and casadi.evalf(value).is_regular():
-        return value
-    if value.numel() == 1 and not constant and casadi.symvar(value)[0].name() == "t":
-        return value
-    raise ModelError(
-        f"{system.name}: the motion of {name} is {quoted(law)}; give a finite number, or a function"
-        " of the time made of CasADi operations, such as lambda t: 0.3 * casadi.sin(2 * t)"
-    )
+    constant = not casadi.symvar(value)
+    if value.numel() != 1 or (constant and not casadi.evalf(value).is_regular()):
+        raise ModelError(
+            f"{system.name}: the motion of {name} is {quoted(given)}; give a finite number, or a"
+            " function of the time made of CasADi operations, such as"
+            " lambda t: 0.3 * casadi.sin(2 * t)"
+        )
+    alone = Function("law", [t], [value], {"allow_free": True})
+    if alone.has_free():
+        raise ModelError(
+            f"{system.name}: the motion of {name} holds the symbols {', '.join(alone.get_free())};"
+            " make it of the time and numbers"
+        )
+    return value

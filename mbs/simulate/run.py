@@ -59,8 +59,8 @@ def run(
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
             of CasADi operations that returns (nv, 1) efforts, or a casadi.Function of (t, q, v).
         motion: laws of time for coordinates that drives move: by name such as "j1.q" a position,
-            "j1.v" a velocity, "j1.a" an acceleration, each a number or a function of t made of
-            CasADi operations. The column `j1.tau` then holds what the drive needs, too.
+            "j1.v" a velocity, "j1.a" an acceleration, each a number or a smooth function of t made
+            of CasADi operations. The column `j1.tau` is the whole effort, the drive's included.
         u: inputs of the devices of drive lines, such as voltages: constants by the name of the
             device, or a function of (t, q, v) as for tau; zero when left out. What the devices
             deliver is added to tau.

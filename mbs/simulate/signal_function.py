@@ -72,11 +72,7 @@ def _traced(
     try:
         values = function(*point)
     except Exception as error:
-        raise ModelError(
-            f"{system.name}: {signal.name}(t, q, v) could not be traced with CasADi symbols"
-            f" ({_reason(error)}); build it from CasADi operations, such as casadi.sin and"
-            " casadi.if_else"
-        ) from error
+        raise untraceable(system, f"{signal.name}(t, q, v)", error) from error
     try:
         result = _column(values)
     except Exception:
@@ -88,6 +84,14 @@ def _traced(
             " and v"
         )
     return result
+
+
+def untraceable(system: System, what: str, error: Exception) -> ModelError:
+    """What a user's function says when it is called with CasADi symbols."""
+    return ModelError(
+        f"{system.name}: {what} could not be traced with CasADi symbols ({_reason(error)}); build"
+        " it from CasADi operations, such as casadi.sin and casadi.if_else"
+    )
 
 
 def _column(values: Any) -> SX:

@@ -122,7 +122,7 @@ def _runtime(names: tuple[str, ...]) -> dict[str, str]:
 
 def _load(path: Path, has_events: bool) -> ctypes.CDLL:
     library = ctypes.CDLL(str(path))
-    handle, real, pointer = ctypes.c_void_p, ctypes.c_double, ctypes.POINTER(ctypes.c_double)
+    handle, real, pointer = ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p
     integer = ctypes.c_longlong
     types: dict[str, tuple[Any, list[Any]]] = {
         "mbs_open": (handle, [ctypes.c_int, ctypes.c_int, pointer, pointer, real]),
@@ -161,5 +161,5 @@ def _opened(library: ctypes.CDLL, problem: Problem) -> Iterator[ctypes.c_void_p]
         library.mbs_close(driver)
 
 
-def _pointer(array: Array) -> Any:
-    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+def _pointer(array: Array) -> int:
+    return array.ctypes.data

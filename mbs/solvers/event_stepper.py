@@ -126,13 +126,14 @@ class EventStepper:
         """Which indicators ask for a jump at the present state.
 
         One that is zero to the tolerance and does not clearly fall waits: the first look at the
-        next step tells whether it leaves zero.
+        next step tells whether it leaves zero. So does one that rises from there, since rounding
+        alone may have made it positive.
         """
         t, step, zero = self.solver.t, self.solver.last_step, self.solver.atol
         slack = max(1e3 * EPSILON * abs(t), DEPARTURE * step)
         value, rise = self.left = self._look(t)
         waits = (value >= -np.fmax(zero, rise * slack)) & ~(rise * step < -zero)
-        self.armed = value > 0
+        self.armed = value > np.where(rise > 0, zero, 0.0)
         self.due = (value <= 0) & ~waits
 
     def _step(self, limit: float) -> int:

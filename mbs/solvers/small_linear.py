@@ -20,14 +20,6 @@ def solve_square(A: SX, B: SX) -> SX:
     return casadi.mtimes(adjugate, B) / determinant
 
 
-def solve_symmetric(A: SX, B: SX) -> SX:
-    """The solution X of A X = B for a symmetric positive definite (n, n) matrix, by L D L'."""
-    if A.shape[0] == 0:
-        return SX(0, B.shape[1])
-    D, LT, permutation = casadi.ldl(casadi.sparsify(A))
-    return casadi.densify(casadi.ldl_solve(B, D, LT, permutation))
-
-
 def _adjugate(A: SX) -> SX:
     match A.shape[0]:
         case 1:

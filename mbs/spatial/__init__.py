@@ -21,7 +21,7 @@ from mbs.spatial.screw import (
     wrench_through,
 )
 from mbs.spatial.vectors import cross, elements, exact_sum, is_zero, skew, snapped, vector, zeros
-from mbs.spatial.wrench import Wrench, add_wrenches
+from mbs.spatial.wrench import Wrench, add_wrenches, carried
 
 __all__ = [
     "Body",
@@ -41,6 +41,7 @@ __all__ = [
     "align_z",
     "axis_turn",
     "body_through",
+    "carried",
     "cross",
     "elements",
     "exact_sum",

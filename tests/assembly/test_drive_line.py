@@ -249,6 +249,37 @@ def test_gears_in_a_ring_that_agree_are_one():
     assert inertia(m.assemble())[0, 0] == pytest.approx(0.3 + 0.09)
 
 
+def test_a_gear_whose_ratio_has_no_value_yet_is_no_ring():
+    m, joint = arm()
+    first, second = IdealGear("first", "N"), IdealGear("second", "sqrt(M)")
+    m.connect(joint.flange, first.flange_b)
+    m.connect(first.flange_a, second.flange_b)
+    m.connect(second.flange_a, ShaftInertia("rotor", 1e-3).flange_a)
+    system = m.assemble()
+    names = [p.name for p in system.parameters]
+    A = mbs.models.inertia_matrix(system)
+    p = system.parameter_values({"N": 20.0, "M": 9.0})
+    assert sorted(names) == ["M", "N"]
+    assert float(A(list(system.posture), p)) == pytest.approx(0.3 + (20 * 3) ** 2 * 1e-3)
+
+
+@pytest.mark.parametrize(("other", "agrees"), [("1 / (1 / N)", True), ("M", False), ("-N", False)])
+def test_rings_of_gears_whose_ratios_have_no_values_yet(other, agrees):
+    m, joint = arm()
+    shaft = ShaftInertia("shaft", 0.01)
+    for name, ratio in (("first", "N"), ("second", other)):
+        gear = IdealGear(name, ratio)
+        m.connect(gear.flange_b, joint.flange)
+        m.connect(gear.flange_a, shaft.flange_a)
+    if not agrees:
+        refused(AssemblyError, "in two ways", "the ratios", by=m.assemble)
+        return
+    system = m.assemble()
+    A = mbs.models.inertia_matrix(system)
+    p = system.parameter_values({"N": 7.0})
+    assert float(A(list(system.posture), p)) == pytest.approx(0.3 + 0.49)
+
+
 def test_refused_twist_of_a_rigid_shaft():
     def twist(m, joint):
         gear, spring = IdealGear("gear", 2), ElasticShaft("spring", 5.0)

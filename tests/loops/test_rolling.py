@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import mbs
 from mbs.components import Body, Free, Planar, Prismatic, Revolute, RollingDisc
-from mbs.errors import DescriptionError
+from mbs.errors import DescriptionError, SolverError
 
 RADIUS, MASS = 0.2, 1.5
 ACROSS, SPIN = 0.25 * MASS * RADIUS**2, 0.5 * MASS * RADIUS**2
@@ -230,3 +230,11 @@ def test_the_bicycle_is_at_the_edge_of_stability_at_the_published_speeds(speed):
     )
     largest = max(np.linalg.eigvals(companion).real)
     assert largest == pytest.approx(0, abs=1e-11)
+
+
+def test_a_disc_that_falls_flat_ends_the_motion():
+    """It went on before, and lost a third of its energy in silence."""
+    system = rolling_disc()
+    start = {"base.qw": math.cos(0.1), "base.qx": math.sin(0.1)}
+    with pytest.raises(SolverError, match="contact lies flat on its plane at t = 0"):
+        mbs.simulate.run(system, 3.0, q0=start, quiet=True)

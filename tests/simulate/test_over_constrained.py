@@ -69,3 +69,36 @@ def test_planar_loops_keep_their_rows():
     for name in ("four_bar", "five_bar", "sr400", "slider_crank"):
         assert not mbs.load(name).assemble().closure.varies
     assert mbs.load("bricard").assemble().closure.varies
+
+
+def test_wrenches_stay_of_one_size_all_the_way_round():
+    """With the rows of one posture a joint seemed to carry forty times as much in another."""
+    system = bennett(1, 3, (0.9, 1.7))
+    free = mbs.models.joint_wrenches(system)
+    tree = mbs.models.joint_wrenches(system, "tree")
+    idm, G = mbs.models.inverse_dynamics(system), mbs.loops.reduction_matrix(system)
+    rates = mbs.models.acceleration_closure(system)
+    largest = []
+    for x in np.linspace(-3.0, 3.0, 41):
+        (mode,) = modes(system, [x])
+        v = np.array(G(mode.q)) @ [1.0]
+        a = np.array(rates(mode.q, [1.0])[2]).ravel()
+        tau = np.zeros(system.nv)
+        tau[list(system.active)] = float(idm(mode.q, [1.0], [0.0]))
+        F, same = np.array(free(mode.q, [1.0], [0.0])), np.array(tree(mode.q, v, a, tau))
+        assert same == pytest.approx(F, rel=1e-6, abs=1e-6)
+        largest.append(np.abs(F).max())
+    assert max(largest) < 5 * np.median(largest)
+
+
+def test_a_motion_that_is_prescribed_goes_all_the_way_round():
+    """The law goes on where one leg ends and the next begins."""
+    system = bennett(1, 3, (0.9, 1.7))
+    start = modes(system, [0.5])[0].q[system.active[0]]
+    result = mbs.simulate.run(
+        system, 2.5, motion={"j1.q": lambda t: start + 3 * t}, tolerance=1e-9, quiet=True
+    )
+    assert result["j1.q"] == pytest.approx(start + 3 * result.time, abs=1e-10)
+    work = np.trapezoid(result["j1.tau"] * result["j1.v"], result.time)
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    assert work == pytest.approx(energy[-1] - energy[0], abs=5e-3)

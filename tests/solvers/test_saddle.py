@@ -98,3 +98,32 @@ def test_rows_come_after_the_columns_that_they_act_on():
     for row in range(m):
         columns = casadi.sparsify(J[row, :]).sparsity().get_triplet()[1]
         assert all(order.index(column) < order.index(n + row) for column in columns)
+
+
+@pytest.mark.parametrize("acting", [(1, 1), (1, 0), (0, 1), (0, 0)])
+def test_switched_rows_act_where_they_are_on(acting):
+    A, J, b, d = problem(7, 5, 3)
+    on = np.array([1, *acting])
+    switch = SX.sym("switch", 2)
+    rows = casadi.diag(casadi.vertcat(1, switch))
+    corner = casadi.vertcat(SX(1, 1), 1 - switch)
+    x, y = solve_saddle(SX(A), casadi.mtimes(rows, J), SX(b), casadi.mtimes(rows, d), 1.0, corner)
+    x, y = (np.array(z).ravel() for z in Function("f", [switch], [x, y])(acting))
+    x_ref, y_ref = reference(A, J[on == 1], b, d[on == 1])
+    assert x == pytest.approx(x_ref, abs=1e-12)
+    assert y[on == 1] == pytest.approx(y_ref, abs=1e-11)
+    assert np.all(y[on == 0] == 0)
+
+
+def test_switched_rows_that_depend_on_others_share_to_many_digits():
+    A, J, b, d = problem(3, 4, 1)
+    corner = SX(DM([0.0]).sparsity(), 0.0)
+    twice, right = np.vstack([J, J]), np.concatenate([d, d])
+    both = casadi.vertcat(SX(1, 1), corner)
+    x, y = (
+        np.array(casadi.evalf(z)).ravel()
+        for z in solve_saddle(SX(A), SX(twice), SX(b), SX(right), 1.0, both)
+    )
+    x_ref, y_ref = reference(A, J, b, d)
+    assert x == pytest.approx(x_ref, abs=1e-9)
+    assert twice.T @ y == pytest.approx(J.T @ y_ref, abs=1e-6)

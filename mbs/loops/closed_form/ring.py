@@ -217,9 +217,8 @@ def _pass_cut(walk: _Walk, system: System, number: int, known: Container[int], q
         walk.through(ball)
         return
     if isinstance(joint, Rod):
-        symbols = {p.name: system.p[k] for k, p in enumerate(system.parameters)}
         walk.through(ball)
-        walk.over(Pose.moved(vector([to_sx(joint.length, symbols), 0, 0])))
+        walk.over(Pose.moved(vector([to_sx(joint.length, system.symbol_table), 0, 0])))
         walk.through(ball)
         return
     if isinstance(joint, PointOnLine):

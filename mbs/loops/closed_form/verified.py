@@ -18,13 +18,12 @@ from mbs.assembly import System
 from mbs.errors import NoClosedForm
 from mbs.loops.closed_form.places import extent
 from mbs.loops.closed_form.stage import Stage, started_at, ways_at
-from mbs.loops.closing import Closing, Vector, closure_parameters
+from mbs.loops.closing import OPEN, Closing, Vector, closure_parameters
 
 _SEED = 20260104
 _MOVE = 0.2
 _TRIES = 8
 _CHECKS = 3
-_OPEN = 1e-6
 
 
 def verified(system: System, stages: Sequence[Stage]) -> tuple[Stage, ...]:
@@ -74,7 +73,7 @@ def _may_close(
     if not np.all(np.isfinite(reached)):
         return True
     rows, _ = Closing(system, p).rows(reached[: system.nq])
-    return float(np.max(np.abs(rows), initial=0.0)) < _OPEN
+    return float(np.max(np.abs(rows), initial=0.0)) < OPEN
 
 
 def _only(system: System, stage: Stage, kept: Sequence[int]) -> Stage:

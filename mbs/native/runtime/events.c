@@ -75,7 +75,7 @@ static int judge(events *e, const double *x) {
     for (k = 0; k < e->count; k++) {
         double value = left(e)[k], rise = left_rate(e)[k];
         int waits = value >= -fmax(zero, rise * slack) && !(rise * step < -zero);
-        armed(e)[k] = value > 0.0;
+        armed(e)[k] = value > (rise > 0.0 ? zero : 0.0);
         due(e)[k] = value <= 0.0 && !waits;
         if (due(e)[k] > 0.0) e->pending = 1;
     }

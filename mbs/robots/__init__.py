@@ -11,6 +11,7 @@ from mbs.robots.flyball_governor import flyball_governor
 from mbs.robots.four_bar import four_bar
 from mbs.robots.loading import catalogue, load
 from mbs.robots.modelica_four_bar import modelica_four_bar
+from mbs.robots.modelica_rod_four_bar import modelica_rod_four_bar
 from mbs.robots.n_four_bar import n_four_bar
 from mbs.robots.planar_2r import planar_2r
 from mbs.robots.puma560 import puma560
@@ -38,6 +39,7 @@ __all__ = [
     "four_bar",
     "load",
     "modelica_four_bar",
+    "modelica_rod_four_bar",
     "n_four_bar",
     "planar_2r",
     "puma560",

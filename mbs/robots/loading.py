@@ -22,6 +22,7 @@ from mbs.robots.five_bar import five_bar
 from mbs.robots.flyball_governor import flyball_governor
 from mbs.robots.four_bar import four_bar
 from mbs.robots.modelica_four_bar import modelica_four_bar
+from mbs.robots.modelica_rod_four_bar import modelica_rod_four_bar
 from mbs.robots.n_four_bar import n_four_bar
 from mbs.robots.planar_2r import planar_2r
 from mbs.robots.puma560 import puma560
@@ -54,6 +55,7 @@ _CATALOGUE: Mapping[str, Callable[[], Mechanism]] = MappingProxyType(
             slider_crank,
             single_cylinder_engine,
             modelica_four_bar,
+            modelica_rod_four_bar,
             simple_pendulum,
             n_four_bar,
             andrews_squeezer,

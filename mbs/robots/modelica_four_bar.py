@@ -9,9 +9,9 @@ _SOURCE = (
     "Modelica Standard Library, Modelica.Mechanics.MultiBody.Examples.Loops.Fourbar1; Otter,"
     " Elmqvist & Mattsson 2003"
 )
-_GRAVITY = 9.80665
-_DIAMETER, _STEEL = 0.05, 7700
-_CRANK, _ROCKER, _ROD = (0, 0.5, 0.1), (0, 0.2, 0), (-1, 0.3, 0.1)
+GRAVITY = 9.80665
+DIAMETER, STEEL = 0.05, 7700
+CRANK, ROCKER, ROD = (0, 0.5, 0.1), (0, 0.2, 0), (-1, 0.3, 0.1)
 
 
 def modelica_four_bar() -> Mechanism:
@@ -25,11 +25,11 @@ def modelica_four_bar() -> Mechanism:
 
     Source: Modelica Standard Library, example Fourbar1; its loops: Otter et al. 2003.
     """
-    gravity = (0, -_GRAVITY, 0)
+    gravity = (0, -GRAVITY, 0)
     m = Mechanism("modelica_four_bar", gravity=gravity, source=_SOURCE, guess={"j2": -0.2})
-    b1 = m.add(round_bar("b1", _CRANK, _DIAMETER, _STEEL))
-    b2 = m.add(round_bar("b2", _ROCKER, _DIAMETER, _STEEL))
-    b3 = m.add(round_bar("b3", _ROD, _DIAMETER, _STEEL))
+    b1 = m.add(round_bar("b1", CRANK, DIAMETER, STEEL))
+    b2 = m.add(round_bar("b2", ROCKER, DIAMETER, STEEL))
+    b3 = m.add(round_bar("b3", ROD, DIAMETER, STEEL))
     j1, rev, rev1, j3, j4, j5 = (
         Revolute(name, axis=axis, actuated=False)
         for name, axis in zip(("j1", "rev", "rev1", "j3", "j4", "j5"), "xyzxyz", strict=True)
@@ -37,10 +37,10 @@ def modelica_four_bar() -> Mechanism:
     m.connect(m.world, j1, b1)
     m.connect(m.world.at(1.2), Prismatic("j2", axis="x"), b2)
     hub, cross, spider = (m.add(Body(name)) for name in ("hub", "cross", "spider"))
-    m.connect(b2.at(*_ROCKER), rev, hub)
+    m.connect(b2.at(*ROCKER), rev, hub)
     m.connect(hub, rev1, b3)
-    m.connect(b1.at(*_CRANK), j3, cross)
+    m.connect(b1.at(*CRANK), j3, cross)
     m.connect(cross, j4, spider)
-    m.connect(spider, j5, b3.at(*_ROD))
+    m.connect(spider, j5, b3.at(*ROD))
     m.cut(j5)
     return m

@@ -19,6 +19,7 @@ ACTIVE = {
     "slider_crank": 1,
     "single_cylinder_engine": 1,
     "modelica_four_bar": 0,
+    "modelica_rod_four_bar": 0,
     "simple_pendulum": 0,
     "n_four_bar": 0,
     "andrews_squeezer": 1,

@@ -22,6 +22,7 @@ MOBILITY = {
     "slider_crank": 1,
     "single_cylinder_engine": 1,
     "modelica_four_bar": 1,
+    "modelica_rod_four_bar": 1,
     "simple_pendulum": 1,
     "n_four_bar": 1,
     "andrews_squeezer": 1,

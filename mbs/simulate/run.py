@@ -68,7 +68,7 @@ def run(
         parameters: values of symbols, the others at their defaults.
         step: time between the rows of the result [s]; it does not change the accuracy.
         tolerance: what the error of the motion should stay near [rad, m, rad/s or m/s]. A step
-            may err by a twentieth of it, and by a thousandth relative to large coordinates.
+            may err by a twenty-fifth of it, and by a thousandth relative to large coordinates.
         method: "dopri5", Dormand and Prince's explicit pair, or "rodas", the linearly implicit
             RODAS5P for stiff systems.
         quiet: no progress bar.
@@ -116,7 +116,7 @@ def run(
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:
     """Relative and absolute tolerance of a step for that of a motion, kept above rounding."""
-    return max(1e-3 * tolerance, 1e-14), max(0.05 * tolerance, 1e-13)
+    return max(1e-3 * tolerance, 1e-14), max(0.04 * tolerance, 1e-13)
 
 
 def _result(system: System, legs: Sequence[Leg], p: Sequence[float]) -> Result:

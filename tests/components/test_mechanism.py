@@ -94,7 +94,7 @@ def body(m):
             ["m: 'c' is connected but is not part", "call add(c) first"],
         ),
         (lambda m: m.cut(Revolute("k")), ["m: joint 'k' is not connected", "connect it before"]),
-        (lambda m: m.cut("j"), ["m: 'j' is not a joint", "cut a joint"]),
+        (lambda m: m.cut("j"), ["m: 'j' is not a joint", "give the joint itself"]),
     ],
 )
 def test_refused(m, call, parts):

@@ -18,7 +18,7 @@ Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""
 
 PostureCheck = Callable[[System, Any, Any], None]
-"""Raises an error where positions q (nq,) and parameters p (np,) make no posture for a model."""
+"""Raises an error where positions q (nq, 1) and parameters p (np, 1) are no posture for a model."""
 
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
@@ -63,9 +63,10 @@ class ModelFunction(Function):
         given = self._given(args, kwargs)
         for name, value in given.items():
             self._check(name, value)
-        self._require_posture(given)
+        inputs = {name: _matrix(value) for name, value in given.items()}
+        self._require_posture(inputs)
         try:
-            outputs = Function.__call__(self, *map(_matrix, given.values()))
+            outputs = Function.__call__(self, *inputs.values())
         except (RuntimeError, NotImplementedError, TypeError, ValueError) as error:
             raise ModelError(
                 f"{self._title}: CasADi does not take these arguments; give numbers, DM, SX or MX"
@@ -143,17 +144,16 @@ class ModelFunction(Function):
         known = f": {elements}" if elements else ""
         raise ModelError(f"{self._title}: {name} has {rows} values, it needs {wanted}{known}")
 
-    def _require_posture(self, given: dict[str, Any]) -> None:
+    def _require_posture(self, inputs: dict[str, Any]) -> None:
         """Refuse a posture in numbers at which the model has no sense."""
-        q, p = given.get("q"), given.get("p", [])
-        if self._check_posture is None or any(isinstance(x, (SX, MX)) for x in (q, p)):
+        if self._check_posture is None:
             return
-        try:
-            position, parameters = (np.array(DM(_matrix(x)), dtype=float) for x in (q, p))
-        except (NotImplementedError, TypeError, ValueError):
-            return  # a list of symbols
-        if position.size == self._system.nq:
-            self._check_posture(self._system, position.ravel(), parameters.ravel())
+        q, p = inputs["q"], inputs.get("p", DM())
+        if any(isinstance(x, (SX, MX)) for x in (q, p)):
+            return
+        position, parameters = DM(q), DM(p)
+        if position.numel() == self._system.nq:
+            self._check_posture(self._system, position, parameters)
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)

@@ -7,12 +7,12 @@ law is written once, on CasADi scalars; the recursions know where its points are
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from casadi import SX
 
-from mbs.components.component import Component, Point
-from mbs.components.on_points import OnPoints
+from mbs.components.component import Component
+from mbs.components.on_points import OnPair, OnPoints
 from mbs.components.placement import SymbolTable
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar, to_float
@@ -97,25 +97,12 @@ class ForceElement(OnPoints):
 
 
 @dataclass(frozen=True, slots=True)
-class PairForce(ForceElement):
+class PairForce(OnPair, ForceElement):
     """An element between two points of two bodies.
 
     Attributes:
         a, b: the points, or bodies for their reference frames.
     """
-
-    a: Any
-    b: Any
-
-    def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._take_point("a")
-        self._take_point("b")
-
-    @property
-    def points(self) -> tuple[Point, ...]:
-        """The two points."""
-        return (self.a, self.b)
 
     def pull(self, motion: RelativeMotion, symbols: SymbolTable) -> Pull:
         """What it does to the body of a."""

@@ -44,3 +44,25 @@ class OnPoints(Component):
                 " joint.frame_a"
             )
         object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, slots=True)
+class OnPair(OnPoints):
+    """A component between two points.
+
+    Attributes:
+        a, b: the points, or bodies for their reference frames.
+    """
+
+    a: Any
+    b: Any
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        self._take_point("a")
+        self._take_point("b")
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The two points."""
+        return (self.a, self.b)

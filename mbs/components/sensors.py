@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mbs.components.component import Component, Point
-from mbs.components.on_points import OnPoints
+from mbs.components.on_points import OnPair, OnPoints
 from mbs.errors import DescriptionError
 from mbs.messages import did_you_mean, quoted
 
@@ -127,7 +127,7 @@ class AbsoluteSensor(MotionSensor):
 
 
 @dataclass(frozen=True, slots=True)
-class RelativeSensor(MotionSensor):
+class RelativeSensor(OnPair, MotionSensor):
     """How a frame b moves for an observer who moves and turns with a frame a.
 
     Position p of b, velocity v and acceleration a as that observer sees them, angular velocity w
@@ -139,44 +139,22 @@ class RelativeSensor(MotionSensor):
         quantities: those to read, some of p, R, v, w, a, wd; all of them when left out.
     """
 
-    a: Any
-    b: Any
     axes: str = "a"
     quantities: Any = None
 
     def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._take_point("a")
-        self._take_point("b")
+        OnPair.__post_init__(self)
         self._check_axes(("a", "b", "world"), "'a', 'b' or 'world'")
         self._check_quantities()
 
-    @property
-    def points(self) -> tuple[Point, ...]:
-        """The two frames."""
-        return (self.a, self.b)
-
 
 @dataclass(frozen=True, slots=True)
-class DistanceSensor(Sensor):
+class DistanceSensor(OnPair, Sensor):
     """Distance L between two points and its rate Ld; where they coincide the rate is zero.
 
     Attributes:
         a, b: the points, or bodies for their reference frames.
     """
-
-    a: Any
-    b: Any
-
-    def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._take_point("a")
-        self._take_point("b")
-
-    @property
-    def points(self) -> tuple[Point, ...]:
-        """The two points."""
-        return (self.a, self.b)
 
     @property
     def measured(self) -> tuple[Quantity, ...]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
-from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import Closure, LoopRow, System
@@ -20,8 +19,8 @@ from mbs.loops.closing import Closing, closure_parameters
 from mbs.loops.closure import row_labels
 from mbs.loops.posture import closed_posture
 from mbs.loops.rolling import SLIPS, rolling_discs
-from mbs.loops.velocity import constraint_rows
-from mbs.solvers.rank import independent_rows, rank
+from mbs.loops.velocity import constraint_jacobian
+from mbs.solvers.rank import independent_rows, null_space_of, rank
 
 Matrix = NDArray[np.float64]
 
@@ -52,7 +51,7 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
     posture = _assembled(system, guess, p)
     nearby = Closing(system, p).nearby(posture, _REACH, _TRIES, _SEED)
     postures = [posture, *islice(nearby, _POSTURES)]
-    J = _jacobian(system)
+    J = constraint_jacobian(system)
     jacobians = [np.array(J(q, p)) for q in postures]
     ranks = _ranks(jacobians)
     generic = max(ranks)
@@ -60,7 +59,8 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
     regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
     labels = _labels(system)
     positions = sum(len(rows) for rows, _ in labels)
-    kept = _kept_rows(regular, positions, generic)
+    held = max(_ranks([J[:positions] for J in regular])) if positions else 0
+    kept = _kept_rows(regular, positions, held, generic - held)
     active = _independent_velocities(system, chosen, regular, system.nv - generic)
     closure = Closure(
         rows=kept.positions,
@@ -111,17 +111,17 @@ class _Kept:
     slips: tuple[int, ...]
 
 
-def _kept_rows(jacobians: Sequence[Matrix], positions: int, count: int) -> _Kept:
+def _kept_rows(jacobians: Sequence[Matrix], positions: int, held: int, slips: int) -> _Kept:
     """The independent rows at regular postures, rows of positions before those of velocities.
 
     Args:
         jacobians: (m, nv) each, the first rows those of positions.
         positions: how many of them are.
-        count: rank of all.
+        held: rank of these.
+        slips: by how much the others raise it.
     """
-    holonomic = [J[:positions] for J in jacobians]
-    rows = independent_rows(holonomic, max(_ranks(holonomic), default=0) if positions else 0)
-    every = independent_rows(jacobians, count, tuple(rows))
+    rows = independent_rows([J[:positions] for J in jacobians], held)
+    every = independent_rows(jacobians, held + slips, tuple(rows))
     return _Kept(tuple(rows), tuple(k - positions for k in every if k >= positions))
 
 
@@ -147,12 +147,10 @@ def rows_at(system: System, q: Matrix, p: Matrix) -> System:
     """
     closure = system.closure
     assert closure is not None
-    J = np.array(_jacobian(system)(q, p))
+    J = np.array(constraint_jacobian(system)(q, p))
     labels = _labels(system)
     positions = sum(len(rows) for rows, _ in labels)
-    rows = independent_rows([J[:positions]], len(closure.rows))
-    every = independent_rows([J], len(closure.rows) + len(closure.slips), tuple(rows))
-    kept = _Kept(tuple(rows), tuple(k - positions for k in every if k >= positions))
+    kept = _kept_rows([J], positions, len(closure.rows), len(closure.slips))
     return replace(
         system,
         closure=replace(closure, rows=kept.positions, slips=kept.slips),
@@ -168,7 +166,7 @@ def _free_positions(
     if not kept.slips:
         return tuple(active)
     size = jacobians[0].shape[1] - len(kept.positions)
-    free = [_null_space(J[list(kept.positions)], size) for J in jacobians]
+    free = [null_space_of(J[list(kept.positions)], size) for J in jacobians]
     return tuple(independent_rows(free, size, tuple(active)))
 
 
@@ -189,17 +187,13 @@ def _independent_velocities(
             f"{system.name}: {len(first)} velocities are {what} ({names}) but the mobility is"
             f" {mobility}; {do} {mobility} at most"
         )
-    free = [_null_space(J, mobility) for J in jacobians]
+    free = [null_space_of(J, mobility) for J in jacobians]
     if first and max(rank(N[first], _GAP) for N in free) < len(first):
         raise AssemblyError(
             f"{system.name}: the {what} velocities {names} depend on each other through the"
             f" loops; {do} joints that can move independently"
         )
     return independent_rows(free, mobility, tuple(first))
-
-
-def _null_space(J: Matrix, mobility: int) -> Matrix:
-    return np.array(np.linalg.svd(J)[2][-mobility:].T)
 
 
 _Labels = list[tuple[list[str], tuple[str, ...]]]
@@ -220,9 +214,3 @@ def _with_rows(loops: Sequence[LoopRow], labels: _Labels, kept: _Kept) -> tuple[
         result.append(replace(loop, rows=(*names, *slips), dropped=tuple(dropped)))
         row, slip = row + len(names), slip + len(slips)
     return tuple(result)
-
-
-def _jacobian(system: System) -> Function:
-    """`J(q, p)`, every row."""
-    q = SX.sym("q", system.nq)
-    return Function("J", [q, system.p], [constraint_rows(system, q)])

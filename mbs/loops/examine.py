@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from casadi import SX, Function
+from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
@@ -16,7 +16,12 @@ from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters
 from mbs.loops.closure import closure_rows
 from mbs.loops.scales import scales
-from mbs.loops.velocity import constraint_rows, independent_constraint_rows, kept_rows
+from mbs.loops.velocity import (
+    constraint_jacobian,
+    determining_rows,
+    independent_constraint_rows,
+    kept_rows,
+)
 from mbs.solvers.rank import rank
 
 Vector = NDArray[np.float64]
@@ -77,7 +82,9 @@ def examine(
     position = np.array(system.position(q))
     p = closure_parameters(system, parameters)
     residual, leads = (float(x) for x in _health(system)(position, p))
-    J = np.array(_rows(system)(position, p))
+    found = scales(system)
+    J = np.array(constraint_jacobian(system)(position, p)) * found.rows.reshape(-1, 1)
+    J *= found.columns([speed.unit for speed in system.speeds])
     return PostureState(residual, system.nv - rank(J), system.closure.mobility, leads)
 
 
@@ -115,10 +122,9 @@ def _health(system: System) -> Function:
         q = SX.sym("q", system.nq)
         assert system.closure is not None
         residual = casadi.mmax(casadi.fabs(casadi.vertcat(0, closure_rows(system, q))))
-        every = constraint_rows(system, q) if system.closure.varies else None
-        J = independent_constraint_rows(system, q) if every is None else every
-        J_p = _scaled(system, J, every is None)[:, list(system.closure.passive)]
-        leads = _independence(J_p if every is None else J_p.T)
+        varies, passive = system.closure.varies, list(system.closure.passive)
+        J_p = _scaled(system, determining_rows(system, q).J)[:, passive]
+        leads = _independence(J_p.T if varies else J_p)
         return Function("health", [q, system.p], [residual, leads], {"cse": True})
 
     function: Function = system.cached("posture health", build)
@@ -141,14 +147,12 @@ def row_independence(system: System) -> Function:
     return function
 
 
-def _scaled(system: System, J: SX, kept: bool = True) -> SX:
-    """The kept rows, or all, in sizes that do not depend on units."""
-    found = scales(system)
-    rows = kept_rows(system) if kept else range(len(found.rows))
-    columns = found.columns([speed.unit for speed in system.speeds])
-    return (
-        J * casadi.DM(found.rows[list(rows)]) * casadi.repmat(casadi.DM(columns).T, J.shape[0], 1)
-    )
+def _scaled(system: System, J: SX) -> SX:
+    """The kept rows, or all of them, in sizes that do not depend on units."""
+    found, kept = scales(system), kept_rows(system)
+    rows = found.rows[kept] if J.shape[0] == len(kept) else found.rows
+    columns = DM(found.columns([speed.unit for speed in system.speeds]))
+    return J * DM(rows) * casadi.repmat(columns.T, J.shape[0], 1)
 
 
 def _independence(J: SX) -> SX:
@@ -161,12 +165,3 @@ def _independence(J: SX) -> SX:
     squares = casadi.fmax(casadi.sum2(J * J), 1)
     D, _, order = casadi.ldl(casadi.sparsify(casadi.mtimes(J, J.T)))
     return casadi.mmin(D / squares[order])
-
-
-def _rows(system: System) -> Function:
-    def build() -> Function:
-        q = SX.sym("q", system.nq)
-        return Function("rows", [q, system.p], [_scaled(system, constraint_rows(system, q), False)])
-
-    function: Function = system.cached("constraint rows", build)
-    return function

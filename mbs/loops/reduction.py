@@ -13,11 +13,7 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.loops.examine import require_led
-from mbs.loops.velocity import (
-    acceleration_bias,
-    constraint_rows,
-    independent_constraint_rows,
-)
+from mbs.loops.velocity import acceleration_bias, determining_rows
 from mbs.solvers.small_linear import solve_square
 from mbs.spatial import zeros
 
@@ -55,9 +51,6 @@ def reduction_matrix(system: System) -> Function:
 def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     """G, and gamma for the independent velocities v_a, at the symbols q.
 
-    Where no choice of rows is independent everywhere, all rows are taken, by least squares: as
-    they agree with each other on closed loops, the solution is the same.
-
     Args:
         system: with closed loops.
         q: (nq, 1) symbols of positions that close the loops.
@@ -65,20 +58,16 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     """
     closure = system.closure
     assert closure is not None
-    active, passive = list(closure.active), list(closure.passive)
-    J = constraint_rows(system, q) if closure.varies else independent_constraint_rows(system, q)
-    J_p, J_a = J[:, passive], J[:, active]
-    mixed = J_p.T if closure.varies else SX(DM.eye(len(passive)))
-    J_p, J_a = casadi.mtimes(mixed, J_p), casadi.mtimes(mixed, J_a)
-    W = -solve_square(J_p, J_a)
+    active, rows = list(closure.active), determining_rows(system, q)
+    W = -solve_square(rows.square, casadi.mtimes(rows.mixed, rows.J[:, active]))
     G = tree_rows(system, W, SX(DM.eye(len(active))))
     if v_a is None:
         return Reduction(G, None)
     v = casadi.densify(casadi.mtimes(G, v_a))
     speed = SX.sym("v", system.nv)
-    psi = casadi.substitute(acceleration_bias(system, q, speed, J), speed, v)
-    psi = casadi.mtimes(mixed, psi)
-    return Reduction(G, tree_rows(system, -solve_square(J_p, psi), zeros(len(active))))
+    psi = casadi.substitute(acceleration_bias(system, q, speed, rows.J), speed, v)
+    a_p = -solve_square(rows.square, casadi.mtimes(rows.mixed, psi))
+    return Reduction(G, tree_rows(system, a_p, zeros(len(active))))
 
 
 def tree_rows(system: System, passive: SX, active: SX) -> SX:

@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.loops.closure import row_labels
-from mbs.loops.velocity import constraint_rows
+from mbs.loops.velocity import constraint_jacobian
 
 _VANISHING = 1e-9
 
@@ -38,12 +37,10 @@ class Scales:
 
 
 def scales(system: System) -> Scales:
-    """The scales of a system; ones where a symbol has no value."""
+    """The scales of a system; ones where a symbol has no value, and no rows in an open chain."""
 
     def build() -> Scales:
-        q = SX.sym("q", system.nq)
-        rows = Function("rows", [q, system.p], [constraint_rows(system, q)])
-        J = np.array(rows(list(system.posture), system.p_default))
+        J = np.array(constraint_jacobian(system)(list(system.posture), system.p_default))
         if J.size == 0 or not np.all(np.isfinite(J)):
             return Scales(np.ones(len(J)), 1.0)
         units = [speed.unit for speed in system.speeds]

@@ -5,8 +5,12 @@ The rows of J are those of the closure, then those of rolling discs, which bind 
 Source: Khalil & Creusot 1997, eq. 11 and 14.
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+
 import casadi
-from casadi import SX, Function
+from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
@@ -45,12 +49,51 @@ def independent_constraint_rows(system: System, q: SX) -> SX:
     return casadi.vertcat(J, slips[list(system.closure.slips), :])
 
 
+def constraint_jacobian(system: System) -> Function:
+    """``constraint_jacobian(q, p) -> J``: every row, also where parameters have no value."""
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        return Function("constraint_jacobian", [q, system.p], [constraint_rows(system, q)])
+
+    function: Function = system.cached("constraint jacobian", build)
+    return function
+
+
 def kept_rows(system: System) -> list[int]:
-    """The numbers of the independent rows among all."""
+    """The numbers of the independent rows among all; none in an open chain."""
+    if system.closure is None:
+        return []
+    positions = sum(len(rows) for _, rows in row_labels(system))
+    return [*system.closure.rows, *(positions + k for k in system.closure.slips)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DeterminingRows:
+    """Rows from which the passive velocities follow in every posture that leads them.
+
+    These are the kept rows; all of them, by least squares, where no choice of rows is independent
+    everywhere: as rows agree with each other on closed loops, the solution is the same.
+
+    Attributes:
+        J: (m, nv).
+        mixed: (r, m) combinations of the rows, as many as there are passive velocities.
+        square: (r, r) their columns of the passive velocities.
+    """
+
+    J: SX
+    mixed: SX
+    square: SX
+
+
+def determining_rows(system: System, q: SX) -> DeterminingRows:
+    """The rows of a system with loops at the symbols q."""
     closure = system.closure
     assert closure is not None
-    positions = sum(len(rows) for _, rows in row_labels(system))
-    return [*closure.rows, *(positions + k for k in closure.slips)]
+    J = constraint_rows(system, q) if closure.varies else independent_constraint_rows(system, q)
+    J_p = J[:, list(closure.passive)]
+    mixed = J_p.T if closure.varies else SX(DM.eye(J.shape[0]))
+    return DeterminingRows(J, mixed, casadi.mtimes(mixed, J_p))
 
 
 def velocity_rows(system: System, q: SX, phi: SX) -> SX:

@@ -10,7 +10,7 @@ from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import Tree
 from mbs.loops.cut_wrenches import cut_wrenches, on_links
-from mbs.loops.velocity import constraint_rows, kept_rows
+from mbs.loops.velocity import constraint_jacobian, determining_rows, kept_rows
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.surroundings import Surroundings, exerted, surroundings
 from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
@@ -132,20 +132,20 @@ def _closure_efforts(
     """
     closure = system.closure
     assert closure is not None
-    needed, passive = tree_efforts(system, s, a, around), list(closure.passive)
-    every = constraint_rows(system, s.q)
-    if closure.varies:
-        J_p, left = every[:, passive], needed if tau is None else needed - tau
-        square = casadi.mtimes(J_p.T, J_p)
-        return casadi.densify(casadi.mtimes(J_p, solve_square(square, left[passive])))
-    kept, lam = kept_rows(system), SX.zeros(every.shape[0])
-    J = every[kept, :]
-    if tau is None:
-        lam[kept] = solve_square(J[:, passive].T, needed[passive])
+    needed = tree_efforts(system, s, a, around)
+    left = needed if tau is None else needed - tau
+    rows = determining_rows(system, s.q)
+    if tau is None or closure.varies:
+        shares = solve_square(rows.square.T, left[list(closure.passive)])
+        lam = casadi.mtimes(rows.mixed.T, shares)
     else:
-        rest = SX.zeros(len(kept))
-        lam[kept] = solve_saddle(SX.eye(system.nv), J, tau - needed, rest, 1.0)[1]
-    return lam
+        rest = SX.zeros(rows.J.shape[0])
+        lam = solve_saddle(SX.eye(system.nv), rows.J, -left, rest, 1.0)[1]
+    if closure.varies:
+        return casadi.densify(lam)
+    every = SX.zeros(constraint_jacobian(system).size1_out(0))
+    every[kept_rows(system)] = lam
+    return every
 
 
 def _at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wrench:

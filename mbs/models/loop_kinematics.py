@@ -19,7 +19,7 @@ from mbs.loops.examine import require_led
 from mbs.loops.reduction import reduction, tree_rows
 from mbs.loops.velocity import (
     acceleration_bias,
-    constraint_rows,
+    determining_rows,
     independent_constraint_rows,
 )
 from mbs.models.symbols import symbols_of
@@ -99,13 +99,10 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
         speed = SX.sym("v", system.nv)
         both = casadi.vertcat(rows.tree, rows.cut)
         bias = acceleration_bias(system, s.q, speed, both)
-        J, r = rows.tree, rows.tree.shape[0]
-        every = constraint_rows(system, s.q) if _varies(system) else J
-        mixed = every[:, rows.passive].T if _varies(system) else SX(DM.eye(r))
-        still = zeros(len(rows.active), len(rows.active))
-        turned = casadi.mtimes(_rate(system, every, s.q, speed), reduction(system, s.q).G)
-        square = casadi.mtimes(mixed, every[:, rows.passive])
-        G_dot = tree_rows(system, -solve_square(square, casadi.mtimes(mixed, turned)), still)
+        r, every = rows.tree.shape[0], determining_rows(system, s.q)
+        turned = casadi.mtimes(_rate(system, every.J, s.q, speed), reduction(system, s.q).G)
+        W_dot = -solve_square(every.square, casadi.mtimes(every.mixed, turned))
+        G_dot = tree_rows(system, W_dot, zeros(len(rows.active), len(rows.active)))
         values = casadi.substitute([bias, G_dot], [speed], [s.v_tree])
         outputs = [("Psi", values[0][:r]), ("Phi", values[0][r:]), ("G_dot", values[1])]
         return [("q", s.q), (f"v{s.suffix}", s.v)], outputs
@@ -127,11 +124,6 @@ class _Rows:
     cut: SX
     active: list[int]
     passive: list[int]
-
-
-def _varies(system: System) -> bool:
-    """Whether all rows are needed, by least squares, to hold in every posture."""
-    return system.closure is not None and system.closure.varies
 
 
 def _require_loops(system: System) -> None:

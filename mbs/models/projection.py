@@ -78,13 +78,13 @@ def projected(
     wanted = casadi.vertcat(SX(J.shape[0] - len(held), 1), *(speed for _, speed in held))
     J = casadi.vertcat(J, casadi.jacobian(still, v))
     speed = casadi.vertcat(casadi.mtimes(J[: wanted.numel(), :], v) - wanted, still)
-    first = _row_scales(system)
-    units = ([c.unit for c in system.coordinates], [c.unit for c in system.speeds])
-    columns = [
-        scales(system).columns(unit) if system.is_closed else np.ones(len(unit)) for unit in units
-    ]
-    step_q, _ = _shortest(J_q, r, place_off, first[: loops.numel()], columns[0])
-    step_v, awake = _shortest(J, speed, slide_off, first, columns[1])
+    found = scales(system)
+    first = found.rows[kept_rows(system)]
+    places_of, speeds_of = (
+        found.columns([row.unit for row in table]) for table in (system.coordinates, system.speeds)
+    )
+    step_q, _ = _shortest(J_q, r, place_off, first[: loops.numel()], places_of)
+    step_v, awake = _shortest(J, speed, slide_off, first, speeds_of)
     rows = casadi.vertcat(every, norms, *places, distance, speed)
     residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
     values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])
@@ -109,11 +109,6 @@ def _touched(
 def _switched(acting: SX) -> SX:
     """What stands in for the squares of rows that vanish when they do not act."""
     return casadi.if_else(acting, _SHARED, 1)
-
-
-def _row_scales(system: System) -> Array:
-    """What the independent rows of the loops are multiplied by."""
-    return scales(system).rows[kept_rows(system)] if system.is_closed else np.empty(0)
 
 
 def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, SX]:

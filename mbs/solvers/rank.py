@@ -25,7 +25,12 @@ def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
 
 def null_space(matrix: Matrix, gap: float = RELATIVE_GAP) -> Matrix:
     """(n, n - rank) orthonormal columns that the matrix (m, n) takes to zero."""
-    return np.array(np.linalg.svd(matrix)[2][rank(matrix, gap) :].T)
+    return null_space_of(matrix, matrix.shape[1] - rank(matrix, gap))
+
+
+def null_space_of(matrix: Matrix, dimension: int) -> Matrix:
+    """(n, dimension) orthonormal columns that the matrix (m, n) shortens most."""
+    return np.array(np.linalg.svd(matrix)[2][matrix.shape[1] - dimension :].T)
 
 
 def independent_rows(

@@ -1,0 +1,108 @@
+"""A serial arm in numbers: its pose, its Jacobian, for one posture or many at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """Joints that turn about or slide along their z axes, and the constant ways between them.
+
+    The pose of the frame is G_0 J_1(q_1) G_1 J_2(q_2) .. J_n(q_n) G_n.
+
+    Attributes:
+        names: of the joints.
+        prismatic: (n,) whether each slides.
+        gaps: (n + 1, 4, 4) the constant ways G.
+    """
+
+    names: tuple[str, ...]
+    prismatic: NDArray[np.bool_]
+    gaps: Array
+
+    @property
+    def size(self) -> int:
+        """The number of joints."""
+        return len(self.prismatic)
+
+    @property
+    def length(self) -> float:
+        """A length of the arm's size [m], 1 where all its ways are turns alone."""
+        total = float(np.sum(np.linalg.norm(self.gaps[:, :3, 3], axis=1)))
+        return total if total > 0 else 1.0
+
+    def pose(self, q: Array) -> Array:
+        """(..., 4, 4) pose of the frame at postures q, (..., n) [rad or m]."""
+        return self._walked(q)[0]
+
+    def pose_and_jacobian(self, q: Array) -> tuple[Array, Array]:
+        """The poses, and the Jacobians (..., 6, n) of [V; w] of the frame, in the base."""
+        T, axes, origins = self._walked(q)
+        arms = T[..., None, :3, 3] - origins
+        turning = np.where(self.prismatic[:, None], 0.0, axes)
+        linear = np.where(self.prismatic[:, None], axes, np.cross(axes, arms))
+        return T, np.swapaxes(np.concatenate([linear, turning], axis=-1), -1, -2)
+
+    def _walked(self, q: Array) -> tuple[Array, Array, Array]:
+        """The poses, then the axes and the origins of all joints, (..., n, 3), in the base."""
+        q = np.asarray(q, dtype=float)
+        T = np.broadcast_to(self.gaps[0], (*q.shape[:-1], 4, 4))
+        axes, origins = np.empty((*q.shape, 3)), np.empty((*q.shape, 3))
+        for k in range(self.size):
+            axes[..., k, :], origins[..., k, :] = T[..., :3, 2], T[..., :3, 3]
+            T = T @ motion(q[..., k], bool(self.prismatic[k])) @ self.gaps[k + 1]
+        return T, axes, origins
+
+
+def motion(q: Array, prismatic: bool) -> Array:
+    """(..., 4, 4) slide along z by q [m], or turn about z by q [rad]."""
+    T = np.zeros((*np.shape(q), 4, 4))
+    T[..., range(4), range(4)] = 1.0
+    if prismatic:
+        T[..., 2, 3] = q
+        return T
+    c, s = np.cos(q), np.sin(q)
+    T[..., 0, 0], T[..., 0, 1], T[..., 1, 0], T[..., 1, 1] = c, -s, s, c
+    return T
+
+
+def inverse(T: Array) -> Array:
+    """(..., 4, 4) inverse of rigid transforms."""
+    back = np.zeros_like(T)
+    R = np.swapaxes(T[..., :3, :3], -1, -2)
+    back[..., :3, :3], back[..., 3, 3] = R, 1.0
+    back[..., :3, 3] = -(R @ T[..., :3, 3:])[..., 0]
+    return back
+
+
+def gap_to(wanted: Array, T: Array) -> Array:
+    """(..., 6) what is missing from poses T to the wanted one: translation [m], rotation [rad].
+
+    To first order it is the [V; w] that leads there in unit time; it vanishes at the wanted pose
+    alone.
+    """
+    R = wanted[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
+    vector = np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
+        axis=-1,
+    )
+    s = 0.5 * np.linalg.norm(vector, axis=-1)
+    angle = np.arctan2(s, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1))
+    scale = np.where(s > 1e-9, angle / np.maximum(2 * s, 1e-300), 0.5)
+    turn = np.where((s <= 1e-9) & (angle > 1), angle, 0.0)
+    rotation = scale[..., None] * vector + turn[..., None] * _half_turn_axis(R)
+    return np.concatenate([wanted[..., :3, 3] - T[..., :3, 3], rotation], axis=-1)
+
+
+def _half_turn_axis(R: Array) -> Array:
+    """(..., 3) the axis of turns by pi."""
+    B = 0.5 * (R + np.eye(3))
+    column = np.argmax(B[..., range(3), range(3)], axis=-1)
+    axis = np.take_along_axis(B, column[..., None, None], axis=-1)[..., 0]
+    return axis / np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-300)

@@ -1,0 +1,189 @@
+"""The joints between the base and a frame: what the inverse geometric model solves for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.assembly.tree import Link
+from mbs.components.motion import Motion
+from mbs.errors import ModelError
+from mbs.loops.closed_form.ring import Gap, Ring, Unknown
+from mbs.loops.sequence import Problem
+from mbs.messages import did_you_mean
+from mbs.models.geometry import terminal_frame
+from mbs.models.inverse_geometry.arm import Arm
+from mbs.spatial import Pose, axis_turn, vector
+
+_SAMPLES, _SEED = 4, 20260105
+_LARGEST = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """Free joints from the base to a frame, and the ways between them.
+
+    Attributes:
+        system: whose chain it is.
+        frame: at its end.
+        names: of the free joints, from the base on.
+        places: their numbers in q.
+        prismatic: whether each slides.
+        gaps: the ways before, between and after them, of parameters p; locked joints are in them.
+        locked: positions of the other joints of the chain by name [rad or m].
+    """
+
+    system: System
+    frame: str | int
+    names: tuple[str, ...]
+    places: tuple[int, ...]
+    prismatic: tuple[bool, ...]
+    gaps: tuple[Pose, ...]
+    locked: Mapping[str, float]
+
+    def arm(self, p: NDArray[np.float64]) -> Arm:
+        """The chain in numbers for parameters p, (np,)."""
+        stacked = casadi.vertcat(*(gap.matrix for gap in self.gaps))
+        function = Function("gaps", [self.system.p], [casadi.densify(stacked)])
+        gaps = np.array(DM(function(p))).reshape(len(self.gaps), 4, 4)
+        return Arm(self.names, np.array(self.prismatic, dtype=bool), gaps)
+
+    def problem(self, p: NDArray[np.float64] | None = None) -> Problem:
+        """The loop that the wanted pose closes.
+
+        Args:
+            p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
+
+        Returns:
+            Problem whose `given` is the parameters, where they are symbols, then the first three
+            rows of the pose T, column by column.
+        """
+        n, symbols = len(self.names), self.system.p if p is None else SX(0, 1)
+        numbers = dict[int, SX]() if p is None else {0: SX(DM(p))}
+        t = casadi.vertcat(*(SX.sym(f"T{r}{c}") for c in range(1, 5) for r in range(1, 4)))
+        T = Pose(casadi.reshape(t[0:9], 3, 3), t[9:12])
+        gaps = [
+            Gap(Pose(*self._substituted(gap, numbers[0])) if numbers else gap) for gap in self.gaps
+        ]
+        back = gaps[n].then(T.inverse())
+        joints = tuple(
+            Unknown(name, Motion.PRISMATIC if slides else Motion.REVOLUTE, place, 1)
+            for place, (name, slides) in enumerate(zip(self.names, self.prismatic, strict=True))
+        )
+        ring = Ring(joints, (gaps[0].after(back), *gaps[1:n]))
+        sums = [SX.sym(f"x{k + 1}") for k in range(n)]
+        x = casadi.vertcat(*(SX.sym(name) for name in self.names), *sums)
+        return Problem(ring, x, casadi.vertcat(symbols, t), self._samples(p))
+
+    def _substituted(self, gap: Pose, p: SX) -> tuple[SX, SX]:
+        return tuple(casadi.substitute(m, self.system.p, p) for m in (gap.R, gap.p))
+
+    def _samples(
+        self, p: NDArray[np.float64] | None
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        rng = np.random.default_rng(_SEED)
+        samples = []
+        for _ in range(_SAMPLES):
+            own = rng.uniform(0.4, 1.6, self.system.p.numel()) if p is None else p
+            q = np.where(self.prismatic, rng.uniform(0.2, 1.2, len(self.names)), 0.0)
+            turns = rng.uniform(-np.pi, np.pi, len(self.names))
+            q = np.where(self.prismatic, q, turns)
+            T = self.arm(own).pose(q)[:3].ravel(order="F")
+            samples.append((q, np.concatenate([own if p is None else np.zeros(0), T])))
+        return samples
+
+
+def chain(
+    system: System,
+    frame: str | int | None = None,
+    locked: Mapping[str, float] | None = None,
+) -> Chain:
+    """The joints from the base to a frame.
+
+    Args:
+        system: open or closed; of a closed one the joints of its tree.
+        frame: a body, a named frame, the number of a link, or None for the terminal frame.
+        locked: positions of joints that stay where they are, by name [rad or m].
+
+    Raises:
+        ModelError: there is no such frame or joint, a joint of the chain is a ball or free, or
+            more than six are free to move.
+    """
+    require_system(system)
+    name = terminal_frame(system) if frame is None else frame
+    number, pose = system.frame(name)
+    links = [system.tree.links[k] for k in system.tree.path(number)]
+    held = _locked(system, links, dict(locked or {}))
+    base = system.frame("base")[1].inverse()
+    gaps, free = [base], list[Link]()
+    for link in links:
+        _require_simple(system, link)
+        gaps[-1] = gaps[-1] @ link.placement.pose()
+        if link.name in held:
+            gaps[-1] = gaps[-1] @ _moved(link, held[link.name])
+        else:
+            free.append(link)
+            gaps.append(Pose.identity())
+    gaps[-1] = gaps[-1] @ pose
+    _require_few(system, name, free)
+    return Chain(
+        system,
+        name,
+        tuple(link.name for link in free),
+        tuple(link.q.start for link in free),
+        tuple(link.motion is Motion.PRISMATIC for link in free),
+        tuple(gaps),
+        held,
+    )
+
+
+def _moved(link: Link, q: float) -> Pose:
+    if link.motion is Motion.PRISMATIC:
+        return Pose.moved(vector([0, 0, q]))
+    return Pose.turned(axis_turn("z", SX(q)).matrix)
+
+
+def _locked(system: System, links: list[Link], given: dict[str, float]) -> dict[str, float]:
+    names = [link.name for link in links]
+    for name in given:
+        if name not in names:
+            raise ModelError(
+                f"{system.name}: joint {name!r} is not between the base and the frame, so that it"
+                f" cannot be locked; {did_you_mean(name, names)}"
+            )
+    positions = system.position(given)
+    return {link.name: positions[link.q.start] for link in links if link.name in given}
+
+
+def _require_simple(system: System, link: Link) -> None:
+    if link.motion not in (Motion.REVOLUTE, Motion.PRISMATIC):
+        raise ModelError(
+            f"{system.name}: joint {link.name} of the chain is {link.motion.name.lower()}; the"
+            " inverse geometric model knows revolute and prismatic joints, use"
+            " mbs.loops.solve_pose"
+        )
+
+
+def _require_few(system: System, frame: str | int, free: list[Link]) -> None:
+    if not free:
+        raise ModelError(f"{system.name}: no joint moves frame {frame!r}; name another frame")
+    if len(free) > _LARGEST:
+        surplus = len(free) - _LARGEST
+        raise ModelError(
+            f"{system.name}: {len(free)} joints are free between the base and frame {frame!r},"
+            f" and a pose determines {_LARGEST}; lock {surplus} of them with"
+            f" locked={{{_proposal(free, surplus)}}}"
+        )
+
+
+def _proposal(free: list[Link], surplus: int) -> str:
+    """The joints in the middle of the chain: most often those that make it redundant."""
+    middle = (len(free) - surplus) // 2
+    return ", ".join(f"{link.name!r}: 0.0" for link in free[middle : middle + surplus])

@@ -48,5 +48,5 @@ class Problem:
         ]
 
     def always_zero(self, values: SX) -> bool:
-        """Whether every element of an expression of x and given vanishes wherever the loop closes."""
+        """Whether an expression of x and given vanishes wherever the loop closes."""
         return all(bool(np.all(np.abs(sample) < _ZERO)) for sample in self.at_samples(values))

@@ -35,7 +35,9 @@ def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
     Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
     Args:
-        X, Y, Z: coefficients.
+        X: factor of cos t.
+        Y: factor of sin t.
+        Z: the right side.
         sign: +1 for the root at a positive angle from that direction, -1 for the other.
         scale: of the size of what the coefficients are sums of, in their unit.
     """

@@ -104,5 +104,6 @@ def _half_turn_axis(R: Array) -> Array:
     """(..., 3) the axis of turns by pi."""
     B = 0.5 * (R + np.eye(3))
     column = np.argmax(B[..., range(3), range(3)], axis=-1)
-    axis = np.take_along_axis(B, column[..., None, None], axis=-1)[..., 0]
-    return axis / np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-300)
+    axis: Array = np.take_along_axis(B, column[..., None, None], axis=-1)[..., 0]
+    length: Array = np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-300)
+    return axis / length

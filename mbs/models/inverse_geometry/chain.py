@@ -83,7 +83,8 @@ class Chain:
         return Problem(ring, x, casadi.vertcat(symbols, t), self._samples(p))
 
     def _substituted(self, gap: Pose, p: SX) -> tuple[SX, SX]:
-        return tuple(casadi.substitute(m, self.system.p, p) for m in (gap.R, gap.p))
+        R, position = (SX(casadi.substitute(m, self.system.p, p)) for m in (gap.R, gap.p))
+        return R, position
 
     def _samples(
         self, p: NDArray[np.float64] | None

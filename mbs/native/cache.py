@@ -14,7 +14,7 @@ from pathlib import Path
 import casadi
 
 from mbs.errors import CompilerError
-from mbs.native.compiler import FLAGS, LIBRARY_SUFFIX, compile_library, find_compiler
+from mbs.native.compiler import FLAGS, LIBRARY_SUFFIX, Compiler, compile_library, find_compiler
 
 
 def cache_dir() -> Path:
@@ -30,7 +30,13 @@ def cache_dir() -> Path:
     return _process_dir()
 
 
-def cached_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Path:
+def cached_library(
+    files: Mapping[str, str],
+    flags: Sequence[str] = FLAGS,
+    *,
+    compiler: Compiler | None = None,
+    suffix: str = LIBRARY_SUFFIX,
+) -> Path:
     """The shared library of these sources, built when nobody has built it yet.
 
     Two processes may ask at once: each builds in a folder of its own and the last to finish wins.
@@ -38,6 +44,8 @@ def cached_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Pa
     Args:
         files: file name to its text; names that end in .c are compiled, the others are headers.
         flags: every flag of the compiler.
+        compiler: that builds it, the one of this computer when left out.
+        suffix: of the library.
 
     Returns:
         path of the library.
@@ -45,8 +53,8 @@ def cached_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Pa
     Raises:
         CompilerError: there is no compiler, or it refused the code.
     """
-    folder = cache_dir()
-    target = folder / f"{_key(files, flags)}{LIBRARY_SUFFIX}"
+    folder, chosen = cache_dir(), compiler or find_compiler()
+    target = folder / f"{_key(files, flags, chosen)}{suffix}"
     if target.exists():
         return target
     with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as name:
@@ -54,13 +62,13 @@ def cached_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Pa
         for file, text in files.items():
             (build / file).write_text(text, encoding="utf-8")
         sources = [build / file for file in files if file.endswith(".c")]
-        library = compile_library(sources, [build], flags, build / f"library{LIBRARY_SUFFIX}")
+        output = build / f"library{suffix}"
+        library = compile_library(sources, [build], flags, output, compiler=chosen)
         _install(library, target)
     return target
 
 
-def _key(files: Mapping[str, str], flags: Sequence[str]) -> str:
-    compiler = find_compiler()
+def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> str:
     digest = hashlib.sha256()
     facts = (casadi.CasadiMeta.version(), platform.machine(), *compiler.command, compiler.version)
     texts = (text for name in sorted(files) for text in (name, files[name]))

@@ -128,6 +128,8 @@ def compile_library(
     include_dirs: Sequence[Path] = (),
     flags: Sequence[str] = FLAGS,
     output: Path = Path("library" + LIBRARY_SUFFIX),
+    *,
+    compiler: Compiler | None = None,
 ) -> Path:
     """Compile C files into one shared library that brings its own libm reference.
 
@@ -136,6 +138,7 @@ def compile_library(
         include_dirs: folders searched for headers.
         flags: every flag, including those that make the library shared.
         output: library to write.
+        compiler: that builds it, the one of this computer when left out.
 
     Returns:
         the library.
@@ -143,9 +146,9 @@ def compile_library(
     Raises:
         CompilerError: there is no compiler, or it refused the code.
     """
-    compiler = find_compiler()
+    compiler = compiler or find_compiler()
     includes = [f"-I{folder}" for folder in include_dirs]
-    libm = [] if sys.platform == "win32" else ["-lm"]
+    libm = [] if output.suffix == ".dll" else ["-lm"]
     files = [str(source) for source in sources]
     command = [*compiler.command, *flags, *includes, *files, "-o", str(output), *libm]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -16,11 +16,14 @@ from fmpy.validation import validate_fmu
 from fmu_models import pendulum, slider_crank
 
 from mbs.errors import CompilerError, ExportError
+from mbs.export.fmu import fmi2_xml
 from mbs.export.fmu.description import State, Variable
-from mbs.export.fmu.pack import SOURCES, write_fmu
+from mbs.export.fmu.faces import FACES
+from mbs.export.fmu.pack import write_fmu
 from mbs.native import find_compiler
 from mbs.solvers import integrate
 
+SOURCES = FACES["2.0"].compiled
 MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}
 
 
@@ -121,14 +124,14 @@ def test_equal_models_give_equal_files(fmu, tmp_path):
 
 def test_code_and_description_are_generated_once(tmp_path, monkeypatch):
     calls = []
-    for name in ("source", "model_description"):
-        original = write_fmu.__globals__[name]
+    for home, name in ((write_fmu.__globals__, "source"), (vars(fmi2_xml), "model_description")):
+        original = home[name]
 
         def counted(*arguments, name=name, original=original):
             calls.append(name)
             return original(*arguments)
 
-        monkeypatch.setitem(write_fmu.__globals__, name, counted)
+        monkeypatch.setitem(home, name, counted)
     write_fmu(pendulum(), tmp_path / "once.fmu")
     assert sorted(calls) == ["model_description", "source"]
 
@@ -185,7 +188,9 @@ def test_the_sources_are_clean_c(fmu, tmp_path):
 def test_a_target_that_cannot_be_written_is_refused_before_compiling(
     tmp_path, monkeypatch, target, message
 ):
-    monkeypatch.setitem(write_fmu.__globals__, "cached_library", lambda *_: pytest.fail("compiled"))
+    monkeypatch.setitem(
+        write_fmu.__globals__, "cached_library", lambda *_, **__: pytest.fail("compiled")
+    )
     with pytest.raises(ExportError, match=message):
         write_fmu(pendulum(), tmp_path / target)
 

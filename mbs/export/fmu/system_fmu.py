@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, Coordinate
-from mbs.errors import ExportError, ModelError
+from mbs.errors import ModelError
 from mbs.export.fmu.description import FmuModel, State, Variable
+from mbs.export.fmu.faces import require_version
 from mbs.export.fmu.pack import write_fmu
 from mbs.models.contacts import require_no_contacts
 from mbs.models.geometry import terminal_frame
@@ -21,6 +23,7 @@ def fmu(
     path: str | os.PathLike[str],
     *,
     fmi: str = "2.0",
+    platforms: Sequence[str] | None = None,
     stop_time: float = 10.0,
     step_size: float = 0.01,
     tolerance: float = 1e-8,
@@ -33,12 +36,15 @@ def fmu(
     base: `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`. States are
     the independent joints; in a closed system the others are solved for at every evaluation, so
     that loops cannot drift. Every symbol of the system is a tunable parameter. A solver for
-    Co-Simulation (Dormand and Prince 5(4)) is inside.
+    Co-Simulation (Dormand and Prince 5(4)) is inside. Directional derivatives, and in FMI 3.0
+    adjoint ones, are exact through closed loops.
 
     Args:
         system: open or closed.
         path: of the file to write.
-        fmi: "2.0".
+        fmi: "2.0" or "3.0".
+        platforms: what computers it is for, such as ["x86_64-linux", "x86_64-windows"], made with
+            ziglang; this computer when left out, with its own compiler.
         stop_time: default end of a simulation [s].
         step_size: default communication step [s].
         tolerance: default relative tolerance.
@@ -49,13 +55,12 @@ def fmu(
     Raises:
         ExportError: the file cannot be written, or another FMI version was asked for.
         ModelError: a parameter has no value, or the system has no minimal state.
-        CompilerError: there is no C compiler.
+        CompilerError: there is no C compiler, or no such platform.
     """
     require_system(system)
-    if fmi != "2.0":
-        raise ExportError(f"{system.name}: FMI version {fmi!r} is not written; use fmi='2.0'")
+    require_version(system.name, fmi)
     model = fmu_model(system, stop_time=stop_time, step_size=step_size, tolerance=tolerance)
-    return write_fmu(model, path)
+    return write_fmu(model, path, fmi=fmi, platforms=platforms)
 
 
 def fmu_model(

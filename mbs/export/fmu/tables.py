@@ -9,7 +9,8 @@ from mbs.errors import ExportError
 from mbs.export.fmu.description import FmuModel, Variable
 from mbs.native.compiled import generated, unwritten
 
-_NAMES = ("mbs_rhs", "mbs_tangent", "mbs_closure", "mbs_sensitivity")
+_OPEN = ("mbs_rhs", "mbs_tangent", "mbs_adjoint")
+_CLOSED = (*_OPEN, "mbs_closure", "mbs_sensitivity")
 
 _HEADER = """\
 /* Sizes and tables of the model, generated together with modelDescription.xml. */
@@ -46,7 +47,7 @@ def header(model: FmuModel, guid: str) -> str:
     Returns:
         its text.
     """
-    names = _NAMES if model.closure is not None else _NAMES[:2]
+    names = _OPEN if model.closure is None else _CLOSED
     return _HEADER.format(
         guid=_quoted(guid),
         tolerance=repr(float(model.tolerance)),
@@ -100,7 +101,8 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
 
     Returns:
         `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, `mbs_tangent(t, x, z, u, p, dx, du, dp) ->
-        (dxdot, dy, dz)` and, where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
+        (dxdot, dy, dz)`, `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz) -> (gx, gu, gp)` and, where
+        loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
         `mbs_sensitivity(x, z, p) -> steepness`.
     """
     t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
@@ -114,6 +116,7 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
             "mbs_tangent", [*point, dx, du, dp], _dense(_tangent(model, point, [dx, du, dp]))
         ),
     ]
+    answers.append(_adjoint(model, answers[1]))
     if model.closure is not None:
         loop = [x, z, p]
         answers.append(casadi.Function("mbs_closure", loop, _dense(model.closure.call(loop))))
@@ -136,6 +139,18 @@ def _tangent(model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]) ->
         return [*model.tangent.call([*point, *seeds]), dz]
     dt = casadi.MX(t.numel(), 1)
     return [*_forward(model.rhs, point, [dt, dx, dz, du, dp]), dz]
+
+
+def _adjoint(model: FmuModel, tangent: casadi.Function) -> casadi.Function:
+    """The transpose of the tangent, which is linear in its seeds."""
+    point = tangent.mx_in()[:5]
+    zeros = [casadi.MX(*tangent.size_in(k)) for k in range(5, 8)]
+    weights = [
+        casadi.MX.sym(name, tangent.numel_out(k)) for k, name in enumerate(("wxdot", "wy", "wz"))
+    ]
+    nominal = [casadi.MX(*tangent.size_out(k)) for k in range(3)]
+    slopes = tangent.reverse(1).call([*point, *zeros, *nominal, *weights])
+    return casadi.Function("mbs_adjoint", [*point, *weights], _dense(slopes[5:]))
 
 
 def _steepness(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:

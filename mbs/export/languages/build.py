@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -98,10 +99,11 @@ def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tu
 
 def _line_names(plan: Plan, wanted: dict[int, str]) -> dict[int, str]:
     """What every line is called; Z and a number where nothing names it."""
-    names, count = {}, 0
+    names: dict[int, str] = {}
+    taken = set(wanted.values())
+    free = (name for k in itertools.count(1) if (name := f"Z{k}") not in taken)
     for number in (*plan.fixed, *plan.changing):
-        count += number not in wanted
-        names[number] = wanted.get(number, f"Z{count}")
+        names[number] = wanted[number] if number in wanted else next(free)
     return names
 
 

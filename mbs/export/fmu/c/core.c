@@ -8,8 +8,32 @@
 
 #include "closure.h"
 
+static const char *const CATEGORIES[] = {"logAll", "logStatusDiscard", "logStatusError"};
+enum { LOG_ALL, LOG_DISCARD, LOG_ERROR, N_CATEGORIES };
+
+const char *core_category(core_status status) {
+    return CATEGORIES[status == CORE_DISCARD ? LOG_DISCARD : LOG_ERROR];
+}
+
+core_status core_set_logging(core *c, int on, const char *const *categories, size_t n) {
+    size_t i;
+    int discards = n == 0;
+    for (i = 0; i < n; i++) {
+        int k = 0;
+        while (k < N_CATEGORIES &&
+               !(categories && categories[i] && !strcmp(categories[i], CATEGORIES[k])))
+            k++;
+        if (k == N_CATEGORIES)
+            return core_refuse(c, "%s: log category %u is unknown", c->name, (unsigned)i);
+        discards = discards || k != LOG_ERROR;
+    }
+    c->discards = on && discards;
+    return CORE_OK;
+}
+
 static core_status say(core *c, core_status status, const char *format, va_list args) {
     char message[1024];
+    if (status == CORE_DISCARD && !c->discards) return status;
     vsnprintf(message, sizeof message, format, args);
     if (c->log) c->log(c->host, c->name, status, message);
     return status;
@@ -108,7 +132,7 @@ static int allocate(core *c) {
     long long size[4] = {8, 3, 0, 0}, other[4];
     int i, f;
     static int (*const work[])(long long *, long long *, long long *, long long *) = {
-        mbs_rhs_work, mbs_tangent_work,
+        mbs_rhs_work, mbs_tangent_work, mbs_adjoint_work,
 #if NZ > 0
         mbs_closure_work, mbs_sensitivity_work,
 #endif

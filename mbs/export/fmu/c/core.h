@@ -1,6 +1,6 @@
 /* A model that runs: instance, modes, closed loops, integration, derivatives, saved states.
  *
- * Nothing here depends on a version of FMI; fmi2.c is a thin face over it. A value reference is a
+ * Nothing here depends on a version of FMI; fmi2.c and fmi3.c are thin faces over it. A value reference is a
  * place in `values`, in the order of the enumeration below. All that makes one run differ from
  * another is in `memory`, a flat block, so a saved state is a copy of it.
  */
@@ -52,6 +52,7 @@ typedef struct {
     char *name;
     core_logger log;
     void *host;
+    int discards; /* messages of discarded calls are wanted; those of errors always are */
     stepper solver;
     double work[DOPRI5_WORK(NX) + 1], z[NZ + 1];
     const double **arg;
@@ -64,6 +65,8 @@ typedef struct core_state core_state;
 
 core *core_new(const char *name, int cosimulation, core_logger log, void *host);
 void core_free(core *c);
+core_status core_set_logging(core *c, int on, const char *const *categories, size_t n);
+const char *core_category(core_status status);
 core_status core_refuse(core *c, const char *format, ...);
 
 core_status core_setup(core *c, double tolerance, double start);
@@ -74,9 +77,14 @@ core_status core_reset(core *c);
 
 core_status core_get(core *c, const unsigned *ref, size_t n, double *values);
 core_status core_set(core *c, const unsigned *ref, size_t n, const double *values);
+
+/* derivatives of unknowns by knowns, along a direction or against it */
 core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
                              const unsigned *known, size_t n_known, const double *seed,
                              double *answer);
+core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
+                         const unsigned *known, size_t n_known, const double *seed,
+                         double *answer);
 
 /* model exchange */
 core_status core_enter_event_mode(core *c);

@@ -10,11 +10,7 @@ typedef struct {
     core *model;
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
-    int discards; /* messages of discarded calls are wanted; those of errors always are */
 } face;
-
-static const char *const CATEGORIES[] = {"logAll", "logStatusDiscard", "logStatusError"};
-enum { LOG_ALL, LOG_DISCARD, LOG_ERROR, N_CATEGORIES };
 
 #define MODEL(c) (((face *)(c))->model)
 #define NEED(c) \
@@ -27,9 +23,8 @@ static fmi2Status as_fmi(core_status status) {
 
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
-    const char *category = status == CORE_DISCARD ? "logStatusDiscard" : "logStatusError";
-    if (status == CORE_DISCARD && !f->discards) return;
-    if (f->logger) f->logger(f->environment, name, as_fmi(status), category, "%s", message);
+    if (f->logger)
+        f->logger(f->environment, name, as_fmi(status), core_category(status), "%s", message);
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -60,12 +55,12 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         f->logger = functions->logger;
         f->environment = functions->componentEnvironment;
     }
-    f->discards = logging != fmi2False;
     f->model = core_new(name, type == fmi2CoSimulation, forward_log, f);
     if (!f->model) {
         free(f);
         return no_instance(functions, name, "no memory is left");
     }
+    f->model->discards = logging != fmi2False;
     return f;
 }
 
@@ -75,24 +70,10 @@ void fmi2FreeInstance(fmi2Component c) {
     free(c);
 }
 
-static int is_category(const fmi2String categories[], size_t i, int k) {
-    return categories && categories[i] && !strcmp(categories[i], CATEGORIES[k]);
-}
-
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
                                const fmi2String categories[]) {
-    size_t i;
-    int discards = n == 0;
     NEED(c);
-    for (i = 0; i < n; i++) {
-        int k = 0;
-        while (k < N_CATEGORIES && !is_category(categories, i, k)) k++;
-        if (k == N_CATEGORIES)
-            return as_fmi(core_refuse(MODEL(c), "log category %u is unknown", (unsigned)i));
-        discards = discards || k != LOG_ERROR;
-    }
-    ((face *)c)->discards = on && discards;
-    return fmi2OK;
+    return as_fmi(core_set_logging(MODEL(c), on, categories, n));
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,

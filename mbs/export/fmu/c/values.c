@@ -1,4 +1,4 @@
-/* Values by their references, and directional derivatives. */
+/* Values by their references. */
 #include "internal.h"
 
 #include <math.h>
@@ -87,73 +87,6 @@ core_status core_set(core *c, const unsigned *ref, size_t n, const double *value
             c->m.values[ref[i]] = values[i];
             changed(c);
         }
-    }
-    return CORE_OK;
-}
-
-typedef struct {
-    double dx[NX + 1], du[NU + 1], dp[NP + 1], dxdot[NX + 1], dy[NY + 1], dz[NZ + 1];
-} tangents;
-
-static double *seed_of(tangents *d, unsigned ref) {
-    if (ref < DERIVATIVES) return d->dx + (ref - STATES);
-    if (ref >= INPUTS && ref < OUTPUTS) return d->du + (ref - INPUTS);
-    if (ref >= PARAMETERS && ref < DEPENDENTS) return d->dp + (ref - PARAMETERS);
-    return NULL;
-}
-
-static double *answer_of(tangents *d, unsigned ref) {
-    if (ref < DERIVATIVES) return d->dx + (ref - STATES);
-    if (ref < INPUTS) return d->dxdot + (ref - DERIVATIVES);
-    if (ref >= OUTPUTS && ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
-    if (ref >= DEPENDENTS && ref < N_VALUES) return d->dz + (ref - DEPENDENTS);
-    return NULL;
-}
-
-static int call_tangent(core *c, tangents *d) {
-    const double *v = c->m.values;
-    c->arg[0] = &c->m.time;
-    c->arg[1] = v + STATES;
-    c->arg[2] = v + DEPENDENTS;
-    c->arg[3] = v + INPUTS;
-    c->arg[4] = v + PARAMETERS;
-    c->arg[5] = d->dx;
-    c->arg[6] = d->du;
-    c->arg[7] = d->dp;
-    c->res[0] = d->dxdot;
-    c->res[1] = d->dy;
-    c->res[2] = d->dz;
-    return mbs_tangent(c->arg, c->res, c->iw, c->w, 0);
-}
-
-core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
-                             const unsigned *known, size_t n_known, const double *seed,
-                             double *answer) {
-    tangents d;
-    size_t i;
-    core_status status;
-    if (!core_allowed(c, INITIALIZATION | RUNNING, "a derivative")) return CORE_ERROR;
-    memset(&d, 0, sizeof d);
-    for (i = 0; i < n_known; i++) {
-        double *place = seed_of(&d, known[i]);
-        if (!place || !isfinite(seed[i]))
-            return core_refuse(c, "%s: no derivative with respect to value reference %u, seed %g; "
-                               "use states, inputs and parameters", c->name, known[i], seed[i]);
-        *place += seed[i];
-    }
-    for (i = 0; i < n_unknown; i++)
-        if (!answer_of(&d, unknown[i]))
-            return core_refuse(c, "%s: value reference %u has no derivative; use outputs and "
-                               "derivatives of states", c->name, unknown[i]);
-    status = core_refresh(c);
-    if (status) return status;
-    if (call_tangent(c, &d))
-        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
-    for (i = 0; i < n_unknown; i++) {
-        answer[i] = *answer_of(&d, unknown[i]);
-        if (!isfinite(answer[i]))
-            return core_no_answer(c, "%s: the derivative of %s is not finite at time %.9g", c->name,
-                             MODEL_NAMES[unknown[i]], c->m.time);
     }
     return CORE_OK;
 }

@@ -1,0 +1,111 @@
+/* Directional and adjoint derivatives, exact through closed loops. */
+#include "internal.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Numbers that belong to states, inputs, parameters and to what is calculated from them. */
+typedef struct {
+    double dx[NX + 1], du[NU + 1], dp[NP + 1], dxdot[NX + 1], dy[NY + 1], dz[NZ + 1];
+} tangents;
+
+static double *known_of(tangents *d, unsigned ref) {
+    if (ref < DERIVATIVES) return d->dx + (ref - STATES);
+    if (ref >= INPUTS && ref < OUTPUTS) return d->du + (ref - INPUTS);
+    if (ref >= PARAMETERS && ref < DEPENDENTS) return d->dp + (ref - PARAMETERS);
+    return NULL;
+}
+
+static double *unknown_of(tangents *d, unsigned ref) {
+    if (ref < DERIVATIVES) return d->dx + (ref - STATES);
+    if (ref < INPUTS) return d->dxdot + (ref - DERIVATIVES);
+    if (ref >= OUTPUTS && ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
+    if (ref >= DEPENDENTS && ref < N_VALUES) return d->dz + (ref - DEPENDENTS);
+    return NULL;
+}
+
+/* All references can be used, all seeds are finite, and the calculated values are up to date. */
+static core_status ready(core *c, const unsigned *unknown, size_t n_unknown, const unsigned *known,
+                         size_t n_known, const double *seed, size_t n_seed) {
+    tangents d;
+    size_t i;
+    if (!core_allowed(c, INITIALIZATION | RUNNING, "a derivative")) return CORE_ERROR;
+    for (i = 0; i < n_known; i++)
+        if (!known_of(&d, known[i]))
+            return core_refuse(c, "%s: no derivative with respect to value reference %u; use "
+                               "states, inputs and parameters", c->name, known[i]);
+    for (i = 0; i < n_unknown; i++)
+        if (!unknown_of(&d, unknown[i]))
+            return core_refuse(c, "%s: value reference %u has no derivative; use outputs and "
+                               "derivatives of states", c->name, unknown[i]);
+    for (i = 0; i < n_seed; i++)
+        if (!isfinite(seed[i]))
+            return core_refuse(c, "%s: seed %g of a derivative is not finite", c->name, seed[i]);
+    return core_refresh(c);
+}
+
+static void point(core *c) {
+    const double *v = c->m.values;
+    c->arg[0] = &c->m.time;
+    c->arg[1] = v + STATES;
+    c->arg[2] = v + DEPENDENTS;
+    c->arg[3] = v + INPUTS;
+    c->arg[4] = v + PARAMETERS;
+}
+
+static core_status finite_answer(core *c, unsigned ref, double value) {
+    if (isfinite(value)) return CORE_OK;
+    return core_no_answer(c, "%s: the derivative of or by %s is not finite at time %.9g", c->name,
+                          MODEL_NAMES[ref], c->m.time);
+}
+
+core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
+                             const unsigned *known, size_t n_known, const double *seed,
+                             double *answer) {
+    tangents d;
+    size_t i;
+    core_status status = ready(c, unknown, n_unknown, known, n_known, seed, n_known);
+    if (status) return status;
+    memset(&d, 0, sizeof d);
+    for (i = 0; i < n_known; i++) *known_of(&d, known[i]) += seed[i];
+    point(c);
+    c->arg[5] = d.dx;
+    c->arg[6] = d.du;
+    c->arg[7] = d.dp;
+    c->res[0] = d.dxdot;
+    c->res[1] = d.dy;
+    c->res[2] = d.dz;
+    if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0))
+        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+    for (i = 0; i < n_unknown && !status; i++) {
+        answer[i] = *unknown_of(&d, unknown[i]);
+        status = finite_answer(c, unknown[i], answer[i]);
+    }
+    return status;
+}
+
+core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
+                         const unsigned *known, size_t n_known, const double *seed,
+                         double *answer) {
+    tangents w, g;
+    size_t i;
+    core_status status = ready(c, unknown, n_unknown, known, n_known, seed, n_unknown);
+    if (status) return status;
+    memset(&w, 0, sizeof w);
+    for (i = 0; i < n_unknown; i++) *unknown_of(&w, unknown[i]) += seed[i];
+    point(c);
+    c->arg[5] = w.dxdot;
+    c->arg[6] = w.dy;
+    c->arg[7] = w.dz;
+    c->res[0] = g.dx;
+    c->res[1] = g.du;
+    c->res[2] = g.dp;
+    if (mbs_adjoint(c->arg, c->res, c->iw, c->w, 0))
+        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+    for (i = 0; i < NX; i++) g.dx[i] += w.dx[i]; /* a state may be an output */
+    for (i = 0; i < n_known && !status; i++) {
+        answer[i] = *known_of(&g, known[i]);
+        status = finite_answer(c, known[i], answer[i]);
+    }
+    return status;
+}

@@ -1,0 +1,180 @@
+/* FMI 3.0, model exchange and co-simulation, a thin face over core.c: instances and values. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi3_face.h"
+
+#define TIME ((fmi3ValueReference)N_VALUES) /* the independent variable */
+
+static void forward_log(void *host, const char *name, core_status status, const char *message) {
+    face *f = host;
+    (void)name;
+    if (f->logger) f->logger(f->environment, as_fmi(status), core_category(status), message);
+}
+
+const char *fmi3GetVersion(void) { return fmi3Version; }
+
+static fmi3Instance no_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
+                                const char *message) {
+    if (logger) logger(environment, fmi3Error, core_category(CORE_ERROR), message);
+    return NULL;
+}
+
+static fmi3Instance instantiate(fmi3String name, fmi3String token, int cosimulation,
+                                fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                fmi3LogMessageCallback logger) {
+    face *f;
+    if (!name || !*name) return no_instance(environment, logger, "the instance has no name");
+    if (!token || strcmp(token, MODEL_GUID))
+        return no_instance(environment, logger, "the instantiation token is not the one of this "
+                           "model: the model description and the library belong to different FMUs");
+    f = calloc(1, sizeof *f);
+    if (!f) return no_instance(environment, logger, "no memory is left");
+    f->logger = logger;
+    f->environment = environment;
+    f->model = core_new(name, cosimulation, forward_log, f);
+    if (!f->model) {
+        free(f);
+        return no_instance(environment, logger, "no memory is left");
+    }
+    f->model->discards = logging;
+    return f;
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
+                                          fmi3Boolean visible, fmi3Boolean logging,
+                                          fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback logger) {
+    (void)resources, (void)visible;
+    return instantiate(name, token, 0, logging, environment, logger);
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(
+    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+    fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
+    const fmi3ValueReference intermediate[], size_t n_intermediate,
+    fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
+    fmi3IntermediateUpdateCallback update) {
+    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)update;
+    if (event_mode || n_intermediate)
+        return no_instance(environment, logger, "this model has neither an event mode in "
+                           "co-simulation nor intermediate variables");
+    return instantiate(name, token, 1, logging, environment, logger);
+}
+
+fmi3Instance fmi3InstantiateScheduledExecution(
+    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+    fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
+    fmi3ClockUpdateCallback clock_update, fmi3LockPreemptionCallback lock,
+    fmi3UnlockPreemptionCallback unlock) {
+    (void)name, (void)token, (void)resources, (void)visible, (void)logging;
+    (void)clock_update, (void)lock, (void)unlock;
+    return no_instance(environment, logger, "this model has no scheduled execution; use model "
+                       "exchange or co-simulation");
+}
+
+void fmi3FreeInstance(fmi3Instance c) {
+    if (!c) return;
+    core_free(MODEL(c));
+    free(c);
+}
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n,
+                               const fmi3String categories[]) {
+    NEED(c);
+    return as_fmi(core_set_logging(MODEL(c), on, categories, n));
+}
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined,
+                                       fmi3Float64 tolerance, fmi3Float64 start,
+                                       fmi3Boolean stop_defined, fmi3Float64 stop) {
+    core_status status;
+    NEED(c);
+    if (stop_defined && !(stop >= start)) return refused(c, "the stop time lies before the start");
+    status = core_setup(MODEL(c), tolerance_defined ? tolerance : MODEL_TOLERANCE, start);
+    return as_fmi(status ? status : core_enter_initialization(MODEL(c)));
+}
+
+#define FORWARD(name, call) \
+    fmi3Status name(fmi3Instance c) { NEED(c); return as_fmi(call(MODEL(c))); }
+
+FORWARD(fmi3ExitInitializationMode, core_exit_initialization)
+FORWARD(fmi3Terminate, core_terminate)
+FORWARD(fmi3Reset, core_reset)
+FORWARD(fmi3EnterEventMode, core_enter_event_mode)
+FORWARD(fmi3EnterContinuousTimeMode, core_enter_continuous_mode)
+FORWARD(fmi3EvaluateDiscreteStates, core_update_discrete_states)
+
+/* Every variable has one element: as many values as references. */
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                          fmi3Float64 value[], size_t n_values) {
+    size_t first = 0, i;
+    fmi3Status status = fmi3OK;
+    NEED(c);
+    if (n != n_values || (n && (!vr || !value))) return refused(c, "the array of values is wrong");
+    for (i = 0; i <= n && !status; i++) {
+        if (i < n && vr[i] != TIME) continue;
+        status = as_fmi(core_get(MODEL(c), vr + first, i - first, value + first));
+        if (i < n && !status) value[i] = MODEL(c)->m.time;
+        first = i + 1;
+    }
+    return status;
+}
+
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                          const fmi3Float64 value[], size_t n_values) {
+    NEED(c);
+    if (n != n_values) return refused(c, "the array of values is wrong");
+    return as_fmi(core_set(MODEL(c), vr, n, value));
+}
+
+/* All variables are 64-bit floats: no value reference of another type exists. */
+#define NO_VARIABLES(type, text)                                                                \
+    fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
+                             fmi3##type value[], size_t n_values) {                             \
+        (void)vr, (void)value, (void)n_values;                                                  \
+        return none(c, n, "the model has no " text " variables");                               \
+    }                                                                                           \
+    fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
+                             const fmi3##type value[], size_t n_values) {                       \
+        (void)vr, (void)value, (void)n_values;                                                  \
+        return none(c, n, "the model has no " text " variables");                               \
+    }
+
+NO_VARIABLES(Float32, "32-bit float")
+NO_VARIABLES(Int8, "integer")
+NO_VARIABLES(UInt8, "integer")
+NO_VARIABLES(Int16, "integer")
+NO_VARIABLES(UInt16, "integer")
+NO_VARIABLES(Int32, "integer")
+NO_VARIABLES(UInt32, "integer")
+NO_VARIABLES(Int64, "integer")
+NO_VARIABLES(UInt64, "integer")
+NO_VARIABLES(Boolean, "boolean")
+NO_VARIABLES(String, "string")
+
+fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n, size_t sizes[],
+                         fmi3Binary value[], size_t n_values) {
+    (void)vr, (void)sizes, (void)value, (void)n_values;
+    return none(c, n, "the model has no binary variables");
+}
+
+fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                         const size_t sizes[], const fmi3Binary value[], size_t n_values) {
+    (void)vr, (void)sizes, (void)value, (void)n_values;
+    return none(c, n, "the model has no binary variables");
+}
+
+fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
+    (void)vr, (void)n;
+    return refused(c, "dependencies of elements are not listed; every variable has one element");
+}
+
+fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
+                                       size_t elements[], fmi3ValueReference independents[],
+                                       size_t independent_elements[], fmi3DependencyKind kinds[],
+                                       size_t n) {
+    (void)dependent, (void)elements, (void)independents, (void)independent_elements;
+    (void)kinds, (void)n;
+    return refused(c, "dependencies of elements are not listed; every variable has one element");
+}

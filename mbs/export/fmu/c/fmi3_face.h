@@ -1,0 +1,34 @@
+/* What the parts of the FMI 3.0 face share: an instance, its status and its refusals. */
+#ifndef MBS_FMI3_FACE_H
+#define MBS_FMI3_FACE_H
+
+#include "core.h"
+#include "fmi3Functions.h"
+
+typedef struct {
+    core *model;
+    fmi3LogMessageCallback logger;
+    fmi3InstanceEnvironment environment;
+} face;
+
+#define MODEL(c) (((face *)(c))->model)
+#define NEED(c) \
+    if (!(c)) return fmi3Error
+
+static inline fmi3Status as_fmi(core_status status) {
+    static const fmi3Status table[] = {fmi3OK, fmi3Discard, fmi3Error};
+    return table[status];
+}
+
+static inline fmi3Status refused(fmi3Instance c, const char *message) {
+    NEED(c);
+    return as_fmi(core_refuse(MODEL(c), "%s: %s", MODEL(c)->name, message));
+}
+
+/* An array that belongs to something the model has not must be empty. */
+static inline fmi3Status none(fmi3Instance c, size_t n, const char *message) {
+    NEED(c);
+    return n ? refused(c, message) : fmi3OK;
+}
+
+#endif

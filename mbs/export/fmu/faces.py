@@ -1,0 +1,85 @@
+"""The versions of FMI that are written, and the C files of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+
+from mbs.errors import ExportError
+from mbs.messages import quoted
+from mbs.native.cross import Platform
+
+_CORE = (
+    "core.c",
+    "values.c",
+    "derivatives.c",
+    "closure.c",
+    "exchange.c",
+    "cosimulation.c",
+    "saved.c",
+)
+_CORE_HEADERS = ("core.h", "internal.h", "closure.h")
+_RUNTIME = ("stepper.c", "dopri5.c")
+_RUNTIME_HEADERS = ("stepper.h", "dopri5.h")
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A version of FMI, as a thin face over the core.
+
+    Attributes:
+        sources: C files of the face.
+        headers: its own.
+        standard: headers of the standard, which fmpy brings with their licence inside.
+    """
+
+    sources: tuple[str, ...]
+    headers: tuple[str, ...]
+    standard: tuple[str, ...]
+
+    @property
+    def compiled(self) -> tuple[str, ...]:
+        """The C files to compile, in the folder `sources` of the FMU."""
+        return ("model.c", *_CORE, *_RUNTIME, *self.sources)
+
+    def fixed(self) -> dict[str, str]:
+        """The files that do not depend on the model: name to text."""
+        own = resources.files("mbs.export.fmu") / "c"
+        runtime = resources.files("mbs.native") / "runtime"
+        standard = resources.files("fmpy") / "c-code"
+        folders = (
+            (own, (*_CORE, *_CORE_HEADERS, *self.sources, *self.headers)),
+            (runtime, (*_RUNTIME, *_RUNTIME_HEADERS)),
+            (standard, self.standard),
+        )
+        return {
+            name: (folder / name).read_text(encoding="utf-8")
+            for folder, names in folders
+            for name in names
+        }
+
+
+FACES = {
+    "2.0": Face(("fmi2.c",), (), ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")),
+    "3.0": Face(
+        ("fmi3.c", "fmi3_run.c", "fmi3_absent.c"),
+        ("fmi3_face.h",),
+        ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+    ),
+}
+
+
+def require_version(name: str, fmi: object) -> None:
+    """Refuse a version of FMI that is not written.
+
+    Raises:
+        ExportError: says which ones are.
+    """
+    if fmi not in FACES:
+        known = " or ".join(f"fmi={version!r}" for version in FACES)
+        raise ExportError(f"{name}: FMI version {quoted(fmi)} is not written; use {known}")
+
+
+def folder_of(platform: Platform, fmi: str) -> str:
+    """The folder of a platform's library among the binaries."""
+    return platform.fmi2 if fmi == "2.0" else platform.name

@@ -1,0 +1,109 @@
+"""modelDescription.xml and buildDescription.xml of FMI 3.0."""
+
+from collections.abc import Iterable, Mapping
+from xml.etree.ElementTree import Element, SubElement
+
+from mbs.export.fmu.description import FmuModel
+from mbs.export.fmu.xml_parts import (
+    add_categories_and_experiment,
+    add_units,
+    real_attributes,
+    structure,
+    text_of,
+    variable_attributes,
+)
+
+
+def model_description(model: FmuModel, token: str) -> str:
+    """The file modelDescription.xml.
+
+    Args:
+        model: what the FMU is.
+        token: identity of the library that belongs to it.
+
+    Returns:
+        its text.
+    """
+    root = Element(
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=model.name,
+        instantiationToken=token,
+        description=model.description,
+        generationTool="mbs",
+        variableNamingConvention="flat",
+    )
+    _interface(root, "ModelExchange", model)
+    _interface(root, "CoSimulation", model)
+    add_units(root, model)
+    add_categories_and_experiment(root, model)
+    _variables(root, model)
+    found = structure(model)
+    parent = SubElement(root, "ModelStructure")
+    _unknowns(parent, "Output", found.outputs, found.running)
+    _unknowns(parent, "ContinuousStateDerivative", found.derivatives, found.running)
+    _unknowns(parent, "InitialUnknown", found.initial, found.starting)
+    return text_of(root)
+
+
+def build_description(model: FmuModel, sources: Iterable[str]) -> str:
+    """The file buildDescription.xml: how to compile the sources.
+
+    Args:
+        model: what the FMU is.
+        sources: C files to compile, in the folder `sources`.
+    """
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    build = SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
+    files = SubElement(build, "SourceFileSet", language="C99")
+    for name in sources:
+        SubElement(files, "SourceFile", name=name)
+    return text_of(root)
+
+
+def _interface(root: Element, tag: str, model: FmuModel) -> None:
+    attributes = {
+        "modelIdentifier": model.identifier,
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+        "providesAdjointDerivatives": "true",
+    }
+    if tag == "CoSimulation":
+        attributes["canHandleVariableCommunicationStepSize"] = "true"
+    else:
+        attributes["needsCompletedIntegratorStep"] = "true" if model.dependents else "false"
+    SubElement(root, tag, attributes)
+
+
+def _variables(root: Element, model: FmuModel) -> None:
+    variables = SubElement(root, "ModelVariables")
+    for reference, entry in enumerate(model.entries):
+        attributes = variable_attributes(reference, entry) | real_attributes(entry)
+        if entry.kind == "derivative":
+            attributes["derivative"] = str(reference - len(model.states))
+        SubElement(variables, "Float64", attributes)
+    SubElement(
+        variables,
+        "Float64",
+        name="time",
+        valueReference=str(len(model.entries)),
+        causality="independent",
+        variability="continuous",
+        unit="s",
+        description="time",
+    )
+
+
+def _unknowns(
+    parent: Element, tag: str, references: list[int], depends: Mapping[int, list[int]]
+) -> None:
+    for reference in references:
+        known = depends[reference]
+        SubElement(
+            parent,
+            tag,
+            valueReference=str(reference),
+            dependencies=" ".join(str(k) for k in known),
+            dependenciesKind=" ".join("dependent" for _ in known),
+        )

@@ -5,7 +5,7 @@ It is what an importer of an FMU expects: states that may be set freely, and no 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -24,6 +24,9 @@ from mbs.models.geometry import terminal_frame
 from mbs.recursions.route import relative_pose
 from mbs.solvers.small_linear import solve_square
 
+Observe = Callable[[SX, SX, SX], Sequence[SX]]
+"""What is seen of positions q, and of velocities and accelerations of the independent joints."""
+
 _NORM_RATE = 10.0
 """How fast a quaternion returns to unit length [1/s]."""
 
@@ -38,7 +41,7 @@ class MinimalState:
         inputs: numbers in v of the efforts that u starts with; the inputs of devices follow.
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`, y = [accelerations of x; positions z, velocities
             and accelerations of the dependent joints; origin (3) and orientation (9, by rows) of
-            the terminal frame; outputs of devices].
+            the terminal frame; outputs of devices; what is observed].
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
     """
 
@@ -49,8 +52,12 @@ class MinimalState:
     closure: Function | None
 
 
-def minimal_state(system: System) -> MinimalState:
+def minimal_state(system: System, observe: Observe | None = None) -> MinimalState:
     """The state equation of the independent joints.
+
+    Args:
+        system: open or closed.
+        observe: what else the outputs end with.
 
     Raises:
         ModelError: an independent velocity of a loop belongs to a quaternion joint, so that no
@@ -74,7 +81,8 @@ def minimal_state(system: System) -> MinimalState:
     (a,) = outputs_of(system, direct_dynamics(system), unit, v_a, tau)
     rest = _dependent_motion(system, q, v_a, a) if system.is_closed else []
     rate = _free_rate(system, v_a, rest[0]) if rest else _steadied_rate(system, q, v_a)
-    y = casadi.vertcat(a, z, *rest, _terminal_pose(system, unit), shown)
+    seen = () if observe is None else observe(unit, v_a, a)
+    y = casadi.vertcat(a, z, *rest, _terminal_pose(system, unit), shown, *seen)
     return MinimalState(
         positions=positions,
         dependents=dependents,

@@ -12,6 +12,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, Coordinate
 from mbs.errors import ModelError
 from mbs.export.fmu.description import FmuModel, State, Variable
 from mbs.export.fmu.faces import require_version
+from mbs.export.fmu.observed import chosen
 from mbs.export.fmu.pack import write_fmu
 from mbs.models.contacts import require_no_contacts
 from mbs.models.geometry import terminal_frame
@@ -23,6 +24,7 @@ def fmu(
     path: str | os.PathLike[str],
     *,
     fmi: str = "2.0",
+    outputs: Sequence[str] = (),
     platforms: Sequence[str] | None = None,
     stop_time: float = 10.0,
     step_size: float = 0.01,
@@ -43,6 +45,8 @@ def fmu(
         system: open or closed.
         path: of the file to write.
         fmi: "2.0" or "3.0".
+        outputs: what else to show: "sensors" for what they read, such as `tip.p.x`; "energy" for
+            `energy.kinetic` and `energy.potential`; "closure" for the largest closure row.
         platforms: what computers it is for, such as ["x86_64-linux", "x86_64-windows"], made with
             ziglang; this computer when left out, with its own compiler.
         stop_time: default end of a simulation [s].
@@ -54,17 +58,21 @@ def fmu(
 
     Raises:
         ExportError: the file cannot be written, or another FMI version was asked for.
-        ModelError: a parameter has no value, or the system has no minimal state.
+        ModelError: a parameter has no value, there are no such outputs, or the system has no
+            minimal state.
         CompilerError: there is no C compiler, or no such platform.
     """
     require_system(system)
     require_version(system.name, fmi)
-    model = fmu_model(system, stop_time=stop_time, step_size=step_size, tolerance=tolerance)
+    model = fmu_model(
+        system, outputs, stop_time=stop_time, step_size=step_size, tolerance=tolerance
+    )
     return write_fmu(model, path, fmi=fmi, platforms=platforms)
 
 
 def fmu_model(
     system: System,
+    outputs: Sequence[str] = (),
     *,
     stop_time: float = 10.0,
     step_size: float = 0.01,
@@ -73,14 +81,17 @@ def fmu_model(
     """The description of a mechanism's FMU; arguments as for `fmu`."""
     require_no_contacts(system, "the FMU")
     system.parameter_values()
-    state = minimal_state(system)
+    extra = chosen(system, outputs)
+    state = minimal_state(
+        system, lambda *motion: [x for o in extra for x in o.values(system, *motion)]
+    )
     x, z = consistent_start(system, state)
     return FmuModel(
         name=system.name,
         description=system.report().splitlines()[0],
         states=_states(system, state, x),
         inputs=(*(_effort(system.speeds[k]) for k in state.inputs), *_device_inputs(system)),
-        outputs=_outputs(system, state),
+        outputs=(*_outputs(system, state), *(v for o in extra for v in o.variables(system))),
         parameters=_parameters(system),
         dependents=tuple(
             _position(system.coordinates[k], f"{system.coordinates[k].name}.solved", start)

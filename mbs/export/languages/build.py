@@ -23,7 +23,7 @@ _PARAMETERS = ("p",)
 
 def build(function: Function, language: Language, name: str) -> Unit:
     """The function in lines, named for a language and under a name of its own."""
-    graph, given = _graph(function, name)
+    graph, given, reserved = _graph(function, name)
     inputs, outputs = (
         [_element_names(function, port, language) for port in ports]
         for ports in (graph.inputs, graph.outputs)
@@ -37,7 +37,7 @@ def build(function: Function, language: Language, name: str) -> Unit:
     for number, name in _result_names(graph, outputs):
         wanted.setdefault(number, name)
     plan = plan_of(graph, wanted, _PARAMETERS)
-    names = spelled_names(graph, language, _line_names(plan, wanted), [*inputs, *outputs])
+    names = spelled_names(graph, language, _line_names(plan, wanted, reserved), [*inputs, *outputs])
     arguments = [
         Argument(name, *port.sparsity.shape, _is_scalar(function, port))
         for name, port in zip(names.arguments, [*graph.inputs, *graph.outputs], strict=True)
@@ -57,8 +57,8 @@ def build(function: Function, language: Language, name: str) -> Unit:
     )
 
 
-def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str]]:
-    """The operations of a Function, and the nodes in them that the model has named."""
+def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str], set[str]]:
+    """The operations of a Function, the nodes that the model has named, and all its names."""
     annotated = getattr(function, "annotated", None)
     named = annotated() if annotated is not None else None
     graph = graph_of(function if named is None else named)
@@ -76,7 +76,7 @@ def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str]]:
     for number, name in pairs:
         if alive[number] and graph.nodes[number].op not in LEAVES:
             given.setdefault(number, name)
-    return graph, given
+    return graph, given, {name for _, name in pairs}
 
 
 def _element_names(function: Function, port: Port, language: Language) -> list[str]:
@@ -97,10 +97,10 @@ def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tu
                 yield number, name
 
 
-def _line_names(plan: Plan, wanted: dict[int, str]) -> dict[int, str]:
+def _line_names(plan: Plan, wanted: dict[int, str], reserved: set[str]) -> dict[int, str]:
     """What every line is called; Z and a number where nothing names it."""
     names: dict[int, str] = {}
-    taken = set(wanted.values())
+    taken = reserved.union(wanted.values())
     free = (name for k in itertools.count(1) if (name := f"Z{k}") not in taken)
     for number in (*plan.fixed, *plan.changing):
         names[number] = wanted[number] if number in wanted else next(free)

@@ -2,7 +2,9 @@
 
 import csv
 import importlib
+import json
 import os
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -141,6 +143,38 @@ class Result:
             writer = csv.writer(stream)
             writer.writerow(("time", *self.names))
             writer.writerows([repr(v) for v in row] for row in rows)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write everything but `info` to a NumPy archive, which `load` reads back bit for bit.
+
+        Args:
+            path: file to write, such as run.npz; it is replaced as a whole, or left alone.
+
+        Raises:
+            ExportError: the file cannot be written.
+        """
+        rest = {"name": self.name, "units": dict(self.units), "events": self.events}
+        with whole_file(path) as scratch, scratch.open("wb") as stream:
+            np.savez(stream, time=self.time, values=self.values, rest=json.dumps(rest))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> "Result":
+        """What `save` wrote.
+
+        Args:
+            path: the file.
+
+        Raises:
+            ModelError: it is no such file.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                rest = json.loads(str(archive["rest"]))
+                events = tuple((t, name, words) for t, name, words in rest["events"])
+                time, values = archive["time"], archive["values"]
+                return cls(time, values, rest["units"], rest["name"], events=events)
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise ModelError(f"{path} is no saved result ({error})") from error
 
     def to_pandas(self) -> Any:
         """The signals as a pandas DataFrame indexed by time; units in `.attrs["units"]`."""

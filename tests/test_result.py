@@ -1,4 +1,5 @@
 import csv
+import dataclasses
 import sys
 
 import numpy as np
@@ -160,3 +161,19 @@ def test_pandas_and_xarray_when_installed(result):
     assert isinstance(result.to_pandas(), pandas.DataFrame)
     pytest.importorskip("xarray")
     assert result.to_xarray()["force"].attrs["units"] == "N"
+
+
+def test_a_saved_result_reads_back_bit_for_bit(result, tmp_path):
+    result = dataclasses.replace(result, events=((0.5, "stop", "bounces off"),))
+    result.save(tmp_path / "run.npz")
+    again = Result.load(tmp_path / "run.npz")
+    assert np.array_equal(again.time, result.time)
+    assert np.array_equal(again.values, result.values)
+    assert (again.units, again.name, again.events) == (result.units, result.name, result.events)
+
+
+def test_a_file_that_is_no_saved_result(tmp_path):
+    (tmp_path / "x.npz").write_text("no archive")
+    for name in ("x.npz", "absent.npz"):
+        with pytest.raises(ModelError, match="is no saved result"):
+            Result.load(tmp_path / name)

@@ -1,0 +1,91 @@
+"""The cases of a parameter study, and the folder that keeps their results."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mbs.errors import ModelError
+from mbs.files import path_of, write_text
+from mbs.messages import quoted
+
+Case = dict[str, float]
+Grid = Mapping[str, Iterable[float]] | Sequence[Mapping[str, float]]
+
+
+def cases_of(grid: Grid) -> tuple[Case, ...]:
+    """Every combination of the values of a grid, the last name fastest; or the cases as listed.
+
+    Args:
+        grid: name to its values, or one dict of names to values for each case.
+
+    Raises:
+        ModelError: there is no case, or a value is no number.
+    """
+    listed = list(_combinations(grid)) if isinstance(grid, Mapping) else [dict(c) for c in grid]
+    if not listed:
+        raise ModelError("sweep: the grid has no case; give at least one value for every name")
+    return tuple({str(name): _number(name, x) for name, x in case.items()} for case in listed)
+
+
+def _combinations(grid: Mapping[str, Iterable[float]]) -> Iterable[Case]:
+    columns = [
+        list(values) if isinstance(values, Iterable) else [values] for values in grid.values()
+    ]
+    for values in itertools.product(*columns):
+        yield dict(zip(grid, values, strict=True))
+
+
+def _number(name: str, value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ModelError(f"sweep: {name} is {quoted(value)}; give numbers") from None
+
+
+@dataclass(frozen=True, slots=True, weakref_slot=True)
+class Folder:
+    """Where the results of a study are kept, a file for each case.
+
+    Attributes:
+        path: the folder.
+    """
+
+    path: Path
+
+    @staticmethod
+    def opened(path: object, study: Mapping[str, object]) -> Folder:
+        """The folder of a study: made, or found with the same study in it.
+
+        Args:
+            path: where.
+            study: what is studied, as JSON knows it.
+
+        Raises:
+            ModelError: it holds another study.
+            ExportError: it cannot be written.
+        """
+        folder = path_of(path)
+        index = folder / "study.json"
+        text = json.dumps(study, indent=1, sort_keys=True) + "\n"
+        if index.exists():
+            if index.read_text(encoding="utf-8") != text:
+                raise ModelError(
+                    f"sweep: folder {folder} holds another study; choose another folder, or delete"
+                    " it"
+                )
+            return Folder(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(text, index)
+        return Folder(folder)
+
+    def file(self, number: int) -> Path:
+        """The file of a case."""
+        return self.path / f"case_{number:06d}.npz"
+
+    def missing(self, count: int) -> list[int]:
+        """The numbers of the cases, of so many, that have no result yet."""
+        return [number for number in range(count) if not self.file(number).exists()]

@@ -23,7 +23,7 @@ from mbs.export.fmu.pack import write_fmu
 from mbs.native import find_compiler
 from mbs.solvers import integrate
 
-SOURCES = FACES["2.0"].compiled
+SOURCES = FACES["2.0"].compiled("dopri5")
 MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}
 
 

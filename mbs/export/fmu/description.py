@@ -4,13 +4,14 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import casadi
 
 from mbs.errors import ExportError
 from mbs.units import UNITS
 
+Solver = Literal["dopri5", "rodas", "rk4"]
 Kind = Literal["state", "derivative", "input", "output", "parameter", "dependent"]
 
 
@@ -82,6 +83,9 @@ class FmuModel:
         stop_time: default end of a simulation, s.
         tolerance: default relative tolerance of the integration.
         step_size: default communication step, s.
+        solver: of co-simulation: "dopri5", explicit with error control; "rodas", the same for stiff
+            equations; "rk4", with the fixed step `internal_step`.
+        internal_step: length of the steps of "rk4", s.
         documentation: text for `documentation/index.html`; a blank line starts a paragraph.
     """
 
@@ -98,6 +102,8 @@ class FmuModel:
     stop_time: float = 10.0
     tolerance: float = 1e-8
     step_size: float = 0.01
+    solver: Solver = "dopri5"
+    internal_step: float = 0.001
     documentation: str = ""
 
     def __post_init__(self) -> None:
@@ -180,6 +186,10 @@ def _check_names(model: FmuModel) -> None:
 
 
 def _check_numbers(model: FmuModel) -> None:
+    if model.solver not in get_args(Solver):
+        raise ExportError(
+            f"FMU {model.name}: solver is {model.solver!r}; use {' or '.join(get_args(Solver))}"
+        )
     for entry in model.entries:
         v = entry.variable
         place = f"FMU {model.name}: {v.name}"
@@ -197,6 +207,7 @@ def _check_numbers(model: FmuModel) -> None:
         ("stop time", model.stop_time),
         ("tolerance", model.tolerance),
         ("step size", model.step_size),
+        ("internal step", model.internal_step),
     ):
         if not (value > 0 and math.isfinite(value)):
             raise ExportError(f"FMU {model.name}: {what} {value} must be positive")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib import resources
 
 from mbs.errors import ExportError
+from mbs.export.fmu.description import Solver
 from mbs.messages import quoted
 from mbs.native.cross import Platform
 
@@ -14,13 +15,12 @@ _CORE = (
     "values.c",
     "derivatives.c",
     "closure.c",
+    "solver.c",
     "exchange.c",
     "cosimulation.c",
     "saved.c",
 )
-_CORE_HEADERS = ("core.h", "internal.h", "closure.h")
-_RUNTIME = ("stepper.c", "dopri5.c")
-_RUNTIME_HEADERS = ("stepper.h", "dopri5.h")
+_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "solver.h")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,19 +37,18 @@ class Face:
     headers: tuple[str, ...]
     standard: tuple[str, ...]
 
-    @property
-    def compiled(self) -> tuple[str, ...]:
-        """The C files to compile, in the folder `sources` of the FMU."""
-        return ("model.c", *_CORE, *_RUNTIME, *self.sources)
+    def compiled(self, solver: Solver) -> tuple[str, ...]:
+        """The C files to compile with a solver, in the folder `sources` of the FMU."""
+        return ("model.c", *_CORE, "stepper.c", f"{solver}.c", *self.sources)
 
-    def fixed(self) -> dict[str, str]:
-        """The files that do not depend on the model: name to text."""
+    def fixed(self, solver: Solver) -> dict[str, str]:
+        """The files that do not depend on the equations: name to text."""
         own = resources.files("mbs.export.fmu") / "c"
         runtime = resources.files("mbs.native") / "runtime"
         standard = resources.files("fmpy") / "c-code"
         folders = (
             (own, (*_CORE, *_CORE_HEADERS, *self.sources, *self.headers)),
-            (runtime, (*_RUNTIME, *_RUNTIME_HEADERS)),
+            (runtime, tuple(name + end for name in ("stepper", solver) for end in (".c", ".h"))),
             (standard, self.standard),
         )
         return {

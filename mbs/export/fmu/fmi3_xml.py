@@ -71,6 +71,8 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
     }
     if tag == "CoSimulation":
         attributes["canHandleVariableCommunicationStepSize"] = "true"
+        if model.solver == "rk4":
+            attributes["fixedInternalStepSize"] = repr(float(model.internal_step))
     else:
         attributes["needsCompletedIntegratorStep"] = "true" if model.dependents else "false"
     SubElement(root, tag, attributes)

@@ -54,8 +54,8 @@ def write_fmu(
     _check_target(target)
     code = source(model)
     unnamed = _description(model, fmi)
-    guid = _guid(unnamed, code)
-    texts = {"model.c": code, "model.h": header(model, guid), **FACES[fmi].fixed()}
+    guid = _guid(unnamed, header(model, ""), code)
+    texts = {"model.c": code, "model.h": header(model, guid), **FACES[fmi].fixed(model.solver)}
     files = {
         "modelDescription.xml": _identified(unnamed, guid).encode(),
         "documentation/index.html": documentation(model).encode(),
@@ -63,7 +63,7 @@ def write_fmu(
         **{f"sources/{name}": text.encode() for name, text in texts.items()},
     }
     if fmi != "2.0":
-        build = fmi3_xml.build_description(model, FACES[fmi].compiled)
+        build = fmi3_xml.build_description(model, FACES[fmi].compiled(model.solver))
         files["sources/buildDescription.xml"] = build.encode()
     write_bytes(_zipped(files), target)
     return target
@@ -72,7 +72,7 @@ def write_fmu(
 def _description(model: FmuModel, fmi: str) -> str:
     """The model description without identity."""
     if fmi == "2.0":
-        return fmi2_xml.model_description(model, "", FACES[fmi].compiled)
+        return fmi2_xml.model_description(model, "", FACES[fmi].compiled(model.solver))
     return fmi3_xml.model_description(model, "")
 
 
@@ -109,9 +109,9 @@ def _platforms(model: FmuModel, names: Sequence[str]) -> list[Platform]:
     return list(dict.fromkeys(platform_named(name) for name in given))
 
 
-def _guid(description: str, code: str) -> str:
+def _guid(*texts: str) -> str:
     """An identity made of what the FMU says and computes, so that equal models share it."""
-    h = hashlib.sha256((description + code).encode()).hexdigest()
+    h = hashlib.sha256("".join(texts).encode()).hexdigest()
     return "{" + "-".join((h[:8], h[8:12], h[12:16], h[16:20], h[20:32])) + "}"
 
 

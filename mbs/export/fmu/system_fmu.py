@@ -10,7 +10,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, Coordinate
 from mbs.errors import ModelError
-from mbs.export.fmu.description import FmuModel, State, Variable
+from mbs.export.fmu.description import FmuModel, Solver, State, Variable
 from mbs.export.fmu.faces import require_version
 from mbs.export.fmu.observed import chosen
 from mbs.export.fmu.pack import write_fmu
@@ -29,6 +29,8 @@ def fmu(
     stop_time: float = 10.0,
     step_size: float = 0.01,
     tolerance: float = 1e-8,
+    solver: Solver = "dopri5",
+    internal_step: float = 0.001,
 ) -> Path:
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
@@ -38,7 +40,7 @@ def fmu(
     base: `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`. States are
     the independent joints; in a closed system the others are solved for at every evaluation, so
     that loops cannot drift. Every symbol of the system is a tunable parameter. A solver for
-    Co-Simulation (Dormand and Prince 5(4)) is inside. Directional derivatives, and in FMI 3.0
+    Co-Simulation is inside. Directional derivatives, and in FMI 3.0
     adjoint ones, are exact through closed loops.
 
     Args:
@@ -52,6 +54,9 @@ def fmu(
         stop_time: default end of a simulation [s].
         step_size: default communication step [s].
         tolerance: default relative tolerance.
+        solver: of co-simulation: "dopri5", Dormand and Prince's explicit pair; "rodas", the
+            linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real time.
+        internal_step: length of the steps of "rk4" [s].
 
     Returns:
         The path written.
@@ -65,7 +70,13 @@ def fmu(
     require_system(system)
     require_version(system.name, fmi)
     model = fmu_model(
-        system, outputs, stop_time=stop_time, step_size=step_size, tolerance=tolerance
+        system,
+        outputs,
+        stop_time=stop_time,
+        step_size=step_size,
+        tolerance=tolerance,
+        solver=solver,
+        internal_step=internal_step,
     )
     return write_fmu(model, path, fmi=fmi, platforms=platforms)
 
@@ -77,6 +88,8 @@ def fmu_model(
     stop_time: float = 10.0,
     step_size: float = 0.01,
     tolerance: float = 1e-8,
+    solver: Solver = "dopri5",
+    internal_step: float = 0.001,
 ) -> FmuModel:
     """The description of a mechanism's FMU; arguments as for `fmu`."""
     require_no_contacts(system, "the FMU")
@@ -102,6 +115,8 @@ def fmu_model(
         stop_time=stop_time,
         step_size=step_size,
         tolerance=tolerance,
+        solver=solver,
+        internal_step=internal_step,
         documentation="\n\n".join([system.report(), system.source]),
     )
 

@@ -24,7 +24,7 @@ _HEADER = """\
 #define NY {ny}
 #define NP {np}
 #define NZ {nz}
-
+{solver}
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[];
 
@@ -48,6 +48,11 @@ def header(model: FmuModel, guid: str) -> str:
         its text.
     """
     names = _OPEN if model.closure is None else _CLOSED
+    solver = ""
+    if model.solver == "rodas":
+        names, solver = (*names, "mbs_jacobian"), "#define MODEL_RODAS\n"
+    elif model.solver == "rk4":
+        solver = f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
     return _HEADER.format(
         guid=_quoted(guid),
         tolerance=repr(float(model.tolerance)),
@@ -56,6 +61,7 @@ def header(model: FmuModel, guid: str) -> str:
         ny=len(model.outputs),
         np=len(model.parameters),
         nz=len(model.dependents),
+        solver=solver,
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
@@ -103,7 +109,8 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, `mbs_tangent(t, x, z, u, p, dx, du, dp) ->
         (dxdot, dy, dz)`, `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz) -> (gx, gu, gp)` and, where
         loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
-        `mbs_sensitivity(x, z, p) -> steepness`.
+        `mbs_sensitivity(x, z, p) -> steepness`; for an implicit solver
+        `mbs_jacobian(t, x, z, u, p) -> (d xdot / d x, d xdot / d t)`.
     """
     t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
     z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
@@ -121,7 +128,20 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         loop = [x, z, p]
         answers.append(casadi.Function("mbs_closure", loop, _dense(model.closure.call(loop))))
         answers.append(casadi.Function("mbs_sensitivity", loop, [_steepness(model, loop)]))
+    if model.solver == "rodas":
+        answers.append(casadi.Function("mbs_jacobian", point, _dense(_jacobian(model, point))))
     return tuple(answers)
+
+
+def _jacobian(model: FmuModel, point: list[casadi.MX]) -> list[casadi.MX]:
+    """How xdot changes with x, column by column and through the closure, and with t."""
+    t, x, z, _, p = point
+    xdot = model.rhs.call(point)[0]
+    J = casadi.densify(casadi.jacobian(xdot, x))
+    if model.closure is not None:
+        moved = casadi.jacobian(model.closure.call([x, z, p])[0], x)
+        J += casadi.mtimes(casadi.jacobian(xdot, z), moved)
+    return [J, casadi.jacobian(xdot, t)]
 
 
 def _tangent(model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]) -> list[casadi.MX]:

@@ -42,6 +42,8 @@ void stepper_restart(stepper *s) {
     s->memory[ERROR] = 1e-4;
 }
 
+void stepper_fix(stepper *s, double h) { s->h_max = s->memory[STEP] = h; }
+
 void stepper_restart_afresh(stepper *s) {
     stepper_restart(s);
     s->memory[STEP] = 0.0;

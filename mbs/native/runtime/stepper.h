@@ -74,6 +74,9 @@ void stepper_start(stepper *s, double t);
 /* Something jumped (an input, a parameter): the slope is computed anew, the step size is kept. */
 void stepper_restart(stepper *s);
 
+/* After stepper_start: begin with a step of this length, and make no longer one. */
+void stepper_fix(stepper *s, double h);
+
 /* The state jumped: the step size is found anew too. */
 void stepper_restart_afresh(stepper *s);
 

@@ -76,12 +76,16 @@ int core_allowed(core *c, int modes, const char *action) {
     return 0;
 }
 
-static int call_rhs(core *c, double t, const double *x, const double *z, double *xdot, double *y) {
-    c->arg[0] = &t;
+void core_point(core *c, const double *t, const double *x, const double *z) {
+    c->arg[0] = t;
     c->arg[1] = x;
     c->arg[2] = z;
     c->arg[3] = c->m.values + INPUTS;
     c->arg[4] = c->m.values + PARAMETERS;
+}
+
+int core_call_rhs(core *c, double t, const double *x, const double *z, double *xdot, double *y) {
+    core_point(c, &t, x, z);
     c->res[0] = xdot;
     c->res[1] = y;
     return mbs_rhs(c->arg, c->res, c->iw, c->w, 0);
@@ -110,7 +114,7 @@ core_status core_refresh(core *c) {
     if (!c->m.stale) return CORE_OK;
     status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
     if (status) return closure_failed(c, status);
-    if (call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
+    if (core_call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
         return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name, c->m.time);
     memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
     for (i = 0; i < N_VALUES; i++)
@@ -119,11 +123,6 @@ core_status core_refresh(core *c) {
                              "zero mass", c->name, MODEL_NAMES[i], c->m.time);
     c->m.stale = 0;
     return CORE_OK;
-}
-
-static int solver_rhs(void *user, double t, const double *x, double *xdot) {
-    core *c = user;
-    return closure_solve(c, x, c->z) || call_rhs(c, t, x, c->z, xdot, NULL);
 }
 
 static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
@@ -135,6 +134,9 @@ static int allocate(core *c) {
         mbs_rhs_work, mbs_tangent_work, mbs_adjoint_work,
 #if NZ > 0
         mbs_closure_work, mbs_sensitivity_work,
+#endif
+#ifdef MODEL_RODAS
+        mbs_jacobian_work,
 #endif
     };
     for (f = 0; f < (int)(sizeof work / sizeof *work); f++) {
@@ -173,8 +175,7 @@ core *core_new(const char *name, int cosimulation, core_logger log, void *host) 
     c->host = host;
     c->m.cosimulation = cosimulation;
     to_start(c);
-    dopri5_init(&c->solver, NX, solver_rhs, c, c->m.solver, c->work);
-    c->solver.nominal = MODEL_NOMINAL + STATES;
+    core_init_solver(c);
     return c;
 }
 
@@ -212,7 +213,7 @@ core_status core_exit_initialization(core *c) {
     if (status) return status;
     status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     if (status) return status;
-    stepper_start(&c->solver, c->m.time);
+    core_start_solver(c);
     c->m.mode = c->m.cosimulation ? STEP : EVENT;
     return CORE_OK;
 }

@@ -9,8 +9,8 @@
 
 #include <stddef.h>
 
-#include "dopri5.h"
 #include "model.h"
+#include "solver.h"
 
 enum {
     STATES = 0,
@@ -54,7 +54,7 @@ typedef struct {
     void *host;
     int discards; /* messages of discarded calls are wanted; those of errors always are */
     stepper solver;
-    double work[DOPRI5_WORK(NX) + 1], z[NZ + 1];
+    double work[SOLVER_WORK(NX) + 1], z[NZ + 1];
     const double **arg;
     double **res;
     long long *iw;

@@ -45,12 +45,7 @@ static core_status ready(core *c, const unsigned *unknown, size_t n_unknown, con
 }
 
 static void point(core *c) {
-    const double *v = c->m.values;
-    c->arg[0] = &c->m.time;
-    c->arg[1] = v + STATES;
-    c->arg[2] = v + DEPENDENTS;
-    c->arg[3] = v + INPUTS;
-    c->arg[4] = v + PARAMETERS;
+    core_point(c, &c->m.time, c->m.values + STATES, c->m.values + DEPENDENTS);
 }
 
 static core_status finite_answer(core *c, unsigned ref, double value) {

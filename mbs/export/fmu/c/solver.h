@@ -1,0 +1,18 @@
+/* The solver of co-simulation that model.h names: its memory and its scratch. */
+#ifndef MBS_SOLVER_H
+#define MBS_SOLVER_H
+
+#include "model.h"
+
+#if defined MODEL_RODAS
+#include "rodas.h"
+#define SOLVER_WORK RODAS_WORK
+#elif defined MODEL_FIXED_STEP
+#include "rk4.h"
+#define SOLVER_WORK RK4_WORK
+#else
+#include "dopri5.h"
+#define SOLVER_WORK DOPRI5_WORK
+#endif
+
+#endif

@@ -11,7 +11,8 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 _SOURCE = re.compile(r"Source:(.*?)(?:\n\s*\n|\"\"\"|\*/)", re.DOTALL)
 _AUTHOR_YEAR = re.compile(
-    r"([A-Z][a-z]+)(?:(?:,| &| and) (?:and )?[A-Z][a-z]+)*,? ((?:19|20)\d\d)\b"
+    r"\b([A-Z][a-z]+(?:-[A-Z][a-z]+)?)(?:(?:,| &| and) (?:and )?(?:Van )?[A-Z][a-z]+)*,?"
+    r" ((?:19|20)\d\d)\b"
 )
 _ENTRY = re.compile(r"@\w+\{(\w+),\s*author = \{([^,]+),.*?year = \{(\d+)\}", re.DOTALL)
 

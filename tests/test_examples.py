@@ -30,12 +30,19 @@ SMALL = {
         "CoSimulation: largest difference of positions and velocities": 1e-7,
         "ModelExchange: largest difference of positions and velocities": 1e-6,
     },
+    "03_inverse_geometry": {
+        "Largest pose(q) - T": 1e-12,
+        "Nearest solution - q": 1e-10,
+        "Function igm(T, branch) - q": 1e-9,
+        "Largest residual on the line": 1e-12,
+    },
 }
 """What each example prints, and how large it may be."""
 
 FILES = {
     "01_four_bar": ["four_bar.png", "four_bar.fmu", "motion.csv", "models/models.c", "example"],
     "02_puma560": ["puma560.png", "puma560.fmu", "fall.csv", "models/models.h"],
+    "03_inverse_geometry": ["postures.png", "igm.c", "equations.txt"],
 }
 
 

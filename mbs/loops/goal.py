@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi
 import numpy as np
-from casadi import DM, SX, Function
+from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.loops.closing import Closed, Closing, Vector, closure_parameters
+from mbs.loops.wanted import wanted_pose
 from mbs.messages import did_you_mean, quoted
 from mbs.recursions.route import relative_pose
 from mbs.solvers.gauss_newton import gauss_newton
@@ -24,7 +25,6 @@ ROWS = {"x": (0,), "y": (1,), "z": (2,), "orientation": tuple(range(3, 12)), "ax
 
 WHOLE = ("x", "y", "z", "orientation")
 _CLOSURE_WEIGHT = 1e2
-_SKEWED = 1e-6
 _ITERATIONS = 50
 
 
@@ -48,6 +48,10 @@ class Goal:
     def elements(self) -> list[int]:
         """The elements of the pose that count."""
         return sorted({k for name in self.rows for k in ROWS[name]})
+
+    def at(self, T: Vector) -> Goal:
+        """The same goal at another pose (4, 4)."""
+        return replace(self, wanted=_elements(T))
 
     def gap(self, q: Vector) -> tuple[float, float]:
         """How far the frame is away at q, (nq,): distance [m] and angle [rad] of what counts."""
@@ -103,7 +107,7 @@ def goal(
     system.frame(frame)
     closing = Closing(system, closure_parameters(system, parameters))
     chosen = WHOLE if rows is None else _named(system, rows)
-    return Goal(closing, frame, chosen, _elements(_pose_matrix(system, T)))
+    return Goal(closing, frame, chosen, _elements(wanted_pose(system, T)))
 
 
 def _named(system: System, rows: Sequence[str]) -> tuple[str, ...]:
@@ -117,24 +121,6 @@ def _named(system: System, rows: Sequence[str]) -> tuple[str, ...]:
     if not given:
         raise ModelError(f"{system.name}: no rows were named; give some of {', '.join(ROWS)}")
     return tuple(given)
-
-
-def _pose_matrix(system: System, T: Any) -> Vector:
-    """T as (4, 4) numbers, its orientation exactly orthonormal."""
-    try:
-        matrix = T.full() if isinstance(T, DM) else np.array(T, dtype=float)
-    except (TypeError, ValueError):
-        matrix = np.zeros(0)
-    if matrix.shape == (4, 4) and np.all(np.isfinite(matrix)):
-        U, _, V = np.linalg.svd(matrix[:3, :3])
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = U @ V, matrix[:3, 3]
-        if np.linalg.det(U @ V) > 0 and np.max(np.abs(pose - matrix)) < _SKEWED:
-            return pose
-    raise ModelError(
-        f"{system.name}: T is {quoted(T)}; give a pose, (4, 4) with an orthonormal right-handed"
-        " orientation and the last row 0, 0, 0, 1"
-    )
 
 
 def _elements(T: Vector) -> Vector:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.errors import LoopError
 from mbs.loops.closed_form.places import extent, independent_places
 from mbs.loops.closed_form.plan import plan
-from mbs.loops.closed_form.stage import Stage
+from mbs.loops.closed_form.stage import every_posture
 from mbs.loops.closing import Closing, Vector, closure_parameters
 from mbs.loops.independent import Given, independent_positions
 
@@ -70,27 +70,11 @@ def modes(
     start = np.zeros(extent(system))
     start[independent_places(system)] = independent_positions(system, q_active)
     found: list[Mode] = []
-    for q, branch in _postures(stages, start, p, ()):
+    for q, branch in every_posture(stages, start, p):
         mode = _checked(system, q[: system.nq], branch, p)
         if mode is not None and not any(_same(mode, other) for other in found):
             found.append(mode)
     return found
-
-
-def _postures(
-    stages: Sequence[Stage], q: Vector, p: Vector, branch: tuple[str, ...]
-) -> Iterator[tuple[Vector, tuple[str, ...]]]:
-    """Postures and branches, one loop after the other; NaN ends a branch."""
-    if not stages:
-        yield q, branch
-        return
-    stage, rest = stages[0], stages[1:]
-    values = np.array(stage.values(q, p))
-    for way, label in enumerate(stage.labels):
-        if np.all(np.isfinite(values[:, way])):
-            longer = q.copy()
-            longer[list(stage.places)] = values[:, way]
-            yield from _postures(rest, longer, p, branch + ((label,) if label else ()))
 
 
 def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> Mode | None:

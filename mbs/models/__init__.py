@@ -1,5 +1,6 @@
 """Model builders: a System in, a casadi.Function with named inputs and outputs out."""
 
+from mbs.models import inverse_geometry
 from mbs.models.dae import Dae, dae
 from mbs.models.derivatives import (
     direct_dynamics_derivatives,
@@ -36,6 +37,7 @@ __all__ = [
     "inertia_matrix",
     "inverse_dynamics",
     "inverse_dynamics_derivatives",
+    "inverse_geometry",
     "inverse_jacobian",
     "inverse_kinematics",
     "jacobian",

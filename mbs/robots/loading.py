@@ -16,14 +16,20 @@ from mbs.robots.akr3000 import akr3000
 from mbs.robots.andrews_squeezer import andrews_squeezer
 from mbs.robots.bricard import bricard
 from mbs.robots.cart_pole import cart_pole
+from mbs.robots.crx10 import crx10
 from mbs.robots.delta import delta
 from mbs.robots.differential_wrist import differential_wrist
 from mbs.robots.five_bar import five_bar
 from mbs.robots.flyball_governor import flyball_governor
 from mbs.robots.four_bar import four_bar
+from mbs.robots.gantry import gantry
+from mbs.robots.irb120 import irb120
+from mbs.robots.kr6 import kr6
+from mbs.robots.manseur_doty import manseur_doty
 from mbs.robots.modelica_four_bar import modelica_four_bar
 from mbs.robots.modelica_rod_four_bar import modelica_rod_four_bar
 from mbs.robots.n_four_bar import n_four_bar
+from mbs.robots.panda import panda
 from mbs.robots.planar_2r import planar_2r
 from mbs.robots.puma560 import puma560
 from mbs.robots.rx90 import rx90
@@ -35,7 +41,10 @@ from mbs.robots.sr400 import sr400
 from mbs.robots.stanford import stanford
 from mbs.robots.stewart_platform import stewart_platform
 from mbs.robots.two_branch_tree import two_branch_tree
+from mbs.robots.tx90 import tx90
+from mbs.robots.ur5 import ur5
 from mbs.robots.whipple_bicycle import whipple_bicycle
+from mbs.robots.youbot import youbot
 
 _CATALOGUE: Mapping[str, Callable[[], Mechanism]] = MappingProxyType(
     {
@@ -44,6 +53,15 @@ _CATALOGUE: Mapping[str, Callable[[], Mechanism]] = MappingProxyType(
             puma560,
             stanford,
             rx90,
+            tx90,
+            kr6,
+            irb120,
+            ur5,
+            crx10,
+            panda,
+            youbot,
+            manseur_doty,
+            gantry,
             scara,
             planar_2r,
             cart_pole,

@@ -10,8 +10,11 @@ distance, aim, spin, ball                               kernels: links between s
 planar, three_turns, parallelogram, one_slide, two_slides, normal, confined    in a plane
 orientation, sphere, slides                             turns first, then slides
 bennett, trilateration, coupling                        special measures, shared slides, gears
+free_body       a body whose pose is known
 dispatch        the kernel for a loop
 stage           one step of a plan, and which of its ways lead to a posture
 plan            the loops of a system in the order in which they can be solved
 verified        a plan held against postures
+known           joints that may be known together
+posed           the plan for a frame whose pose is known
 """

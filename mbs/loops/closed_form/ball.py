@@ -24,11 +24,11 @@ def ball(ring: Ring, q: SX, p: SX) -> Root | None:
     if len(ring.joints) != 1 or joint.motion is not Motion.SPHERICAL or joint.place is None:
         return None
     R = ring.gaps[0].pose.R
-    quaternion = _quaternion(R.T if joint.sign > 0 else R)
+    quaternion = unit_quaternion(R.T if joint.sign > 0 else R)
     return Root({"": {joint.place + k: quaternion[k] for k in range(4)}})
 
 
-def _quaternion(R: SX) -> SX:
+def unit_quaternion(R: SX) -> SX:
     """(4, 1) unit quaternion w, x, y, z of an orientation, w not negative."""
     a, b, c = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     d, e, f = R[1, 2] + R[2, 1], R[0, 2] + R[2, 0], R[0, 1] + R[1, 0]

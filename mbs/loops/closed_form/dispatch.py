@@ -12,6 +12,7 @@ from mbs.loops.closed_form.ball import ball
 from mbs.loops.closed_form.bennett import bennett
 from mbs.loops.closed_form.confined import confined
 from mbs.loops.closed_form.distance import at_distance
+from mbs.loops.closed_form.free_body import free_body
 from mbs.loops.closed_form.normal import along_normal
 from mbs.loops.closed_form.orientation import orientation
 from mbs.loops.closed_form.planar import planar
@@ -21,6 +22,7 @@ from mbs.loops.closed_form.slides import slides
 from mbs.loops.closed_form.spin import spin
 
 _KERNELS: tuple[Callable[[Ring, SX, SX], Root | None], ...] = (
+    free_body,
     ball,
     spin,
     slides,
@@ -44,7 +46,7 @@ def closed_form(ring: Ring, q: SX, p: SX) -> Root | str:
         q: symbols of positions, those of cut joints included.
         p: (np, 1) symbols of parameters.
     """
-    if any(joint.motion is Motion.FREE for joint in ring.joints):
+    if any(joint.motion is Motion.FREE for joint in ring.joints) and len(ring.joints) > 1:
         return "a free body is in it"
     for kernel in _KERNELS:
         root = kernel(ring, q, p)

@@ -6,7 +6,7 @@ are known then.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import casadi
@@ -24,7 +24,7 @@ from mbs.loops.closed_form.distance import Span, spans
 from mbs.loops.closed_form.places import extent, independent_places
 from mbs.loops.closed_form.ring import Ring, loop_links, ring_of
 from mbs.loops.closed_form.root import Root
-from mbs.loops.closed_form.stage import Stage
+from mbs.loops.closed_form.stage import Stage, started_at
 from mbs.loops.closed_form.survey import constants
 from mbs.loops.closed_form.trilateration import (
     held_point,
@@ -44,9 +44,29 @@ def plan(system: System) -> tuple[Stage, ...]:
     require_system(system)
 
     def build() -> tuple[Stage, ...]:
-        return verified(system, _ordered(system)) if system.closure else ()
+        return plan_from(system, independent_places(system)) if system.closure else ()
 
     stages: tuple[Stage, ...] = system.cached("closed form", build)
+    return stages
+
+
+def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
+    """The loops and couplings in an order in which each follows from what is known.
+
+    Args:
+        system: the assembled mechanism, with loops.
+        known: places of the positions that are known.
+
+    Raises:
+        NoClosedForm: says which loop has none, and why.
+    """
+
+    def build() -> tuple[Stage, ...]:
+        q = SX.sym("q", extent(system))
+        stages = ordered(system, known, q)
+        return verified(system, stages, lambda posture: started_at(system, posture, known))
+
+    stages: tuple[Stage, ...] = system.cached(("closed form from", *sorted(known)), build)
     return stages
 
 
@@ -84,9 +104,18 @@ class _Work:
         return ring_of(self.system, number, self.known, self.values)
 
 
-def _ordered(system: System) -> list[Stage]:
-    q = SX.sym("q", extent(system))
-    work = _Work(system, q, SX(q), set(independent_places(system)))
+def ordered(system: System, known: Collection[int], q: SX) -> list[Stage]:
+    """The stages in their order, not yet held against postures.
+
+    Args:
+        system: whose loops they are.
+        known: places of the positions that are known.
+        q: symbols of all positions.
+
+    Raises:
+        NoClosedForm: a loop cannot be solved, or no loop gives a position.
+    """
+    work = _Work(system, q, SX(q), set(known))
     pending = list(range(len(system.cuts) + len(system.couplings)))
     reasons = dict[int, str]()
     while pending:

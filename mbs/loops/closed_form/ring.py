@@ -73,24 +73,30 @@ class Gap:
     Attributes:
         pose: of the next joint's frame, seen from the frame after the joint before.
         pivots: frames of the known revolute joints on the way, seen likewise.
+        back: the inverse of the pose where it is known in a shorter form; nothing tells that the
+            elements of a symbolic rotation are orthonormal.
     """
 
     pose: Pose = field(default_factory=Pose.identity)
     pivots: tuple[Pose, ...] = ()
+    back: Pose | None = None
 
     def then(self, pose: Pose) -> Gap:
         """The way with one more piece at its end."""
-        return Gap(self.pose @ pose, self.pivots)
+        back = None if self.back is None else pose.inverse() @ self.back
+        return Gap(self.pose @ pose, self.pivots, back)
 
     def after(self, gap: Gap) -> Gap:
         """The way with another one before it."""
         seen = (gap.pose @ pivot for pivot in self.pivots)
-        return Gap(gap.pose @ self.pose, (*gap.pivots, *seen))
+        known = self.back is not None or gap.back is not None
+        back = self.inverse().pose @ gap.inverse().pose if known else None
+        return Gap(gap.pose @ self.pose, (*gap.pivots, *seen), back)
 
     def inverse(self) -> Gap:
         """The way back."""
-        back = self.pose.inverse()
-        return Gap(back, tuple(back @ pivot for pivot in self.pivots))
+        back = self.back or self.pose.inverse()
+        return Gap(back, tuple(back @ pivot for pivot in self.pivots), self.pose)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,8 +198,10 @@ def _unknown(system: System, k: int, sign: int) -> Unknown:
 def _pass(walk: _Walk, joint: Unknown, known: Container[int], q: SX) -> None:
     """Through a joint; over it, where it is known."""
     place = joint.place
-    if place is None or place not in known or joint.motion is Motion.FREE:
+    if place is None or place not in known:
         walk.through(joint)
+    elif joint.motion is Motion.FREE:
+        walk.over(free_pose(q[place : place + 7], joint.sign))
     elif joint.motion is Motion.SPHERICAL:
         walk.over(_ball(q[place : place + 4], joint.sign))
     elif joint.motion is Motion.PRISMATIC:
@@ -201,6 +209,12 @@ def _pass(walk: _Walk, joint: Unknown, known: Container[int], q: SX) -> None:
     else:
         walk.gap = replace(walk.gap, pivots=(*walk.gap.pivots, walk.gap.pose))
         walk.over(Pose.turned(axis_turn("z", joint.sign * q[place]).matrix))
+
+
+def free_pose(values: SX, sign: int = 1) -> Pose:
+    """The pose that three translations and a quaternion tell, or the way back."""
+    pose = Pose.moved(values[0:3]) @ _ball(values[3:7], 1)
+    return pose if sign > 0 else pose.inverse()
 
 
 def _ball(quaternion: SX, sign: int) -> Pose:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,20 +44,36 @@ def ways_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tu
 
     What a stage gives of cut joints is not in q: whether it fits is seen in later stages.
     """
-    return _followed(system, stages, started_at(system, q), q, p)
+    return ways_from(system, stages, started_at(system, q), q, p)
 
 
-def started_at(system: System, q: Vector) -> Vector:
-    """All positions, the independent ones as in the posture q and the others zero."""
+def started_at(system: System, q: Vector, known: Collection[int] | None = None) -> Vector:
+    """All positions, the known ones as in the posture q and the others zero.
+
+    Args:
+        system: whose positions they are.
+        q: (nq,) the posture.
+        known: their places, those of the independent joints when left out.
+    """
     start = np.zeros(extent(system))
-    places = [k for k in independent_places(system) if k < system.nq]
+    given = independent_places(system) if known is None else known
+    places = [k for k in given if k < system.nq]
     start[places] = q[places]
     return start
 
 
-def _followed(
+def ways_from(
     system: System, stages: Sequence[Stage], start: Vector, q: Vector, p: Vector
 ) -> tuple[int, ...]:
+    """The ways of all stages that lead to the closed posture q; as far as they do.
+
+    Args:
+        system: whose loops they are.
+        stages: in their order.
+        start: all positions, the known ones as in q; spins are written into it.
+        q: (nq,) the posture.
+        p: (np,) parameters.
+    """
     if not stages:
         return ()
     stage, longest = stages[0], tuple[int, ...]()
@@ -69,11 +85,34 @@ def _followed(
         reached = start.copy()
         reached[list(stage.places)] = values[:, way]
         if _agree(system, stage.places, reached, q):
-            ways = (way, *_followed(system, stages[1:], reached, q, p))
+            ways = (way, *ways_from(system, stages[1:], reached, q, p))
             longest = max(longest, ways, key=len)
             if len(longest) == len(stages):
                 break
     return longest
+
+
+def every_posture(
+    stages: Sequence[Stage], q: Vector, p: Vector, branch: tuple[str, ...] = ()
+) -> Iterator[tuple[Vector, tuple[str, ...]]]:
+    """All positions and the labels of the branch, one loop after the other; NaN ends a branch.
+
+    Args:
+        stages: in their order.
+        q: all positions, of which the known ones count.
+        p: (np,) parameters.
+        branch: labels so far.
+    """
+    if not stages:
+        yield q, branch
+        return
+    stage, rest = stages[0], stages[1:]
+    values = np.array(stage.values(q, p))
+    for way, label in enumerate(stage.labels):
+        if np.all(np.isfinite(values[:, way])):
+            longer = q.copy()
+            longer[list(stage.places)] = values[:, way]
+            yield from every_posture(rest, longer, p, branch + ((label,) if label else ()))
 
 
 def _agree(system: System, places: Sequence[int], reached: Vector, q: Vector) -> bool:

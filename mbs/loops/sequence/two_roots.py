@@ -43,7 +43,7 @@ def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
     """
     size = X * X + Y * Y
     radicand = size - Z * Z
-    W = sign * casadi.sqrt(casadi.fmax(radicand, 0))
+    W = sign * casadi.sqrt(casadi.fmax(radicand, _TINY))
     angle = casadi.atan2(Y * Z + X * W, X * Z - Y * W)
     return Root(SX(angle), SX(radicand / (size + Z * Z + _TINY)), SX(size / (scale * scale)))
 
@@ -55,5 +55,5 @@ def angle_of(s: SX, c: SX, scale: SX | float = 1.0) -> Root:
 
 def square_root(square: SX, sign: SX, scale: SX | float = 1.0) -> Root:
     """The root of r^2 = square of the given sign; scale is of the size of r, in its unit."""
-    value = sign * casadi.sqrt(casadi.fmax(square, 0))
+    value = sign * casadi.sqrt(casadi.fmax(square, _TINY))
     return Root(SX(value), SX(square / (scale * scale)), SX(1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi
 import numpy as np
@@ -77,7 +77,10 @@ class Chain:
             Unknown(name, Motion.PRISMATIC if slides else Motion.REVOLUTE, place, 1)
             for place, (name, slides) in enumerate(zip(self.names, self.prismatic, strict=True))
         )
-        ring = Ring(joints, (gaps[0].after(back), *gaps[1:n]))
+        closing = replace(
+            gaps[0].after(back), back=gaps[0].pose.inverse() @ T @ gaps[n].pose.inverse()
+        )
+        ring = Ring(joints, (closing, *gaps[1:n]))
         sums = [SX.sym(f"x{k + 1}") for k in range(n)]
         x = casadi.vertcat(*(SX.sym(name) for name in self.names), *sums)
         return Problem(ring, x, casadi.vertcat(symbols, t), self._samples(p))

@@ -1,0 +1,146 @@
+"""The compiled core of the inverse geometric model, of `native/runtime`, on numpy arrays."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from importlib import resources
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.models.inverse_geometry.arm import Arm, Array
+from mbs.native import cached_library, compiler_found
+
+Hits: TypeAlias = NDArray[np.int64]
+
+_PAIRS = ("rigid", "arm", "arm_search", "pair", "dense", "eigenvalues", "raghavan_roth")
+_SOURCES = (
+    "arm_descend.c",
+    "arm_nearest.c",
+    "arm_calls.c",
+    "raghavan_roth_roots.c",
+    "raghavan_roth_middle.c",
+    "raghavan_roth_rest.c",
+    "raghavan_roth_solve.c",
+)
+_FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
+
+_pointer, _real, _integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_longlong
+_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "mbs_polish": (
+        None,
+        (_pointer, _pointer, _integer, _integer, ctypes.c_int, _pointer, _pointer),
+    ),
+    "mbs_search": (
+        _integer,
+        (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer, _pointer, _pointer),
+    ),
+    "mbs_merge": (_integer, (_pointer, _pointer, _integer, _pointer, _pointer, _pointer)),
+    "mbs_general": (
+        _integer,
+        (_pointer, _pointer, _pointer, _integer, _integer, _pointer, _pointer, _pointer, _pointer),
+    ),
+    "mbs_nearest": (_real, (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer)),
+}
+
+
+class _Arm(ctypes.Structure):
+    _fields_ = (
+        ("n", ctypes.c_int),
+        ("gaps", ctypes.c_void_p),
+        ("slides", ctypes.c_void_p),
+        ("length", ctypes.c_double),
+    )
+
+
+def core() -> ctypes.CDLL | None:
+    """The compiled core; None where there is no C compiler.
+
+    Raises:
+        CompilerError: the compiler refused the code.
+    """
+    return _loaded() if compiler_found() else None
+
+
+@functools.cache
+def _loaded() -> ctypes.CDLL:
+    folder = resources.files("mbs.native") / "runtime"
+    names = [*_SOURCES, *(name + end for name in _PAIRS for end in (".c", ".h"))]
+    files = {name: (folder / name).read_text(encoding="utf-8") for name in names}
+    library = ctypes.CDLL(str(cached_library(files, _FLAGS)))
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array, steps: int) -> Array:
+    """Polish postures in place; their residuals, (m,).
+
+    Args:
+        library: the core.
+        arm: whose postures.
+        T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
+        q: (m, n) postures, an array of its own that is overwritten.
+        steps: at most.
+    """
+    wanted, residual = np.ascontiguousarray(T, dtype=float), np.empty(len(q))
+    stride = 16 if wanted.ndim == 3 else 0
+    with_arm = Handed(arm)
+    library.mbs_polish(
+        with_arm.address, wanted.ctypes.data, stride, len(q), steps, _at(q), _at(residual)
+    )
+    return residual
+
+
+def found_by(
+    library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
+) -> tuple[Array, Hits]:
+    """Postures (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
+    wanted = np.ascontiguousarray(T, dtype=float)
+    q, residual, hits = _rooms(starts, arm.size)
+    handed = Handed(arm)
+    count = library.mbs_search(
+        handed.address, _at(wanted), starts, seed, _at(q), _at(residual), hits.ctypes.data
+    )
+    return q[:count].copy(), hits[:count].copy()
+
+
+def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
+    """The distinct ones of postures q, (m, n), and how many are each of them."""
+    wanted = np.ascontiguousarray(T, dtype=float)
+    own, residual, hits = _rooms(len(q), arm.size)
+    own[:] = q
+    handed = Handed(arm)
+    count = library.mbs_merge(
+        handed.address, _at(wanted), len(q), _at(own), _at(residual), hits.ctypes.data
+    )
+    return own[:count].copy(), hits[:count].copy()
+
+
+def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
+    """The posture, (n,), whose pose is nearest to T."""
+    wanted, q = np.ascontiguousarray(T, dtype=float), np.empty(arm.size)
+    handed = Handed(arm)
+    library.mbs_nearest(handed.address, _at(wanted), starts, seed, _at(q))
+    return q
+
+
+class Handed:
+    """An arm as C sees it; keeps the arrays alive that it points to."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.gaps = np.ascontiguousarray(arm.gaps, dtype=float)
+        self.slides = np.ascontiguousarray(arm.prismatic, dtype=np.uint8)
+        self.arm = _Arm(arm.size, self.gaps.ctypes.data, self.slides.ctypes.data, arm.length)
+        self.address = ctypes.addressof(self.arm)
+
+
+def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:
+    return np.empty((count, n)), np.empty(count), np.empty(count, dtype=np.int64)
+
+
+def _at(array: Array) -> int:
+    return int(array.ctypes.data)

@@ -1,0 +1,145 @@
+"""Every posture that takes a frame of a robot to a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.errors import ModelError
+from mbs.models.inverse_geometry.answer import Question, answer
+from mbs.models.inverse_geometry.arm import Arm, Array
+from mbs.models.inverse_geometry.chain import Chain, chain
+from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, key_of
+from mbs.models.inverse_geometry.gathering import Gathered, further, gather
+from mbs.models.inverse_geometry.limits import Given, bounds
+from mbs.models.inverse_geometry.parallel import parallel
+from mbs.models.inverse_geometry.pose_input import wanted_pose
+from mbs.models.inverse_geometry.roots import Root, roots
+from mbs.models.inverse_geometry.solutions import Solutions
+from mbs.models.inverse_geometry.target import Target
+from mbs.models.inverse_geometry.wishes import Wishes
+
+_NEARLY_SINGULAR = 1e-4
+
+
+def solve(
+    system: System,
+    T: Any,
+    frame: str | int | None = None,
+    method: str = "auto",
+    limits: bool | Given | None = None,
+    seed: Mapping[str, float] | Sequence[float] | None = None,
+    *,
+    locked: Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Solutions:
+    """Every posture that takes a frame to a pose.
+
+    Each is checked with the forward model to 1e-12 of max(1 m, the robot's length). Next to
+    singular postures several methods are joined so that none is missed.
+
+    Args:
+        system: a serial robot, a tree, or a robot with loops.
+        T: (4, 4) the pose of the frame seen from the base [m].
+        frame: a body, a named frame, the number of a link, or None for the terminal frame.
+        method: "auto" for a closed form where there is one, else the general method, else the
+            search; or one of "pieper", "paul", "general", "search".
+        limits: None leaves out no solution and says of each whether it is within the robot's own
+            limits; True leaves out those that are not; (lowest, highest) by name replaces limits
+            and leaves out likewise.
+        seed: a posture by name or (nq,) [rad or m]; solutions are sorted by their distance from
+            it and wound towards it, and it places the joints that the frame does not depend on.
+        locked: positions of joints that stay where they are, by name [rad or m].
+        parameters: values of symbols, the others at their defaults.
+
+    Returns:
+        Solutions, which say why they are empty where they are.
+
+    Raises:
+        ModelError: T is no rigid transform, a name or a method is unknown, or more than six
+            joints are free.
+        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+    """
+    require_system(system)
+    p = np.array(system.parameter_values(parameters))
+    wanted = wanted_pose(system, T)
+    way = _chain_or_none(system, frame, locked)
+    wishes = _wishes(system, way, limits, seed)
+    if way is None:
+        return parallel(wishes, frame, wanted, p)
+    question = Question(way, Target(_arm(way, p), wanted), p, wishes)
+    found, used = solved(question, method)
+    return answer(question, found, used)
+
+
+def solved(question: Question, method: str) -> tuple[list[Root], str]:
+    """The solutions of a chain, and the method that gave them.
+
+    Args:
+        question: the chain and the pose.
+        method: as in `solve`.
+    """
+    way, target, p = question.chain, question.target, question.p
+    gathered = gather(way, target, method, p)
+    if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
+        gathered = further(way, target, gathered, p)
+    return roots(target, gathered, question.place), gathered.method
+
+
+def _chain_or_none(
+    system: System, frame: str | int | None, locked: Mapping[str, float] | None
+) -> Chain | None:
+    """The chain to the frame; None where a robot with loops has none that can stand alone."""
+    try:
+        return _chain(system, frame, locked)
+    except ModelError:
+        if locked or not system.is_closed:
+            raise
+        if frame is not None:
+            system.frame(frame)
+        return None
+
+
+def _chain(system: System, frame: str | int | None, locked: Mapping[str, float] | None) -> Chain:
+    """The chain to the frame, kept on the system."""
+    key = ("chain", repr(frame), repr(locked))
+    way: Chain = system.cached(key, lambda: chain(system, frame, locked))
+    return way
+
+
+def _arm(way: Chain, p: Array) -> Arm:
+    """The chain in numbers, kept on its system."""
+    key = ("arm", *key_of(way), p.tobytes())
+    arm: Arm = way.system.cached(key, lambda: way.arm(p))
+    return arm
+
+
+def _is_doubtful(target: Target, gathered: Gathered) -> bool:
+    """Whether a solution may be missing: none was found, or next to a singular posture."""
+    if gathered.doubtful or not len(gathered.q):
+        return True
+    return bool(np.min(target.singular_values(gathered.q)[:, -1]) < _NEARLY_SINGULAR)
+
+
+def _wishes(
+    system: System,
+    way: Chain | None,
+    limits: bool | Given | None,
+    seed: Mapping[str, float] | Sequence[float] | None,
+) -> Wishes:
+    near = np.array(system.position(seed))
+    names = [coordinate.name for coordinate in system.coordinates]
+    held = [] if way is None else [names.index(name) for name in way.locked]
+    if way is not None:
+        if seed is None:
+            near[list(way.places)] = 0.0
+        near[held] = list(way.locked.values())
+    turning = None if way is None or system.is_closed else way.places
+    coupled = [k for c in system.couplings for k in (c.driven, c.driver)]
+    limited = bounds(system, limits, set(turning or range(system.nq)) - {*held, *coupled})
+    strict = limits is not None and limits is not False
+    return Wishes(system, near, limited, strict, seed is not None)

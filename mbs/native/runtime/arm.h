@@ -1,0 +1,52 @@
+/* A serial arm of a few joints: its pose, its Jacobian, and the way to a wanted pose.
+ *
+ * Re-entrant: no globals and no allocation. Poses are 4x4, row by row, and their last rows are
+ * never looked at. Lengths are measured by a length of the arm wherever they meet angles.
+ */
+#ifndef MBS_ARM_H
+#define MBS_ARM_H
+
+#define ARM_JOINTS 7 /* at most */
+
+typedef struct {
+    int n;
+    const double *gaps;          /* (n + 1, 4, 4) constant ways before, between and after joints */
+    const unsigned char *slides; /* (n,) whether each slides along its z axis or turns about it */
+    double length;               /* of the arm's size [m] */
+} arm;
+
+/* A posture and what follows from it. */
+typedef struct {
+    double q[ARM_JOINTS];    /* rad or m */
+    double T[16];            /* its pose */
+    double J[ARM_JOINTS][6]; /* motion of the frame for each joint, [V / length; w], in the base;
+                                slides in arm lengths */
+    double gap[6];           /* way to the wanted pose, [translation / length; rotation vector] */
+    double cost;             /* |gap|^2 */
+} posture;
+
+void arm_pose(const arm *a, const double *q, double *T);
+
+/* From p->q, all the rest of p. */
+void arm_examine(const arm *a, const double *wanted, posture *p);
+
+/* max |T - wanted| [m and 1]. */
+double arm_residual(const double *wanted, const double *T);
+
+/* The same with lengths in arm lengths. */
+double arm_relative_residual(const arm *a, const double *wanted, const double *T);
+
+/* One joint in the unit of its column of the Jacobian. */
+double arm_unit(const arm *a, int joint);
+
+/* All angles into (-pi, pi]. */
+void arm_wrap(const arm *a, double *q);
+
+/* At most `steps` steps of Levenberg and Marquardt from p->q towards the wanted pose. They end
+ * where rounding, or a smallest distance greater than zero, lets them go no further. */
+void arm_descend(const arm *a, const double *wanted, posture *p, int steps);
+
+/* The solution beside q, or q itself where nothing better was found; gives its residual. */
+double arm_polish(const arm *a, const double *wanted, double *q, int steps);
+
+#endif

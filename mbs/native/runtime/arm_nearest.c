@@ -1,0 +1,129 @@
+#include "arm_search.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { STEPS = 60, KEPT = 8, REFINEMENTS = 60 };
+static const double NUDGE = 1e-5, FLAT = 1e-15, FINEST = 1e-31, ALIKE = 1e-14;
+
+typedef double matrix[ARM_JOINTS][ARM_JOINTS];
+
+/* Half the gradient of the cost; exact although J is the motion of the frame and not of the
+ * rotation vector, because that vector is the axis of its own turn. */
+static void slope(const arm *a, const posture *p, double *g) {
+    int j, k;
+    for (j = 0; j < a->n; j++) {
+        g[j] = 0.0;
+        for (k = 0; k < 6; k++) g[j] -= p->J[j][k] * p->gap[k];
+    }
+}
+
+static double norm(const double *v, int n) {
+    double sum = 0.0;
+    int i;
+    for (i = 0; i < n; i++) sum += v[i] * v[i];
+    return sqrt(sum);
+}
+
+/* Differences of the slope. */
+static void curvature(const arm *a, const double *wanted, const posture *p, matrix H) {
+    double ahead[ARM_JOINTS], behind[ARM_JOINTS];
+    posture near = *p;
+    int i, k;
+    for (k = 0; k < a->n; k++) {
+        near.q[k] = p->q[k] + NUDGE * arm_unit(a, k);
+        arm_examine(a, wanted, &near);
+        slope(a, &near, ahead);
+        near.q[k] = p->q[k] - NUDGE * arm_unit(a, k);
+        arm_examine(a, wanted, &near);
+        slope(a, &near, behind);
+        near.q[k] = p->q[k];
+        for (i = 0; i < a->n; i++) H[i][k] = (ahead[i] - behind[i]) / (2.0 * NUDGE);
+    }
+}
+
+/* -(H + shift)^-1 g by Cholesky. 1: not positive. */
+static int newton_step(const matrix H, int n, double shift, const double *g, double *dx) {
+    matrix L;
+    int i, j, k;
+    for (j = 0; j < n; j++) {
+        dx[j] = -g[j];
+        for (i = j; i < n; i++) {
+            double sum = 0.5 * (H[i][j] + H[j][i]) + (i == j ? shift : 0.0);
+            for (k = 0; k < j; k++) sum -= L[i][k] * L[j][k];
+            if (i == j && !(sum > 0.0)) return 1;
+            L[i][j] = i == j ? sqrt(sum) : sum / L[j][j];
+        }
+        for (k = 0; k < j; k++) dx[j] -= L[j][k] * dx[k];
+        dx[j] /= L[j][j];
+    }
+    for (j = n - 1; j >= 0; j--) {
+        for (k = j + 1; k < n; k++) dx[j] -= L[k][j] * dx[k];
+        dx[j] /= L[j][j];
+    }
+    return 0;
+}
+
+/* Near the bottom costs are alike but for rounding, and the slope tells more. */
+static int lower(double cost, double slope, double old_cost, double old_slope) {
+    return cost < old_cost * (1.0 - ALIKE) ||
+           (cost < old_cost * (1.0 + ALIKE) && slope < 0.5 * old_slope);
+}
+
+/* Newton's method to the bottom of the valley that p is in. */
+static void refine(const arm *a, const double *wanted, posture *p) {
+    double g[ARM_JOINTS], next_g[ARM_JOINTS], dx[ARM_JOINTS], shift = 1e-9;
+    int k, step, known = 0;
+    posture next;
+    matrix H;
+    slope(a, p, g);
+    for (step = 0; step < REFINEMENTS && p->cost > FINEST && norm(g, a->n) > FLAT; step++) {
+        if (!known) curvature(a, wanted, p, H);
+        known = 1;
+        if (shift > 1e6) return;
+        if (!newton_step((const double(*)[ARM_JOINTS])H, a->n, shift, g, dx)) {
+            for (k = 0; k < a->n; k++) next.q[k] = p->q[k] + arm_unit(a, k) * dx[k];
+            arm_examine(a, wanted, &next);
+            slope(a, &next, next_g);
+            if (lower(next.cost, norm(next_g, a->n), p->cost, norm(g, a->n))) {
+                *p = next;
+                memcpy(g, next_g, sizeof g);
+                shift = fmax(0.1 * shift, 1e-12);
+                known = 0;
+                continue;
+            }
+        }
+        shift = fmax(10.0 * shift, 1e-6);
+    }
+}
+
+/* Keeps the best ones apart, in the order of their costs. */
+static int keep(const posture *p, posture *best, int count) {
+    int i, place = 0;
+    while (place < count && best[place].cost <= p->cost) place++;
+    if (place > 0 && p->cost - best[place - 1].cost < 1e-6 * p->cost) return count;
+    if (place == KEPT) return count;
+    if (count < KEPT) count++;
+    for (i = count - 1; i > place; i--) best[i] = best[i - 1];
+    best[place] = *p;
+    return count;
+}
+
+double arm_nearest(const arm *a, const double *wanted, long long starts, unsigned long long seed,
+                   double *q) {
+    posture best[KEPT], p;
+    int count = 0, i, nearest = 0;
+    long long start;
+    for (start = 0; start < starts; start++) {
+        arm_start(a, wanted, seed, start, p.q);
+        arm_descend(a, wanted, &p, STEPS);
+        count = keep(&p, best, count);
+    }
+    for (i = 0; i < count; i++) {
+        refine(a, wanted, &best[i]);
+        if (best[i].cost < best[nearest].cost) nearest = i;
+    }
+    memcpy(q, best[nearest].q, (size_t)a->n * sizeof(double));
+    arm_wrap(a, q);
+    return best[nearest].cost;
+}

@@ -1,0 +1,39 @@
+/* All postures that reach a pose, and those that come nearest to one, from random starts.
+ *
+ * Re-entrant: no globals and no allocation. The starts depend on the seed alone.
+ */
+#ifndef MBS_ARM_SEARCH_H
+#define MBS_ARM_SEARCH_H
+
+#include "arm.h"
+
+typedef struct {
+    double *q;        /* (room, n) distinct postures */
+    double *residual; /* (room,) their relative residuals */
+    long long *hits;       /* (room,) how many postures were found to be this one */
+    long long count;
+} arm_postures;
+
+/* A posture to start from, the same for the same numbers: angles in (-pi, pi], slides as far as
+ * the arm and the wanted pose reach. */
+void arm_start(const arm *a, const double *wanted, unsigned long long seed, long long number,
+               double *q);
+
+/* Whether two solutions are one: closer than 1e-6, or closer than 1e-2 with a solution half way,
+ * to 1e-13 or as good as they are, as between copies of a multiple root. Angles that differ by
+ * whole turns are equal; slides are measured in arm lengths. */
+int arm_same(const arm *a, const double *wanted, const double *q, const double *other);
+
+/* Puts a solution among the others, the better of two that are one. */
+void arm_add(const arm *a, const double *wanted, const double *q, arm_postures *found);
+
+/* Solutions found from `starts` starts; there must be room for as many. */
+void arm_search(const arm *a, const double *wanted, long long starts, unsigned long long seed,
+                arm_postures *found);
+
+/* The posture whose pose is nearest, the gap's cost being the square of the distance; gives that
+ * cost. */
+double arm_nearest(const arm *a, const double *wanted, long long starts, unsigned long long seed,
+                   double *q);
+
+#endif

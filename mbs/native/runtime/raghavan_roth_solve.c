@@ -1,0 +1,109 @@
+#include <math.h>
+#include <string.h>
+
+#include "raghavan_roth.h"
+
+enum { STEPS = 60 };
+static const double PI = 3.14159265358979323846;
+static const double COARSE = 1e-3, FINE = 1e-6, FAR = 1e3, REACHED = 1e-12;
+
+typedef struct {
+    const roth_loop *loop;
+    double ways[6][16];
+    roth_matrix matrix;
+    double reach; /* [arm lengths] */
+    double *q;    /* (ROTH_POSTURES, 6) postures of the arm so far */
+    int count;
+} solution;
+
+/* From the joints of the loop to those of the arm. */
+static void add_posture(solution *s, const double *u) {
+    const roth_loop *r = s->loop;
+    double *q = s->q + 6 * s->count;
+    int k;
+    if (s->count == ROTH_POSTURES) return;
+    for (k = 0; k < 6; k++) {
+        double value = r->sign * (u[k] + r->offsets[k]);
+        if (r->slides[k] ? !(fabs(u[k]) < FAR * s->reach) : !(fabs(value) < HUGE_VAL)) return;
+        q[r->order[k]] = r->slides[k] ? value * r->length : remainder(value, 2.0 * PI);
+    }
+    s->count++;
+}
+
+/* The solutions at one angle of joint 3 that `count` of them share. */
+static void add_shared(solution *s, double u, int count) {
+    const roth_loop *r = s->loop;
+    double x[3][ROTH_SHARED], middle[3], postures[3][6];
+    int i, k, rows;
+    count = roth_middle(r, &s->matrix, u, count, x[1], x[2]);
+    for (i = 0; i < count; i++) {
+        x[0][i] = tan(0.5 * u);
+        for (k = 0; k < 3; k++) middle[k] = r->slides[2 + k] ? x[k][i] : 2.0 * atan(x[k][i]);
+        rows = roth_rest(r, (const double(*)[16])s->ways, middle, postures);
+        for (k = 0; k < rows; k++) add_posture(s, postures[k]);
+    }
+}
+
+/* Where a group of ascending angles ends whose neighbours are no farther apart than the gap. */
+static int group_end(const double *u, int start, int count, double gap) {
+    int end = start + 1;
+    while (end < count && u[end] - u[end - 1] <= gap) end++;
+    return end;
+}
+
+static double mean(const double *u, int start, int end) {
+    double sum = 0.0;
+    int i;
+    for (i = start; i < end; i++) sum += u[i] - u[start];
+    return u[start] + sum / (end - start);
+}
+
+/* Around the circle, from the widest gap on. */
+static void begin_after_gap(double *u, int count) {
+    double turned[ROTH_ROOTS], widest = u[0] + 2.0 * PI - u[count - 1];
+    int i, start = 0;
+    for (i = 1; i < count; i++) {
+        if (u[i] - u[i - 1] <= widest) continue;
+        widest = u[i] - u[i - 1];
+        start = i;
+    }
+    for (i = 0; i < count; i++)
+        turned[i] = u[(start + i) % count] + (start + i < count ? 0.0 : 2.0 * PI);
+    memcpy(u, turned, (size_t)count * sizeof(double));
+}
+
+int roth_candidates(const roth_loop *r, const double *T, double *q) {
+    double u[ROTH_ROOTS];
+    int start, end, first, last, count;
+    solution s;
+    s.loop = r;
+    s.q = q;
+    s.count = 0;
+    s.reach = 1.0 + sqrt(T[3] * T[3] + T[7] * T[7] + T[11] * T[11]) / r->length;
+    roth_ways(r, T, s.ways);
+    roth_eliminate(r, (const double(*)[16])s.ways, &s.matrix);
+    count = roth_roots(&s.matrix, u);
+    if (count) begin_after_gap(u, count);
+    for (start = 0; start < count; start = end) {
+        end = group_end(u, start, count, COARSE);
+        add_shared(&s, mean(u, start, end), end - start);
+        last = group_end(u, start, end, FINE);
+        if (last == end) continue;
+        for (first = start; first < end; first = last) {
+            last = group_end(u, first, end, FINE);
+            add_shared(&s, mean(u, first, last), last - first);
+        }
+    }
+    return s.count;
+}
+
+void roth_solve(const arm *a, const roth_loop *r, const double *T, arm_postures *found) {
+    double q[ROTH_POSTURES * 6], pose[16];
+    int i, count = roth_candidates(r, T, q);
+    found->count = 0;
+    for (i = 0; i < count; i++) {
+        arm_polish(a, T, q + 6 * i, STEPS);
+        arm_pose(a, q + 6 * i, pose);
+        if (arm_relative_residual(a, T, pose) < REACHED) arm_add(a, T, q + 6 * i, found);
+    }
+}

@@ -1,0 +1,246 @@
+"""Whole postures of trees and closed robots: the one that made the pose is among them."""
+
+import numpy as np
+import pytest
+from support.closed_mechanisms import closed_chain
+from support.postures import same
+
+import mbs
+from mbs.components import Body, Mechanism, Revolute, Spherical
+from mbs.loops.closed_form.known import completed
+from mbs.loops.closing import Closing
+from mbs.loops.multi_start import closed_postures
+from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.closed_robot import close, posed, why_searched
+from mbs.models.inverse_geometry.search import search
+
+NONE = np.zeros(0)
+FRAMES = {"sr400": 6, "akr3000": 10, "five_bar": "tool", "differential_wrist": "tool"}
+AWAY = {"sr400": 0.5, "akr3000": 0.03, "five_bar": 0.3, "differential_wrist": 0.5}
+
+
+@pytest.fixture(scope="module")
+def systems():
+    return {n: mbs.load(n).assemble() for n in (*FRAMES, "delta", "stewart_platform")}
+
+
+def drawn(system, away, seed):
+    """A closed posture whose independent joints stand elsewhere."""
+    rng = np.random.default_rng(seed)
+    held = completed(system, ()).held
+    q = np.array(system.posture)
+    q[list(held)] += rng.uniform(-away, away, len(held))
+    closed = Closing(system, NONE, held).nearest(q)
+    assert closed.is_closed
+    return closed.q
+
+
+def pose(system, frame, q):
+    return np.array(mbs.models.transform(system, frame)(q))
+
+
+def solutions(system, frame, T):
+    way = chain(system, frame)
+    return close(system, way, search(way.arm(NONE), T), NONE)
+
+
+def assert_solved(system, frame, T, found):
+    closure = mbs.loops.closure(system)
+    for posture in found:
+        assert np.abs(np.array(closure(posture.q))).max(initial=0.0) < 1e-12
+        assert posture.residual < 1e-12
+        np.testing.assert_allclose(pose(system, frame, posture.q), T, atol=1e-12)
+    for k, one in enumerate(found):
+        assert not any(same(system, one.q, other.q, 1e-6) for other in found[:k])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", FRAMES)
+def test_the_posture_that_made_the_pose_is_found(systems, name, seed):
+    system, frame = systems[name], FRAMES[name]
+    q = drawn(system, AWAY[name], seed)
+    T = pose(system, frame, q)
+    found = solutions(system, frame, T)
+    assert_solved(system, frame, T, found)
+    assert any(same(system, posture.q, q, 1e-7) for posture in found)
+    assert why_searched(system, chain(system, frame)) is None
+
+
+@pytest.mark.parametrize("way", ["parallel", "crossed"])
+@pytest.mark.parametrize("seed", range(5))
+def test_both_assemblies_of_the_sr400(systems, way, seed):
+    """The motors far from the assembled posture, the loop a parallelogram or crossed."""
+    system = systems["sr400"]
+    rng = np.random.default_rng(seed)
+    names = [system.speeds[k].name for k in system.free]
+    motors = dict(zip(names, rng.uniform(-2.5, 2.5, 6), strict=True))
+    q = mbs.loops.solve(system, motors, branch=f"q9:{way}")
+    T = pose(system, 6, q)
+    found = solutions(system, 6, T)
+    assert_solved(system, 6, T, found)
+    assert any(same(system, posture.q, q, 1e-7) for posture in found)
+    labels = [posture.label for posture in found]
+    assert labels.count("q8:parallel") == labels.count("q8:crossed") == len(found) / 2
+
+
+@pytest.mark.parametrize(("name", "count"), [("sr400", 16), ("akr3000", 32)])
+def test_as_many_as_a_search_in_all_joints_finds(systems, name, count):
+    system, frame = systems[name], FRAMES[name]
+    q = drawn(system, AWAY[name], 7)
+    T = pose(system, frame, q)
+    found = solutions(system, frame, T)
+    modes = mbs.loops.working_modes(system, frame, T, tries=150)
+    assert len(found) == count >= len(modes) >= count * 0.7
+    for mode in modes:
+        assert any(same(system, posture.q, mode.q, 1e-6) for posture in found)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_delta_has_eight_postures(systems, seed):
+    system = systems["delta"]
+    q = drawn(system, 0.3, seed)
+    T = pose(system, "tool", q)
+    found = posed(system, "tool", T, NONE)
+    assert_solved(system, "tool", T, found)
+    assert why_searched(system, "tool") is None
+    assert len(found) == len(mbs.loops.working_modes(system, "tool", T, tries=100)) == 8
+    assert len({posture.label for posture in found}) == 8
+    assert any(same(system, posture.q, q, 1e-7) for posture in found)
+    T[:3, :3] = T[:3, :3] @ np.diag([-1, -1, 1])
+    assert posed(system, "tool", T, NONE) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_arm_with_a_ball_for_a_wrist(seed):
+    m = Mechanism("ball_wrist")
+    a, b, c, d = (m.add(Body(n, mass=1, inertia=(0.1, 0.1, 0.1))) for n in "abcd")
+    m.connect(m.world, Revolute("j1", axis="z"), a)
+    m.connect(a.at(0.02, 0, 0.3), Revolute("j2", axis="y"), b)
+    m.connect(b.at(0.5), Revolute("j3", axis="y"), c)
+    m.connect(c.at(0.4, 0.05), Spherical("wrist"), d)
+    m.add_frame("tool", d.at(0.1))
+    system = m.assemble()
+    q = np.random.default_rng(seed).uniform(-1.2, 1.2, system.nq)
+    q[3:] /= np.linalg.norm(q[3:])
+    T = pose(system, "tool", q)
+    found = posed(system, "tool", T, NONE)
+    assert_solved(system, "tool", T, found)
+    modes = mbs.loops.working_modes(system, "tool", T, tries=100)
+    assert len(found) == len(modes)
+    assert any(same(system, posture.q, q, 1e-8) for posture in found)
+
+
+def test_stewart_platform_has_four_ways_for_every_leg(systems):
+    """Each leg forwards or backwards, its universal joint turned round or not; nearest first."""
+    system = systems["stewart_platform"]
+    q = drawn(system, 0.05, 1)
+    T = pose(system, "centre", q)
+    found = posed(system, "centre", T, NONE, q)
+    assert len(found) == 4**6
+    assert same(system, found[0].q, q, 1e-9)
+    assert max(posture.residual for posture in found) < 1e-12
+    assert_solved(system, "centre", T, found[:6])
+
+
+def test_a_tree_keeps_the_other_arm_where_it_is():
+    system = mbs.load("two_branch_tree").assemble()
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-1, 1, 7)
+    for frame, other in ((4, [4, 5, 6]), (7, [1, 2, 3])):
+        T = pose(system, frame, q)
+        way = chain(system, frame)
+        postures = search(way.arm(NONE), T)
+        found = close(system, way, postures, NONE, q)
+        assert len(found) == len(postures) >= 1
+        assert any(same(system, posture.q, q, 1e-9) for posture in found)
+        for posture in found:
+            np.testing.assert_array_equal(posture.q[other], q[other])
+            np.testing.assert_allclose(pose(system, frame, posture.q), T, atol=1e-12)
+        at_rest = close(system, way, postures, NONE)
+        np.testing.assert_array_equal(at_rest[0].q[other], np.array(system.posture)[other])
+
+
+def test_joints_that_nothing_determines_stay(systems):
+    system = systems["five_bar"]
+    q = drawn(system, 0.3, 2)
+    way = chain(system, "link1")
+    found = close(system, way, q[[0]], NONE, q)
+    assert len(found) == 2
+    assert all(posture.q[0] == q[0] and posture.q[2] == q[2] for posture in found)
+    assert any(same(system, posture.q, q, 1e-9) for posture in found)
+
+
+def test_locked_joints_are_known():
+    system = mbs.load("sr400").assemble()
+    q = drawn(system, 0.4, 4)
+    way = chain(system, 6, {"q4": float(q[3])})
+    found = close(system, way, q[[0, 1, 2, 4, 5]], NONE)
+    assert len(found) == 2
+    assert any(same(system, posture.q, q, 1e-9) for posture in found)
+
+
+def test_a_posture_of_the_chain_that_leaves_the_loop_open(systems):
+    assert close(systems["five_bar"], chain(systems["five_bar"], "tool"), [[3.0, 0.0]], NONE) == []
+    nothing = np.zeros((0, 2))
+    assert close(systems["five_bar"], chain(systems["five_bar"], "tool"), nothing, NONE) == []
+
+
+def test_chain_joints_that_depend_on_each_other():
+    """A point of the coupler of a four-bar: its two joints fit the loop, or there is no posture."""
+    system = mbs.load("four_bar").assemble()
+    q = drawn(system, 0.3, 1)
+    frame = next(k + 1 for k in range(len(system.tree.links)) if len(system.tree.path(k)) == 2)
+    way = chain(system, frame)
+    found = solutions(system, frame, pose(system, frame, q))
+    assert [same(system, posture.q, q, 1e-8) for posture in found] == [True]
+    assert close(system, way, q[list(way.places)] + 0.1, NONE) == []
+
+
+@pytest.mark.parametrize(("closing", "seed"), [("spherical", 1), ("spherical", 2), ("revolute", 1)])
+def test_spatial_loops_without_closed_form_are_searched(seed, closing):
+    mechanism, guess = closed_chain(seed, closing)
+    system = mechanism.assemble(guess=guess)
+    frame = "body2"
+    way = chain(system, frame)
+    q = drawn(system, 0.1, seed)
+    T = pose(system, frame, q)
+    found = solutions(system, frame, T)
+    assert_solved(system, frame, T, found[:8])
+    reason = why_searched(system, way)
+    if reason is not None:
+        assert "no closed form known here" in reason
+    held = completed(system, way.places).held
+    rest = close(system, way, q[list(way.places)], NONE, q)
+    assert any(same(system, posture.q, q, 1e-6) for posture in rest)
+    for posture in rest:
+        np.testing.assert_allclose(posture.q[list(held)], q[list(held)], atol=1e-12)
+
+
+def test_search_with_positions_held_finds_what_closed_forms_find(systems):
+    system = systems["akr3000"]
+    q = drawn(system, 0.03, 3)
+    places = chain(system, 10).places
+    found = closed_postures(Closing(system, NONE, places), q)
+    exact = close(system, chain(system, 10), q[list(places)], NONE)
+    assert len(found) == len(exact) == 4
+    for posture in exact:
+        assert any(same(system, posture.q, other, 1e-7) for other in found)
+
+
+def test_a_ball_that_turns_freely_stays():
+    m = Mechanism("loose")
+    a, b, c, d = (m.add(Body(n, mass=1, inertia=(0.1, 0.1, 0.1))) for n in "abcd")
+    m.connect(m.world, Revolute("j1", actuated=True), a)
+    m.connect(a.at(0.5), Revolute("j2"), b)
+    m.connect(m.world.at(1), Revolute("j3"), d)
+    m.connect(d.at(0.6), Revolute("j4"), b.at(0.9))
+    m.connect(b.at(0.3), Spherical("loose", actuated=False), c)
+    system = m.assemble(guess={"j1": 1.2, "j2": -1.0, "j3": 1.5})
+    places = [k for k, c in enumerate(system.coordinates) if c.name.startswith("loose")]
+    seed = np.array(system.posture)
+    seed[places] = [0.5, -0.5, 0.5, 0.5]
+    found = close(system, chain(system, "a"), [[1.1]], NONE, seed)
+    assert len(found) == 2
+    for posture in found:
+        np.testing.assert_array_equal(posture.q[places], seed[places])
+        assert posture.q[0] == 1.1

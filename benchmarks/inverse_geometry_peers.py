@@ -51,7 +51,7 @@ class Eaik:
             raise Refused("prismatic joints")
         self._size = len(arm.slides)
         self._robot = HomogeneousRobot(_at_zero(arm))
-        if not self._robot.hasKnownDecomposition():
+        if "Unknown" in self._robot.getKinematicFamily():
             raise Refused("unknown class")
 
     def solve(self, T: Array) -> tuple[Array, Array]:

@@ -49,8 +49,8 @@ def sequence_of(
     numbers = None if p is None else np.asarray(p, dtype=float).tobytes()
     key = ("steps", method, *key_of(chain), numbers)
     solved = chain.system.cached(key, lambda: _solved(chain, method, p))
-    if isinstance(solved, NoClosedForm):
-        raise solved
+    if isinstance(solved, str):
+        raise NoClosedForm(solved)
     steps: Sequence = solved
     return steps
 
@@ -65,7 +65,7 @@ def given_of(way: Chain, T: SX) -> SX:
     return SX(casadi.vertcat(way.system.p, casadi.vec(T[:3, :])))
 
 
-def _solved(chain: Chain, method: str, p: NDArray[np.float64] | None) -> Sequence | NoClosedForm:
+def _solved(chain: Chain, method: str, p: NDArray[np.float64] | None) -> Sequence | str:
     """The cheapest sequence of the methods that are asked for, or why there is none.
 
     A wrist leaves no method fewer branches than Pieper's; Paul's, which takes longer to find its
@@ -83,7 +83,7 @@ def _solved(chain: Chain, method: str, p: NDArray[np.float64] | None) -> Sequenc
             break
     if found:
         return found[0] if len(found) == 1 else min(found, key=lambda s: _price(s, problem))
-    return NoClosedForm(
+    return (
         f"{chain.system.name}: no closed form gives {', '.join(chain.names)} from the pose of"
         f" frame {chain.frame!r} ({'; '.join(reasons)}); use"
         " mbs.models.inverse_geometry.solve, which needs none"

@@ -39,9 +39,9 @@ class ManySolutions:
         q: (N, branches, nq) postures [rad or m]; where there is no solution any finite numbers.
         valid: (N, branches) whether there is a solution.
         residual: (N, branches) largest difference of an element between the pose of q and the
-            wanted one, in m and 1.
+            wanted one, in m and 1; infinite where a column is not used.
         labels: of the branches; empty texts where no closed form tells them apart.
-        searched: (N,) whether a search gave the solutions: its postures stand in the columns of
+        searched: (N,) whether the pose was solved by itself: its postures stand in the columns of
             the nearest branches.
     """
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.arms import general_6r, three_parallel
+from support.arms import general_6r
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
@@ -32,6 +32,7 @@ def test_paul_is_taken_where_no_axes_meet():
 
 def test_numbers_take_the_place_of_parameters():
     rows = [{"antecedent": 0, "joint": "revolute"}, {"antecedent": 1, "joint": "revolute"}]
+    rows[1]["d"] = 0.3
     rows += [{"antecedent": 2, "joint": "revolute", "d": "L"}]
     rows += [{"antecedent": 3, "joint": "prismatic", "d": 0.5}]
     way = chain(mbs.load({"name": "l", "parameters": {"L": 0.4}, "frame": rows}).assemble())
@@ -41,14 +42,9 @@ def test_numbers_take_the_place_of_parameters():
 
 
 def test_refusals_name_the_reasons():
-    for system in (general_6r(1), three_parallel(1, 0)):
-        way = chain(system)
-        try:
+    way = chain(general_6r(1))
+    for _ in range(2):
+        with pytest.raises(NoClosedForm, match=r"pieper: .*; paul: .*inverse_geometry\.solve"):
             sequence_of(way)
-        except NoClosedForm as error:
-            assert "pieper: " in str(error)
-            assert "paul: " in str(error)
-            with pytest.raises(NoClosedForm):
-                sequence_of(way)
     with pytest.raises(ModelError, match=r"method is 'peiper'.*did you mean 'pieper'"):
         sequence_of(way, "peiper")

@@ -1,0 +1,63 @@
+"""Where solutions come from."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mbs
+from mbs.errors import ModelError, NoClosedForm
+from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.gathering import further, gather
+from mbs.models.inverse_geometry.target import Target
+
+NONE = np.zeros(0)
+
+
+@cache
+def way(name):
+    return chain(mbs.load(name).assemble())
+
+
+def target(name, q):
+    arm = way(name).arm(NONE)
+    return Target(arm, arm.pose(np.array(q)))
+
+
+REGULAR = [0.3, -0.5, 0.7, 0.4, 0.9, 0.2]
+
+
+def test_leaves_carry_their_signs():
+    found = gather(way("puma560"), target("puma560", REGULAR), "auto", NONE)
+    assert found.method == "pieper"
+    assert not found.doubtful
+    assert len(found.q) == len(set(found.labels)) == 8
+    assert np.max(target("puma560", REGULAR).residual(found.q)) < 1e-14
+
+
+def test_a_degenerate_pose_is_doubtful():
+    aim = target("puma560", [0.3, -0.5, 0.7, 0.4, 0.0, 0.2])
+    found = gather(way("puma560"), aim, "pieper", NONE)
+    assert found.doubtful
+    more = further(way("puma560"), aim, found, NONE)
+    assert len(more.q) > len(found.q)
+    assert more.labels[: len(found.labels)] == found.labels
+    assert np.max(aim.residual(more.q)) < aim.tolerance
+
+
+def test_each_method_says_its_name():
+    aim = target("puma560", REGULAR)
+    for method in ("general", "search"):
+        found = gather(way("puma560"), aim, method, NONE)
+        assert (found.method, len(found.q)) == (method, 8)
+        assert set(found.labels) == {""}
+
+
+def test_what_does_not_fit_is_refused():
+    aim = target("scara", [0.3, 0.5, 0.2, -0.1])
+    with pytest.raises(NoClosedForm):
+        gather(way("scara"), aim, "pieper", NONE)
+    with pytest.raises(ModelError, match="it is for six joints"):
+        gather(way("scara"), aim, "general", NONE)
+    with pytest.raises(ModelError, match="which solves no pose"):
+        gather(way("scara"), aim, "newton", NONE)

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from support.plain_arms import apart, manseur_doty, puma
 
-from mbs.models.inverse_geometry import core
-from mbs.models.inverse_geometry.general import general, general_of
-from mbs.models.inverse_geometry.merge import merged
-from mbs.models.inverse_geometry.nearest import nearest
-from mbs.models.inverse_geometry.polish import polish
-from mbs.models.inverse_geometry.search import search
+from mbs.models.inverse_geometry.numeric import core
+from mbs.models.inverse_geometry.numeric.general import general, general_of
+from mbs.models.inverse_geometry.numeric.merge import merged
+from mbs.models.inverse_geometry.numeric.nearest import nearest
+from mbs.models.inverse_geometry.numeric.polish import polish
+from mbs.models.inverse_geometry.numeric.search import search
 from mbs.native import compiler_found
 
 

@@ -8,8 +8,8 @@ import pytest
 
 import mbs
 from mbs.models.inverse_geometry import solve
+from mbs.models.inverse_geometry.answers.labels import Anatomy, anatomy, labels
 from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.labels import Anatomy, anatomy, labels
 
 
 @cache

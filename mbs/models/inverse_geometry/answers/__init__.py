@@ -1,0 +1,1 @@
+"""From postures to answers: distinct roots, self-motions, branches, limits, reasons."""

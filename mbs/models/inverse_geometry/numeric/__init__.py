@@ -1,0 +1,1 @@
+"""Postures in numbers, compiled: polished, searched, by the general method, nearest."""

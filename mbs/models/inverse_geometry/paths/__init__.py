@@ -1,0 +1,1 @@
+"""Paths followed on one branch."""

@@ -173,8 +173,10 @@ class Result:
                 events = tuple((t, name, words) for t, name, words in rest["events"])
                 time, values = archive["time"], archive["values"]
                 return cls(time, values, rest["units"], rest["name"], events=events)
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-            raise ModelError(f"{path} is no saved result ({error})") from error
+        except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
+            raise ModelError(
+                f"{path} is no saved result ({error}); give a file that Result.save wrote"
+            ) from error
 
     def to_pandas(self) -> Any:
         """The signals as a pandas DataFrame indexed by time; units in `.attrs["units"]`."""

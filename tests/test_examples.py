@@ -36,6 +36,11 @@ SMALL = {
         "Function igm(T, branch) - q": 1e-9,
         "Largest residual on the line": 1e-12,
     },
+    "04_identification": {
+        "Largest error of a parameter": 0.05,
+        "Residual on the same motion": 0.6,
+        "Residual on the other motion": 0.6,
+    },
 }
 """What each example prints, and how large it may be."""
 
@@ -43,6 +48,7 @@ FILES = {
     "01_four_bar": ["four_bar.png", "four_bar.fmu", "motion.csv", "models/models.c", "example"],
     "02_puma560": ["puma560.png", "puma560.fmu", "fall.csv", "models/models.h"],
     "03_inverse_geometry": ["postures.png", "igm.c", "equations.txt"],
+    "04_identification": ["identification.png", "motion.csv"],
 }
 
 

@@ -11,7 +11,7 @@ import pytest
 import mbs
 import mbs.errors
 
-HEAVY = ("sympy", "fmpy", "mujoco", "matplotlib", "rich", "typer", "pandas", "xarray")
+HEAVY = ("sympy", "scipy", "fmpy", "mujoco", "matplotlib", "rich", "typer", "pandas", "xarray")
 
 
 def _modules_after(statement: str) -> list[str]:

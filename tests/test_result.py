@@ -174,6 +174,8 @@ def test_a_saved_result_reads_back_bit_for_bit(result, tmp_path):
 
 def test_a_file_that_is_no_saved_result(tmp_path):
     (tmp_path / "x.npz").write_text("no archive")
-    for name in ("x.npz", "absent.npz"):
+    (tmp_path / "empty.npz").touch()
+    np.save(tmp_path / "one.npy", np.zeros(3))
+    for name in ("x.npz", "absent.npz", "empty.npz", "one.npy"):
         with pytest.raises(ModelError, match="is no saved result"):
             Result.load(tmp_path / name)

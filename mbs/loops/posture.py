@@ -8,7 +8,9 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.assembly.rates import quaternion_slices
 from mbs.errors import LoopError, ModelError, Unclosable
+from mbs.loops.alike import difference
 from mbs.loops.closing import OPEN, Closed, Closing, Vector, closure_parameters
 from mbs.loops.continuation import followed_posture
 from mbs.loops.function import posture_on
@@ -18,6 +20,10 @@ from mbs.messages import quoted
 _RESTARTS = 60
 _SEED = 20260101
 _LARGEST_ANGLE = np.pi
+_GUESSES = 16
+_NEAR = 0.3
+"""Distance from a guess [rad or m] within which the first posture found is taken."""
+_CLOSED = 1e-10
 
 
 def solve(
@@ -71,8 +77,43 @@ def solve(
     if not system.is_closed:
         return target
     if guess:
-        return closed_posture(Closing(system, p, held), target)
+        named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
+        return _guessed_posture(Closing(system, p, held), target, named)
     return followed_posture(system, target, held, p)
+
+
+def _guessed_posture(closing: Closing, start: Vector, named: list[int]) -> Vector:
+    """The posture whose named positions are nearest to those of `start`, (nq,).
+
+    Newton's method may land far from its start: unless it stays near, starts that differ in the
+    positions that nobody named are tried as well, and the nearest answer is taken.
+    """
+    rng = np.random.default_rng(_SEED)
+    others = [k for k in closing.free if k not in named]
+    found: list[tuple[float, Vector]] = []
+    for _ in range(_GUESSES):
+        trial = start.copy()
+        if found:
+            trial[others] += rng.uniform(-_LARGEST_ANGLE, _LARGEST_ANGLE, len(others))
+        closed = closing.nearest(trial)
+        if not closed.is_closed and found:
+            continue
+        q = _unwound(closing, closed.q, start) if closed.is_closed else None
+        q = closed_posture(closing, start) if q is None else q
+        far = float(np.max(np.abs(q[named] - start[named]), initial=0.0))
+        found.append((far, q))
+        if far < _NEAR:
+            break
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def _unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
+    """The posture with angles within half a turn of the start, where that closes the loops too."""
+    near: Vector = start + difference(closing.system, q, start)
+    for part in quaternion_slices(closing.system.tree):
+        near[part] = q[part]
+    near[list(closing.held)] = q[list(closing.held)]
+    return near if float(np.max(np.abs(closing.rows(near)[0]), initial=0.0)) < _CLOSED else q
 
 
 def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:

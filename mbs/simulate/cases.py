@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mbs.errors import ModelError
+from mbs.errors import ExportError, ModelError
 from mbs.files import path_of, write_text
 from mbs.messages import quoted
 
@@ -26,7 +26,7 @@ def cases_of(grid: Grid) -> tuple[Case, ...]:
         ModelError: there is no case, or a value is no number.
     """
     listed = list(_combinations(grid)) if isinstance(grid, Mapping) else [dict(c) for c in grid]
-    if not listed:
+    if not grid or not listed:
         raise ModelError("sweep: the grid has no case; give at least one value for every name")
     return tuple({str(name): _number(name, x) for name, x in case.items()} for case in listed)
 
@@ -65,22 +65,22 @@ class Folder:
             study: what is studied, as JSON knows it.
 
         Raises:
-            ModelError: it holds another study.
+            ModelError: it holds another study, or results of an unknown one.
             ExportError: it cannot be written.
         """
-        folder = path_of(path)
-        index = folder / "study.json"
+        folder = Folder(_made(path_of(path)))
+        index = folder.path / "study.json"
         text = json.dumps(study, indent=1, sort_keys=True) + "\n"
-        if index.exists():
-            if index.read_text(encoding="utf-8") != text:
-                raise ModelError(
-                    f"sweep: folder {folder} holds another study; choose another folder, or delete"
-                    " it"
-                )
-            return Folder(folder)
-        folder.mkdir(parents=True, exist_ok=True)
+        known = index.read_bytes() if index.exists() else None
+        if known == text.encode():
+            return folder
+        if known is not None or any(folder.path.glob("case_*.npz")):
+            raise ModelError(
+                f"sweep: folder {folder.path} holds another study; choose another folder, or delete"
+                " it"
+            )
         write_text(text, index)
-        return Folder(folder)
+        return folder
 
     def file(self, number: int) -> Path:
         """The file of a case."""
@@ -89,3 +89,13 @@ class Folder:
     def missing(self, count: int) -> list[int]:
         """The numbers of the cases, of so many, that have no result yet."""
         return [number for number in range(count) if not self.file(number).exists()]
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(
+            f"folder {folder} cannot be made ({error.strerror}); choose another one"
+        ) from error
+    return folder

@@ -206,7 +206,7 @@ def _simulated(
 
 def _run(simulate: Callable[..., Any], folder: str, options: dict[str, Any]) -> Any:
     description = options["model_description"]
-    if description.fmiVersion != "2.0":
+    if description.fmiVersion[0] not in "23":
         return simulate(folder, **options)
     with instance(description, folder, options["fmi_type"]) as fmu:
         return simulate(folder, fmu_instance=fmu, **options)

@@ -39,25 +39,34 @@ def heard(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def instance(description: Any, folder: str, kind: str) -> Iterator[Any]:
-    """An instance of an FMI 2.0 FMU whose messages are heard; it is freed at the end.
+    """An instance of an FMU of FMI 2.0 or 3.0 whose messages are heard; it is freed at the end.
 
     Args:
         description: its model description.
         folder: where it was unpacked.
         kind: "CoSimulation" or "ModelExchange".
     """
-    from fmpy import fmi2
+    from fmpy import fmi2, fmi3
 
-    interface = description.coSimulation if kind == "CoSimulation" else description.modelExchange
-    made = fmi2.FMU2Slave if kind == "CoSimulation" else fmi2.FMU2Model
-    fmu = made(
+    stepped, newer = kind == "CoSimulation", description.fmiVersion.startswith("3")
+    interface = description.coSimulation if stepped else description.modelExchange
+    kinds = {
+        ("2", True): fmi2.FMU2Slave,
+        ("2", False): fmi2.FMU2Model,
+        ("3", True): fmi3.FMU3Slave,
+        ("3", False): fmi3.FMU3Model,
+    }
+    fmu = kinds[description.fmiVersion[0], stepped](
         guid=description.guid,
         modelIdentifier=interface.modelIdentifier,
         unzipDirectory=folder,
         instanceName=description.modelName,
     )
     says_why = description.generationTool == "mbs"  # others, asked to log, say everything
-    fmu.instantiate(callbacks=_callbacks(), loggingOn=says_why)
+    if newer:
+        fmu.instantiate(loggingOn=says_why, logMessage=_log_newer)
+    else:
+        fmu.instantiate(callbacks=_callbacks(), loggingOn=says_why)
     try:
         yield fmu
     finally:
@@ -85,5 +94,16 @@ def _log(environment: Any, name: bytes, status: int, category: bytes, message: b
     listener = _LISTENERS.get(threading.get_ident())
     if listener is None:
         fmi2.printLogMessage(environment, name, status, category, message)
+    else:
+        listener(status, message.decode("utf-8", "replace"))
+
+
+def _log_newer(environment: Any, status: int, category: bytes, message: bytes) -> None:
+    """The same in FMI 3.0, which needs no proxy."""
+    from fmpy import fmi3
+
+    listener = _LISTENERS.get(threading.get_ident())
+    if listener is None:
+        fmi3.printLogMessage(environment, status, category, message)
     else:
         listener(status, message.decode("utf-8", "replace"))

@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,13 @@ from typing import Any
 
 from mbs.assembly import System
 from mbs.errors import MbsError, ModelError
-from mbs.messages import quoted
+from mbs.messages import did_you_mean, quoted
 from mbs.result import Result
 from mbs.simulate.cases import Case, Folder, Grid, cases_of
 from mbs.simulate.fmu import fmu
 from mbs.simulate.progress import progress
 from mbs.simulate.run import run
+from mbs.simulate.study import study_of
 
 _START = {".q": "q0", ".v": "v0", ".tau": "tau"}
 
@@ -54,8 +55,8 @@ class Sweep:
         Raises:
             ModelError: it failed, or there is no such case.
         """
-        if not 0 <= number < len(self.cases):
-            raise ModelError(f"sweep: there is no case {number}; they are 0 to {len(self) - 1}")
+        if not isinstance(number, int) or not 0 <= number < len(self.cases):
+            raise ModelError(f"sweep: there is no case {number!r}; they are 0 to {len(self) - 1}")
         if number in self.failures:
             raise ModelError(f"sweep: case {number} failed: {self.failures[number]}")
         return Result.load(self.folder.file(number))
@@ -74,7 +75,9 @@ def sweep(
     """Simulate a mechanism or an FMU for every case of a grid.
 
     Each result is written as soon as it is there. A study that was interrupted goes on where it
-    stopped when it is started again with the same folder; cases that failed are tried again.
+    stopped when it is started again with the same folder; cases that failed are tried again. It is
+    the same study when the cases, the options and the content of the model are the same; functions
+    among the options are told apart by their names alone.
 
     Args:
         model: a system, simulated by `run`; or the path of an FMU, simulated by `fmu`.
@@ -93,20 +96,35 @@ def sweep(
         the cases and their results.
 
     Raises:
-        ModelError: the grid is empty, the folder holds another study, or the model cannot be sent
-            to other processes.
+        ModelError: the grid is empty, a name in it is unknown to the system, the folder holds
+            another study, there is no such FMU, a system has no duration, or the model cannot be
+            sent to other processes.
+        ExportError: the folder cannot be written.
     """
     cases = cases_of(grid)
     if duration is not None:
         options["duration"] = duration
+    elif isinstance(model, System):
+        raise ModelError(
+            f"sweep: {model.name} is a system and has no duration; give one in seconds"
+        )
+    if not isinstance(executor, Executor | None):
+        raise ModelError(
+            f"sweep: executor is {quoted(executor)}; give one of concurrent.futures, such as"
+            " ThreadPoolExecutor(2)"
+        )
+    if isinstance(model, System):
+        _require_names(model, cases)
+        if executor is not None:
+            _require_threads(executor)
+    study = study_of(model, cases, options)
     kept = tempfile.mkdtemp(prefix="mbs-sweep-") if folder is None else folder
-    name = model.name if isinstance(model, System) else os.fspath(model)
-    study = {"model": name, "cases": list(cases), "options": _told(options)}
     place = Folder.opened(kept, study)
     if folder is None:
         weakref.finalize(place, shutil.rmtree, kept, ignore_errors=True)
     tasks = {k: _Task(model, cases[k], options, place.file(k)) for k in place.missing(len(cases))}
-    with progress(f"{len(tasks)} simulations of {name}", 0.0, len(tasks), quiet=quiet) as reached:
+    label = f"{len(tasks)} simulations of {study['model']}"
+    with progress(label, 0.0, len(tasks), quiet=quiet) as reached:
         answers = _in_turn(tasks) if executor is None else _spread(tasks, executor)
         failures: dict[int, str] = {}
         for done, (number, complaint) in enumerate(answers, start=1):
@@ -137,11 +155,34 @@ class _Task:
 
 def _run(task: _Task) -> Result:
     assert isinstance(task.model, System)
-    given: dict[str, Any] = {}
-    for name, value in task.case.items():
-        ending = next((e for e in _START if name.endswith(e)), "")
-        given.setdefault(_START.get(ending, "parameters"), {})[name.removesuffix(ending)] = value
+    given = _arguments(task.model, task.case)
     return run(task.model, quiet=True, **_merged(task.options, given))
+
+
+def _arguments(system: System, case: Case) -> dict[str, dict[str, float]]:
+    """The arguments of `run` that the names of a case belong to."""
+    given: dict[str, dict[str, float]] = {}
+    for name, value in case.items():
+        known = name in system.symbol_table
+        ending = "" if known else next((e for e in _START if name.endswith(e)), "")
+        given.setdefault(_START.get(ending, "parameters"), {})[name.removesuffix(ending)] = value
+    return given
+
+
+def _require_names(system: System, cases: Sequence[Case]) -> None:
+    """Refuse a name that the system does not have, before anything is simulated.
+
+    Raises:
+        ModelError: says which one, and what there is.
+    """
+    coordinates = [c.name for c in system.coordinates], [s.name for s in system.speeds]
+    known = {*system.symbol_table, *(f"{name}.q" for name in coordinates[0])}
+    known |= {f"{name}{ending}" for name in coordinates[1] for ending in (".v", ".tau")}
+    for name in dict.fromkeys(name for case in cases for name in case):
+        if name not in known:
+            raise ModelError(
+                f"sweep: {system.name} has no {name!r} to vary; {did_you_mean(name, sorted(known))}"
+            )
 
 
 def _fmu(task: _Task) -> Result:
@@ -160,12 +201,13 @@ def _merged(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, A
     """Options of all cases, with the values of one."""
     merged = dict(options)
     for argument, values in given.items():
-        if not isinstance(merged.get(argument) or {}, Mapping):
+        common = {} if merged.get(argument) is None else merged[argument]
+        if not isinstance(common, Mapping):
             raise ModelError(
-                f"sweep: {argument} is {quoted(merged[argument])} and the grid has"
+                f"sweep: {argument} is {quoted(common)} and the grid has"
                 f" {', '.join(values)}; give {argument} as a dict"
             )
-        merged[argument] = {**(merged.get(argument) or {}), **values}
+        merged[argument] = {**common, **values}
     return merged
 
 
@@ -174,11 +216,13 @@ def _in_turn(tasks: Mapping[int, Callable[[], str]]) -> Iterator[tuple[int, str]
 
 
 def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[int, str]]:
-    if any(isinstance(task.model, System) for task in tasks.values()):
-        _require_threads(executor)
     futures = {executor.submit(task): number for number, task in tasks.items()}
-    for future in as_completed(futures):
-        yield futures[future], future.result()
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:  # those that have not begun when one breaks the study off
+        for future in futures:
+            future.cancel()
 
 
 def _require_threads(executor: Executor) -> None:
@@ -192,11 +236,3 @@ def _require_threads(executor: Executor) -> None:
             "sweep: a System stays in its process; write it by mbs.export.fmu and give the path of"
             " the FMU, or use a ThreadPoolExecutor"
         )
-
-
-def _told(options: Mapping[str, Any]) -> dict[str, str]:
-    """The options as texts that are the same the next time: functions by their names."""
-    return {
-        name: getattr(value, "__qualname__", None) or repr(value)
-        for name, value in sorted(options.items())
-    }

@@ -171,6 +171,25 @@ def test_saved_states_continue_bit_for_bit(fmu):
     instance.freeFMUState(state)
 
 
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_time_is_listed_where_it_is_a_variable_and_equations_need_it(tmp_path, version):
+    path = write_fmu(pendulum(), tmp_path / "pendulum.fmu", fmi=version)
+    listed = fmpy.read_model_description(path)
+    needs = {
+        part: {u.variable.name: [v.name for v in u.dependencies] for u in unknowns}
+        for part, unknowns in [
+            ("running", listed.derivatives),
+            ("starting", listed.initialUnknowns),
+        ]
+    }
+    time = ["time"] if version == "3.0" else []
+    assert needs["running"]["der(j1.v)"] == ["j1.q", "j1.v", "tau", *time]
+    assert needs["running"]["der(j1.q)"] == ["j1.v"]
+    parameters = ["mass", "length", "damping", "g"]
+    assert needs["starting"]["der(j1.v)"] == ["j1.q", "j1.v", "tau", *parameters, *time]
+    assert needs["starting"]["tip.x"] == ["j1.q", "length"]
+
+
 def test_wrong_calls_are_refused(fmu):
     with pytest.raises(Exception, match="instantiate"):
         fmu.open(FMU3Slave, token="{wrong}")

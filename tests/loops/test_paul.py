@@ -44,6 +44,12 @@ def puma_5r():
     return arm({}, {"alpha": -HALF, "r": 0.15}, {"d": 0.43}, wrist, {"alpha": HALF})
 
 
+def two_sums():
+    """A slide and two pairs of parallel axes: its equations have products of three angles."""
+    tilted = {"alpha": 0.8, "d": 0.2, "r": 0.3}
+    return arm({"s": 1}, {"d": 0.3, "r": 0.1}, {"d": 0.5}, tilted, {"d": 0.4})
+
+
 def moved_origins():
     """A spherical wrist whose frames do not have their origins where its axes meet."""
     axes = ("z", "y", "y", "x", "y", "x")
@@ -74,6 +80,7 @@ SOLVED = {
     "rr": (lambda: arm({}, {"alpha": 0.5, "d": 0.3, "r": 0.1}), 1),
     "p": (lambda: arm({"s": 1, "alpha": 0.3}), 1),
     "prprpr": (lambda: slides_and_turns("PRPRPR", 1), 2),
+    "two_sums": (two_sums, 4),
     "spherical_1": (lambda: spherical(1, 2), 8),
     "spherical_4": (lambda: spherical(4, 2), 8),
     "parallel_2": (lambda: three_parallel(2, 2), 8),

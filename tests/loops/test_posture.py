@@ -35,6 +35,13 @@ def test_a_full_turn_stays_on_the_branch(angle):
     np.testing.assert_allclose(T, np.array(mbs.models.transform(system, "b")(q)), atol=1e-9)
 
 
+@pytest.mark.parametrize(("j2", "root"), [(-1.0, -1.695449), (-1.7, -1.695449), (2.0, 0.544084)])
+def test_a_guess_of_one_joint_leads_to_the_nearest_root_without_turns(j2, root):
+    q = solve(mbs.load("four_bar").assemble(), {"j1": 0.3}, guess={"j2": j2})
+    assert q[1] == pytest.approx(root, abs=1e-6)
+    assert abs(q[2]) < 2 * np.pi
+
+
 def test_a_guess_chooses_the_other_branch():
     system = four_bar()
     q = solve(system, {"j1": 0.3}, guess={"j2": -1.7, "j4": -1.8})

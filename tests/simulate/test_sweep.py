@@ -1,21 +1,22 @@
 """Parameter studies over executors, interrupted and resumed."""
 
 import inspect
+import threading
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 import mbs
-from mbs.errors import ModelError
+from mbs.errors import ExportError, ModelError
 
 
-def pendulum():
+def pendulum(m=2.0):
     return mbs.load(
         {
             "name": "pendulum",
             "gravity": [0, -9.81, 0],
-            "parameters": {"L": 0.5, "m": 2.0},
+            "parameters": {"L": 0.5, "m": m},
             "frame": [{"antecedent": 0, "joint": "revolute"}],
             "body": [{"frame": 1, "YY": "m*L^2", "ZZ": "m*L^2", "MX": "m*L", "M": "m"}],
         }
@@ -107,16 +108,13 @@ def test_a_failed_case_does_not_stop_the_others(system):
 @pytest.mark.parametrize(
     ("grid", "message"),
     [
-        ({}, None),
+        ({}, "no case"),
         ({"L": []}, "no case"),
         ([], "no case"),
         ({"L": ["long"]}, "L is 'long'; give numbers"),
     ],
 )
 def test_grids(system, grid, message):
-    if message is None:
-        assert len(mbs.simulate.sweep(system, grid, 0.1, **OPTIONS)) == 1
-        return
     with pytest.raises(ModelError, match=message):
         mbs.simulate.sweep(system, grid, 0.1, **OPTIONS)
 
@@ -126,6 +124,63 @@ def test_a_system_is_not_sent_to_processes(system):
         mbs.simulate.sweep(system, GRID, 0.1, executor=executor, **OPTIONS)
 
 
-def test_an_unknown_name_is_the_failure_of_its_case(system):
-    study = mbs.simulate.sweep(system, {"K": [1.0]}, 0.1, **OPTIONS)
-    assert "no parameter 'K'" in study.failures[0]
+@pytest.mark.parametrize(("name", "meant"), [("K", "L"), ("q1", "q1.q"), ("q1.p", "q1.q")])
+def test_an_unknown_name_is_refused_before_anything_runs(system, name, meant):
+    with pytest.raises(ModelError, match=rf"pendulum has no '{name}' to vary; .*{meant}"):
+        mbs.simulate.sweep(system, {name: [1.0]}, 0.1, **OPTIONS)
+
+
+def test_the_reason_of_a_failure_is_that_of_the_fmu(fmu):
+    study = mbs.simulate.sweep(fmu, {"m": [0.0]}, 0.1, **OPTIONS)
+    assert "not finite" in study.failures[0]
+
+
+def test_what_is_no_executor(system):
+    with pytest.raises(ModelError, match=r"executor is 2; give one of concurrent\.futures"):
+        mbs.simulate.sweep(system, GRID, 0.1, executor=2, **OPTIONS)
+
+
+def test_a_folder_is_for_one_model_with_its_numbers(tmp_path):
+    arguments = ({"q1.q": [0.1]}, 0.1)
+    mbs.simulate.sweep(pendulum(), *arguments, folder=tmp_path / "a", **OPTIONS)
+    assert not mbs.simulate.sweep(pendulum(), *arguments, folder=tmp_path / "a", **OPTIONS).failures
+    with pytest.raises(ModelError, match="holds another study"):
+        mbs.simulate.sweep(pendulum(2.5), *arguments, folder=tmp_path / "a", **OPTIONS)
+    (tmp_path / "a" / "study.json").unlink()  # whose results these are is not known any more
+    with pytest.raises(ModelError, match="holds another study"):
+        mbs.simulate.sweep(pendulum(), *arguments, folder=tmp_path / "a", **OPTIONS)
+
+
+def test_common_values_as_an_array_are_refused_beside_those_of_the_grid(system):
+    study = mbs.simulate.sweep(system, {"q1.q": [0.1]}, 0.1, q0=np.array([0.2, 0.3]), **OPTIONS)
+    assert "give q0 as a dict" in study.failures[0]
+
+
+def test_a_system_needs_a_duration_and_an_fmu_must_be_there(system, tmp_path):
+    with pytest.raises(ModelError, match="has no duration; give one"):
+        mbs.simulate.sweep(system, GRID, **OPTIONS)
+    with pytest.raises(ModelError, match=r"no.fmu cannot be read .*; give the path of an FMU"):
+        mbs.simulate.sweep(tmp_path / "no.fmu", GRID, **OPTIONS)
+    with pytest.raises(ModelError, match="sweep: 3 is no model"):
+        mbs.simulate.sweep(3, GRID, **OPTIONS)
+
+
+def test_a_folder_that_cannot_be_made(system, tmp_path):
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(ExportError, match="taken cannot be made"):
+        mbs.simulate.sweep(system, GRID, 0.1, folder=tmp_path / "taken", **OPTIONS)
+
+
+def test_a_broken_off_study_begins_no_further_case(system, monkeypatch):
+    begun, first = [], threading.Event()
+
+    def broken(*arguments, **options):
+        begun.append(options["parameters"])
+        if len(begun) == 1:
+            raise RuntimeError("broken")
+        first.wait(0.2)
+
+    monkeypatch.setattr(inspect.getmodule(mbs.simulate.sweep), "run", broken)
+    with ThreadPoolExecutor(1) as executor, pytest.raises(RuntimeError, match="broken"):
+        mbs.simulate.sweep(system, {"L": [0.1] * 50}, 0.1, executor=executor, **OPTIONS)
+    assert len(begun) < 50

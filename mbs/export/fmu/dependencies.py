@@ -1,10 +1,10 @@
-"""Which calculated values of an FMU depend on which states, inputs and parameters."""
+"""Which calculated values of an FMU depend on which states, inputs, parameters and on time."""
 
 import casadi
 
 from mbs.export.fmu.description import FmuModel
 
-_X, _Z, _U, _P = 1, 2, 3, 4
+_T, _X, _Z, _U, _P = range(5)  # arguments of rhs
 
 
 def dependencies(model: FmuModel) -> list[tuple[int, list[int]]]:
@@ -15,13 +15,14 @@ def dependencies(model: FmuModel) -> list[tuple[int, list[int]]]:
 
     Returns:
         value reference of the unknown, and of the states, inputs and parameters that it needs,
-        in increasing order.
+        in increasing order; last that of time, the number of entries.
     """
     places = {_X: model.first("state"), _U: model.first("input"), _P: model.first("parameter")}
+    places[_T] = len(model.entries)
     through = _through_loops(model)
     answer = []
     for output, first in ((0, model.first("derivative")), (1, model.first("output"))):
-        patterns = {k: _rows(model.rhs.jac_sparsity(output, k)) for k in (_X, _Z, _U, _P)}
+        patterns = {k: _rows(model.rhs.jac_sparsity(output, k)) for k in (*places, _Z)}
         for row in range(model.rhs.numel_out(output)):
             known = {places[k] + c for k in places for c in patterns[k].get(row, ())}
             if patterns[_Z].get(row):

@@ -69,11 +69,17 @@ def _interface(root: Element, tag: str, model: FmuModel, files: list[str]) -> No
 
 
 def _structure(root: Element, model: FmuModel) -> None:
-    found = structure(model)
+    found, time = structure(model), len(model.entries)
+    running, starting = (_without(time, known) for known in (found.running, found.starting))
     parent = SubElement(root, "ModelStructure")
-    _unknowns(parent, "Outputs", found.outputs, found.running)
-    _unknowns(parent, "Derivatives", found.derivatives, found.running)
-    _unknowns(parent, "InitialUnknowns", found.initial, found.starting)
+    _unknowns(parent, "Outputs", found.outputs, running)
+    _unknowns(parent, "Derivatives", found.derivatives, running)
+    _unknowns(parent, "InitialUnknowns", found.initial, starting)
+
+
+def _without(time: int, known: Mapping[int, list[int]]) -> dict[int, list[int]]:
+    """No variable is time: the standard then takes it that everything depends on it."""
+    return {ref: [r for r in references if r != time] for ref, references in known.items()}
 
 
 def _unknowns(

@@ -29,12 +29,14 @@ CATEGORIES = {
 class Structure:
     """Which calculated values there are, and what they depend on; all by value references.
 
+    That of time is the number of entries.
+
     Attributes:
         outputs: every output, states among them.
         derivatives: of the states.
         initial: what initialization calculates.
-        running: states and inputs that each output and derivative needs.
-        starting: states, inputs and parameters that each of `initial` needs.
+        running: states, inputs and time, where each output and derivative needs them.
+        starting: likewise of `initial`, and parameters.
     """
 
     outputs: list[int]
@@ -46,11 +48,9 @@ class Structure:
 
 def structure(model: FmuModel) -> Structure:
     """The structure of a model."""
-    n = len(model.states)
+    n, fixed = len(model.states), range(model.first("parameter"), model.first("dependent"))
     starting = dict(dependencies(model))
-    running = {
-        ref: [r for r in known if r < model.first("parameter")] for ref, known in starting.items()
-    }
+    running = {ref: [r for r in known if r not in fixed] for ref, known in starting.items()}
     shown = [k for k, state in enumerate(model.states) if state.output]
     running.update({k: [k] for k in shown})
     calculated = list(range(model.first("output"), model.first("parameter")))

@@ -51,7 +51,8 @@ def element_names(port: Port, elements: Elements) -> list[str]:
     """A name for each non-zero element of an input or output.
 
     Coordinates and parameters have their own, velocities are QP1, QP2 .., accelerations QDP1 ..,
-    efforts GAM1 ..; the others are named by their place, such as A12 and H3.
+    efforts GAM1 ..; the others are named by their place, such as A12 and H3, or by row and column
+    where the columns have names: D3_XX6.
     """
     rows, columns = port.sparsity.shape
     if (rows, columns) == (1, 1) and not elements:
@@ -63,6 +64,10 @@ def element_names(port: Port, elements: Elements) -> list[str]:
         return [names[place.row] for place in places(port)]
     if columns == 1:
         return [f"{port.name}{place.row + 1}" for place in places(port)]
+    if len(elements) == columns != rows:
+        place = {p: f"{p.row + 1}_" if rows > 1 else "" for p in places(port)}
+        start = f"{port.name}_" if rows == 1 or port.name[-1].isdigit() else port.name
+        return [f"{start}{row}{elements[p.column][0]}" for p, row in place.items()]
     between = "_" if max(rows, columns) > 9 else ""
     return [f"{port.name}{p.row + 1}{between}{p.column + 1}" for p in places(port)]
 

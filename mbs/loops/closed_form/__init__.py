@@ -10,6 +10,7 @@ distance, aim, spin, ball                               kernels: links between s
 planar, three_turns, parallelogram, one_slide, two_slides, normal, confined    in a plane
 orientation, sphere, slides                             turns first, then slides
 bennett, trilateration, coupling                        special measures, shared slides, gears
+split, closed_samples    whatever is left, by Paul's method, and numbers at which a loop closes
 free_body       a body whose pose is known
 dispatch        the kernel for a loop
 stage           one step of a plan, and which of its ways lead to a posture

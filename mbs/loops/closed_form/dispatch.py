@@ -20,6 +20,7 @@ from mbs.loops.closed_form.ring import Ring
 from mbs.loops.closed_form.root import Root
 from mbs.loops.closed_form.slides import slides
 from mbs.loops.closed_form.spin import spin
+from mbs.loops.closed_form.split import split
 
 _KERNELS: tuple[Callable[[Ring, SX, SX], Root | None], ...] = (
     free_body,
@@ -52,6 +53,9 @@ def closed_form(ring: Ring, q: SX, p: SX) -> Root | str:
         root = kernel(ring, q, p)
         if root is not None and any(root.ways.values()):
             return root
+    found = split(ring, q, p)
+    if isinstance(found, Root):
+        return found
     unknown = ", ".join(joint.name for joint in ring.joints)
     count = len(ring.joints)
-    return f"{count} positions are unknown ({unknown}) and no kernel fits their axes"
+    return f"{count} positions are unknown ({unknown}) and no kernel fits their axes: {found}"

@@ -14,6 +14,9 @@ from mbs.loops.paul.terms import MOST_VARIABLES, ZERO, Row, Values, simple_rows
 
 Key = tuple[int, ...]
 
+PRODUCTS = 2
+"""The most variables of an equation with products of them."""
+
 _WEIGHT = (0, 3, 2, 2, 2, 2, 1, 1, 1, 4, 4, 4, 6, 6, 6)
 
 
@@ -75,13 +78,18 @@ class Equation:
         return np.zeros(1, dtype=complex) if part is None else part.values
 
 
-def equations(knowledge: Knowledge) -> tuple[Equation, ...]:
-    """The equations of all splits with few unknowns, the cheapest of those that are equal."""
+def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...]:
+    """The equations of all splits with few unknowns, the cheapest of those that are equal.
+
+    Args:
+        knowledge: what is known.
+        most: variables of an equation with products of them, before known sums are taken out.
+    """
     slides = frozenset(k for k, joint in enumerate(knowledge.ring.joints) if not joint.turns)
     sums = [(known.members, at) for known, _, at in knowledge.open_sums()]
     found = dict[object, Equation]()
     for split in splits(knowledge):
-        for row, terms in simple_rows(split, slides):
+        for row, terms in simple_rows(split, slides, most):
             new = _equation(row, terms, slides, sums)
             if new is not None:
                 mark = _mark(new)
@@ -136,7 +144,8 @@ def _equation(
     if len(parts) < len(reduced):
         return None
     cost = _WEIGHT[row.element] + sum(len(part.sources) for part in parts.values())
-    return Equation(row, variables, parts, frozenset(terms), cost)
+    equation = Equation(row, variables, parts, frozenset(terms), cost)
+    return equation if len(variables) <= PRODUCTS or equation.linear else None
 
 
 def _folded(

@@ -9,7 +9,7 @@ from mbs.errors import NoClosedForm
 from mbs.loops.paul.candidate import Stage
 from mbs.loops.paul.coefficients import ways
 from mbs.loops.paul.eliminated import eliminated
-from mbs.loops.paul.equation import equations
+from mbs.loops.paul.equation import PRODUCTS, equations
 from mbs.loops.paul.feet import at_feet
 from mbs.loops.paul.knowledge import Variable, beginning
 from mbs.loops.paul.linear import linear
@@ -48,6 +48,9 @@ def paul(problem: Problem) -> Sequence:
     while knowledge.unknown:
         stage = Stage(knowledge, loop, equations(knowledge))
         candidate = _cheapest(stage)
+        if candidate is None and knowledge.sums:
+            stage = Stage(knowledge, loop, equations(knowledge, PRODUCTS + 1))
+            candidate = _cheapest(stage)
         if candidate is None:
             raise NoClosedForm(_refusal(stage, steps))
         step, variables = candidate

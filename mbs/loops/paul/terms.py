@@ -44,9 +44,15 @@ class Row:
 
 
 def simple_rows(
-    split: Split, slides: frozenset[int]
+    split: Split, slides: frozenset[int], most: int
 ) -> Iterator[tuple[Row, dict[Members, Values]]]:
-    """The rows that may have few unknowns, and their terms."""
+    """The rows that may have few unknowns, and their terms.
+
+    Args:
+        split: of the loop.
+        slides: numbers of its slides.
+        most: variables of a row with products of them.
+    """
     offset = 0 if split.seed == 2 else -6
     rows = [r + offset for r in split.rows]
     if not rows:
@@ -56,7 +62,7 @@ def simple_rows(
     masks = [np.max(np.abs(side.values[:, rows]), axis=0) > ZERO for side in sides]
     counts = np.sum([_counts(t, mask) for t, mask in zip(tables, masks, strict=True)], axis=0)
     variables, joints, long = counts
-    few = (variables <= 2) | ((variables <= MOST_VARIABLES) & (long == 0))
+    few = (variables <= most) | ((variables <= MOST_VARIABLES) & (long == 0))
     for number in np.flatnonzero((joints > 0) & (joints <= _MOST_JOINTS) & few):
         row = Row(split.start, split.end, split.seed, split.rows[number])
         found = dict[Members, Values]()

@@ -22,10 +22,10 @@ from casadi import DM, SX
 
 from mbs.loops.sequence.two_roots import Root
 
-_TINY, _SMALL = 1e-280, 1e-140
-_NOISE = 1e-11
-_FAR = 1e8
-_STEPS = 3
+_TINY, _SMALL = 1e-280, 1e-140  # added to squares, and to numbers, so that nothing divides by zero
+_NOISE = 1e-11  # of a trace that decides whether the lines are real
+_FAR = 1e8  # largest root, in its scale
+_STEPS = 3  # of Newton
 
 
 @dataclass(frozen=True, slots=True)

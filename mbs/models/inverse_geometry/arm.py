@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,22 +20,35 @@ class Arm:
         names: of the joints.
         prismatic: (n,) whether each slides.
         gaps: (n + 1, 4, 4) the constant ways G.
+        length: a length of the arm's size [m], 1 where all its ways are turns alone.
+        units: (n,) what joints are measured by: 1 rad, or the length of the arm [m].
     """
 
     names: tuple[str, ...]
     prismatic: NDArray[np.bool_]
     gaps: Array
+    length: float = field(init=False)
+    units: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        total = float(np.sum(np.linalg.norm(self.gaps[:, :3, 3], axis=1)))
+        length = total if total > 0 else 1.0
+        object.__setattr__(self, "length", length)
+        object.__setattr__(self, "units", np.where(self.prismatic, length, 1.0))
 
     @property
     def size(self) -> int:
         """The number of joints."""
         return len(self.prismatic)
 
-    @property
-    def length(self) -> float:
-        """A length of the arm's size [m], 1 where all its ways are turns alone."""
-        total = float(np.sum(np.linalg.norm(self.gaps[:, :3, 3], axis=1)))
-        return total if total > 0 else 1.0
+    def wrapped(self, way: Array) -> Array:
+        """Differences (..., n) of postures, those of turns brought into [-pi, pi)."""
+        return np.where(self.prismatic, way, np.mod(way + np.pi, 2 * np.pi) - np.pi)
+
+    def residual(self, q: Array, T: Array) -> Array:
+        """(...) largest element of pose(q) - T [m or 1], at postures q, (..., n)."""
+        error: Array = np.max(np.abs(self.pose(q) - T), axis=(-2, -1))
+        return error
 
     def pose(self, q: Array) -> Array:
         """(..., 4, 4) pose of the frame at postures q, (..., n) [rad or m]."""
@@ -48,6 +61,10 @@ class Arm:
         turning = np.where(self.prismatic[:, None], 0.0, axes)
         linear = np.where(self.prismatic[:, None], axes, np.cross(axes, arms))
         return T, np.swapaxes(np.concatenate([linear, turning], axis=-1), -1, -2)
+
+    def lines(self, q: Array) -> tuple[Array, Array]:
+        """The directions of all axes and a point on each, (..., n, 3) [m], in the base."""
+        return self._walked(q)[1:]
 
     def _walked(self, q: Array) -> tuple[Array, Array, Array]:
         """The poses, then the axes and the origins of all joints, (..., n, 3), in the base."""
@@ -62,8 +79,8 @@ class Arm:
 
 def motion(q: Array, prismatic: bool) -> Array:
     """(..., 4, 4) slide along z by q [m], or turn about z by q [rad]."""
-    T = np.zeros((*np.shape(q), 4, 4))
-    T[..., range(4), range(4)] = 1.0
+    T = np.empty((*np.shape(q), 4, 4))
+    T[...] = np.eye(4)
     if prismatic:
         T[..., 2, 3] = q
         return T
@@ -95,8 +112,11 @@ def gap_to(wanted: Array, T: Array) -> Array:
     s = 0.5 * np.linalg.norm(vector, axis=-1)
     angle = np.arctan2(s, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1))
     scale = np.where(s > 1e-9, angle / np.maximum(2 * s, 1e-300), 0.5)
-    turn = np.where((s <= 1e-9) & (angle > 1), angle, 0.0)
-    rotation = scale[..., None] * vector + turn[..., None] * _half_turn_axis(R)
+    rotation = scale[..., None] * vector
+    half_turn = (s <= 1e-9) & (angle > 1)
+    if np.any(half_turn):
+        turn = np.where(half_turn, angle, 0.0)
+        rotation = rotation + turn[..., None] * _half_turn_axis(R)
     return np.concatenate([wanted[..., :3, 3] - T[..., :3, 3], rotation], axis=-1)
 
 

@@ -17,7 +17,7 @@ from mbs.components.motion import Motion
 from mbs.errors import ModelError
 from mbs.loops.closed_form.ring import Gap, Ring, Unknown
 from mbs.loops.sequence import Problem
-from mbs.messages import did_you_mean
+from mbs.messages import did_you_mean, quoted
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.arm import Arm
 from mbs.spatial import Pose, axis_turn, vector
@@ -48,8 +48,17 @@ class Chain:
     gaps: tuple[Pose, ...]
     locked: Mapping[str, float]
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What tells chains of one system apart."""
+        return self.frame, tuple(self.locked.items())
+
     def arm(self, p: NDArray[np.float64]) -> Arm:
-        """The chain in numbers for parameters p, (np,)."""
+        """The chain in numbers for parameters p, (np,); kept on the system."""
+        arm: Arm = self.system.cached(("arm", *self.key, p.tobytes()), lambda: self._numbers(p))
+        return arm
+
+    def _numbers(self, p: NDArray[np.float64]) -> Arm:
         stacked = casadi.vertcat(*(gap.matrix for gap in self.gaps))
         function = Function("gaps", [self.system.p], [casadi.densify(stacked)])
         gaps = np.array(DM(function(p))).reshape(len(self.gaps), 4, 4)
@@ -99,7 +108,8 @@ class Chain:
             q = np.where(self.prismatic, rng.uniform(0.2, 1.2, len(self.names)), 0.0)
             turns = rng.uniform(-np.pi, np.pi, len(self.names))
             q = np.where(self.prismatic, q, turns)
-            T = self.arm(own).pose(q)[:3].ravel(order="F")
+            arm = self._numbers(own) if p is None else self.arm(p)
+            T = arm.pose(q)[:3].ravel(order="F")
             samples.append((q, np.concatenate([own if p is None else np.zeros(0), T])))
         return samples
 
@@ -109,7 +119,7 @@ def chain(
     frame: str | int | None = None,
     locked: Mapping[str, float] | None = None,
 ) -> Chain:
-    """The joints from the base to a frame.
+    """The joints from the base to a frame; kept on the system.
 
     Args:
         system: open or closed; of a closed one the joints of its tree.
@@ -118,17 +128,31 @@ def chain(
 
     Raises:
         ModelError: there is no such frame or joint, a joint of the chain is a ball or free, or
-            more than six are free to move.
+            none or more than six are free to move.
     """
     require_system(system)
-    name = terminal_frame(system) if frame is None else frame
-    number, pose = system.frame(name)
+    name = _terminal_frame(system) if frame is None else frame
+    number = system.frame(name)[0]
     links = [system.tree.links[k] for k in system.tree.path(number)]
-    held = _locked(system, links, dict(locked or {}))
+    held = _locked(system, links, locked)
+    key = ("chain", name, tuple(held.items()))
+    way: Chain = system.cached(key, lambda: _chained(system, name, links, held))
+    return way
+
+
+def _terminal_frame(system: System) -> str | int:
+    name: str | int = system.cached("terminal frame", lambda: terminal_frame(system))
+    return name
+
+
+def _chained(
+    system: System, name: str | int, links: list[Link], held: Mapping[str, float]
+) -> Chain:
+    pose = system.frame(name)[1]
+    _require_few(system, name, links, held)
     base = system.frame("base")[1].inverse()
     gaps, free = [base], list[Link]()
     for link in links:
-        _require_simple(system, link)
         gaps[-1] = gaps[-1] @ link.placement.pose()
         if link.name in held:
             gaps[-1] = gaps[-1] @ _moved(link, held[link.name])
@@ -136,7 +160,6 @@ def chain(
             free.append(link)
             gaps.append(Pose.identity())
     gaps[-1] = gaps[-1] @ pose
-    _require_few(system, name, free)
     return Chain(
         system,
         name,
@@ -154,13 +177,20 @@ def _moved(link: Link, q: float) -> Pose:
     return Pose.turned(axis_turn("z", SX(q)).matrix)
 
 
-def _locked(system: System, links: list[Link], given: dict[str, float]) -> dict[str, float]:
+def _locked(system: System, links: list[Link], given: object) -> dict[str, float]:
+    """Positions of the locked joints, in their order from the base on."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise ModelError(
+            f"{system.name}: locked is {quoted(given)}; give a dict of joint names to positions"
+        )
     names = [link.name for link in links]
     for name in given:
         if name not in names:
             raise ModelError(
-                f"{system.name}: joint {name!r} is not between the base and the frame, so that it"
-                f" cannot be locked; {did_you_mean(name, names)}"
+                f"{system.name}: joint {quoted(name)} is not between the base and the frame, so"
+                f" that it cannot be locked; {did_you_mean(name, names)}"
             )
     positions = system.position(given)
     return {link.name: positions[link.q.start] for link in links if link.name in given}
@@ -175,19 +205,33 @@ def _require_simple(system: System, link: Link) -> None:
         )
 
 
-def _require_few(system: System, frame: str | int, free: list[Link]) -> None:
-    if not free:
+def _require_few(
+    system: System, frame: str | int, links: list[Link], held: Mapping[str, float]
+) -> None:
+    for link in links:
+        _require_simple(system, link)
+    free = [link for link in links if link.name not in held]
+    if not links:
         raise ModelError(f"{system.name}: no joint moves frame {frame!r}; name another frame")
+    if not free:
+        raise ModelError(
+            f"{system.name}: every joint between the base and frame {frame!r} is locked; leave one"
+            " of them free"
+        )
     if len(free) > _LARGEST:
         surplus = len(free) - _LARGEST
         raise ModelError(
             f"{system.name}: {len(free)} joints are free between the base and frame {frame!r},"
             f" and a pose determines {_LARGEST}; lock {surplus} of them with"
-            f" locked={{{_proposal(free, surplus)}}}"
+            f" locked={{{_proposal(system, free, surplus)}}}"
         )
 
 
-def _proposal(free: list[Link], surplus: int) -> str:
-    """The joints in the middle of the chain: most often those that make it redundant."""
-    middle = (len(free) - surplus) // 2
-    return ", ".join(f"{link.name!r}: 0.0" for link in free[middle : middle + surplus])
+def _proposal(system: System, free: list[Link], surplus: int) -> str:
+    """Joints before the middle of the chain, where they are in the assembled posture.
+
+    An arm of seven joints keeps its elbow, without which it has one length alone.
+    """
+    first = (len(free) - surplus - 1) // 2
+    held = free[first : first + surplus]
+    return ", ".join(f"{link.name!r}: {system.posture[link.q.start]:.6g}" for link in held)

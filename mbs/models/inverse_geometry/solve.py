@@ -12,14 +12,13 @@ from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.answers.answer import Question, answer
 from mbs.models.inverse_geometry.answers.gathering import Gathered, further, gather
-from mbs.models.inverse_geometry.answers.limits import Given, bounds
+from mbs.models.inverse_geometry.answers.limits import Given, bounds, leaves_out
 from mbs.models.inverse_geometry.answers.roots import Root, roots
 from mbs.models.inverse_geometry.answers.solutions import Solutions
 from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.answers.wishes import Wishes
-from mbs.models.inverse_geometry.arm import Arm, Array
 from mbs.models.inverse_geometry.chain import Chain, chain
-from mbs.models.inverse_geometry.equations.closed_form import CLOSED_FORMS, key_of
+from mbs.models.inverse_geometry.equations.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.pose_input import wanted_pose
 from mbs.models.inverse_geometry.whole_robots.parallel import parallel
 
@@ -71,7 +70,7 @@ def solve(
     wishes = _wishes(system, way, limits, seed)
     if way is None:
         return parallel(wishes, frame, wanted, p)
-    question = Question(way, Target(_arm(way, p), wanted), p, wishes)
+    question = Question(way, Target(way.arm(p), wanted), p, wishes)
     found, used = solved(question, method)
     return answer(question, found, used)
 
@@ -95,27 +94,13 @@ def _chain_or_none(
 ) -> Chain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
     try:
-        return _chain(system, frame, locked)
+        return chain(system, frame, locked)
     except ModelError:
         if locked or not system.is_closed:
             raise
         if frame is not None:
             system.frame(frame)
         return None
-
-
-def _chain(system: System, frame: str | int | None, locked: Mapping[str, float] | None) -> Chain:
-    """The chain to the frame, kept on the system."""
-    key = ("chain", repr(frame), repr(locked))
-    way: Chain = system.cached(key, lambda: chain(system, frame, locked))
-    return way
-
-
-def _arm(way: Chain, p: Array) -> Arm:
-    """The chain in numbers, kept on its system."""
-    key = ("arm", *key_of(way), p.tobytes())
-    arm: Arm = way.system.cached(key, lambda: way.arm(p))
-    return arm
 
 
 def _is_doubtful(target: Target, gathered: Gathered) -> bool:
@@ -141,5 +126,4 @@ def _wishes(
     turning = None if way is None or system.is_closed else way.places
     coupled = [k for c in system.couplings for k in (c.driven, c.driver)]
     limited = bounds(system, limits, set(turning or range(system.nq)) - {*held, *coupled})
-    strict = limits is not None and limits is not False
-    return Wishes(system, near, limited, strict, seed is not None)
+    return Wishes(system, near, limited, leaves_out(limits), seed is not None)

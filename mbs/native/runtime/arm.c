@@ -5,7 +5,7 @@
 
 #include "rigid.h"
 
-static const double PI = 3.14159265358979323846;
+static const double REACHED = 1e-12;
 
 /* T = T G, of which G stays. */
 static void walk(double *T, const double *G) {
@@ -122,4 +122,8 @@ double arm_residual(const double *wanted, const double *T) { return largest(want
 
 double arm_relative_residual(const arm *a, const double *wanted, const double *T) {
     return largest(wanted, T, a->length);
+}
+
+int arm_reaches(const arm *a, const double *wanted, const double *T) {
+    return arm_relative_residual(a, wanted, T) < REACHED;
 }

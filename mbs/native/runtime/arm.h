@@ -6,7 +6,7 @@
 #ifndef MBS_ARM_H
 #define MBS_ARM_H
 
-#define ARM_JOINTS 7 /* at most */
+enum { ARM_JOINTS = 7, /* at most */ ARM_STEPS = 60 /* of a descent, at most */ };
 
 typedef struct {
     int n;
@@ -36,17 +36,20 @@ double arm_residual(const double *wanted, const double *T);
 /* The same with lengths in arm lengths. */
 double arm_relative_residual(const arm *a, const double *wanted, const double *T);
 
+/* Whether T is the wanted pose but for rounding: a relative residual below 1e-12. */
+int arm_reaches(const arm *a, const double *wanted, const double *T);
+
 /* One joint in the unit of its column of the Jacobian. */
 double arm_unit(const arm *a, int joint);
 
 /* All angles into (-pi, pi]. */
 void arm_wrap(const arm *a, double *q);
 
-/* At most `steps` steps of Levenberg and Marquardt from p->q towards the wanted pose. They end
- * where rounding, or a smallest distance greater than zero, lets them go no further. */
-void arm_descend(const arm *a, const double *wanted, posture *p, int steps);
+/* Steps of Levenberg and Marquardt from p->q towards the wanted pose. They end where rounding, or a
+ * smallest distance greater than zero, lets them go no further. */
+void arm_descend(const arm *a, const double *wanted, posture *p);
 
 /* The solution beside q, or q itself where nothing better was found; gives its residual. */
-double arm_polish(const arm *a, const double *wanted, double *q, int steps);
+double arm_polish(const arm *a, const double *wanted, double *q);
 
 #endif

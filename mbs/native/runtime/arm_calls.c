@@ -10,10 +10,10 @@
 
 /* Polishes q (count, n) for wanted poses (4, 4) that lie `stride` doubles apart; 0: one for all. */
 EXPORT void mbs_polish(const arm *a, const double *wanted, long long stride, long long count,
-                       int steps, double *q, double *residual) {
+                       double *q, double *residual) {
     long long i;
     for (i = 0; i < count; i++)
-        residual[i] = arm_polish(a, wanted + i * stride, q + i * a->n, steps);
+        residual[i] = arm_polish(a, wanted + i * stride, q + i * a->n);
 }
 
 /* Fills q (starts, n), residual and hits (starts,); gives how many postures were found. */

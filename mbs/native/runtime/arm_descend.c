@@ -84,12 +84,12 @@ static void attempt(const arm *a, const double *wanted, const posture *from, dou
 
 /* The damping is proportional to the cost, which makes the last steps those of Newton
  * (Yamashita and Fukushima 2001), even where the Jacobian loses rank. */
-void arm_descend(const arm *a, const double *wanted, posture *p, int steps) {
+void arm_descend(const arm *a, const double *wanted, posture *p) {
     double damping = 0.1;
     int stalls = 0, step;
     posture next;
     arm_examine(a, wanted, p);
-    for (step = 0; step < steps && p->cost > FINEST && stalls < STALLS; step++) {
+    for (step = 0; step < ARM_STEPS && p->cost > FINEST && stalls < STALLS; step++) {
         double gain;
         attempt(a, wanted, p, damping, &next);
         if (!(next.cost < p->cost)) {
@@ -104,13 +104,13 @@ void arm_descend(const arm *a, const double *wanted, posture *p, int steps) {
     }
 }
 
-double arm_polish(const arm *a, const double *wanted, double *q, int steps) {
+double arm_polish(const arm *a, const double *wanted, double *q) {
     double before, after, T[16];
     posture p;
     memcpy(p.q, q, (size_t)a->n * sizeof(double));
     arm_pose(a, q, T);
     before = arm_residual(wanted, T);
-    arm_descend(a, wanted, &p, steps);
+    arm_descend(a, wanted, &p);
     arm_wrap(a, p.q);
     arm_pose(a, p.q, T);
     after = arm_residual(wanted, T);

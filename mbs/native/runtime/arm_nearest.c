@@ -3,8 +3,12 @@
 #include <math.h>
 #include <string.h>
 
-enum { STEPS = 60, KEPT = 8, REFINEMENTS = 60 };
-static const double NUDGE = 1e-5, FLAT = 1e-15, FINEST = 1e-31, ALIKE = 1e-14;
+enum { KEPT = 8, REFINEMENTS = 60 };
+static const double NUDGE = 1e-5;   /* of joints, for differences of the slope */
+static const double FLAT = 1e-15;   /* slopes below it are rounding */
+static const double FINEST = 1e-31; /* costs below it leave nothing to gain */
+static const double ALIKE = 1e-14;  /* relative rounding of costs */
+static const double EQUAL = 1e-6;   /* costs that are closer, relatively, are of one valley */
 
 typedef double matrix[ARM_JOINTS][ARM_JOINTS];
 
@@ -101,7 +105,7 @@ static void refine(const arm *a, const double *wanted, posture *p) {
 static int keep(const posture *p, posture *best, int count) {
     int i, place = 0;
     while (place < count && best[place].cost <= p->cost) place++;
-    if (place > 0 && p->cost - best[place - 1].cost < 1e-6 * p->cost) return count;
+    if (place > 0 && p->cost - best[place - 1].cost < EQUAL * p->cost) return count;
     if (place == KEPT) return count;
     if (count < KEPT) count++;
     for (i = count - 1; i > place; i--) best[i] = best[i - 1];
@@ -116,7 +120,7 @@ double arm_nearest(const arm *a, const double *wanted, long long starts, unsigne
     long long start;
     for (start = 0; start < starts; start++) {
         arm_start(a, wanted, seed, start, p.q);
-        arm_descend(a, wanted, &p, STEPS);
+        arm_descend(a, wanted, &p);
         count = keep(&p, best, count);
     }
     for (i = 0; i < count; i++) {

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-enum { STEPS = 60 };
-static const double PI = 3.14159265358979323846;
-static const double REACHED = 1e-12, SAME = 1e-6, CLOSE = 1e-2, BETWEEN = 1e-13;
+#include "rigid.h"
+
+static const double SAME = 1e-6, CLOSE = 1e-2, BETWEEN = 1e-13; /* see arm_same */
 
 /* Source: Steele, Lea and Flood 2014, the generator SplitMix64, entered at its `place`. */
 static double uniform(unsigned long long seed, unsigned long long place) {
@@ -77,8 +77,8 @@ void arm_search(const arm *a, const double *wanted, long long starts, unsigned l
     found->count = 0;
     for (start = 0; start < starts; start++) {
         arm_start(a, wanted, seed, start, p.q);
-        arm_descend(a, wanted, &p, STEPS);
+        arm_descend(a, wanted, &p);
         arm_wrap(a, p.q);
-        if (arm_relative_residual(a, wanted, p.T) < REACHED) arm_add(a, wanted, p.q, found);
+        if (arm_reaches(a, wanted, p.T)) arm_add(a, wanted, p.q, found);
     }
 }

@@ -10,7 +10,7 @@
 typedef struct {
     double *q;        /* (room, n) distinct postures */
     double *residual; /* (room,) their relative residuals */
-    long long *hits;       /* (room,) how many postures were found to be this one */
+    long long *hits;  /* (room,) how many postures were found to be this one */
     long long count;
 } arm_postures;
 
@@ -24,7 +24,7 @@ void arm_start(const arm *a, const double *wanted, unsigned long long seed, long
  * whole turns are equal; slides are measured in arm lengths. */
 int arm_same(const arm *a, const double *wanted, const double *q, const double *other);
 
-/* Puts a solution among the others, the better of two that are one. */
+/* Puts a solution among the others, the better of two that are one. q is none of theirs. */
 void arm_add(const arm *a, const double *wanted, const double *q, arm_postures *found);
 
 /* Solutions found from `starts` starts; there must be room for as many. */
@@ -32,7 +32,7 @@ void arm_search(const arm *a, const double *wanted, long long starts, unsigned l
                 arm_postures *found);
 
 /* The posture whose pose is nearest, the gap's cost being the square of the distance; gives that
- * cost. */
+ * cost. At least one start. */
 double arm_nearest(const arm *a, const double *wanted, long long starts, unsigned long long seed,
                    double *q);
 

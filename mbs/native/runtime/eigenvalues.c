@@ -136,7 +136,8 @@ static void first_column(int n, const double *H, int m, const shifts *s, double 
     v[2] = H[(m + 2) * n + m + 1];
 }
 
-/* Where two elements below the diagonal are together so small that the step may begin. */
+/* Where two elements below the diagonal are together so small that the step may begin; the block
+ * has three rows or more. */
 static int step_start(int n, const double *H, int first, int last, const shifts *s) {
     double v[3];
     int m;
@@ -148,7 +149,7 @@ static int step_start(int n, const double *H, int first, int last, const shifts 
                               fabs(H[(m + 1) * n + m + 1]));
         if (left < DBL_EPSILON * right) break;
     }
-    return m < first ? first : m;
+    return m;
 }
 
 /* Rows k .. k + size - 1 of columns k .. last, then these columns of rows first .. end. */

@@ -5,7 +5,8 @@
 #include "eigenvalues.h"
 #include "raghavan_roth.h"
 
-static const double MIX = 0.6180339887, ROUNDING = 1e-13;
+static const double MIX = 0.6180339887; /* of x5 with x4, so that sums of solutions differ */
+static const double ROUNDING = 1e-13;   /* of pivots */
 
 typedef double block[ROTH_SHARED * ROTH_SHARED];
 

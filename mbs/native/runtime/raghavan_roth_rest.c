@@ -7,7 +7,9 @@
 
 enum { KEPT = 6 };
 static const int BY_TURN[KEPT] = {1, 2, 5, 8, 11, 14}, BY_SLIDE[KEPT] = {3, 4, 6, 7, 8, 11};
-static const double FLAT = 1e-4, NONE = 1e-9, NOTHING = 1e-12;
+static const double FLAT = 1e-4;     /* ratio of singular values below which there are two roots too */
+static const double NONE = 1e-9;     /* and below which there is no single root */
+static const double NOTHING = 1e-12; /* singular values, in arm lengths, that are rounding */
 
 /* Singular values s, left vectors in the place of A's columns and right vectors V of A (KEPT, 2),
  * column by column. Source: Hestenes 1958, which for two columns is one rotation. */

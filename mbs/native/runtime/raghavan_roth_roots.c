@@ -4,10 +4,13 @@
 #include "dense.h"
 #include "eigenvalues.h"
 #include "raghavan_roth.h"
+#include "rigid.h"
 
 enum { OFFSETS = 8 };
-static const double PI = 3.14159265358979323846;
-static const double FIRST_OFFSET = 0.2731, WELL = 1e-3, ROUNDING = 1e-15, OFF_CIRCLE = 0.5;
+static const double FIRST_OFFSET = 0.2731; /* [rad], an angle that no design prefers */
+static const double WELL = 1e-3;           /* a regularity with which no other offset is tried */
+static const double ROUNDING = 1e-15;      /* of pivots */
+static const double OFF_CIRCLE = 0.5;      /* |log| of the size of e^(iu) of roots that are kept */
 
 /* The matrix where x = tan((u - offset) / 2) is infinite. */
 static void far_matrix(const roth_matrix *m, double offset, double *A) {

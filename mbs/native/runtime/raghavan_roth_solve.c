@@ -2,10 +2,12 @@
 #include <string.h>
 
 #include "raghavan_roth.h"
+#include "rigid.h"
 
-enum { STEPS = 60 };
-static const double PI = 3.14159265358979323846;
-static const double COARSE = 1e-3, FINE = 1e-6, FAR = 1e3, REACHED = 1e-12;
+/* Gaps between angles that may be one root [rad]: of a multiple one, spread by rounding; of a
+ * double one, so that neighbours of its kind are tried apart too. */
+static const double COARSE = 1e-3, FINE = 1e-6;
+static const double FAR = 1e3; /* slides, in reaches, that are taken for infinite */
 
 typedef struct {
     const roth_loop *loop;
@@ -102,8 +104,8 @@ void roth_solve(const arm *a, const roth_loop *r, const double *T, arm_postures 
     int i, count = roth_candidates(r, T, q);
     found->count = 0;
     for (i = 0; i < count; i++) {
-        arm_polish(a, T, q + 6 * i, STEPS);
+        arm_polish(a, T, q + 6 * i);
         arm_pose(a, q + 6 * i, pose);
-        if (arm_relative_residual(a, T, pose) < REACHED) arm_add(a, T, q + 6 * i, found);
+        if (arm_reaches(a, T, pose)) arm_add(a, T, q + 6 * i, found);
     }
 }

@@ -2,6 +2,8 @@
 #ifndef MBS_RIGID_H
 #define MBS_RIGID_H
 
+#define PI 3.14159265358979323846
+
 /* T = A B; T is neither of them. */
 void rigid_product(const double *A, const double *B, double *T);
 

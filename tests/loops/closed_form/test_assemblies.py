@@ -7,9 +7,8 @@ from support.postures import active, same, searched
 from support.ring_loops import MADE_OF, ring_loop
 
 from mbs.assembly.rates import quaternion_slices
-from mbs.errors import NoClosedForm, Unclosable
+from mbs.errors import Unclosable
 from mbs.loops import function, modes, reduction_matrix, solve
-from mbs.loops.closed_form.plan import plan
 
 SEARCHED = (
     *("RSUR", "PSUR", "RSUP", "PUSP"),  # SSR and SSP, one ball a universal joint
@@ -116,9 +115,3 @@ def test_out_of_reach_the_range_is_named(kinds, unit):
     low, high = (float(text) for text in str(error.value).split("can be ")[1].split()[:3:2])
     middle = (low + high) / 2
     assert np.isfinite(solve(system, [middle], branch=[])).all()
-
-
-def test_a_ball_and_three_turns_askew_have_no_closed_form():
-    system = ring_loop(1, "RRRRS").assemble()
-    with pytest.raises(NoClosedForm, match=r"4 positions are unknown \(.*\) and no kernel fits"):
-        plan(system)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from support.plain_arms import apart, manseur_doty, puma
+from support.plain_arms import apart, manseur_doty, puma, random_arm
 
 from mbs.models.inverse_geometry.numeric import core
 from mbs.models.inverse_geometry.numeric.general import general, general_of
@@ -20,6 +20,28 @@ def no_compiler(monkeypatch):
 @pytest.mark.skipif(not compiler_found(), reason="no C compiler")
 def test_the_core_is_loaded_once():
     assert core.core() is core.core() is not None
+
+
+def test_arms_of_more_joints_than_the_core_has_room_for_are_solved_too():
+    arm = random_arm(np.random.default_rng(3), 9)
+    assert core.core_of(arm) is None
+    q = np.random.default_rng(4).uniform(-1, 1, 9)
+    T = arm.pose(q)
+    assert np.max(polish(arm, T, q[None] + 1e-3).residual) < 1e-13
+    assert len(search(arm, T, starts=3)) > 0
+    assert nearest(arm, T).distance < 1e-12
+
+
+@pytest.mark.skipif(not compiler_found(), reason="no C compiler")
+def test_poses_and_postures_of_wrong_shapes_are_refused():
+    arm, T = manseur_doty()
+    for poses, postures in ((T[:3], np.zeros((2, 6))), (T[None].repeat(3, 0), np.zeros((2, 6)))):
+        with pytest.raises(ValueError, match="broadcast"):
+            polish(arm, poses, postures)
+    with pytest.raises(ValueError, match="broadcast"):
+        polish(arm, T, np.zeros((2, 5)))
+    with pytest.raises(ValueError, match="broadcast"):
+        search(arm, T[:3], starts=2)
 
 
 @pytest.mark.usefixtures("no_compiler")

@@ -106,7 +106,9 @@ def test_slides_are_never_wound():
         ({"q9": (0, 1)}, "'q9', which is no coordinate"),
         ({"q1": (2, 1)}, r"the limits of q1 are \(2, 1\)"),
         ({"q1": 3}, "the limits of q1 are 3"),
-        ({"q1": (0, float("nan"))}, "the lowest and the highest"),
+        ({"q1": (0, float("nan"))}, r"give \(lowest, highest\)"),
+        ("wide", "limits is 'wide'; give True"),
+        ([1, 2], r"limits is \[1, 2\]"),
     ],
 )
 def test_wrong_limits_are_named(limits, said):

@@ -195,7 +195,7 @@ def test_five_joints():
 
 def test_wrong_questions():
     system = assembled("puma560")
-    with pytest.raises(ModelError, match="there is no method 'fast'"):
+    with pytest.raises(ModelError, match="method is 'fast'"):
         solve_many(system, np.eye(4)[None], method="fast")
     with pytest.raises(ModelError, match=r"give them as \(N, 4, 4\)"):
         solve_many(system, np.eye(4))

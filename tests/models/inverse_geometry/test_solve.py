@@ -142,6 +142,9 @@ def test_closest():
         assert answer.closest(solution.q + 0.01).q == pytest.approx(solution.q, abs=1e-12)
     with pytest.raises(ModelError, match="5 values"):
         answer.closest(q[:5])
+    for wrong in ("home", np.full(6, np.nan), {"q1": 0.1}):
+        with pytest.raises(ModelError, match="give a finite number for each coordinate"):
+            answer.closest(wrong)
 
 
 def test_a_locked_joint_of_a_redundant_arm():
@@ -152,7 +155,7 @@ def test_a_locked_joint_of_a_redundant_arm():
     system = mbs.load({"name": "seven", "frame": rows}).assemble()
     q = np.array([0.2, -0.4, 0.6, 0.5, -0.3, 0.8, 0.1])
     T = np.array(mbs.models.direct_geometry(system)(q))
-    with pytest.raises(ModelError, match="lock 1 of them"):
+    with pytest.raises(ModelError, match=r"lock 1 of them with locked=\{'q3': 0\}"):
         solve(system, T)
     answer = solve(system, T, locked={"q3": 0.6})
     assert nearest_of(system, answer, q) < 1e-9

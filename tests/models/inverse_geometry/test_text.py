@@ -151,5 +151,5 @@ def test_parameters_locked_joints_and_branches_are_told():
 
 
 def test_wrong_method():
-    with pytest.raises(ModelError, match="'general', which gives no closed form"):
+    with pytest.raises(ModelError, match="method is 'general', which is not known here"):
         sheet("puma560", "general")

@@ -93,11 +93,12 @@ int core_call_rhs(core *c, double t, const double *x, const double *z, double *x
 
 static core_status closure_failed(core *c, int status) {
     if (status == CLOSURE_SINGULAR)
-        return core_no_answer(c, "%s: singular posture at time %.9g: the states do not determine the "
-                         "dependent coordinates; start elsewhere or choose other states",
-                         c->name, c->m.time);
-    return core_no_answer(c, "%s: unclosable posture at time %.9g: no dependent coordinates near the "
-                     "last ones close the loops", c->name, c->m.time);
+        return core_no_answer(c, "%s: singular posture at time %.9g: the states do not determine "
+                              "the dependent coordinates; start elsewhere or choose other states",
+                              c->name, c->m.time);
+    return core_no_answer(c, "%s: unclosable posture at time %.9g: no dependent coordinates near "
+                          "the last ones close the loops; start elsewhere or move less",
+                          c->name, c->m.time);
 }
 
 core_status core_accept_posture(core *c, const double *x, const double *z) {
@@ -115,12 +116,13 @@ core_status core_refresh(core *c) {
     status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
     if (status) return closure_failed(c, status);
     if (core_call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
-        return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name, c->m.time);
+        return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
+                              c->m.time);
     memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
     for (i = 0; i < N_VALUES; i++)
         if (!isfinite(v[i]))
-            return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular posture or a "
-                             "zero mass", c->name, MODEL_NAMES[i], c->m.time);
+            return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular "
+                                  "posture or a zero mass", c->name, MODEL_NAMES[i], c->m.time);
     c->m.stale = 0;
     return CORE_OK;
 }

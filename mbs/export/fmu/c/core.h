@@ -1,8 +1,8 @@
 /* A model that runs: instance, modes, closed loops, integration, derivatives, saved states.
  *
- * Nothing here depends on a version of FMI; fmi2.c and fmi3.c are thin faces over it. A value reference is a
- * place in `values`, in the order of the enumeration below. All that makes one run differ from
- * another is in `memory`, a flat block, so a saved state is a copy of it.
+ * Nothing here depends on a version of FMI; fmi2.c and fmi3.c are thin faces over it. A value
+ * reference is a place in `values`, in the order of the enumeration below. All that makes one run
+ * differ from another is in `core_memory`, a flat block, so a saved state is a copy of it.
  */
 #ifndef MBS_CORE_H
 #define MBS_CORE_H

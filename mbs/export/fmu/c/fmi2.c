@@ -27,6 +27,11 @@ static void forward_log(void *host, const char *name, core_status status, const 
         f->logger(f->environment, name, as_fmi(status), core_category(status), "%s", message);
 }
 
+static fmi2Status refused(fmi2Component c, const char *message) {
+    NEED(c);
+    return as_fmi(core_refuse(MODEL(c), "%s: %s", MODEL(c)->name, message));
+}
+
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
 
@@ -80,7 +85,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
                                fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop) {
     NEED(c);
     if (stop_defined && !(stop >= start))
-        return as_fmi(core_refuse(MODEL(c), "stop time %g lies before start time %g", stop, start));
+        return refused(c, "the stop time lies before the start; give a later one");
     return as_fmi(core_setup(MODEL(c), tolerance_defined ? tolerance : MODEL_TOLERANCE, start));
 }
 
@@ -106,21 +111,21 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 }
 
 /* All variables are real: no value reference of another type exists. */
-static fmi2Status none(fmi2Component c, size_t n, const char *type) {
+static fmi2Status none(fmi2Component c, size_t n, const char *message) {
     NEED(c);
-    return n ? as_fmi(core_refuse(MODEL(c), "the model has no %s variables", type)) : fmi2OK;
+    return n ? refused(c, message) : fmi2OK;
 }
 
 #define NO_VARIABLES(type, text)                                                         \
     fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t n,   \
                              fmi2##type value[]) {                                       \
         (void)vr, (void)value;                                                           \
-        return none(c, n, text);                                                         \
+        return none(c, n, "the model has no " text " variables");                        \
     }                                                                                    \
     fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t n,   \
                              const fmi2##type value[]) {                                 \
         (void)vr, (void)value;                                                           \
-        return none(c, n, text);                                                         \
+        return none(c, n, "the model has no " text " variables");                        \
     }
 
 NO_VARIABLES(Integer, "integer")
@@ -148,7 +153,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     NEED(c);
-    if (!state || !size) return as_fmi(core_refuse(MODEL(c), "the state or its size is NULL"));
+    if (!state || !size) return refused(c, "the state or its size is NULL");
     *size = core_state_size();
     return fmi2OK;
 }
@@ -171,7 +176,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         fmi2Real answer[]) {
     NEED(c);
     if ((n_unknown && (!unknown || !answer)) || (n_known && (!known || !seed)))
-        return as_fmi(core_refuse(MODEL(c), "an array of the derivative is NULL"));
+        return refused(c, "an array of the derivative is NULL");
     return as_fmi(core_directional(MODEL(c), unknown, n_unknown, known, n_known, seed, answer));
 }
 
@@ -179,7 +184,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     NEED(c);
-    if (!info) return as_fmi(core_refuse(MODEL(c), "the event information is NULL"));
+    if (!info) return refused(c, "the event information is NULL");
     memset(info, 0, sizeof *info);
     return as_fmi(core_update_discrete_states(MODEL(c)));
 }
@@ -189,7 +194,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_befor
     NEED(c);
     (void)no_set_before;
     if (!enter_event_mode || !terminate)
-        return as_fmi(core_refuse(MODEL(c), "a flag of the completed step is NULL"));
+        return refused(c, "a flag of the completed step is NULL");
     *enter_event_mode = *terminate = fmi2False;
     return as_fmi(core_completed_step(MODEL(c)));
 }
@@ -215,9 +220,8 @@ VECTOR(fmi2GetDerivatives, core_get_derivatives)
 VECTOR(fmi2GetNominalsOfContinuousStates, core_get_nominals)
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t n) {
-    NEED(c);
     (void)indicators;
-    return n ? as_fmi(core_refuse(MODEL(c), "the model has no event indicators")) : fmi2OK;
+    return none(c, n, "the model has no event indicators");
 }
 
 /* ---- co-simulation ---- */
@@ -226,14 +230,14 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
                                        const fmi2Integer order[], const fmi2Real value[]) {
     NEED(c);
     (void)vr, (void)n, (void)order, (void)value;
-    return as_fmi(core_refuse(MODEL(c), "inputs are not interpolated"));
+    return refused(c, "inputs are not interpolated");
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                         const fmi2Integer order[], fmi2Real value[]) {
     NEED(c);
     (void)vr, (void)n, (void)order, (void)value;
-    return as_fmi(core_refuse(MODEL(c), "outputs have no derivatives of their own"));
+    return refused(c, "outputs have no derivatives of their own");
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no_set_before) {
@@ -244,12 +248,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
     NEED(c);
-    return as_fmi(core_refuse(MODEL(c), "no step is under way: steps are not asynchronous"));
+    return refused(c, "no step is under way: steps are not asynchronous");
 }
 
 static fmi2Status no_status(fmi2Component c) {
-    NEED(c);
-    return as_fmi(core_refuse(MODEL(c), "this status is only known of asynchronous steps"));
+    return refused(c, "this status is only known of asynchronous steps");
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {

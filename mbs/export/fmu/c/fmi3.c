@@ -5,6 +5,7 @@
 #include "fmi3_face.h"
 
 #define TIME ((fmi3ValueReference)N_VALUES) /* the independent variable */
+#define WRONG_COUNT "an array is NULL or too short; give one value for each reference"
 
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
@@ -90,7 +91,8 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
                                        fmi3Boolean stop_defined, fmi3Float64 stop) {
     core_status status;
     NEED(c);
-    if (stop_defined && !(stop >= start)) return refused(c, "the stop time lies before the start");
+    if (stop_defined && !(stop >= start))
+        return refused(c, "the stop time lies before the start; give a later one");
     status = core_setup(MODEL(c), tolerance_defined ? tolerance : MODEL_TOLERANCE, start);
     return as_fmi(status ? status : core_enter_initialization(MODEL(c)));
 }
@@ -111,7 +113,8 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     size_t first = 0, i;
     fmi3Status status = fmi3OK;
     NEED(c);
-    if (n != n_values || (n && (!vr || !value))) return refused(c, "the array of values is wrong");
+    if (n != n_values || (n && (!vr || !value))) return refused(c, WRONG_COUNT);
+    if (!n) return as_fmi(core_get(MODEL(c), NULL, 0, NULL));
     for (i = 0; i <= n && !status; i++) {
         if (i < n && vr[i] != TIME) continue;
         status = as_fmi(core_get(MODEL(c), vr + first, i - first, value + first));
@@ -124,7 +127,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                           const fmi3Float64 value[], size_t n_values) {
     NEED(c);
-    if (n != n_values) return refused(c, "the array of values is wrong");
+    if (n != n_values) return refused(c, WRONG_COUNT);
     return as_fmi(core_set(MODEL(c), vr, n, value));
 }
 

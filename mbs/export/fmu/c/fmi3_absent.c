@@ -5,7 +5,9 @@ fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) {
     return refused(c, "the model has no structural parameters");
 }
 
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) { return refused(c, "the model has no structural parameters"); }
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
+    return refused(c, "the model has no structural parameters");
+}
 
 fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time) {
     (void)clock, (void)time;

@@ -13,7 +13,8 @@ static core_status known_reference(core *c, unsigned ref) {
 core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     core_status status = CORE_OK;
     size_t i;
-    if (!core_allowed(c, INITIALIZATION | RUNNING | TERMINATED, "getting values")) return CORE_ERROR;
+    if (!core_allowed(c, INITIALIZATION | RUNNING | TERMINATED, "getting values"))
+        return CORE_ERROR;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
     for (i = 0; i < n && !status; i++) status = known_reference(c, ref[i]);
     for (i = 0; i < n && !status; i++) {

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mbs.models.inverse_geometry.answers.distinct import distinct
 from mbs.models.inverse_geometry.answers.families import Family
 from mbs.models.inverse_geometry.answers.labels import Anatomy, anatomy, labels
 from mbs.models.inverse_geometry.answers.reasons import unreachable
@@ -15,7 +16,6 @@ from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.answers.wishes import Draft, Wishes
 from mbs.models.inverse_geometry.arm import Array
 from mbs.models.inverse_geometry.chain import Chain
-from mbs.models.inverse_geometry.equations.closed_form import key_of
 from mbs.models.inverse_geometry.numeric.nearest import Nearest, nearest
 from mbs.models.inverse_geometry.whole_robots.closed_robot import ClosedPosture, close, why_searched
 
@@ -70,7 +70,7 @@ def answer(question: Question, found: list[Root], method: str) -> Solutions:
         closest = nearest(question.target.arm, question.target.T)
         reason = unreachable(question.target, closest)
         return question.wishes.solutions([], method, reason, _whole(question, closest))
-    drafts = _drafts(question, _named(question, found))
+    drafts = _drafts(question, _named(question, _shown(question, found)))
     if why_searched(question.chain.system, question.chain) is not None:
         method += ", loops by search"
     return question.wishes.solutions(drafts, method, "" if drafts else _NO_LOOP)
@@ -79,7 +79,7 @@ def answer(question: Question, found: list[Root], method: str) -> Solutions:
 def _drafts(question: Question, found: list[Root]) -> list[Draft]:
     """The solutions of the robot: several for one of the chain where its loops allow."""
     target = question.target
-    q = np.array([_shown(question, root) for root in found])
+    q = np.array([root.q for root in found])
     residual, sigma = target.residual(q), target.singular_values(q)[:, -1]
     return [
         Draft(
@@ -98,7 +98,7 @@ def _drafts(question: Question, found: list[Root]) -> list[Draft]:
 def _named(question: Question, found: list[Root]) -> list[Root]:
     """With the names of shoulder, elbow and wrist where the arm has them, else a number."""
     way, arm = question.chain, question.target.arm
-    key = ("anatomy", *key_of(way), question.p.tobytes())
+    key = ("anatomy", *way.key, question.p.tobytes())
     has: Anatomy = way.system.cached(key, lambda: anatomy(arm))
     named = labels(arm, has, np.array([root.q for root in found]))
     names = [name or root.label for name, root in zip(named, found, strict=True)]
@@ -111,9 +111,24 @@ def _named(question: Question, found: list[Root]) -> list[Root]:
     return result
 
 
-def _shown(question: Question, root: Root) -> Array:
-    """The posture (n,) of the chain; of a self-motion that which stands for it."""
-    return root.q if root.family is None else _representative(question, root.family)
+def _shown(question: Question, found: list[Root]) -> list[Root]:
+    """With the postures that stand for self-motions; those that prove to be one are listed once."""
+    shown = list[Root]()
+    for root in found:
+        if root.family is None:
+            shown.append(root)
+            continue
+        q = _representative(question, root.family)
+        if not any(_is_same(question.target, other, root.family, q) for other in shown):
+            shown.append(replace(root, q=q))
+    return shown
+
+
+def _is_same(target: Target, other: Root, family: Family, q: Array) -> bool:
+    """Whether a root is a self-motion of the same joints through the same posture q, (n,)."""
+    if other.family is None or other.family.moving != family.moving:
+        return False
+    return len(distinct(target, np.array([other.q, q]))) == 1
 
 
 def _representative(question: Question, family: Family) -> Array:
@@ -130,8 +145,6 @@ def _representative(question: Question, family: Family) -> Array:
 
 
 def _whole(question: Question, found: Nearest) -> Nearest:
-    """The nearest pose with the posture of the whole robot."""
-    near = question.wishes.near
-    q = near.copy()
-    q[list(question.chain.places)] = found.q
-    return replace(found, q=question.wishes.bounds.wound(q, near))
+    """The nearest pose with the posture of the whole robot; NaN where its loops stay open."""
+    whole = question.whole(found.q)
+    return replace(found, q=question.wishes.bounds.wound(whole, question.wishes.near))

@@ -22,6 +22,9 @@ def distinct(target: Target, q: Array) -> list[list[int]]:
     """
     groups: list[list[int]] = []
     x, scale = q / target.unit, max(1.0, target.arm.length)
+    apart = np.max(np.abs(target.wrapped(x[:, None] - x)), axis=2, initial=0.0)
+    if np.sum(apart < _CLOSE) == len(q):  # each is close to itself alone
+        return [[k] for k in range(len(q))]
     for k in range(len(q)):
         first = [group[0] for group in groups]
         way = target.wrapped(x[k] - x[first])

@@ -20,6 +20,8 @@ Whole = Callable[[Array], Array]
 _MOVES = 1e-6
 _SAME = 1e-6
 _REFINEMENTS = 5
+_COMPARABLE = 0.5
+"""Part of the widest motion from which a joint nearer the base is the free one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -175,13 +177,15 @@ def family(
 
 
 def _free_joint(curve: Curve, moves: Array) -> int:
-    """The joint that moves most evenly: the one whose slowest part is fastest."""
+    """The first joint that tells all postures apart, or moves as far as most of the others.
+
+    Where every joint turns back, postures that share its position are told apart by the side from
+    which the curve reaches them.
+    """
     steps = np.diff(curve.x, axis=0)
-    rates = np.abs(steps) / np.linalg.norm(steps, axis=1, keepdims=True)
-    slowest = np.where(moves, np.min(rates, axis=0), -1.0)
-    directed = np.all(steps > 0, axis=0) | np.all(steps < 0, axis=0)
-    score = np.where(directed, slowest + 1.0, np.where(moves, np.ptp(curve.x, axis=0) * 1e-3, -1))
-    return int(np.flatnonzero(score >= np.max(score) - 1e-6)[0])
+    onwards = moves & (np.all(steps > 0, axis=0) | np.all(steps < 0, axis=0))
+    span = np.where(onwards if np.any(onwards) else moves, np.ptp(curve.x, axis=0), 0.0)
+    return int(np.flatnonzero(span >= _COMPARABLE * np.max(span))[0])
 
 
 def _relations(target: Target, curve: Curve, free: int) -> tuple[str, ...]:

@@ -10,11 +10,14 @@ from casadi import DM, SX, Function
 
 from mbs.errors import ModelError, NoClosedForm
 from mbs.loops.sequence import Sequence
-from mbs.messages import did_you_mean, quoted
 from mbs.models.inverse_geometry.answers.target import Target
-from mbs.models.inverse_geometry.arm import Arm, Array
+from mbs.models.inverse_geometry.arm import Array
 from mbs.models.inverse_geometry.chain import Chain
-from mbs.models.inverse_geometry.equations.closed_form import CLOSED_FORMS, key_of, sequence_of
+from mbs.models.inverse_geometry.equations.closed_form import (
+    CLOSED_FORMS,
+    require_method,
+    sequence_of,
+)
 from mbs.models.inverse_geometry.numeric.general import General, general, general_of
 from mbs.models.inverse_geometry.numeric.polish import polish
 from mbs.models.inverse_geometry.numeric.search import search
@@ -60,11 +63,7 @@ def gather(chain: Chain, target: Target, method: str, p: Array) -> Gathered:
         NoClosedForm: "pieper" or "paul" was asked for and does not fit.
         ModelError: there is no such method, or it does not hold for the chain.
     """
-    if method not in METHODS:
-        raise ModelError(
-            f"{chain.system.name}: method is {quoted(method)}, which solves no pose; "
-            + did_you_mean(method, METHODS)
-        )
+    require_method(chain.system, method, METHODS)
     if method in (*CLOSED_FORMS, "auto"):
         try:
             return _by_closed_form(chain, target, sequence_of(chain, method, p), p)
@@ -73,7 +72,7 @@ def gather(chain: Chain, target: Target, method: str, p: Array) -> Gathered:
                 raise
     if method == "search":
         return _by_search(target)
-    ready = _ready(chain, target.arm, p)
+    ready = general_ready(chain, p)
     if ready is None and method == "general":
         raise ModelError(
             f"{chain.system.name}: the general method does not hold for the joints"
@@ -86,7 +85,7 @@ def gather(chain: Chain, target: Target, method: str, p: Array) -> Gathered:
 def further(chain: Chain, target: Target, gathered: Gathered, p: Array) -> Gathered:
     """What was gathered, and what the general method and the search add to it."""
     parts = [gathered]
-    ready = _ready(chain, target.arm, p)
+    ready = general_ready(chain, p)
     if gathered.method != "general" and ready is not None:
         parts.append(_by_general(target, ready))
     if gathered.method != "search":
@@ -128,13 +127,11 @@ def _leaves(chain: Chain, sequence: Sequence, p: Array) -> Function:
 
 
 def _name(chain: Chain, sequence: Sequence, p: Array) -> str:
-    """Which of the closed forms a sequence is: Pieper's where that gives the same equations."""
+    """Which of the closed forms a sequence is."""
     try:
-        steps = sequence_of(chain, "pieper", p).steps
+        return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"
     except NoClosedForm:
         return "paul"
-    same = [step.equation for step in steps] == [step.equation for step in sequence.steps]
-    return "pieper" if same else "paul"
 
 
 def _by_general(target: Target, ready: General) -> Gathered:
@@ -158,14 +155,14 @@ def _polished(target: Target, gathered: Gathered) -> Gathered:
     return Gathered(better.q[solved], labels, gathered.method, gathered.doubtful)
 
 
-def _ready(chain: Chain, arm: Arm, p: Array) -> General | None:
-    """The general method of a chain, None where it does not hold."""
+def general_ready(chain: Chain, p: Array) -> General | None:
+    """The general method of a chain for parameters p, (np,); None where it does not hold."""
 
     def build() -> General | None:
         try:
-            return general_of(arm)
+            return general_of(chain.arm(p))
         except (ModelError, NoClosedForm):
             return None
 
-    ready: General | None = chain.system.cached(("general", *key_of(chain), p.tobytes()), build)
+    ready: General | None = chain.system.cached(("general", *chain.key, p.tobytes()), build)
     return ready

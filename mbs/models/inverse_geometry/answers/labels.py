@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbs.models.inverse_geometry.arm import Arm, Array, motion
+from mbs.models.inverse_geometry.arm import Arm, Array
 
 _PARALLEL = 1e-9
 _UNDECIDED = 1e-9
@@ -36,7 +36,7 @@ def anatomy(arm: Arm) -> Anatomy:
     """What an arm has of shoulder, elbow and wrist."""
     if arm.size != 6 or any(arm.prismatic[3:]) or not _wrist_meets(arm):
         return Anatomy(False, False, False)
-    axes, origins = _lines(arm, np.zeros(6))
+    axes, origins = arm.lines(np.zeros(6))
     shoulder = not any(arm.prismatic[:2]) and abs(axes[0] @ axes[1]) < _PARALLEL
     parallel = np.linalg.norm(np.cross(axes[1], axes[2])) < _PARALLEL
     apart = np.linalg.norm(np.cross(axes[1], origins[2] - origins[1])) > _PARALLEL * arm.length
@@ -57,7 +57,7 @@ def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
     """
     if not has.wrist:
         return [""] * len(q)
-    axes, points = _lines(arm, q)
+    axes, points = arm.lines(q)
     a, p = np.moveaxis(axes, 1, 0), np.moveaxis(points, 1, 0)
     reach = _meeting(a[4], p[4], a[5], p[5]) - p[1]
     right = _dot(a[0], np.cross(a[1], reach)) / arm.length
@@ -85,23 +85,13 @@ def _elbow(bend: float, right: float) -> str:
     return "elbow up" if bend * right > 0 else "elbow down"
 
 
-def _lines(arm: Arm, q: Array) -> tuple[Array, Array]:
-    """The axes and a point on each, (..., 6, 3), in the base."""
-    T, axes, points = np.broadcast_to(arm.gaps[0], (*q.shape[:-1], 4, 4)), [], []
-    for k in range(arm.size):
-        axes.append(T[..., :3, 2])
-        points.append(T[..., :3, 3])
-        T = T @ motion(q[..., k], bool(arm.prismatic[k])) @ arm.gaps[k + 1]
-    return np.stack(axes, axis=-2), np.stack(points, axis=-2)
-
-
 def _wrist_meets(arm: Arm) -> bool:
     """Whether axes 4, 5, 6 meet in one point; they do so in every posture if in two."""
     return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
 
 
 def _meet(arm: Arm, q: Array) -> bool:
-    axes, points = _lines(arm, q)
+    axes, points = arm.lines(q)
     if min(np.linalg.norm(np.cross(axes[k], axes[k + 1])) for k in (3, 4)) < _PARALLEL:
         return False
     centre = _meeting(axes[4], points[4], axes[5], points[5])

@@ -91,16 +91,17 @@ def bounds(
 
     Args:
         system: whose coordinates.
-        given: (lowest, highest) [rad or m] by name, None for a coordinate that has none.
+        given: (lowest, highest) [rad or m] by name, None for a coordinate that has none; True,
+            False and None replace nothing.
         turning: numbers of the revolute coordinates that may be changed by whole turns, all of
             them when left out.
 
     Raises:
-        ModelError: there is no such coordinate, or the limits are no pair of numbers.
+        ModelError: there is no such coordinate, or limits are no dict or no pair of numbers.
     """
     names = tuple(coordinate.name for coordinate in system.coordinates)
     own = {c.name: c.limits for c in system.coordinates}
-    for name, pair in (given if isinstance(given, Mapping) else {}).items():
+    for name, pair in _replacing(system, given).items():
         if name not in own:
             raise ModelError(
                 f"{system.name}: limits are given for {quoted(name)}, which is no coordinate;"
@@ -114,6 +115,22 @@ def bounds(
     return Bounds(names, low, high, np.array(turns, dtype=bool))
 
 
+def leaves_out(given: bool | Given | None) -> bool:
+    """Whether limits that a user gives leave out what is beyond them."""
+    return given is not None and given is not False
+
+
+def _replacing(system: System, given: object) -> Given:
+    if isinstance(given, Mapping):
+        return given
+    if given is None or isinstance(given, bool):
+        return {}
+    raise ModelError(
+        f"{system.name}: limits is {quoted(given)}; give True for those of the robot, or a dict of"
+        " names to (lowest, highest)"
+    )
+
+
 def _pair(system: System, name: str, pair: object) -> tuple[float, float]:
     try:
         low, high = (float(x) for x in pair)  # type: ignore[attr-defined]
@@ -121,8 +138,8 @@ def _pair(system: System, name: str, pair: object) -> tuple[float, float]:
         low = high = math.nan
     if not low <= high:
         raise ModelError(
-            f"{system.name}: the limits of {name} are {quoted(pair)}; give the lowest and the"
-            " highest position"
+            f"{system.name}: the limits of {name} are {quoted(pair)}; give (lowest, highest), or"
+            " None for none"
         )
     return low, high
 

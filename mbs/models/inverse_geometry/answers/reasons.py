@@ -13,6 +13,8 @@ from mbs.models.inverse_geometry.numeric.nearest import Nearest
 
 _STARTS, _STEPS, _SEED = 40, 60, 20260109
 _REACHED = 1e-9
+_SMALLEST = 1e-9
+"""Distance [m] and angle [rad] that are told; below it is rounding."""
 
 
 def unreachable(target: Target, nearest: Nearest) -> str:
@@ -23,19 +25,32 @@ def unreachable(target: Target, nearest: Nearest) -> str:
         nearest: the reachable pose nearest to it.
     """
     arm = target.arm
-    apart = f"the nearest pose is {nearest.distance:.4g} m and {_angle(nearest.angle)} away"
+    away = f"the nearest reachable pose is {apart(nearest.distance, nearest.angle)}"
     position, orientation = reaches_position(target), reaches_orientation(target)
     if arm.size < 6 and position:
         joints = "1 joint" if arm.size == 1 else f"{arm.size} joints"
         also = "and so is the orientation alone" if orientation else "but not the orientation"
         return (
             f"the pose is off the manifold that {joints} can reach: its position alone is"
-            f" reached, {also}; {apart}"
+            f" reached, {also}; {away}"
         )
     if position:
-        return f"out of reach: the position is reached, but not with this orientation; {apart}"
+        return f"out of reach: the position is reached, but not with this orientation; {away}"
     also = "is reached alone" if orientation else "is not reached either"
-    return f"out of reach: the position is too far or too near, the orientation {also}; {apart}"
+    return f"out of reach: the position is too far or too near, the orientation {also}; {away}"
+
+
+def apart(distance: float, angle: float) -> str:
+    """How far two poses are apart, in words; what is but rounding is left out.
+
+    Args:
+        distance: between their origins [m].
+        angle: between their orientations [rad].
+    """
+    parts = [f"{distance:.4g} m away"] if distance > _SMALLEST else []
+    if angle > _SMALLEST:
+        parts.append(f"turned by {math.degrees(angle):.4g} degrees")
+    return " and ".join(parts) or "within rounding of it"
 
 
 def excluded(outside: Sequence[Sequence[str]]) -> str:
@@ -76,7 +91,3 @@ def _reaches(target: Target, rows: slice) -> bool:
         e, J = np.where(better[:, None], e_trial, e), np.where(better[:, None, None], J_trial, J)
         damping = np.where(better, np.maximum(damping / 5, 1e-14), damping * 4)
     return bool(np.min(np.max(np.abs(e), axis=1)) < _REACHED)
-
-
-def _angle(angle: float) -> str:
-    return f"{angle:.4g} rad ({math.degrees(angle):.3g} degrees)"

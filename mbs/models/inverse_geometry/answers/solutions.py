@@ -9,6 +9,7 @@ from typing import overload
 import numpy as np
 
 from mbs.errors import ModelError
+from mbs.messages import quoted
 from mbs.models.inverse_geometry.answers.families import Family
 from mbs.models.inverse_geometry.answers.limits import Bounds
 from mbs.models.inverse_geometry.arm import Array
@@ -88,11 +89,11 @@ class Solutions(Sequence[Solution]):
         """The solution nearest a posture (nq,) [rad or m], wound as near to it as limits allow.
 
         Raises:
-            ModelError: there is no solution, or the posture has the wrong number of values.
+            ModelError: there is no solution, or the posture is not that many finite numbers.
         """
         if not self.solutions:
             raise ModelError(f"{self.system}: there is no solution; {self.reason}")
-        near = np.asarray(q, dtype=float).ravel()
+        near = _numbers(self.system, q)
         if near.size != len(self.names):
             raise ModelError(
                 f"{self.system}: the posture has {near.size} values, the robot has"
@@ -130,3 +131,15 @@ class Solutions(Sequence[Solution]):
             "within" if s.within_limits else "outside",
             note,
         )
+
+
+def _numbers(system: str, q: object) -> Array:
+    try:
+        near = np.asarray(q, dtype=float).ravel()
+    except (TypeError, ValueError):
+        near = np.full(1, np.nan)
+    if not np.all(np.isfinite(near)):
+        raise ModelError(
+            f"{system}: the posture is {quoted(q)}; give a finite number for each coordinate"
+        )
+    return near

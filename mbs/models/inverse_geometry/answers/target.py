@@ -24,7 +24,7 @@ class Target:
 
     Attributes:
         arm: that moves the frame.
-        T: (4, 4) the wanted pose.
+        T: (4, 4) the wanted pose; (m, 4, 4) of m postures, each its own.
     """
 
     arm: Arm
@@ -33,7 +33,7 @@ class Target:
     @property
     def unit(self) -> Array:
         """(n,) the unit of every joint [m or rad]."""
-        return np.where(self.arm.prismatic, self.arm.length, 1.0)
+        return self.arm.units
 
     @property
     def tolerance(self) -> float:
@@ -42,8 +42,7 @@ class Target:
 
     def residual(self, q: Array) -> Array:
         """(...) largest element of pose(q) - T at postures q, (..., n)."""
-        error: Array = np.max(np.abs(self.arm.pose(q) - self.T), axis=(-2, -1))
-        return error
+        return self.arm.residual(q, self.T)
 
     def excess(self, x: Array) -> tuple[Array, Array]:
         """The equations e(x) = 0, (..., 6), and their derivative to first order, (..., 6, n)."""
@@ -58,8 +57,7 @@ class Target:
 
     def wrapped(self, x: Array) -> Array:
         """Differences x with those of turns brought into [-pi, pi)."""
-        turned = np.mod(x + np.pi, 2 * np.pi) - np.pi
-        return np.where(self.arm.prismatic, x, turned)
+        return self.arm.wrapped(x)
 
     def corrected(self, x: Array, held: Array, values: Array, iterations: int = 40) -> Array:
         """Solutions near x, (..., n), at which held @ x = values, by Gauss-Newton.

@@ -13,7 +13,6 @@ from mbs.loops.sequence import Sequence
 from mbs.models.inverse_geometry.arm import Array
 from mbs.models.inverse_geometry.chain import Chain
 from mbs.models.inverse_geometry.equations.all_branches import all_branches
-from mbs.models.inverse_geometry.equations.closed_form import key_of
 from mbs.native import compiled
 
 _COLUMNS = 32
@@ -50,12 +49,12 @@ def batch(chain: Chain, sequence: Sequence, p: NDArray[np.float64], T: Array) ->
     plain = _plain(chain, sequence, p)
     if len(T) < _MANY:
         return _interpreted(plain, T)
-    key = ("machine code of igm_all", sequence, *key_of(chain), p.tobytes())
+    key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
     return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
 
 
 def _plain(chain: Chain, sequence: Sequence, p: NDArray[np.float64]) -> Function:
-    key = ("igm_all", sequence, *key_of(chain), p.tobytes())
+    key = ("igm_all", sequence, *chain.key, p.tobytes())
     plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
     return plain
 

@@ -81,7 +81,7 @@ def _polish(arm: Arm, T: Array, every: Batch, which: Booleans) -> Booleans:
     before = every.q[which]
     better = polish(arm, T[np.nonzero(which)[0]], before)
     every.q[which], every.residual[which] = better.q, better.residual
-    far: Booleans = np.max(np.abs(_difference(arm, better.q, before)), axis=-1) > _MEETING
+    far: Booleans = np.max(np.abs(arm.wrapped(better.q - before)), axis=-1) > _MEETING
     return far
 
 
@@ -93,19 +93,13 @@ def _merge(arm: Arm, every: Batch, valid: Booleans) -> Booleans:
     some, q = valid[rows], every.q[rows]
     meeting = np.zeros(len(valid), dtype=bool)
     for b in range(1, valid.shape[1]):
-        apart = np.max(np.abs(_difference(arm, q[:, :b], q[:, b : b + 1])), axis=-1)
+        apart = np.max(np.abs(arm.wrapped(q[:, :b] - q[:, b : b + 1])), axis=-1)
         apart[~some[:, :b]] = np.inf
         nearest = np.min(apart, axis=1)
         meeting[rows] |= some[:, b] & (nearest >= _SAME) & (nearest < _MEETING)
         some[:, b] &= nearest >= _SAME
     valid[rows] = some
     return meeting
-
-
-def _difference(arm: Arm, a: Array, b: Array) -> Array:
-    """A - b (..., n), that of turns brought into [-pi, pi)."""
-    d = a - b
-    return np.where(arm.prismatic, d, np.mod(d + np.pi, 2 * np.pi) - np.pi)
 
 
 def with_postures(draft: Draft, k: int, arm: Arm, q: Array, T: Array) -> Draft:
@@ -122,7 +116,7 @@ def with_postures(draft: Draft, k: int, arm: Arm, q: Array, T: Array) -> Draft:
     columns = _nearest_columns(arm, draft.q[k], q)
     draft.valid[k] = False
     draft.valid[k, columns], draft.q[k, columns] = True, q
-    draft.residual[k, columns] = np.max(np.abs(arm.pose(q) - T), axis=(-2, -1))
+    draft.residual[k, columns] = arm.residual(q, T)
     return draft
 
 
@@ -139,7 +133,7 @@ def _widened(draft: Draft, columns: int) -> Draft:
 
 def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
     """A column for every posture: the nearest pairs first."""
-    apart = np.sum(np.abs(_difference(arm, q[:, None], branches[None])), axis=-1)
+    apart = np.sum(np.abs(arm.wrapped(q[:, None] - branches[None])), axis=-1)
     columns = [-1] * len(q)
     for _ in columns:
         posture, column = np.unravel_index(int(np.argmin(apart)), apart.shape)

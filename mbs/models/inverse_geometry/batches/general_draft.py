@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.answers.target import SOLVED
-from mbs.models.inverse_geometry.arm import Arm, Array
+from mbs.models.inverse_geometry.answers.gathering import general_ready
+from mbs.models.inverse_geometry.answers.target import Target
+from mbs.models.inverse_geometry.arm import Array
 from mbs.models.inverse_geometry.batches.draft import Draft
-from mbs.models.inverse_geometry.numeric.general import General, general_many, general_of
+from mbs.models.inverse_geometry.chain import Chain
+from mbs.models.inverse_geometry.numeric.general import General, general_many
 
 _NEARLY_SINGULAR = 1e-4
 """Smallest singular value below which a solution next to the one found may be missing."""
 _REGULAR = 1e-9
 
 
-def ready(arm: Arm) -> General | None:
-    """The general method of an arm; None where it does not hold, or hardly."""
-    try:
-        found = general_of(arm)
-    except (ModelError, NoClosedForm):
-        return None
-    return found if found.prepared.regularity >= _REGULAR else None
+def ready(chain: Chain, p: Array) -> General | None:
+    """The general method of a chain for parameters p, (np,); None where it hardly holds."""
+    found = general_ready(chain, p)
+    return found if found and found.prepared.regularity >= _REGULAR else None
 
 
 def general_draft(general: General, T: Array) -> Draft:
@@ -38,18 +36,9 @@ def general_draft(general: General, T: Array) -> Draft:
     shape = len(T), int(np.max(column, initial=-1)) + 1
     every, valid = np.zeros((*shape, arm.size)), np.zeros(shape, dtype=bool)
     residual, searched = np.full(shape, np.inf), np.zeros(len(T), dtype=bool)
-    reached, least = _residual_and_least(arm, q, T[pose])
+    target = Target(arm, T[pose])
+    reached, least = target.residual(q), target.singular_values(q)[:, -1]
     every[pose, column], valid[pose, column], residual[pose, column] = q, True, reached
-    unsure = (least < _NEARLY_SINGULAR) | (reached > SOLVED * max(1.0, arm.length))
+    unsure = (least < _NEARLY_SINGULAR) | (reached > target.tolerance)
     searched[pose[unsure]] = True
     return Draft(every, valid, residual, ("",) * shape[1], searched)
-
-
-def _residual_and_least(arm: Arm, q: Array, T: Array) -> tuple[Array, Array]:
-    """(m,) residuals, and smallest singular values of the Jacobian, in lengths of the arm."""
-    pose, J = arm.pose_and_jacobian(q)
-    J[..., :3, :] /= arm.length
-    J = J * np.where(arm.prismatic, arm.length, 1.0)
-    residual: Array = np.max(np.abs(pose - T), axis=(-2, -1))
-    least: Array = np.asarray(np.linalg.svd(J, compute_uv=False)[..., -1], dtype=np.float64)
-    return residual, least

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.errors import ModelError, NoClosedForm
+from mbs.assembly.model_function import require_system
+from mbs.errors import NoClosedForm
 from mbs.loops.sequence import Sequence
-from mbs.messages import did_you_mean, quoted
 from mbs.models.inverse_geometry.answers.gathering import METHODS
-from mbs.models.inverse_geometry.answers.limits import Bounds, Given, bounds
+from mbs.models.inverse_geometry.answers.limits import Bounds, Given, bounds, leaves_out
 from mbs.models.inverse_geometry.answers.solutions import Solutions
 from mbs.models.inverse_geometry.arm import Arm, Array
 from mbs.models.inverse_geometry.batches.draft import (
@@ -26,7 +26,11 @@ from mbs.models.inverse_geometry.batches.draft import (
 )
 from mbs.models.inverse_geometry.batches.general_draft import general_draft, ready
 from mbs.models.inverse_geometry.chain import Chain, chain
-from mbs.models.inverse_geometry.equations.closed_form import CLOSED_FORMS, sequence_of
+from mbs.models.inverse_geometry.equations.closed_form import (
+    CLOSED_FORMS,
+    require_method,
+    sequence_of,
+)
 from mbs.models.inverse_geometry.numeric.general import General
 from mbs.models.inverse_geometry.pose_input import wanted_poses
 from mbs.models.inverse_geometry.solve import solve
@@ -109,7 +113,8 @@ def solve_many(
         ModelError: a matrix is no rigid transform, a name is unknown, or more than six joints
             are free.
     """
-    _require_method(system, method)
+    require_system(system)
+    require_method(system, method, METHODS)
     poses, p = wanted_poses(system, T), np.array(system.parameter_values(parameters))
 
     def solved(pose: Array) -> Solutions:
@@ -118,14 +123,14 @@ def solve_many(
     given = limits if system.is_closed else None
     if system.is_closed:
         return _stacked(system, [solved(pose) for pose in poses])
-    robot = _robot(system, frame, method, locked, p)
+    robot = _robot(chain(system, frame, locked), method, p)
     draft = robot.draft(poses)
     for k in np.flatnonzero(draft.searched):
         pose = poses[k]
         q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.way.places)]
         draft = with_postures(draft, int(k), robot.arm, q, pose)
     q, valid = robot.whole(draft.q), draft.valid
-    if limits is not None and limits is not False:
+    if leaves_out(limits):
         q, within = _wound(bounds(system, limits, robot.way.places), q)
         valid = valid & within
     return ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
@@ -133,10 +138,9 @@ def solve_many(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Robot:
-    """What stays the same from call to call; without both methods every pose is searched."""
+    """How a robot is solved; without both methods every pose is searched for by itself."""
 
     way: Chain
-    method: str
     p: Array
     arm: Arm
     sequence: Sequence | None
@@ -161,30 +165,11 @@ class _Robot:
         return every
 
 
-def _require_method(system: System, method: str) -> None:
-    if method not in METHODS:
-        name = getattr(system, "name", system)
-        raise ModelError(
-            f"{name}: there is no method {quoted(method)}; {did_you_mean(method, METHODS)}"
-        )
-
-
-def _robot(
-    system: System,
-    frame: str | int | None,
-    method: str,
-    locked: Mapping[str, float] | None,
-    p: Array,
-) -> _Robot:
-    def make() -> _Robot:
-        way = chain(system, frame, locked)
-        sequence, arm = _sequence(way, method, p), way.arm(p)
-        general = ready(arm) if sequence is None and method in ("auto", "general") else None
-        return _Robot(way, method, p, arm, sequence, general)
-
-    key = ("many", repr(frame), method, repr(locked), p.tobytes())
-    robot: _Robot = system.cached(key, make)
-    return robot
+def _robot(way: Chain, method: str, p: Array) -> _Robot:
+    sequence, general = _sequence(way, method, p), None
+    if sequence is None and method in ("auto", "general"):
+        general = ready(way, p)
+    return _Robot(way, p, way.arm(p), sequence, general)
 
 
 def _sequence(way: Chain, method: str, p: Array) -> Sequence | None:

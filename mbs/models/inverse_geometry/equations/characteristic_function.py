@@ -9,7 +9,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function
 from mbs.models.inverse_geometry.chain import Chain
-from mbs.models.inverse_geometry.equations.closed_form import given_of, key_of
+from mbs.models.inverse_geometry.equations.closed_form import given_of
 
 if TYPE_CHECKING:
     from mbs.models.inverse_geometry.raghavan_roth.characteristic import Characteristic
@@ -61,8 +61,8 @@ def characteristic_function(way: Chain) -> Function:
             every = parts.call([given_of(way, T)])
             return [("T", T)], [(f"M{k}", part) for k, part in enumerate(every)]
 
-        plain = model_function(way.system, ("igm_characteristic", *key_of(way)), build)
+        plain = model_function(way.system, ("igm_characteristic", *way.key), build)
         return CharacteristicFunction(Function(plain), way.system, found)
 
-    made: Function = way.system.cached(("characteristic matrix", *key_of(way)), make)
+    made: Function = way.system.cached(("characteristic matrix", *way.key), make)
     return made

@@ -11,19 +11,24 @@ import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import ModelFunction, Named, model_function
+from mbs.assembly.model_function import (
+    ModelFunction,
+    Named,
+    model_function,
+    require_system,
+)
 from mbs.errors import ModelError
 from mbs.loops.sequence import Leaf, Sequence, Step
-from mbs.messages import did_you_mean, quoted
 from mbs.models.inverse_geometry.chain import Chain, chain
 from mbs.models.inverse_geometry.equations.characteristic_function import characteristic_function
 from mbs.models.inverse_geometry.equations.closed_form import (
     CLOSED_FORMS,
     given_of,
-    key_of,
+    require_method,
     sequence_of,
 )
 from mbs.models.inverse_geometry.equations.forward import forward, relative_residual, size
+from mbs.models.inverse_geometry.pose_input import wanted_pose
 
 METHODS = ("auto", *CLOSED_FORMS, "general")
 
@@ -54,7 +59,10 @@ class InverseGeometry(ModelFunction):
         return tuple(self._sequence.steps)
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Evaluate it as any model; a branch given in numbers must be one of its own."""
+        """Evaluate it as any model; a branch and a pose given in numbers must be such."""
+        T = kwargs.get("T", args[0] if args else None)
+        if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
+            wanted_pose(self.system, T)
         branch = kwargs.get("branch", args[1] if len(args) > 1 else None)
         if isinstance(branch, (int, float, np.ndarray, np.generic)):
             self._require_branch(np.asarray(branch))
@@ -100,11 +108,8 @@ def function(
         ModelError: there is no such method, frame or joint, more than six joints are free, or
             the system is closed.
     """
-    if method not in METHODS:
-        raise ModelError(
-            f"{getattr(system, 'name', system)}: there is no method {quoted(method)};"
-            f" {did_you_mean(method, METHODS)}"
-        )
+    require_system(system)
+    require_method(system, method, METHODS)
     way = chain(system, frame, locked)
     if method == "general":
         return characteristic_function(way)
@@ -112,16 +117,12 @@ def function(
     sequence = sequence_of(way, method)
 
     def make() -> Function:
-        key = ("igm", *_key(way, method))
+        key = ("igm", method, *way.key)
         plain: Any = model_function(system, key, lambda: _built(way, sequence))
         return InverseGeometry(Function(plain), system, sequence, plain.annotated)
 
-    made: Function = system.cached(("inverse geometry", *_key(way, method)), make)
+    made: Function = system.cached(("inverse geometry", method, *way.key), make)
     return made
-
-
-def _key(way: Chain, method: str) -> tuple[object, ...]:
-    return method, *key_of(way)
 
 
 def _require_open(system: System) -> None:

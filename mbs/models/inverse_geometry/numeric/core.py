@@ -26,12 +26,13 @@ _SOURCES = (
     "raghavan_roth_solve.c",
 )
 _FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
+_JOINTS = 7  # for which the core has room
 
 _pointer, _real, _integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_longlong
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "mbs_polish": (
         None,
-        (_pointer, _pointer, _integer, _integer, ctypes.c_int, _pointer, _pointer),
+        (_pointer, _pointer, _integer, _integer, _pointer, _pointer),
     ),
     "mbs_search": (
         _integer,
@@ -64,6 +65,15 @@ def core() -> ctypes.CDLL | None:
     return _loaded() if compiler_found() else None
 
 
+def core_of(arm: Arm) -> ctypes.CDLL | None:
+    """The core for an arm; None where there is no C compiler, or it has more joints than seven.
+
+    Raises:
+        CompilerError: the compiler refused the code.
+    """
+    return core() if arm.size <= _JOINTS else None
+
+
 @functools.cache
 def _loaded() -> ctypes.CDLL:
     folder = resources.files("mbs.native") / "runtime"
@@ -76,30 +86,28 @@ def _loaded() -> ctypes.CDLL:
     return library
 
 
-def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array, steps: int) -> Array:
-    """Polish postures in place; their residuals, (m,).
+def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
+    """Polished postures, (m, n), and their residuals, (m,).
 
     Args:
         library: the core.
         arm: whose postures.
         T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
-        q: (m, n) postures, an array of its own that is overwritten.
-        steps: at most.
+        q: (m, n) postures [rad or m].
     """
-    wanted, residual = np.ascontiguousarray(T, dtype=float), np.empty(len(q))
-    stride = 16 if wanted.ndim == 3 else 0
-    with_arm = Handed(arm)
-    library.mbs_polish(
-        with_arm.address, wanted.ctypes.data, stride, len(q), steps, _at(q), _at(residual)
-    )
-    return residual
+    own, residual, _ = _rooms(len(q), arm.size)
+    own[:] = q
+    wanted = _wanted(T, *((4, 4) if np.ndim(T) == 2 else (len(q), 4, 4)))
+    stride, handed = 16 if wanted.ndim == 3 else 0, Handed(arm)
+    library.mbs_polish(handed.address, _at(wanted), stride, len(q), _at(own), _at(residual))
+    return own, residual
 
 
 def found_by(
     library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
 ) -> tuple[Array, Hits]:
     """Postures (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
-    wanted = np.ascontiguousarray(T, dtype=float)
+    wanted = _wanted(T, 4, 4)
     q, residual, hits = _rooms(starts, arm.size)
     handed = Handed(arm)
     count = library.mbs_search(
@@ -110,7 +118,7 @@ def found_by(
 
 def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
     """The distinct ones of postures q, (m, n), and how many are each of them."""
-    wanted = np.ascontiguousarray(T, dtype=float)
+    wanted = _wanted(T, 4, 4)
     own, residual, hits = _rooms(len(q), arm.size)
     own[:] = q
     handed = Handed(arm)
@@ -122,7 +130,7 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
 
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
     """The posture, (n,), whose pose is nearest to T."""
-    wanted, q = np.ascontiguousarray(T, dtype=float), np.empty(arm.size)
+    wanted, q = _wanted(T, 4, 4), np.empty(arm.size)
     handed = Handed(arm)
     library.mbs_nearest(handed.address, _at(wanted), starts, seed, _at(q))
     return q
@@ -136,6 +144,11 @@ class Handed:
         self.slides = np.ascontiguousarray(arm.prismatic, dtype=np.uint8)
         self.arm = _Arm(arm.size, self.gaps.ctypes.data, self.slides.ctypes.data, arm.length)
         self.address = ctypes.addressof(self.arm)
+
+
+def _wanted(T: Array, *shape: int) -> Array:
+    """Poses as C reads them; a wrong shape is refused, for C would read beyond the array."""
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
 
 
 def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:

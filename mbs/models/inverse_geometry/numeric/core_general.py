@@ -14,7 +14,8 @@ from mbs.models.inverse_geometry.raghavan_roth import Prepared
 
 Numbers: TypeAlias = NDArray[np.int64]
 
-_ROOM, _CANDIDATES = 4096, 144
+_ROOM = 4096  # postures of one call
+_CANDIDATES = 144  # ROTH_POSTURES: those of one pose, at most
 
 _int, _double = ctypes.c_int, ctypes.c_double
 

@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 from mbs.models.inverse_geometry.arm import Arm, Array, gap_to
 
-_FINE, _FINEST, _LEAST, _STALLS = 1e-26, 1e-31, 1e-31, 3
-
-
-def units(arm: Arm) -> Array:
-    """(n,) what joints are measured by: 1 rad, or the length of the arm [m]."""
-    return np.where(arm.prismatic, arm.length, 1.0)
+_STEPS = 60  # at most
+_STALLS = 3  # steps without progress
+_FINE = 1e-26  # costs below it are those of solutions but for rounding
+_FINEST = 1e-31  # nothing is left to gain
+_LEAST = 1e-31  # damping, so that no matrix is singular
 
 
 def examined(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
@@ -23,13 +22,13 @@ def examined(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
     pose, J = arm.pose_and_jacobian(q)
     gap = gap_to(T, pose)
     gap[..., :3] /= arm.length
-    J = J * units(arm)
+    J = J * arm.units
     J[..., :3, :] /= arm.length
     return np.sum(gap**2, axis=-1), gap, J
 
 
-def descended(arm: Arm, T: Array, q: Array, steps: int) -> tuple[Array, Array]:
-    """Postures that steps lead to until rounding or a smallest distance stops them; their costs.
+def descended(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
+    """Postures (m, n) where rounding or a smallest distance stops the steps; their costs (m,).
 
     The damping is proportional to the cost, which makes the last steps those of Newton, even
     where the Jacobian loses rank.
@@ -39,18 +38,17 @@ def descended(arm: Arm, T: Array, q: Array, steps: int) -> tuple[Array, Array]:
         arm: whose postures.
         T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
         q: (m, n) postures to start from [rad or m].
-        steps: at most.
     """
     wanted = np.broadcast_to(T, (len(q), 4, 4))
     q = np.array(q, dtype=float)
     cost, gap, J = examined(arm, wanted, q)
     damping, stalls = np.full(len(q), 0.1), np.zeros(len(q), dtype=int)
-    for _ in range(steps):
+    for _ in range(_STEPS):
         going = np.flatnonzero((cost > _FINEST) & (stalls < _STALLS))
         if not len(going):
             break
         dx = _step(J[going], gap[going], damping[going] * cost[going] + _LEAST)
-        tried = q[going] + units(arm) * dx
+        tried = q[going] + arm.units * dx
         tried_cost, tried_gap, tried_J = examined(arm, wanted[going], tried)
         better = tried_cost < cost[going]
         _settle(going, tried_cost, cost, damping, stalls)

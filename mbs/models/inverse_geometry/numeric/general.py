@@ -10,11 +10,9 @@ from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.arm import Arm, Array
 from mbs.models.inverse_geometry.numeric import core
 from mbs.models.inverse_geometry.numeric.core_general import HandedLoop, Numbers, solved_by
-from mbs.models.inverse_geometry.numeric.merge import merged_with_numpy, relative_residual
+from mbs.models.inverse_geometry.numeric.merge import merged_with_numpy, reached
 from mbs.models.inverse_geometry.numeric.polish import polished_with_numpy
 from mbs.models.inverse_geometry.raghavan_roth import Prepared, candidates_many, prepare
-
-_REACHED = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +72,7 @@ def general_many(arm: General, T: Array) -> tuple[Numbers, Array]:
     Returns:
         (m,) numbers of the poses, ascending, and (m, 6) postures for them.
     """
-    library = core.core()
+    library = core.core_of(arm.arm)
     if library is not None:
         return solved_by(library, arm.handed, T)
     return general_with_numpy(arm, T)
@@ -84,8 +82,8 @@ def general_with_numpy(arm: General, T: Array) -> tuple[Numbers, Array]:
     """`general_many` where there is no C compiler."""
     number, q = candidates_many(arm.prepared, T)
     q = polished_with_numpy(arm.arm, T[number], q).q
-    reached = relative_residual(arm.arm, T[number], q) < _REACHED
-    number, q = number[reached], q[reached]
+    solved = reached(arm.arm, T[number], q)
+    number, q = number[solved], q[solved]
     found = [merged_with_numpy(arm.arm, T[k], q[number == k]).q for k in range(len(T))]
     numbers = np.repeat(np.arange(len(T)), [len(own) for own in found])
     return numbers, np.concatenate([np.zeros((0, 6)), *found])

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from mbs.models.inverse_geometry.arm import Arm, Array
 from mbs.models.inverse_geometry.numeric import core
-from mbs.models.inverse_geometry.numeric.descent import units
 
-_SAME, _CLOSE, _BETWEEN = 1e-6, 1e-2, 1e-13
+_SAME, _CLOSE, _BETWEEN = 1e-6, 1e-2, 1e-13  # see `merged`
+_REACHED = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ def merged(arm: Arm, T: Array, q: Array) -> Merged:
         T: (4, 4) wanted pose.
         q: (m, n) solutions [rad or m].
     """
-    library = core.core()
+    library = core.core_of(arm)
     if library is not None:
         return Merged(*core.merged_by(library, arm, T, q))
     return merged_with_numpy(arm, T, q)
@@ -60,6 +60,11 @@ def merged_with_numpy(arm: Arm, T: Array, q: Array) -> Merged:
         if residual[number] < residual[places[twin]]:
             places[twin] = number
     return Merged(np.array(q[places], dtype=float), np.array(hits, dtype=np.int64))
+
+
+def reached(arm: Arm, T: Array, q: Array) -> NDArray[np.bool_]:
+    """(...,) whether postures have the pose but for rounding: a relative residual below 1e-12."""
+    return relative_residual(arm, T, q) < _REACHED
 
 
 def relative_residual(arm: Arm, T: Array, q: Array) -> Array:
@@ -82,7 +87,7 @@ def _twin(arm: Arm, T: Array, found: Array, own: Array) -> int | None:
         return None
     way = own - found
     way = np.where(arm.prismatic, way, wrapped(arm, way))
-    farthest = np.max(np.abs(way / units(arm)), axis=-1)
+    farthest = np.max(np.abs(way / arm.units), axis=-1)
     for number in np.flatnonzero(farthest < _CLOSE):
         half = found[number] + 0.5 * way[number]
         middle, *ends = relative_residual(arm, T, np.array([half, found[number], own]))

@@ -8,12 +8,16 @@ import numpy as np
 
 from mbs.models.inverse_geometry.arm import Arm, Array, gap_to
 from mbs.models.inverse_geometry.numeric import core
-from mbs.models.inverse_geometry.numeric.descent import descended, examined, units
+from mbs.models.inverse_geometry.numeric.descent import descended, examined
 from mbs.models.inverse_geometry.numeric.merge import wrapped
 from mbs.models.inverse_geometry.numeric.search import SEED, random_postures
 
-_STARTS, _STEPS, _KEPT, _REFINEMENTS = 100, 60, 8, 60
-_NUDGE, _FLAT, _FINEST, _ALIKE = 1e-5, 1e-15, 1e-31, 1e-14
+_STARTS, _KEPT, _REFINEMENTS = 100, 8, 60
+_NUDGE = 1e-5  # of joints, for differences of the slope
+_FLAT = 1e-15  # slopes below it are rounding
+_FINEST = 1e-31  # costs below it leave nothing to gain
+_ALIKE = 1e-14  # relative rounding of costs
+_EQUAL = 1e-6  # costs that are closer, relatively, are of one valley
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,10 +44,10 @@ def nearest(arm: Arm, T: Array) -> Nearest:
     where the slope vanishes.
 
     Args:
-        arm: with up to seven joints.
-        T: (4, 4) wanted pose.
+        arm: whose postures; compiled for up to seven joints.
+        T: (4, 4) wanted pose [m].
     """
-    library = core.core()
+    library = core.core_of(arm)
     if library is not None:
         return _measured(arm, T, core.nearest_by(library, arm, T, _STARTS, SEED))
     return _measured(arm, T, nearest_with_numpy(arm, T))
@@ -51,7 +55,7 @@ def nearest(arm: Arm, T: Array) -> Nearest:
 
 def nearest_with_numpy(arm: Arm, T: Array) -> Array:
     """(n,) the posture of `nearest` where there is no C compiler."""
-    q, cost = descended(arm, T, random_postures(arm, T, _STARTS, SEED), _STEPS)
+    q, cost = descended(arm, T, random_postures(arm, T, _STARTS, SEED))
     best = [_refined(arm, T, q[k]) for k in _apart(cost)]
     lowest = min(best, key=lambda found: found[1])
     return wrapped(arm, lowest[0])
@@ -67,7 +71,7 @@ def _apart(cost: Array) -> list[int]:
     """The numbers of the lowest costs that differ."""
     kept = list[int]()
     for k in np.argsort(cost, kind="stable"):
-        if not kept or cost[k] - cost[kept[-1]] >= 1e-6 * cost[k]:
+        if not kept or cost[k] - cost[kept[-1]] >= _EQUAL * cost[k]:
             kept.append(int(k))
     return kept[:_KEPT]
 
@@ -83,7 +87,7 @@ def _refined(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
         curvature = _curvature(arm, T, q) if curvature is None else curvature
         try:
             L = np.linalg.cholesky(curvature + shift * np.eye(arm.size))
-            tried = q - units(arm) * np.linalg.solve(L.T, np.linalg.solve(L, slope))
+            tried = q - arm.units * np.linalg.solve(L.T, np.linalg.solve(L, slope))
             tried_cost, tried_slope = _sloped(arm, T, tried)
         except np.linalg.LinAlgError:  # not positive: a longer shift
             tried_cost, tried_slope = np.array(np.inf), slope
@@ -114,7 +118,7 @@ def _sloped(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
 
 
 def _curvature(arm: Arm, T: Array, q: Array) -> Array:
-    nudges = _NUDGE * np.diag(units(arm))
+    nudges = _NUDGE * np.diag(arm.units)
     ahead, behind = _sloped(arm, T, q + nudges)[1], _sloped(arm, T, q - nudges)[1]
     H: Array = (ahead - behind) / (2 * _NUDGE)
     return 0.5 * (H + H.T)

@@ -11,8 +11,6 @@ from mbs.models.inverse_geometry.numeric import core
 from mbs.models.inverse_geometry.numeric.descent import descended
 from mbs.models.inverse_geometry.numeric.merge import wrapped
 
-_STEPS = 60
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polished:
@@ -38,23 +36,16 @@ def polish(arm: Arm, T: Array, q: Array) -> Polished:
         T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
         q: (m, n) postures [rad or m].
     """
-    library = core.core()
+    library = core.core_of(arm)
     if library is None:
         return polished_with_numpy(arm, T, q)
-    own = np.array(q, dtype=float, order="C")
-    return Polished(own, core.polished_by(library, arm, T, own, _STEPS))
+    return Polished(*core.polished_by(library, arm, T, q))
 
 
 def polished_with_numpy(arm: Arm, T: Array, q: Array) -> Polished:
     """`polish` where there is no C compiler."""
-    before = residual_of(arm, T, q)
-    better = wrapped(arm, descended(arm, T, q, _STEPS)[0])
-    after = residual_of(arm, T, better)
+    before = arm.residual(q, T)
+    better = wrapped(arm, descended(arm, T, q)[0])
+    after = arm.residual(better, T)
     improved = after < before
     return Polished(np.where(improved[:, None], better, q), np.where(improved, after, before))
-
-
-def residual_of(arm: Arm, T: Array, q: Array) -> Array:
-    """(...,) max |arm.pose(q) - T| over the elements of the poses [m and 1]."""
-    worst: Array = np.max(np.abs(arm.pose(q) - T), axis=(-2, -1))
-    return worst

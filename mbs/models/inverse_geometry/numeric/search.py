@@ -11,12 +11,11 @@ from mbs.models.inverse_geometry.numeric.descent import descended
 from mbs.models.inverse_geometry.numeric.merge import (
     Merged,
     merged_with_numpy,
-    relative_residual,
+    reached,
     wrapped,
 )
 
 SEED = 20260105
-_STEPS, _REACHED = 60, 1e-12
 
 
 def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
@@ -25,7 +24,7 @@ def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
     Nothing proves that they are all; `counted_search` tells how often each was met.
 
     Args:
-        arm: with up to seven joints.
+        arm: whose postures; compiled for up to seven joints.
         T: (4, 4) wanted pose.
         starts: how many random postures.
         seed: of them.
@@ -38,7 +37,7 @@ def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
 
 def counted_search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Merged:
     """`search`, and how many of the starts lead to each solution."""
-    library = core.core()
+    library = core.core_of(arm)
     if library is not None:
         return Merged(*core.found_by(library, arm, T, starts, seed))
     return searched_with_numpy(arm, T, starts, seed)
@@ -46,8 +45,8 @@ def counted_search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> M
 
 def searched_with_numpy(arm: Arm, T: Array, starts: int, seed: int) -> Merged:
     """`counted_search` where there is no C compiler."""
-    q = wrapped(arm, descended(arm, T, random_postures(arm, T, starts, seed), _STEPS)[0])
-    return merged_with_numpy(arm, T, q[relative_residual(arm, T, q) < _REACHED])
+    q = wrapped(arm, descended(arm, T, random_postures(arm, T, starts, seed))[0])
+    return merged_with_numpy(arm, T, q[reached(arm, T, q)])
 
 
 def random_postures(arm: Arm, T: Array, count: int, seed: int) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from mbs.errors import ModelError
 from mbs.loops.goal import goal
 from mbs.messages import quoted
 from mbs.models.geometry import terminal_frame
+from mbs.models.inverse_geometry.answers.limits import Given
 from mbs.models.inverse_geometry.paths.follower import Follower, follower
 from mbs.models.inverse_geometry.paths.path import Path, path_of
 from mbs.models.inverse_geometry.paths.stops import stop_reason
@@ -54,7 +55,7 @@ def follow(
     *,
     samples: int = 101,
     locked: Mapping[str, float] | None = None,
-    limits: Mapping[str, Sequence[float]] | None = None,
+    limits: bool | Given | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Followed:
     """The postures along a path of poses, on the branch of the first one.
@@ -74,7 +75,8 @@ def follow(
         frame: a body, a named frame, or the number of a link; the terminal frame when left out.
         samples: how many poses of a function are given back.
         locked: positions of joints that stay where they are, by name [rad or m].
-        limits: (lower, upper) by name of the joint instead of the system's own; {} for none.
+        limits: (lowest, highest) by name replaces limits of the description, None for a joint
+            without; False leaves all out of account.
         parameters: values of symbols, the others at their defaults.
 
     Returns:
@@ -114,14 +116,11 @@ def _followed(led: Follower, poses: Path, q: Array) -> Followed:
 def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Array:
     """(nq,) the start, with locked joints where they are locked."""
     given = getattr(start, "q", start)
-    if isinstance(given, Mapping):
-        q = np.array(system.position({**given, **(locked or {})}))
-    else:
-        q = _numbers(system, given)
-        held = np.array(system.position(locked))
-        names = [coordinate.name for coordinate in system.coordinates]
-        places = [names.index(name) for name in locked or {}]
-        q[places] = held[places]
+    q = np.array(system.position(given)) if isinstance(given, Mapping) else _numbers(system, given)
+    held = np.array(system.position(locked))
+    names = [coordinate.name for coordinate in system.coordinates]
+    places = [names.index(name) for name in locked or {}]
+    q[places] = held[places]
     return q
 
 

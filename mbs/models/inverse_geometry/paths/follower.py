@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,14 +14,13 @@ from mbs.loops.closed_form.known import held_beside, regular_posture
 from mbs.loops.closed_form.places import spin_places
 from mbs.loops.goal import Goal
 from mbs.messages import did_you_mean, quoted
+from mbs.models.inverse_geometry.answers.limits import Bounds, Given, bounds
 from mbs.models.inverse_geometry.arm import Arm, gap_to
 from mbs.models.inverse_geometry.chain import chain
 from mbs.models.inverse_geometry.paths.tracking import Rows, Tracker
 from mbs.solvers.rank import null_space
 
 Array = NDArray[np.float64]
-Limits = Mapping[int, tuple[float, float]]
-
 _WHOLE = 6
 _ON_LIMIT = 1e-9
 
@@ -37,7 +36,7 @@ class Follower:
         rows: what is missing to a pose, and how the joints change it.
         slack: directions that no row sees.
         exact: whether any pose nearby can be taken.
-        limits: by number in q.
+        bounds: limits of the coordinates; None where none holds them.
     """
 
     wanted: Goal
@@ -46,7 +45,7 @@ class Follower:
     rows: Rows
     slack: int
     exact: bool
-    limits: Limits
+    bounds: Bounds | None
 
     @property
     def system(self) -> System:
@@ -82,8 +81,10 @@ class Follower:
 
     def passed(self, x: Array, slack: float = 0.0) -> tuple[int, float] | None:
         """A joint, by its number in q, that comes within `slack` of its limit, and this limit."""
+        if self.bounds is None:
+            return None
         for place, value in zip(self.places, x * self.scale, strict=True):
-            low, high = self.limits.get(place, (-np.inf, np.inf))
+            low, high = float(self.bounds.low[place]), float(self.bounds.high[place])
             if value > high - slack:
                 return place, high
             if value < low + slack:
@@ -98,7 +99,7 @@ def follower(
     wanted: Goal,
     start: Array,
     locked: Mapping[str, float] | None,
-    limits: Mapping[str, Sequence[float]] | None,
+    limits: bool | Given | None,
 ) -> Follower:
     """What follows the poses of a frame.
 
@@ -106,25 +107,27 @@ def follower(
         wanted: the frame, and the loops.
         start: (nq,) posture, in which joints that do not follow stay.
         locked: by name, joints that stay where they are.
-        limits: (lower, upper) by name instead of the system's own.
+        limits: as in `follow`.
 
     Raises:
         ModelError: a name is unknown, or the chain has more than six free joints.
     """
     system, frame = wanted.closing.system, wanted.frame
-    ends = _limits(system, limits)
+    ends = None if limits is False else bounds(system, limits)
     path = system.tree.path(system.frame(frame)[0])
     simple = all(system.tree.links[k].motion.nq == 1 for k in path)
     if simple and not system.is_closed:
         found = chain(system, frame, locked)
         arm = found.arm(wanted.closing.p)
-        scale = np.where(arm.prismatic, arm.length, 1.0)
+        scale = arm.units
         exact = arm.size == _WHOLE
         return Follower(wanted, found.places, scale, _arm_rows(arm, scale), 0, exact, ends)
     return _closed_follower(wanted, start, list(locked or {}), ends)
 
 
-def _closed_follower(wanted: Goal, start: Array, locked: list[str], ends: Limits) -> Follower:
+def _closed_follower(
+    wanted: Goal, start: Array, locked: list[str], ends: Bounds | None
+) -> Follower:
     """Every joint of the system, less those that stay where they are."""
     system = wanted.closing.system
     places = {link.name: link.q.start for link in system.tree.links if link.motion.nq == 1}
@@ -159,27 +162,3 @@ def _arm_rows(arm: Arm, scale: Array) -> Rows:
         return gap_to(T, pose) / lengths, J * scale / lengths[:, None]
 
     return rows
-
-
-def _limits(system: System, given: Mapping[str, Sequence[float]] | None) -> Limits:
-    coordinates = system.coordinates
-    if given is None:
-        return {k: c.limits for k, c in enumerate(coordinates) if c.limits is not None}
-    names = [coordinate.name for coordinate in coordinates]
-    limits = dict[int, tuple[float, float]]()
-    for name, ends in given.items():
-        if name not in names:
-            raise ModelError(
-                f"{system.name}: there is no joint {quoted(name)} to limit;"
-                f" {did_you_mean(name, names)}"
-            )
-        try:
-            low, high = (float(x) for x in ends)
-        except (TypeError, ValueError):
-            low, high = np.nan, np.nan
-        if not low <= high:
-            raise ModelError(
-                f"{system.name}: the limits of {name} are {quoted(ends)}; give (lower, upper)"
-            )
-        limits[names.index(name)] = (low, high)
-    return limits

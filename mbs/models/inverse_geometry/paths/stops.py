@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mbs.models.inverse_geometry.answers.reasons import apart
 from mbs.models.inverse_geometry.arm import gap_to
 from mbs.models.inverse_geometry.paths.follower import Follower
 from mbs.models.inverse_geometry.paths.path import Path
@@ -37,10 +38,8 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
     passed = led.passed(x, _AT_LIMIT)
     if passed is not None:
         place, limit = passed
-        return (
-            f"joint {led.system.coordinates[place].name} passes its limit {limit:.6g} before "
-            + (title)
-        )
+        name = led.system.coordinates[place].name
+        return f"joint {name} passes its limit {limit:.6g} before {title}"
     nearest, left = _nearest(led, x, T)
     if left > _REACHED:
         return f"{title} is out of reach: {_miss(led, led.whole(q, nearest), T)}"
@@ -51,10 +50,7 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
 def _miss(led: Follower, q: Array, T: Array) -> str:
     gap = gap_to(T, led.pose(q))
     distance, angle = float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:]))
-    return (
-        f"the nearest posture found leaves the frame {round(distance, 9):.4g} m away and turned by"
-        f" {round(angle, 9):.4g} rad"
-    )
+    return f"the nearest posture found leaves the frame {apart(distance, angle)}"
 
 
 def _nearest(led: Follower, x: Array, T: Array) -> tuple[Array, float]:
@@ -88,4 +84,4 @@ def _singular(led: Follower, q: Array) -> str:
     rises = [value(x + step) + value(x - step) for step in moved]
     place = led.places[int(np.argmax(rises))]
     name = led.system.coordinates[place].name
-    return f"{name} = {q[place]:.3f}, smallest singular value {value(x):.1g}"
+    return f"{name} = {q[place]:.3f}, smallest singular value {round(value(x), 12):.1g}"

@@ -29,6 +29,8 @@ _LARGEST = 0.35
 _ITERATIONS = 12
 _SMALL = 1e-9
 _SMALLEST_STEP = 1e-12
+_MOST_STEPS = 200
+"""Between two poses; a joint that turns all the way round takes some tens."""
 _NOISE = 1e-14
 
 
@@ -77,10 +79,13 @@ def carried(
         step: first one to try.
 
     Returns:
-        Where it ended, at which number, and the last step tried; the number is 1 unless it stopped.
+        Where it ended, at which number, and the last step tried; the number is 1 unless it stopped
+        at a singular posture, a limit, or after many steps that hardly advance.
     """
     point, at = start, 0.0
-    while at < 1.0 and step > _SMALLEST_STEP and smallest(tracker, point.J) > SINGULAR:
+    for _ in range(_MOST_STEPS):
+        if at == 1.0 or step <= _SMALLEST_STEP or smallest(tracker, point.J) <= SINGULAR:
+            break
         to = min(1.0, at + step)
         found = _stepped(tracker, point, pose(to))
         if found is None:

@@ -13,7 +13,8 @@ For each pose, `candidates`, in units of the loop's length:
 2. `Pencil.matrices`: the parts M_k of the matrix of joint 3, from the left null rows of what
    joints 1 and 2 are in.
 3. `roots`: eigenvalues of a companion matrix, with the offset of joint 3, of eight, at which the
-   matrix at infinity is best conditioned; roots near the unit circle are kept, in clusters.
+   matrix at infinity is best conditioned (compiled: the first at which it is well conditioned);
+   roots near the unit circle are kept, in clusters.
 4. `middle`: the null space of the matrix at a root, as large as the cluster; joints 4 and 5 from
    its shifts.
 5. `rest`: joint 2 from linear equations, one root or two, then joints 1 and 6.

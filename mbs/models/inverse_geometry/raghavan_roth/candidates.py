@@ -17,7 +17,7 @@ from mbs.models.inverse_geometry.raghavan_roth.roots import clusters, roots
 
 Numbers = NDArray[np.int64]
 
-_FAR = 1e3
+_FAR = 1e3  # slides, in reaches of the arm, that are taken for infinite
 
 
 def candidates(prepared: Prepared, T: Array) -> Array:

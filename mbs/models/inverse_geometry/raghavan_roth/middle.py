@@ -13,7 +13,7 @@ import numpy as np
 
 from mbs.models.inverse_geometry.raghavan_roth.pairs import Array
 
-_MIX = 0.6180339887
+_MIX = 0.6180339887  # of X5 with X4, so that eigenvalues of the sum differ
 
 
 def middle_joints(M: Array, grid: tuple[int, int], count: int) -> tuple[Array, Array]:

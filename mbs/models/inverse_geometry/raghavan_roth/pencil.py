@@ -10,9 +10,10 @@ from mbs.models.inverse_geometry.raghavan_roth.elimination import Elimination, a
 from mbs.models.inverse_geometry.raghavan_roth.pairs import Array
 
 _SEED = 20260212
-_ANGLES = np.array([0.4137, 2.2691, -1.5283])
-_RANK = 1e-9
-_SLIDING, _SPARE, _SMALL = 0.01, 100.0, 0.1
+_ANGLES = np.array([0.4137, 2.2691, -1.5283])  # of joint 3 [rad], at which nothing is special
+_RANK = 1e-9  # singular values below it, relatively, are rounding
+_SLIDING, _SPARE = 0.01, 100.0  # merit of a joint 3 that slides; the most of further equations
+_SMALL = 0.1  # a matrix without larger entries is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,7 +22,9 @@ from mbs.models.inverse_geometry.raghavan_roth.pairs import (
     rho,
 )
 
-_FLAT, _NONE, _NOTHING = 1e-4, 1e-9, 1e-12
+_FLAT = 1e-4  # ratio of singular values below which joint 2 has two roots too
+_NONE = 1e-9  # and below which it has no single root
+_NOTHING = 1e-12  # singular values, in lengths of the loop, that are rounding
 
 
 def completed(ways: Array, prismatic: Joints, middle: Array) -> tuple[Array, Array]:
@@ -60,7 +62,7 @@ def _first(prismatic: bool, near: Array, goal: Array) -> Array:
 
 
 def _second(way: Array, prismatic: Joints, beyond: Array, goal: Array) -> tuple[Array, Array]:
-    """Numbers of the rows, and positions of joint 2: two where the equations are but one."""
+    """Numbers of the rows, and positions of joint 2: two more where there is but one equation."""
     kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
     moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
     A = (rho(way) @ moved)[:, kept]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from mbs.models.inverse_geometry.raghavan_roth.elimination import weights
 from mbs.models.inverse_geometry.raghavan_roth.pairs import Array
 
-_OFF_CIRCLE = 0.5
-_OFFSETS = 0.2731 + np.arange(8) * np.pi / 4
-_COARSE, _FINE = 1e-3, 1e-6
-_LARGEST = 6
+_OFF_CIRCLE = 0.5  # |log| of the size of e^(i u) of roots that are kept
+_OFFSETS = 0.2731 + np.arange(8) * np.pi / 4  # of joint 3 [rad], angles that no design prefers
+_COARSE, _FINE = 1e-3, 1e-6  # gaps between angles that may be one multiple root, a double one [rad]
+_LARGEST = 6  # solutions at one root
 _ROUNDING, _TINY = 1e-16, 1e-300
 
 

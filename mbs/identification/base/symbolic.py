@@ -1,0 +1,82 @@
+"""Grouping by rules: those of trees, then those of closed loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import casadi
+from casadi import SX
+
+from mbs.assembly import System
+from mbs.identification.base.grouping import Grouping, Terms, related
+from mbs.identification.base.loops import (
+    Postures,
+    cut_relations,
+    pair_relations,
+    speed_relations,
+)
+from mbs.identification.base.rules import Key, tree_rules
+from mbs.identification.base.samples import sampler
+from mbs.identification.base.structure import Structure
+from mbs.identification.columns import Column
+
+
+def grouped_by_rules(
+    system: System,
+    columns: Sequence[Column],
+    postures: Sequence[Postures],
+    structure: Structure,
+) -> Grouping:
+    """What the rules find.
+
+    Args:
+        system: open or closed.
+        columns: the parameters.
+        postures: that close the loops; none for an open system.
+        structure: of its tree.
+    """
+    places = _places(columns)
+    grouping = _by_tree(structure, Grouping.none(len(columns)), places)
+    if not system.is_closed:
+        return grouping
+    sampled = sampler(system)
+    relations = [
+        *cut_relations(system),
+        *pair_relations(system, postures, base_moves=structure.base_moves),
+        *speed_relations(system, postures),
+    ]
+    for relation in relations:
+        terms = _terms(relation, places)
+        if terms is not None:
+            grouping = related(grouping, terms, lambda k: columns[k].link, sampled)
+    return grouping
+
+
+def _by_tree(structure: Structure, grouping: Grouping, places: Mapping[Key, int]) -> Grouping:
+    for removal in tree_rules(structure):
+        dropped, terms = places.get(removal.parameter), _terms(removal.effects, places)
+        if dropped is not None and terms is not None and dropped in grouping.columns[dropped]:
+            grouping = grouping.replaced(dropped, terms)
+    return grouping
+
+
+def _places(columns: Sequence[Column]) -> dict[Key, int]:
+    """Numbers of the parameters of one link or joint."""
+    return {(c.link - 1, c.kind): k for k, c in enumerate(columns) if not c.other}
+
+
+def _terms(effects: Mapping[Key, SX], places: Mapping[Key, int]) -> Terms | None:
+    """The combination in numbers of columns; None when a parameter of it is no column."""
+    if any(key not in places for key in effects):
+        return None
+    return {places[key]: x for key, x in effects.items()}
+
+
+def depends_on_symbols(system: System) -> bool:
+    """Whether lengths, angles or gravity of the system have symbols in them."""
+    tree = system.tree
+    placements = [x for link in tree.links for x in link.placement.parameters]
+    frames = [x for cut in system.cuts for x in (cut.pose_a.matrix, cut.pose_b.matrix)]
+    couplings = [c for coupling in system.couplings for c in coupling.coefficients]
+    geometry = casadi.veccat(*placements, *frames, *couplings, tree.gravity)
+    return bool(casadi.symvar(geometry))

@@ -1,0 +1,99 @@
+"""The energy identification model: one row, without accelerations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mbs.assembly import System
+from mbs.assembly.model_function import Named
+from mbs.identification.columns import Joints, columns_of
+from mbs.identification.joint_columns import JointColumns
+from mbs.identification.regressor import Regressor, regressor_function, side_by_side
+from mbs.models.symbols import ModelSymbols
+from mbs.recursions.regressor_energy import inertial_energy
+from mbs.recursions.velocities import link_velocities
+from mbs.spatial import zeros
+
+
+def energy_regressor(
+    system: System,
+    *,
+    rotors: bool = True,
+    friction: bool = True,
+    offsets: bool = False,
+    couplings: Sequence[Joints] = (),
+    coordinates: str = "independent",
+) -> Regressor:
+    """``energy_regressor(q, v) -> h``: kinetic and potential energy as h K.
+
+    The work of the joint efforts over an interval is the change of h K and the integral of P K,
+    with P from `power_regressor`. Columns of friction and offsets are zero.
+
+    Source: Gautier & Khalil 1988; Khalil & Creusot 1997, eq. 47-52.
+
+    Args:
+        system: open or closed; q must close the loops.
+        rotors: see `columns_of`.
+        friction: see `columns_of`.
+        offsets: see `columns_of`.
+        couplings: see `columns_of`.
+        coordinates: of a closed system, "independent" or "tree".
+
+    Returns:
+        Function of q (nq, 1) and v (m, 1); h (1, n) with `columns`.
+
+    Raises:
+        ModelError: as `columns_of`.
+    """
+    columns = columns_of(
+        system, rotors=rotors, friction=friction, offsets=offsets, couplings=couplings
+    )
+
+    def build(s: ModelSymbols) -> tuple[Named, Named]:
+        velocities = link_velocities(system.tree, s.poses, s.v_tree)
+        joints = JointColumns(system.tree, s.poses, s.v_tree, velocities)
+        blocks = inertial_energy(system.tree, s.poses, velocities)
+        return [], [("h", side_by_side(columns, blocks, joints.energy))]
+
+    return regressor_function(system, "energy_regressor", columns, build, coordinates)
+
+
+def power_regressor(
+    system: System,
+    *,
+    rotors: bool = True,
+    friction: bool = True,
+    offsets: bool = False,
+    couplings: Sequence[Joints] = (),
+    coordinates: str = "independent",
+) -> Regressor:
+    """``power_regressor(q, v) -> P``: what friction and offsets take of the power of the efforts.
+
+    It has the columns of `energy_regressor`; those that store energy are zero. Integrate P over
+    an interval for the columns of friction of the energy model.
+
+    Args:
+        system: open or closed; q must close the loops.
+        rotors: see `columns_of`.
+        friction: see `columns_of`.
+        offsets: see `columns_of`.
+        couplings: see `columns_of`.
+        coordinates: of a closed system, "independent" or "tree".
+
+    Returns:
+        Function of q (nq, 1) and v (m, 1); P (1, n) with `columns`.
+
+    Raises:
+        ModelError: as `columns_of`.
+    """
+    columns = columns_of(
+        system, rotors=rotors, friction=friction, offsets=offsets, couplings=couplings
+    )
+
+    def build(s: ModelSymbols) -> tuple[Named, Named]:
+        velocities = link_velocities(system.tree, s.poses, s.v_tree)
+        joints = JointColumns(system.tree, s.poses, s.v_tree, velocities)
+        blocks = [zeros(1, 10) for _ in system.tree.links]
+        return [], [("P", side_by_side(columns, blocks, joints.power))]
+
+    return regressor_function(system, "power_regressor", columns, build, coordinates)

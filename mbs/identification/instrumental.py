@@ -1,0 +1,51 @@
+"""Instrumental variables: least squares that noise in the regressor does not bias."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from mbs.errors import ModelError
+from mbs.identification.estimate import Estimate
+from mbs.identification.excitation_quality import require_visible
+from mbs.identification.observations import Observations
+
+Array = npt.NDArray[np.float64]
+
+
+def instrumental(
+    observations: Observations, instruments: Observations, weights: Array | None = None
+) -> Estimate:
+    """The parameters whose errors are uncorrelated with the instruments: Z' (y - W K) = 0.
+
+    Source: Janot, Vandanjon & Gautier 2014, section III (IDIM-IV).
+
+    Args:
+        observations: y = W K, W made of measured motion.
+        instruments: of the same rows and columns, Z in place of W, made of a motion that is free
+            of the measurement's noise, such as `simulated_motion` or the motion that was ordered.
+        weights: (m,) of each effort [1/(N m) or 1/N]; ones when None.
+
+    Raises:
+        ModelError: the instruments do not fit, or they do not show every parameter.
+    """
+    if instruments.W.shape != observations.W.shape or instruments.names != observations.names:
+        raise ModelError(
+            f"instruments: W has the shape {instruments.W.shape}, the observations"
+            f" {observations.W.shape}; make both from the same instants and columns"
+        )
+    require_visible(observations)
+    require_visible(instruments)
+    used = np.ones(observations.y.shape[1]) if weights is None else np.asarray(weights, dtype=float)
+    w = np.broadcast_to(used, observations.y.shape).reshape(-1)
+    (W, y), (Z, _) = observations.rows, instruments.rows
+    lengths = np.linalg.norm(Z * w[:, None], axis=0)
+    Z, W, y = Z * w[:, None] / lengths, W * w[:, None] / lengths, y * w
+    inverse = np.linalg.inv(Z.T @ W)
+    x = inverse @ (Z.T @ y)
+    error = y - W @ x
+    variance = float(error @ error) / max(len(y) - len(x), 1)
+    covariance = variance * inverse @ (Z.T @ Z) @ inverse.T / np.outer(lengths, lengths)
+    return Estimate(
+        "instrumental variables", observations.columns, x / lengths, covariance, used, observations
+    )

@@ -1,0 +1,90 @@
+"""A readable account of an identification."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbs.identification.columns import INERTIAL
+from mbs.identification.estimate import Estimate
+from mbs.identification.excitation_quality import ExcitationQuality, excitation_quality
+from mbs.identification.physical_set import pseudo_inertias
+from mbs.identification.residuals import Residuals
+
+_POOR = 30.0
+
+
+def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
+    """Parameters with their deviations, errors of every joint, and what the record shows.
+
+    Args:
+        estimate: by any method.
+        *tests: further errors with a title each, such as ("last quarter", held_out(...)).
+
+    Returns:
+        lines of text; a * marks parameters whose deviation is more than 30 %.
+    """
+    observations = estimate.observations
+    rows, m = observations.y.shape
+    span = observations.time[-1] - observations.time[0]
+    lines = [
+        f"Identification by {estimate.method}: {len(estimate.names)} parameters from"
+        f" {rows} instants of {m} efforts, {span:.4g} s",
+        "",
+        *_parameters(estimate),
+        "",
+        *_residuals("Errors", estimate.residuals),
+    ]
+    for title, residuals in tests:
+        lines += ["", *_residuals(f"Errors, {title}", residuals)]
+    quality = excitation_quality(observations)
+    return "\n".join([*lines, "", *_excitation(quality), *_consistency(estimate)])
+
+
+def _parameters(estimate: Estimate) -> list[str]:
+    lines = [f"{'parameter':<12}{'value':>12}{'deviation':>12}{'%':>9}  unit"]
+    rows = zip(
+        estimate.columns, estimate.values, estimate.deviations, estimate.percent, strict=True
+    )
+    for column, value, deviation, percent in rows:
+        share = f"{percent:.1f}" if percent < 1000 else "-"
+        mark = " *" if percent > _POOR else ""
+        lines.append(
+            f"{column.name:<12}{value:>12.5g}{deviation:>12.2g}{share:>9}  {column.unit}{mark}"
+        )
+    return lines
+
+
+def _residuals(title: str, residuals: Residuals) -> list[str]:
+    lines = [f"{title}: {residuals.total_percent:.2f} % of all efforts"]
+    rows = zip(
+        residuals.efforts, residuals.percent, residuals.rms, residuals.effort_units, strict=True
+    )
+    return lines + [
+        f"{name:<12}{percent:>8.2f} %{rms:>12.4g} {u}" for name, percent, rms, u in rows
+    ]
+
+
+def _excitation(quality: ExcitationQuality) -> list[str]:
+    if quality.sentence:
+        return [f"Excitation: {quality.sentence}"]
+    return [
+        f"Excitation: condition number {quality.condition:.4g}, {quality.scaled_condition:.4g}"
+        " with scaled columns"
+    ]
+
+
+def _consistency(estimate: Estimate) -> list[str]:
+    """Whether bodies can have the parameters, where all ten of every link are there."""
+    inertial = [c for c in estimate.columns if c.kind in INERTIAL]
+    links = {c.link for c in inertial}
+    if len(inertial) < len(INERTIAL) * len(links) or not links:
+        return []
+    least = {k: np.linalg.eigvalsh(P)[0] for k, P in _bodies(estimate).items()}
+    bad = [str(link) for link, value in least.items() if value <= 0]
+    if not bad:
+        return [f"Bodies: all {len(least)} pseudo-inertias are positive definite"]
+    return [f"Bodies: no body has the parameters of link {', '.join(bad)}"]
+
+
+def _bodies(estimate: Estimate) -> dict[int, np.typing.NDArray[np.float64]]:
+    return pseudo_inertias(estimate.columns, estimate.values)

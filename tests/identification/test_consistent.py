@@ -1,0 +1,107 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.measured_arm import equations, mbs_values, noisy_samples
+
+from mbs.errors import ModelError
+from mbs.identification.consistent import consistent, consistent_weighted, unconstrained_error
+from mbs.identification.least_squares import least_squares
+from mbs.identification.observations import observe
+from mbs.identification.physical_set import consistent_links, pseudo_inertias
+from mbs.identification.recovery import recovered
+
+DEVIATIONS = np.array([0.3, 0.1, 0.02])
+
+
+def full_observations(deviation=DEVIATIONS, seed=0):
+    return observe(equations()[0], noisy_samples(deviation, seed))
+
+
+def at_base(estimate):
+    return equations()[1].matrix @ estimate.values
+
+
+def test_bodies_explain_the_efforts_as_well_as_base_parameters():
+    full, (_, base, truth) = full_observations(), equations()
+    bodies = consistent_weighted(full)
+    free = least_squares(full.grouped(base))
+    assert consistent_links(bodies.columns, bodies.values) == [1, 2, 3]
+    assert bodies.residuals.total_percent < 1.01 * free.residuals.total_percent
+    deviations = np.sqrt(np.diag(base.matrix @ bodies.covariance @ base.matrix.T))
+    assert (np.abs(at_base(bodies) - truth) / deviations).max() < 4
+    assert unconstrained_error(full) == pytest.approx(free.residuals.error, abs=1e-8)
+
+
+def test_a_good_guess_is_kept_where_the_record_says_nothing():
+    truth = np.array(mbs_values(equations()[0].columns))
+    bodies = consistent(full_observations(0.05), guess=truth)
+    assert bodies["M1"] == pytest.approx(6.0, rel=0.05)
+    assert bodies["MZ2"] == pytest.approx(truth[bodies.names.index("MZ2")], abs=0.05)
+    assert bodies.residuals.rms == pytest.approx([0.05] * 3, rel=0.1)
+    errors = (bodies.values - truth) / bodies.deviations
+    assert np.abs(errors).max() < 4
+
+
+def test_negative_friction_and_impossible_bodies_are_avoided():
+    full = full_observations(0.0)
+    names = list(full.names)
+    pulled = full.y.copy()
+    for name, change in (("Fv2", -1.0), ("Ia3", -0.5), ("XX3", -0.2), ("YY3", -0.2)):
+        pulled += change * full.W[:, :, names.index(name)]
+    wrong = replace(full, y=pulled)
+    bodies = consistent(wrong)
+    assert bodies["Fv2"] == pytest.approx(0.0, abs=1e-4)
+    assert bodies["Ia3"] >= 0
+    assert consistent_links(bodies.columns, bodies.values) == [1, 2, 3]
+    free = least_squares(wrong.grouped(equations()[1]))
+    assert free["Fv2"] == pytest.approx(-0.2, abs=1e-6)
+    assert free.residuals.total_percent < bodies.residuals.total_percent
+
+
+def test_masses_are_bounded():
+    free, bounded = (consistent(full_observations(), heaviest=m) for m in (100.0, 1.5))
+    assert max(free[f"M{j}"] for j in (1, 2, 3)) > 1.6
+    assert all(bounded[f"M{j}"] <= 1.5 + 1e-6 for j in (1, 2, 3))
+
+
+def test_what_cannot_be_a_full_set_is_refused():
+    full, (_, base, _) = full_observations(), equations()
+    with pytest.raises(ModelError, match="give the observations of the full set"):
+        consistent(full.grouped(base))
+    with pytest.raises(ModelError, match="heaviest is 0 kg"):
+        consistent(full, heaviest=0.0)
+    with pytest.raises(ModelError, match="guess for link 1 is no body"):
+        consistent(full, guess=np.zeros(len(full.columns)))
+    W = full.W.copy()
+    W[:, :, full.names.index("Fv2")] = 0.0
+    with pytest.raises(ModelError, match="Fv2 cannot be seen in this record; move the joint"):
+        consistent(replace(full, W=W))
+
+
+def test_pseudo_inertia_of_a_ball():
+    columns = equations()[0].columns[:10]
+    second = 0.4 * 2 * 0.1**2
+    ball = np.array([second, 0, 0, second, 0, second, 0, 0, 0, 2.0])
+    P = pseudo_inertias(columns, ball)[1]
+    assert pytest.approx(np.diag([second / 2] * 3 + [2.0])) == P
+    assert consistent_links(columns, ball) == [1]
+    assert consistent_links(columns, ball - np.eye(10)[0] * 2.5 * second) == []
+
+
+def test_full_set_from_base_parameters():
+    D, base, _ = equations()
+    estimate = least_squares(full_observations().grouped(base))
+    found = recovered(estimate, D.columns, base.matrix)
+    assert consistent_links(found.columns, found.values) == [1, 2, 3]
+    assert np.abs(found.misfit).max() < 3
+    expected = (base.matrix @ found.values - estimate.values) / estimate.deviations
+    assert found.misfit == pytest.approx(expected)
+    assert found["Fv1"] == pytest.approx(0.8, abs=4 * found.deviations[found.names.index("Fv1")])
+    truth = np.array(mbs_values(D.columns))
+    near = recovered(estimate, D.columns, base.matrix, guess=truth)
+    assert near["M1"] == pytest.approx(6.0, rel=0.05)
+    with pytest.raises(ModelError, match="no parameter 'M9'"):
+        found["M9"]
+    with pytest.raises(ModelError, match="give that of the base parameters identified"):
+        recovered(estimate, D.columns[:5], base.matrix)

@@ -1,0 +1,71 @@
+"""The filtered model: its rate and its rest are the dynamic model."""
+
+import casadi
+import numpy as np
+import pytest
+from support.regressor_states import CLOSED, OPEN, ROTORS, TREES, Motion, state_of, system_of
+from symbolic_robots import symbolic_robot
+
+from mbs.identification import energy_regressor, filtered_regressor, regressor
+from mbs.operations import count
+
+BOUNDS = {"puma560": "566/358", "rx90": "497/303", "iiwa": "900/530"}
+"""Multiplications and additions of D1 and D2 together."""
+
+
+def parts(name):
+    system = system_of(name)
+    pairs = [(1, 2)] if name == "puma560" else []
+    options = {"offsets": True, "couplings": pairs}
+    return system, regressor(system, **options), filtered_regressor(system, **options)
+
+
+@pytest.mark.parametrize("name", [*OPEN, *CLOSED, *TREES, *ROTORS])
+def test_rate_and_rest_are_the_dynamic_model(name):
+    system, D, filtered = parts(name)
+    motion = Motion(system)
+    D1, D2 = filtered(motion.q, motion.v)
+    dynamic = D(motion.q, motion.v, motion.a)
+    state = state_of(system)
+    scale = motion.largest(dynamic, state)
+    assert motion.largest(motion.rate(D1) + D2 - dynamic, state) < 1e-12 * scale
+
+
+@pytest.mark.parametrize("name", ["puma560", "scara", "sr400", "ball_base"])
+def test_momentum_is_the_derivative_of_energy(name):
+    system, _, filtered = parts(name)
+    motion = Motion(system)
+    h = energy_regressor(system)(motion.q, motion.v)
+    D1, _ = filtered(motion.q, motion.v)
+    columns = h.shape[1]
+    shared = [k for k, c in enumerate(filtered.names) if c in energy_regressor(system).names]
+    assert len(shared) == columns
+    slope = casadi.jacobian(h, motion.v).T
+    assert motion.largest(slope - D1[:, shared], state_of(system)) < 1e-10
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_it_costs_less_than_derivatives_of_energy(name):
+    system = symbolic_robot(name).assemble()
+    filtered = filtered_regressor(system, rotors=False, friction=False)
+    found = count(filtered)
+    mul, add = (int(part) for part in BOUNDS[name].split("/"))
+    assert (found.mul <= mul, found.add <= add) == (True, True), str(found)
+    energy = energy_regressor(system, rotors=False, friction=False)
+    motion = Motion(system)
+    H = energy(motion.q, motion.v, system.p)
+    U = casadi.substitute(H, motion.v, 0 * motion.v)
+    slopes = [casadi.jacobian(H, motion.v), casadi.jacobian(2 * U - H, motion.q)]
+    inputs = [motion.q, motion.v, system.p]
+    options = {"cse": True}
+    plain = casadi.Function("plain", inputs, slopes, ["q", "v", "p"], ["D1", "D2"], options)
+    assert found.total < count(plain).total
+
+
+def test_first_joint_has_no_centrifugal_rest():
+    system, _, filtered = parts("puma560")
+    q, v, _ = state_of(system)
+    inertial = [k for k, c in enumerate(filtered.columns) if c.kind not in ("Fv", "Fs", "offset")]
+    inertial = [k for k in inertial if not filtered.names[k].startswith(("Fvm", "Fsm"))]
+    D2 = np.array(filtered(q, v)[1])
+    assert not D2[0, inertial].any()

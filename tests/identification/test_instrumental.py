@@ -1,0 +1,70 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.measured_arm import equations, motion, noisy_samples
+
+from mbs.errors import ModelError
+from mbs.identification.instrumental import instrumental
+from mbs.identification.least_squares import least_squares
+from mbs.identification.observations import observe
+from mbs.identification.simulated_motion import simulated_motion
+
+_ACCELERATION = 3.0
+
+
+def noisy_motion(samples, seed=0):
+    """Samples whose accelerations have noise, as differences of positions have."""
+    noise = np.random.default_rng((4, seed)).normal(size=samples.a.shape)
+    return replace(samples, a=samples.a + _ACCELERATION * noise)
+
+
+def bias(estimate, name="Ia3"):
+    return estimate[name] - equations()[2][estimate.names.index(name)]
+
+
+def test_instruments_take_out_the_bias_of_noise_in_the_regressor():
+    D, base, truth = equations()
+    exact = noisy_samples(0.05)
+    measured = observe(D, noisy_motion(exact)).grouped(base)
+    ordered = observe(D, exact).grouped(base)
+    plain, free = least_squares(measured), instrumental(measured, ordered)
+    assert bias(plain) < -0.03
+    assert abs(bias(free)) < 0.25 * abs(bias(plain))
+    assert np.abs((free.values - truth) / free.deviations).max() < 4
+    assert np.abs((plain.values - truth) / plain.deviations).max() > 10
+
+
+def test_without_noise_it_is_least_squares():
+    D, base, truth = equations()
+    clean = observe(D, noisy_samples(0.0)).grouped(base)
+    weights = np.array([1.0, 2.0, 3.0])
+    found = instrumental(clean, clean, weights)
+    assert found.values == pytest.approx(truth, abs=1e-8)
+    assert found.weights == pytest.approx(weights)
+
+
+def test_simulated_motion_follows_the_measured_one():
+    D, base, _ = equations()
+    samples = noisy_samples(0.02, rate=200.0)
+    kept = [column.name for column in base.kept]
+    estimate = least_squares(observe(D, samples).grouped(base))
+    simulated = simulated_motion(D, kept, estimate, samples)
+    _, q, v, a = motion(rate=200.0)
+    assert simulated.q == pytest.approx(q, abs=0.02)
+    assert simulated.v == pytest.approx(v, abs=0.05)
+    assert np.sqrt(np.mean((simulated.a - a) ** 2)) < 0.1 * np.sqrt(np.mean(a**2))
+    rough = noisy_motion(samples)
+    instruments = simulated_motion(D, kept, least_squares(observe(D, rough).grouped(base)), rough)
+    measured = observe(D, rough).grouped(base)
+    found = instrumental(measured, observe(D, instruments).grouped(base))
+    assert abs(bias(found)) < 0.5 * abs(bias(least_squares(measured)))
+
+
+def test_instruments_that_do_not_fit_are_refused():
+    D, base, _ = equations()
+    full = observe(D, noisy_samples(0.1)).grouped(base)
+    with pytest.raises(ModelError, match="from the same instants and columns"):
+        instrumental(full, full.split(0.5)[0])
+    with pytest.raises(ModelError, match="give the name of the kept column for each"):
+        simulated_motion(D, ["M1"], least_squares(full), noisy_samples(0.1))

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+from support.measured_arm import equations, noisy_samples
+
+from mbs.identification.consistent import consistent
+from mbs.identification.estimate import held_out
+from mbs.identification.observations import observe
+from mbs.identification.report import report
+from mbs.identification.residual_plot import plot_residuals
+from mbs.identification.weighted import weighted
+
+
+def full():
+    return observe(equations()[0], noisy_samples(np.array([0.3, 0.1, 0.5])))
+
+
+def test_the_report_says_values_deviations_errors_and_excitation():
+    observations = full().grouped(equations()[1])
+    estimate = weighted(observations)
+    text = report(estimate, ("last quarter", held_out(weighted, observations)))
+    lines = text.splitlines()
+    head = f"weighted least squares: {len(estimate.names)} parameters from 500 instants of 3 eff"
+    assert head in lines[0]
+    row = next(line.split() for line in lines if line.startswith("Fv1"))
+    assert float(row[1]) == pytest.approx(estimate["Fv1"], rel=1e-4)
+    assert float(row[2]) == pytest.approx(estimate.deviations[estimate.names.index("Fv1")], rel=0.1)
+    assert row[4] == "N.m.s/rad"
+    total = estimate.residuals.total_percent
+    assert f"Errors: {total:.2f} % of all efforts" in text
+    assert "Errors, last quarter: " in text
+    assert sum(line.startswith("q3 ") for line in lines) == 2
+    assert "condition number" in lines[-1]
+    marked = [line.split()[0] for line in lines if line.endswith(" *")]
+    assert marked == [n for n, p in zip(estimate.names, estimate.percent, strict=True) if p > 30]
+
+
+def test_the_report_of_a_full_set_speaks_of_bodies():
+    text = report(consistent(full()))
+    assert "Bodies: all 3 pseudo-inertias are positive definite" in text
+    assert "cannot be told apart" in text
+
+
+def test_residuals_are_drawn_for_each_joint(tmp_path):
+    pytest.importorskip("matplotlib")
+    residuals = weighted(full().grouped(equations()[1])).residuals
+    figure = plot_residuals(residuals, tmp_path / "errors.png", "arm")
+    assert (tmp_path / "errors.png").stat().st_size > 1000
+    assert len(figure.axes) == 3
+    drawn = figure.axes[1].lines[2].get_ydata()
+    assert np.array_equal(drawn, residuals.measured[:, 1] - residuals.predicted[:, 1])
+    assert f"{residuals.percent[1]:.1f} %" in figure.axes[1].get_title()

@@ -8,7 +8,7 @@ import pytest
 
 import mbs
 from mbs.assembly import System
-from mbs.errors import ModelError, SolverError
+from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
 from mbs.identification.base_parameters import base_parameters
 from mbs.identification.excitation import Plane, Series, Trajectory, excitation
@@ -86,7 +86,7 @@ def test_table_and_text() -> None:
     found = planar()
     table = found.table(100.0, periods=2)
     assert len(table) == 1201
-    assert table.names[:2] == ("j1.q", "j2.q") or len(table.names) == 6
+    assert table.names == ("q1.q", "q2.q", "q1.v", "q2.v", "q1.a", "q2.a")
     assert table.values[600] == pytest.approx(table.values[0], abs=1e-10)
     text = found.text()
     assert f"{len(found.columns)} columns" in text
@@ -106,6 +106,22 @@ def test_puma_is_seen_well() -> None:
     assert np.abs(found.q(t)).max() <= 2.5 + 1e-9
     assert np.abs(found.v(t)).max() <= 2.0 + 1e-9
     assert np.abs(found.a(t)).max() <= 6.0 + 1e-9
+
+
+def test_condition_of_52_columns_of_puma() -> None:
+    found = excitation(
+        system_of("puma560"),
+        series=Series(samples=60),
+        position=2.5,
+        velocity=3.0,
+        acceleration=8.0,
+        objective="condition",
+        starts=1,
+        rounds=100,
+    )
+    assert len(found.columns) == 52
+    assert found.condition < 30
+    assert all(margin.part >= 0 for margin in found.margins if margin.limit.is_finite)
 
 
 def test_same_seed_gives_the_same_motion() -> None:
@@ -137,6 +153,26 @@ def test_closed_robot_keeps_its_loop_closed() -> None:
         assert np.array(closed).ravel() == pytest.approx(q, abs=1e-9)
     assert len(found.columns) == 19
     assert found.scaled_condition < 100
+
+
+def test_loops_without_closed_form_are_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(_: System) -> None:
+        raise NoClosedForm("no closed form")
+
+    system = mbs.load("five_bar").assemble()
+    middle = [system.posture[k] for k in system.active]
+    options = {
+        "series": FORM,
+        "position": [(x - 0.3, x + 0.3) for x in middle],
+        "starts": 1,
+        "rounds": 3,
+    }
+    explicit = excitation(system, **options)
+    monkeypatch.setattr("mbs.identification.excitation_instant.closed_form", refused)
+    followed = excitation(system, **options)
+    t = np.linspace(0, 6, 9)
+    assert followed.posture(t) == pytest.approx(explicit.posture(t), abs=1e-4)
+    assert followed.condition == pytest.approx(explicit.condition, rel=1e-3)
 
 
 def test_impossible_effort_is_told() -> None:

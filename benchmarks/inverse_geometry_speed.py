@@ -25,7 +25,7 @@ from mbs.models.inverse_geometry.numeric.core import core
 
 _SHARE = 0.03
 """Seconds that a contender takes in a round."""
-_MOST = 512
+_MOST = 2000
 """Poses in one call."""
 
 

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import ModelError
 from mbs.identification.columns import Column
+from mbs.identification.named_values import NamedValues
 from mbs.identification.observations import Observations
 from mbs.identification.residuals import Residuals
-from mbs.messages import did_you_mean
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Estimate:
+class Estimate(NamedValues):
     """Values of parameters found from observations.
 
     Attributes:
@@ -31,6 +32,8 @@ class Estimate:
         rounds: how often the weights were set.
     """
 
+    what: ClassVar[str] = "estimate"
+
     method: str
     columns: tuple[Column, ...]
     values: Array
@@ -38,23 +41,6 @@ class Estimate:
     weights: Array
     observations: Observations
     rounds: int = 1
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(column.name for column in self.columns)
-
-    def __getitem__(self, name: str) -> float:
-        if name not in self.names:
-            raise ModelError(
-                f"estimate: there is no parameter {name!r}; {did_you_mean(name, self.names)}"
-            )
-        return float(self.values[self.names.index(name)])
-
-    @property
-    def deviations(self) -> Array:
-        """(k,) standard deviations, in the unit of each parameter."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=float)
 
     @property
     def percent(self) -> Array:

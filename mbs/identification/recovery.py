@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,14 +13,14 @@ from mbs.errors import ModelError
 from mbs.identification.columns import Column
 from mbs.identification.consistent import HEAVIEST
 from mbs.identification.estimate import Estimate
+from mbs.identification.named_values import NamedValues
 from mbs.identification.physical_set import Misfit, likeliest
-from mbs.messages import did_you_mean
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FullSet:
+class FullSet(NamedValues):
     """A full set of parameters and how far it is from the base parameters it was made of.
 
     Attributes:
@@ -30,28 +31,13 @@ class FullSet:
         misfit: (count,) its base parameters minus the identified ones, in standard deviations.
     """
 
+    what: ClassVar[str] = "full set"
+
     columns: tuple[Column, ...]
     values: Array
     covariance: Array
     base_names: tuple[str, ...]
     misfit: Array
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(column.name for column in self.columns)
-
-    def __getitem__(self, name: str) -> float:
-        if name not in self.names:
-            raise ModelError(
-                f"full set: there is no parameter {name!r}; {did_you_mean(name, self.names)}"
-            )
-        return float(self.values[self.names.index(name)])
-
-    @property
-    def deviations(self) -> Array:
-        """(k,) standard deviations, in the unit of each parameter."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=float)
 
 
 def recovered(

@@ -180,7 +180,7 @@ class Result:
 
     def to_pandas(self) -> Any:
         """The signals as a pandas DataFrame indexed by time; units in `.attrs["units"]`."""
-        pandas = _optional("pandas", "pip install pandas")
+        pandas = optional_module("pandas", "pip install pandas")
         index = pandas.Index(self.time, name="time")
         frame = pandas.DataFrame(self.values.copy(), index=index, columns=list(self.names))
         frame.attrs["units"] = dict(self.units)
@@ -188,7 +188,7 @@ class Result:
 
     def to_xarray(self) -> Any:
         """The signals as an xarray Dataset over time, each with its unit as attribute."""
-        xarray = _optional("xarray", "pip install xarray")
+        xarray = optional_module("xarray", "pip install xarray")
         signals = {n: ("time", self[n].copy(), {"units": u}) for n, u in self.units.items()}
         return xarray.Dataset(
             signals,
@@ -253,7 +253,12 @@ def _label(unit: str) -> str:
     return quantity if unit == "1" else f"{quantity} [{unit}]"
 
 
-def _optional(module: str, remedy: str) -> Any:
+def optional_module(module: str, remedy: str) -> Any:
+    """A module that an extra brings.
+
+    Raises:
+        ModelError: it is not installed; the message ends with the remedy.
+    """
     try:
         return importlib.import_module(module)
     except ImportError as error:
@@ -263,10 +268,12 @@ def _optional(module: str, remedy: str) -> Any:
 def _figure(rows: int, *, shown: bool) -> Any:
     size = (8.0, 1.0 + 2.5 * max(rows, 1))
     remedy = 'pip install "mbs[plot]"'
-    _optional("matplotlib", remedy)
+    optional_module("matplotlib", remedy)
     if shown:
-        return _optional("matplotlib.pyplot", remedy).figure(figsize=size, layout="constrained")
-    return _optional("matplotlib.figure", remedy).Figure(figsize=size, layout="constrained")
+        return optional_module("matplotlib.pyplot", remedy).figure(
+            figsize=size, layout="constrained"
+        )
+    return optional_module("matplotlib.figure", remedy).Figure(figsize=size, layout="constrained")
 
 
 def _save(figure: Any, path: str | os.PathLike[str]) -> None:

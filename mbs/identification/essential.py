@@ -11,7 +11,7 @@ import numpy.typing as npt
 from mbs.errors import ModelError
 from mbs.identification.estimate import Estimate
 from mbs.identification.triangle import compressed, solve
-from mbs.result import _optional
+from mbs.result import optional_module
 
 Array = npt.NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def essential(
         raise ModelError(
             f"essential parameters: {estimate.method} has no deviations; use weighted()"
         )
-    distribution = _optional("scipy.stats", 'pip install "mbs[identify]"').f
+    distribution = optional_module("scipy.stats", 'pip install "mbs[identify]"').f
     A, b = _equations(estimate)
     free = len(estimate.observations) - len(estimate.names)
     all_squares = _squares(A, b, estimate.values)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from mbs.errors import ModelError
 from mbs.identification.filters import Samples
 from mbs.identification.observations import Observations, evaluated, known_of
-from mbs.result import _optional
+from mbs.result import optional_module
 
 Array = npt.NDArray[np.float64]
 
@@ -58,6 +58,6 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
 
 
 def _filtered(values: Array, numerator: list[float], corner: float, rate: float) -> Array:
-    signal = _optional("scipy.signal", 'pip install "mbs[identify]"')
+    signal = optional_module("scipy.signal", 'pip install "mbs[identify]"')
     b, a = signal.bilinear(numerator, [1.0, 2 * corner, corner**2], fs=rate)
     return np.asarray(signal.lfilter(b, a, values, axis=0), dtype=float)

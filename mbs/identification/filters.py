@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from mbs.errors import ModelError
 from mbs.identification.record import Record
-from mbs.result import _optional
+from mbs.result import optional_module
 
 Array = npt.NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def zero_phase(values: Array, rate: float, bandwidth: float, order: int = ORDER)
             f"filter: {len(values)} samples are too few for it; give a record of more than"
             f" {padding} samples"
         )
-    signal = _optional("scipy.signal", 'pip install "mbs[identify]"')
+    signal = optional_module("scipy.signal", 'pip install "mbs[identify]"')
     sections = signal.butter(order, bandwidth, fs=rate, output="sos")
     return np.asarray(signal.sosfiltfilt(sections, values, axis=0), dtype=float)
 

@@ -64,6 +64,17 @@ class Chain:
         gaps = np.array(DM(function(p))).reshape(len(self.gaps), 4, 4)
         return Arm(self.names, np.array(self.prismatic, dtype=bool), gaps)
 
+    def ways(self, p: NDArray[np.float64] | None = None) -> tuple[Pose, ...]:
+        """The gaps with numbers p, (np,), in the place of the parameters, where they are given."""
+        if p is None:
+            return self.gaps
+        symbols, numbers = self.system.p, SX(DM(p))
+
+        def substituted(matrix: SX) -> SX:
+            return SX(casadi.substitute(matrix, symbols, numbers))
+
+        return tuple(Pose(substituted(gap.R), substituted(gap.p)) for gap in self.gaps)
+
     def problem(self, p: NDArray[np.float64] | None = None) -> Problem:
         """The loop that the wanted pose closes.
 
@@ -75,12 +86,9 @@ class Chain:
             rows of the pose T, column by column.
         """
         n, symbols = len(self.names), self.system.p if p is None else SX(0, 1)
-        numbers = dict[int, SX]() if p is None else {0: SX(DM(p))}
         t = casadi.vertcat(*(SX.sym(f"T{r}{c}") for c in range(1, 5) for r in range(1, 4)))
         T = Pose(casadi.reshape(t[0:9], 3, 3), t[9:12])
-        gaps = [
-            Gap(Pose(*self._substituted(gap, numbers[0])) if numbers else gap) for gap in self.gaps
-        ]
+        gaps = [Gap(way) for way in self.ways(p)]
         back = gaps[n].then(T.inverse())
         joints = tuple(
             Unknown(name, Motion.PRISMATIC if slides else Motion.REVOLUTE, place, 1)
@@ -93,10 +101,6 @@ class Chain:
         sums = [SX.sym(f"x{k + 1}") for k in range(n)]
         x = casadi.vertcat(*(SX.sym(name) for name in self.names), *sums)
         return Problem(ring, x, casadi.vertcat(symbols, t), self._samples(p))
-
-    def _substituted(self, gap: Pose, p: SX) -> tuple[SX, SX]:
-        R, position = (SX(casadi.substitute(m, self.system.p, p)) for m in (gap.R, gap.p))
-        return R, position
 
     def _samples(
         self, p: NDArray[np.float64] | None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi
 import numpy as np
-from casadi import DM, SX
+from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.models.inverse_geometry.chain import Chain
@@ -19,7 +19,7 @@ def forward(chain: Chain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
         x: positions [rad or m].
         p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
     """
-    gaps = _gaps(chain, p)
+    gaps = chain.ways(p)
     pose = gaps[0]
     for k, slides in enumerate(chain.prismatic):
         turn = Pose.turned(axis_turn("z", SX(x[k])).matrix)
@@ -40,16 +40,5 @@ def relative_residual(pose: Pose, T: SX, length: SX) -> SX:
 
 def size(chain: Chain, p: NDArray[np.float64] | None = None) -> SX:
     """A length of the chain's size [m], 1 where all its ways are turns alone."""
-    lengths = [casadi.norm_2(gap.p) for gap in _gaps(chain, p) if not gap.p.is_zero()]
+    lengths = [casadi.norm_2(gap.p) for gap in chain.ways(p) if not gap.p.is_zero()]
     return SX(sum(lengths, SX(0))) if lengths else SX(1)
-
-
-def _gaps(chain: Chain, p: NDArray[np.float64] | None) -> list[Pose]:
-    if p is None:
-        return list(chain.gaps)
-    symbols = chain.system.p
-
-    def numbers(matrix: SX) -> SX:
-        return SX(casadi.substitute(matrix, symbols, SX(DM(p))))
-
-    return [Pose(numbers(gap.R), numbers(gap.p)) for gap in chain.gaps]

@@ -314,18 +314,6 @@ def test_directional_derivatives_are_total(fmu):
     instance.freeInstance()
 
 
-def test_a_given_tangent_is_used(tmp_path, swing):
-    model = pendulum()
-    at = [model.rhs.sx_in(k) for k in range(5)]
-    dx, du, dp = ca.SX.sym("dx", 2), ca.SX.sym("du"), ca.SX.sym("dp", 4)
-    tangent = ca.Function("tangent", [*at, dx, du, dp], [7 * dx, 3 * dx])
-    path = write_fmu(dataclasses.replace(model, tangent=tangent), tmp_path / "t.fmu")
-    own = Fmu(path, tmp_path / "t")
-    instance = own.open(FMU2Model)
-    references = [own.references["der(j1.v)"]]
-    assert instance.getDirectionalDerivative(references, [1], [1.0]) == [7.0]
-    instance.freeInstance()
-
 
 def test_communication_steps_do_not_matter(fmu):
     ends = []

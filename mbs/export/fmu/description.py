@@ -12,7 +12,7 @@ from mbs.errors import ExportError
 from mbs.units import UNITS
 
 Solver = Literal["dopri5", "rodas", "rk4"]
-Kind = Literal["state", "derivative", "input", "output", "parameter", "dependent"]
+Kind = Literal["state", "derivative", "input", "output", "parameter", "mode", "dependent"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +56,30 @@ class State(Variable):
 
 
 @dataclass(frozen=True, slots=True)
+class Jumps:
+    """Where an FMU's states and modes jump, and how; m counts its modes, k its indicators.
+
+    All functions take the parameters with the modes behind them as p, as `FmuModel.rhs` does then.
+
+    Attributes:
+        modes: numbers that are constant between events.
+        first: `first(t, x, z, u, p) -> (modes, beyond)` before the first event, of the modes in p
+            nothing; beyond (k, 1) is positive where x is outside what the model allows.
+        indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events. An event is
+            where one of them is not positive any more.
+        jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
+            indicator that is not positive.
+        names: (k) what each indicator watches, for messages.
+    """
+
+    modes: tuple[Variable, ...]
+    first: casadi.Function
+    indicators: casadi.Function
+    jump: casadi.Function
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Entry:
     """A variable at its place: the value reference is the index in the table of entries."""
 
@@ -66,6 +90,8 @@ class Entry:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuModel:
     """All that an FMU says and computes; nx, nz, nu, np, ny count the variables below.
+
+    Where there are jumps, p is followed by their modes in rhs, not in closure.
 
     Attributes:
         name: of the model; letters, digits and underscores of it make the file names inside.
@@ -78,8 +104,7 @@ class FmuModel:
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
             absolute closure row at z; None when there is no z.
-        tangent: `tangent(t, x, z, u, p, dx, du, dp) -> (dxdot, dy)`, the total derivative along a
-            direction; None to have it derived from `rhs` and `closure`.
+        jumps: events; None when the motion is smooth.
         stop_time: default end of a simulation, s.
         tolerance: default relative tolerance of the integration.
         step_size: default communication step, s.
@@ -98,7 +123,7 @@ class FmuModel:
     parameters: tuple[Variable, ...] = ()
     dependents: tuple[Variable, ...] = ()
     closure: casadi.Function | None = None
-    tangent: casadi.Function | None = None
+    jumps: Jumps | None = None
     stop_time: float = 10.0
     tolerance: float = 1e-8
     step_size: float = 0.01
@@ -122,6 +147,11 @@ class FmuModel:
         """Every variable in the order of the value references."""
         return tuple(_entries(self))
 
+    @property
+    def modes(self) -> tuple[Variable, ...]:
+        """The modes of its events."""
+        return self.jumps.modes if self.jumps else ()
+
     def first(self, kind: Kind) -> int:
         """Value reference of the first variable of a kind.
 
@@ -137,6 +167,7 @@ class FmuModel:
             ("input", len(self.inputs)),
             ("output", len(self.outputs)),
             ("parameter", len(self.parameters)),
+            ("mode", len(self.modes)),
             ("dependent", len(self.dependents)),
         )
         place = 0
@@ -169,6 +200,7 @@ def _entries(model: FmuModel) -> Iterator[Entry]:
     yield from (Entry("input", v) for v in model.inputs)
     yield from (Entry("output", v) for v in model.outputs)
     yield from (Entry("parameter", v) for v in model.parameters)
+    yield from (Entry("mode", v) for v in model.modes)
     yield from (Entry("dependent", v) for v in model.dependents)
 
 
@@ -215,8 +247,8 @@ def _check_numbers(model: FmuModel) -> None:
 
 def _check_functions(model: FmuModel) -> None:
     nx, nz, nu = len(model.states), len(model.dependents), len(model.inputs)
-    ny, n_p = len(model.outputs), len(model.parameters)
-    _check_shape(model, "rhs", model.rhs, (1, nx, nz, nu, n_p), (nx, ny))
+    ny, n_p, n_m = len(model.outputs), len(model.parameters), len(model.modes)
+    _check_shape(model, "rhs", model.rhs, (1, nx, nz, nu, n_p + n_m), (nx, ny))
     if (model.closure is None) != (nz == 0):
         raise ExportError(
             f"FMU {model.name}: {nz} dependent coordinates need "
@@ -224,9 +256,11 @@ def _check_functions(model: FmuModel) -> None:
         )
     if model.closure is not None:
         _check_shape(model, "closure", model.closure, (nx, nz, n_p), (nz, 1))
-    if model.tangent is not None:
-        sizes = (1, nx, nz, nu, n_p, nx, nu, n_p)
-        _check_shape(model, "tangent", model.tangent, sizes, (nx, ny))
+    if model.jumps is not None:
+        point, k = (1, nx, nz, nu, n_p + n_m), len(model.jumps.names)
+        _check_shape(model, "first", model.jumps.first, point, (n_m, k))
+        _check_shape(model, "indicators", model.jumps.indicators, point, (k,))
+        _check_shape(model, "jump", model.jumps.jump, (*point, k), (nx, n_m))
 
 
 def _check_shape(

@@ -155,8 +155,6 @@ def _tangent(model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]) ->
     dz = casadi.MX(z.numel(), 1)
     if model.closure is not None:
         dz = _forward(model.closure, [x, z, p], [dx, dz, dp])[0]
-    if model.tangent is not None:
-        return [*model.tangent.call([*point, *seeds]), dz]
     dt = casadi.MX(t.numel(), 1)
     return [*_forward(model.rhs, point, [dt, dx, dz, du, dp]), dz]
 

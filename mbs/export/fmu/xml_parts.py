@@ -9,12 +9,14 @@ from mbs.export.fmu.dependencies import dependencies
 from mbs.export.fmu.description import Entry, FmuModel, State
 from mbs.units import UNITS
 
-_CAUSALITY = {"input": "input", "output": "output", "parameter": "parameter"}
+_CAUSALITY = {"input": "input", "output": "output", "parameter": "parameter", "mode": "output"}
+_VARIABILITY = {"parameter": "tunable", "mode": "discrete"}
 _INITIAL = {
     "state": "exact",
     "derivative": "calculated",
     "output": "calculated",
     "parameter": "exact",
+    "mode": "calculated",
     "dependent": "approx",
 }
 _STARTS = ("state", "input", "parameter", "dependent")
@@ -65,7 +67,7 @@ def variable_attributes(reference: int, entry: Entry) -> dict[str, str]:
         "name": v.name,
         "valueReference": str(reference),
         "causality": _CAUSALITY.get(entry.kind, "local"),
-        "variability": "tunable" if entry.kind == "parameter" else "continuous",
+        "variability": _VARIABILITY.get(entry.kind, "continuous"),
     }
     if v.description:
         attributes["description"] = v.description

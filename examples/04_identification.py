@@ -12,13 +12,19 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mbs
-from mbs.identification import numbers_of, regressor
-from mbs.identification.base_parameters import base_parameters
-from mbs.identification.excitation import Series, excitation
-from mbs.identification.filters import smoothed
-from mbs.identification.observations import observe_filtered
-from mbs.identification.record import Record
-from mbs.identification.weighted import weighted
+from mbs.identification import (
+    Prior,
+    Record,
+    Series,
+    base_parameters,
+    excitation,
+    identify,
+    numbers_of,
+    observe_filtered,
+    plot_residuals,
+    regressor,
+    smoothed,
+)
 
 system = mbs.load("puma560").assemble()
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/identification")
@@ -30,7 +36,7 @@ print(f"{base.count} base parameters of {len(base.columns)}, such as {base.equat
 series = Series(period=10.0, harmonics=5, samples=40)
 limits = {"velocity": 2.0, "acceleration": 6.0, "effort": [100, 120, 60, 10, 10, 10]}
 first, second = (
-    excitation(system, base, series=series, starts=1, rounds=30, seed=seed, **limits)
+    excitation(system, base, series=series, starts=1, rounds=60, seed=seed, quiet=True, **limits)
     for seed in (1, 2)
 )
 print(first.text())
@@ -54,41 +60,53 @@ def measured(motion):
     return Record.of(system, t, q + 1e-5 * rng.standard_normal(q.shape), tau)
 
 
+def on_other(estimate, observations):
+    """Errors in percent of an estimate in fewer parameters."""
+    return estimate.residuals_on(observations.select(estimate.names)).total_percent
+
+
+# %% Identify: base parameters, the essential ones among them, and bodies
 bandwidth = 5.0
-known, unknown = (
-    observe_filtered(D, smoothed(measured(motion), bandwidth)).grouped(base)
-    for motion in (first, second)
-)
+found = identify(system, measured(first), bandwidth, prior=Prior(heaviest=30.0), quiet=True)
+(folder / "report.txt").write_text(found.text(), encoding="utf-8")
+print("\n".join(found.text().splitlines()[:12]), "\n... the rest is in report.txt")
 
-# %% Identify, and validate on the other motion
-estimate = weighted(known)
+# %% Compare with the truth, in standard deviations
 true = base.matrix @ K
-error = np.abs(estimate.values - true)
-print(f"\n{'parameter':<10} {'true':>9} {'found':>9} {'sd':>9}")
-for name, x, y, s in zip(estimate.names, true, estimate.values, estimate.deviations, strict=True):
-    print(f"{name:<10} {x:9.4f} {y:9.4f} {s:9.4f}")
-print(f"\nLargest error of a parameter: {error.max():.4f}")
-residuals = estimate.residuals_on(unknown)
-print(f"Residual on the same motion: {estimate.residuals.total_percent:.3f} %")
-print(f"Residual on the other motion: {residuals.total_percent:.3f} %")
+error = (found.estimate.values - true) / found.estimate.deviations
+print(f"\nLargest error of a parameter: {np.abs(found.estimate.values - true).max():.4f}")
+print(f"Errors of the parameters: {np.sqrt(np.mean(error**2)):.2f} deviations in the mean,")
+print(f"{np.abs(error).max():.1f} at most; {np.sum(found.estimate.percent < 10)} are known to 10 %")
+few = found.essential()
+print(f"Essential parameters: {len(few.estimate.names)} of {base.count}; {few.reason}")
 
-# %% Draw the motion and the efforts that were predicted
-figure = Figure(figsize=(10, 8), layout="constrained")
-motion, *efforts = figure.subplots(4, 1, sharex=True)
+# %% Validate: parts of the same record, then the other motion
+unknown = observe_filtered(D, smoothed(measured(second), bandwidth)).grouped(base)
+residuals = found.estimate.residuals_on(unknown)
+print(f"\nResidual on the same motion: {found.estimate.residuals.total_percent:.3f} %")
+print(
+    f"Residual of parts that were left out in turn: {found.cross_validated().total_percent:.3f} %"
+)
+print(f"Residual on the other motion: {residuals.total_percent:.3f} %")
+print(f"The same with the essential parameters alone: {on_other(few.estimate, unknown):.3f} %")
+plot_residuals(residuals, folder / "residuals.png", "Other motion, filtered efforts")
+
+# %% Draw the motion, the errors of the parameters and how sure they are
+figure = Figure(figsize=(9, 9), layout="constrained")
+motion, rates, values = figure.subplots(3, 1)
 t = np.linspace(0, 10, 501)
 motion.plot(t, first.q(t), label=[c.name for c in system.coordinates])
-motion.set(ylabel="q [rad]", title="Motion to identify")
-motion.legend(ncols=6, fontsize="small")
-shown = residuals.time < residuals.time[0] + 10
-for axes, k in zip(efforts, (1, 2, 4), strict=True):
-    t = residuals.time[shown] - residuals.time[0]
-    axes.plot(t, residuals.measured[shown, k], "k", linewidth=1, label="measured")
-    axes.plot(t, residuals.predicted[shown, k], "--", label="predicted")
-    axes.plot(t, residuals.error[shown, k], linewidth=1, label="difference")
-    axes.set(ylabel=f"{residuals.efforts[k]} [{residuals.effort_units[k]}]")
+motion.set(ylabel="position [rad]", title="Motion to identify", xlim=(0, 10))
+motion.legend(ncols=6, fontsize="small", loc="upper right")
+rates.plot(t, first.v(t))
+rates.set(xlabel="time [s]", ylabel="velocity [rad/s]", xlim=(0, 10))
+numbers = np.arange(base.count)
+values.bar(numbers, error, color=np.where(found.estimate.percent < 10, "C0", "C1"))
+values.axhspan(-2, 2, color="C2", alpha=0.2, zorder=0)
+values.set_xticks(numbers, found.estimate.names, rotation=90, fontsize="x-small")
+values.set(ylabel="error [deviations]", xlim=(-1, base.count))
+values.set_title("Errors of base parameters; orange: deviation over 10 %, green: two deviations")
+for axes in (motion, rates, values):
     axes.grid(alpha=0.3)
-efforts[0].set_title("Other motion, filtered efforts")
-efforts[0].legend(ncols=3, fontsize="small")
-efforts[-1].set_xlabel("time [s]")
 figure.savefig(folder / "identification.png", dpi=90)
 print(f"\nFiles in {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")

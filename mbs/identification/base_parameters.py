@@ -30,11 +30,11 @@ from mbs.identification.base.states import closed_positions
 from mbs.identification.base.structure import Structure, structure_of
 from mbs.identification.base.symbolic import depends_on_symbols, grouped_by_rules
 from mbs.identification.base.text import equation, table
-from mbs.identification.columns import Column, columns_of, values_of
+from mbs.identification.base.turning import postures_needed
+from mbs.identification.columns import Column, chosen_columns, values_of
 from mbs.messages import did_you_mean, quoted
 
 METHODS = ("symbolic", "numeric")
-_POSTURES = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +87,11 @@ class BaseParameters:
         return tuple(f"{c.name}R" if len(terms) > 1 else c.name for c, terms in pairs)
 
     @property
+    def columns_in_base(self) -> tuple[Column, ...]:
+        """The kept columns under the names of the base parameters, such as for `regressor`."""
+        return tuple(replace(c, name=n) for c, n in zip(self.kept, self.names, strict=True))
+
+    @property
     def equations(self) -> tuple[str, ...]:
         """Every base parameter as text, such as "XX2R = XX2 - YY2 + 0.25*M3"."""
         return tuple(map(equation, self.names, self._terms))
@@ -121,6 +126,7 @@ class BaseParameters:
 
         Eliminated parameters are zero, kept ones have the grouped values. Links are then no
         longer bodies that could exist; wrenches between them and energies of single links differ.
+        It holds for this gravity alone, and for a base at rest unless `moving_base` was said.
         """
         inputs = [values_of(self.system, self.columns)]
         inputs += [self.system.p] if self.system.parameters else []
@@ -162,10 +168,10 @@ def base_parameters(
     """
     require_system(system)
     _check_method(system, method, order)
-    chosen = columns_of(system) if columns is None else tuple(columns)
+    chosen = chosen_columns(system, columns, {})
     first = _first(system, chosen, order or ())
-    sampled = Sample.on_moving_base if moving_base else Sample.of
-    sample = sampled(system, chosen, default_parameters(system), seed)
+    p = default_parameters(system)
+    sample = Sample.of(system, chosen, p, seed, base_moves=moving_base)
     preference = preferred_order(chosen, first)
     if method == "numeric":
         grouping, check = grouped_by_rank(sample, preference)
@@ -204,13 +210,16 @@ def _completed(
 
 
 def _postures(system: System, seed: int) -> list[Postures]:
-    """Closed postures at the defaults of the symbols, and at other values where there are any."""
+    """Closed postures at the defaults of the symbols, and at other values where there are any.
+
+    They are others than those of the check.
+    """
     if not system.is_closed:
         return []
     symbolic = depends_on_symbols(system)
     values = parameter_samples(system, system.p)[:2] if symbolic else [default_parameters(system)]
-    rng = np.random.default_rng(seed)
-    return [Postures(closed_positions(system, p, _POSTURES, rng), p) for p in values]
+    count = postures_needed(system)
+    return [Postures(closed_positions(system, p, count, seed + 1), p) for p in values]
 
 
 def _numbers(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypedDict
 
 import casadi
 import numpy as np
@@ -40,6 +41,15 @@ Joints = tuple[str | int, str | int]
 """Two joints of the tree, by name or by the number of their link, from 1."""
 
 
+class ColumnChoice(TypedDict, total=False):
+    """Which parameters to take; see `columns_of`."""
+
+    rotors: bool
+    friction: bool
+    offsets: bool
+    couplings: Sequence[Joints]
+
+
 @dataclass(frozen=True, slots=True)
 class Column:
     """A parameter in which the equations of motion are linear.
@@ -58,6 +68,11 @@ class Column:
     link: int
     unit: str
     other: int = 0
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """What it is the parameter of, whatever its name."""
+        return self.kind, self.link, self.other
 
 
 def columns_of(
@@ -101,6 +116,59 @@ def columns_of(
     for pair in couplings:
         columns += _coupled(system, pair)
     return tuple(columns)
+
+
+def chosen_columns(
+    system: System, columns: Sequence[Column] | None, choice: ColumnChoice
+) -> tuple[Column, ...]:
+    """The columns that are given, or those of `columns_of`.
+
+    Args:
+        system: open or closed.
+        columns: in the order wanted, under any names; None to choose by options.
+        choice: options of `columns_of`.
+
+    Raises:
+        ModelError: both were given, or a column is no parameter of the system or given twice.
+    """
+    if columns is None:
+        return columns_of(system, **choice)
+    require_system(system)
+    if choice:
+        raise ModelError(
+            f"{system.name}: columns were given and {quoted(next(iter(choice)))} too; give the"
+            " columns alone"
+        )
+    numbers_among(system, every_column(system, columns), columns)
+    if len({column.key for column in columns}) < len(columns):
+        twice = next(c for k, c in enumerate(columns) if c.key in {b.key for b in columns[:k]})
+        raise ModelError(f"{system.name}: {quoted(twice.name)} is given twice; give it once")
+    return tuple(columns)
+
+
+def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...]:
+    """All parameters of the system of the kinds of some columns, in the order of `columns_of`."""
+    return columns_of(
+        system,
+        offsets=any(column.kind == "offset" for column in columns),
+        couplings=list(dict.fromkeys((c.link, c.other) for c in columns if c.other)),
+    )
+
+
+def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Column]) -> list[int]:
+    """Where some columns stand among all of them.
+
+    Raises:
+        ModelError: a column is not among them.
+    """
+    places = {column.key: k for k, column in enumerate(every)}
+    for column in columns:
+        if column.key not in places:
+            known = did_you_mean(column.name, [c.name for c in every])
+            raise ModelError(
+                f"{system.name}: {quoted(column.name)} is no parameter of the system; {known}"
+            )
+    return [places[column.key] for column in columns]
 
 
 def values_of(system: System, columns: Iterable[Column]) -> SX:

@@ -9,35 +9,30 @@ from mbs.errors import ModelError
 from mbs.identification.columns import INERTIAL
 from mbs.identification.estimate import Estimate
 from mbs.identification.excitation_quality import excitation_quality
+from mbs.identification.follower import Watch
 from mbs.identification.observations import Observations
 from mbs.identification.physical_set import Misfit, likeliest
+from mbs.identification.prior import Prior
 
 Array = npt.NDArray[np.float64]
-
-HEAVIEST = 100.0
-"""Bound on the mass of a link where none is given [kg]."""
 
 _RANK = 1e-9
 
 
 def consistent(
-    observations: Observations,
-    guess: Array | None = None,
-    heaviest: float = HEAVIEST,
-    emphasis: float = 1.0,
+    observations: Observations, prior: Prior | None = None, watch: Watch | None = None
 ) -> Estimate:
     """The likeliest full set of parameters that bodies can have, with errors alike in all joints.
 
-    Every pseudo-inertia is positive definite, no link is heavier than the bound, rotors and
-    friction are not negative. What the record does not show comes from the guess.
+    Every pseudo-inertia is positive definite, masses keep their bounds, rotors and friction are
+    not negative. What the record does not show comes from the guess.
 
     Source: Wensing, Kim & Slotine 2018; Rucker & Wensing 2022; Lee, Wensing & Park 2020.
 
     Args:
         observations: in the full set of parameters.
-        guess: (k,) parameters such as those of a drawing; balls of 1 kg when None.
-        heaviest: bound on the mass of a link [kg].
-        emphasis: weight of the guess; 1 lets it count as one equation.
+        prior: guess and bounds; `Prior()` when None.
+        watch: is told the part of the search that is over, between 0 and 1.
 
     Raises:
         ModelError: a rotor or friction cannot be seen, or the set is not a full one.
@@ -47,27 +42,23 @@ def consistent(
     freedom = max(error.size - observations.W.shape[2], 1)
     deviation = float(np.linalg.norm(error)) / np.sqrt(freedom)
     weights = np.full(error.shape[1], 1 / _positive(deviation, observations))
-    return _with_weights(observations, weights, guess, heaviest, emphasis)
+    return _with_weights(observations, weights, prior or Prior(), watch)
 
 
 def consistent_weighted(
-    observations: Observations,
-    guess: Array | None = None,
-    heaviest: float = HEAVIEST,
-    emphasis: float = 1.0,
+    observations: Observations, prior: Prior | None = None, watch: Watch | None = None
 ) -> Estimate:
     """As `consistent`, every effort divided by the deviation of its own error.
 
     Args:
         observations: in the full set of parameters.
-        guess: as for `consistent`.
-        heaviest: as for `consistent`.
-        emphasis: as for `consistent`.
+        prior: as for `consistent`.
+        watch: as for `consistent`.
     """
     error = unconstrained_error(observations)
     rms = np.sqrt(np.mean(error**2, axis=0))
     weights = np.array([1 / _positive(float(x), observations) for x in rms])
-    return _with_weights(observations, weights, guess, heaviest, emphasis)
+    return _with_weights(observations, weights, prior or Prior(), watch)
 
 
 def unconstrained_error(observations: Observations) -> Array:
@@ -85,11 +76,7 @@ def _positive(deviation: float, observations: Observations) -> float:
 
 
 def _with_weights(
-    observations: Observations,
-    weights: Array,
-    guess: Array | None,
-    heaviest: float,
-    emphasis: float,
+    observations: Observations, weights: Array, prior: Prior, watch: Watch | None
 ) -> Estimate:
     unseen = set(excitation_quality(observations).unseen)
     hidden = [c.name for c in observations.columns if c.kind not in INERTIAL and c.name in unseen]
@@ -101,7 +88,7 @@ def _with_weights(
     W, y = observations.rows
     w = np.broadcast_to(weights, observations.y.shape).reshape(-1)
     misfit = Misfit.of_rows(W * w[:, None], y * w)
-    values, covariance = likeliest(misfit, observations.columns, guess, heaviest, emphasis)
+    values, covariance = likeliest(misfit, observations.columns, prior, watch)
     return Estimate(
         "physically consistent",
         observations.columns,

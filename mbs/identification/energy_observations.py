@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from mbs.errors import ModelError
 from mbs.identification.filters import Samples
-from mbs.identification.observations import Observations, evaluated, known_of
+from mbs.identification.observations import Observations, evaluated, known_of, motion_of
 
 Array = npt.NDArray[np.float64]
 
@@ -41,9 +41,7 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
             " samples; give one or more, and less than the record has"
         )
     (h,), (P,) = evaluated(energy, samples), evaluated(power, samples)
-    v = samples.v
-    if v.shape[1] != samples.tau.shape[1]:
-        v = v[:, list(energy.system.active)]
+    v = motion_of(energy, samples)[1]
     work = _integral(np.sum(v * (samples.tau - known_of(energy, samples)), axis=1), samples.rate)
     taken = h[:, 0] + _integral(P[:, 0], samples.rate)
     ends = np.arange(0, len(samples.time), step)

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Unpack
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named
-from mbs.identification.columns import Joints, columns_of
+from mbs.identification.columns import Column, ColumnChoice, chosen_columns
 from mbs.identification.joint_columns import JointColumns
 from mbs.identification.regressor import Regressor, regressor_function, side_by_side
 from mbs.models.symbols import ModelSymbols
 from mbs.recursions.regressor_energy import inertial_energy
-from mbs.recursions.velocities import link_velocities
 from mbs.spatial import zeros
 
 
 def energy_regressor(
     system: System,
+    columns: Sequence[Column] | None = None,
     *,
-    rotors: bool = True,
-    friction: bool = True,
-    offsets: bool = False,
-    couplings: Sequence[Joints] = (),
     coordinates: str = "independent",
+    **choice: Unpack[ColumnChoice],
 ) -> Regressor:
-    """``energy_regressor(q, v) -> h``: kinetic and potential energy as h K.
+    """``energy_regressor(q, v) -> h``: kinetic and potential energy as h K, the base at rest.
 
     The work of the joint efforts over an interval is the change of h K and the integral of P K,
     with P from `power_regressor`. Columns of friction and offsets are zero.
@@ -33,39 +31,32 @@ def energy_regressor(
 
     Args:
         system: open or closed; q must close the loops.
-        rotors: see `columns_of`.
-        friction: see `columns_of`.
-        offsets: see `columns_of`.
-        couplings: see `columns_of`.
+        columns: as for `regressor`.
         coordinates: of a closed system, "independent" or "tree".
+        choice: rotors, friction, offsets, couplings; see `columns_of`.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); h (1, n) with `columns`.
 
     Raises:
-        ModelError: as `columns_of`.
+        ModelError: as `regressor`.
     """
-    columns = columns_of(
-        system, rotors=rotors, friction=friction, offsets=offsets, couplings=couplings
-    )
+    taken = chosen_columns(system, columns, choice)
 
     def build(s: ModelSymbols) -> tuple[Named, Named]:
-        velocities = link_velocities(system.tree, s.poses, s.v_tree)
-        joints = JointColumns(system.tree, s.poses, s.v_tree, velocities)
-        blocks = inertial_energy(system.tree, s.poses, velocities)
-        return [], [("h", side_by_side(columns, blocks, joints.energy))]
+        joints = JointColumns.of(system.tree, s.poses, s.v_tree)
+        blocks = inertial_energy(system.tree, s.poses, joints.velocities)
+        return [], [("h", side_by_side(taken, blocks, joints.energy))]
 
-    return regressor_function(system, "energy_regressor", columns, build, coordinates)
+    return regressor_function(system, ("energy_regressor", False, coordinates), taken, build)
 
 
 def power_regressor(
     system: System,
+    columns: Sequence[Column] | None = None,
     *,
-    rotors: bool = True,
-    friction: bool = True,
-    offsets: bool = False,
-    couplings: Sequence[Joints] = (),
     coordinates: str = "independent",
+    **choice: Unpack[ColumnChoice],
 ) -> Regressor:
     """``power_regressor(q, v) -> P``: what friction and offsets take of the power of the efforts.
 
@@ -74,26 +65,21 @@ def power_regressor(
 
     Args:
         system: open or closed; q must close the loops.
-        rotors: see `columns_of`.
-        friction: see `columns_of`.
-        offsets: see `columns_of`.
-        couplings: see `columns_of`.
+        columns: as for `regressor`.
         coordinates: of a closed system, "independent" or "tree".
+        choice: rotors, friction, offsets, couplings; see `columns_of`.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); P (1, n) with `columns`.
 
     Raises:
-        ModelError: as `columns_of`.
+        ModelError: as `regressor`.
     """
-    columns = columns_of(
-        system, rotors=rotors, friction=friction, offsets=offsets, couplings=couplings
-    )
+    taken = chosen_columns(system, columns, choice)
 
     def build(s: ModelSymbols) -> tuple[Named, Named]:
-        velocities = link_velocities(system.tree, s.poses, s.v_tree)
-        joints = JointColumns(system.tree, s.poses, s.v_tree, velocities)
+        joints = JointColumns.of(system.tree, s.poses, s.v_tree)
         blocks = [zeros(1, 10) for _ in system.tree.links]
-        return [], [("P", side_by_side(columns, blocks, joints.power))]
+        return [], [("P", side_by_side(taken, blocks, joints.power))]
 
-    return regressor_function(system, "power_regressor", columns, build, coordinates)
+    return regressor_function(system, ("power_regressor", False, coordinates), taken, build)

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import ModelError
+from mbs.identification.effort_equations import EffortEquations
 from mbs.identification.estimate import Estimate
-from mbs.identification.triangle import compressed, solve
+from mbs.identification.named_values import percent_of
 from mbs.result import optional_module
 
 Array = npt.NDArray[np.float64]
@@ -44,10 +45,11 @@ def essential(
 ) -> Essential:
     """Drop the parameter of largest relative deviation while the errors stay as good.
 
-    The test compares the sum of squares with that of all parameters; it holds for errors that are
-    independent, so take observations that were decimated.
+    The test asks whether all dropped parameters together may be zero, by the covariance of the
+    whole set; for errors that are alike it is the comparison of the sums of squares.
 
-    Source: Pham & Gautier 1991 (essential parameters); Draper & Smith 1998 (F-test).
+    Source: Pham & Gautier 1991 (essential parameters); Draper & Smith 1998 (F-test of several
+    parameters).
 
     Args:
         estimate: by `least_squares`, `weighted` or `reweighted`, whose weights are kept.
@@ -67,48 +69,39 @@ def essential(
             f"essential parameters: {estimate.method} has no deviations; use weighted()"
         )
     distribution = optional_module("scipy.stats", 'pip install "mbs[identify]"').f
-    A, b = _equations(estimate)
-    free = len(estimate.observations) - len(estimate.names)
-    all_squares = _squares(A, b, estimate.values)
-    kept, dropped = list(range(len(estimate.names))), list[str]()
+    equations = EffortEquations.of(estimate.observations).with_errors(estimate.residuals.error)
+    deviations = equations.deviations(equations.solved(estimate.weights))
+    free = equations.freedom(len(estimate.names))
+    kept, dropped = list(range(len(estimate.names))), list[int]()
     values, covariance = estimate.values, estimate.covariance
     while True:
-        share = _percent(values, covariance)
-        worst = int(np.argmax(share))
-        name = estimate.names[kept[worst]]
-        if share[worst] <= largest_percent:
+        share = percent_of(values, covariance)
+        worst = kept[int(np.argmax(share))]
+        name, without = estimate.names[worst], [*dropped, worst]
+        if share.max() <= largest_percent:
             reason = f"all deviations are below {largest_percent:g} %"
             break
         if len(kept) == 1:
             reason = f"{name} is the last parameter"
             break
-        fewer = [k for k in kept if k != kept[worst]]
-        count = len(dropped) + 1
-        x, C = solve(A[:, fewer], b, free + count)
-        ratio = (_squares(A[:, fewer], b, x) / all_squares - 1) * free / count
-        if ratio > float(distribution.isf(significance, count, free)):
+        ratio = _ratio(estimate, without)
+        if ratio > float(distribution.isf(significance, len(without), free)):
             reason = f"without {name} the errors grow more than noise explains (F = {ratio:.3g})"
             break
-        kept, values, covariance = fewer, x, C
-        dropped.append(name)
-    return Essential(_estimate(estimate, kept, values, covariance), tuple(dropped), reason)
+        kept, dropped = [k for k in kept if k != worst], without
+        left = equations.select(kept)
+        fit = left.solved(estimate.weights)
+        values = fit.values
+        covariance = left.covariance(fit, estimate.weights, deviations)
+    names = tuple(estimate.names[k] for k in dropped)
+    return Essential(_estimate(estimate, kept, values, covariance), names, reason)
 
 
-def _equations(estimate: Estimate) -> tuple[Array, Array]:
-    """The weighted equations in as few rows as they need."""
-    W, y = estimate.observations.rows
-    w = np.broadcast_to(estimate.weights, estimate.observations.y.shape).reshape(-1)
-    return compressed(W * w[:, None], y * w)
-
-
-def _percent(values: Array, covariance: Array) -> Array:
-    sizes = np.abs(values)
-    share = 100 * np.sqrt(np.diag(covariance)) / np.where(sizes > 0, sizes, 1.0)
-    return np.where(sizes > 0, share, np.inf)
-
-
-def _squares(A: Array, b: Array, x: Array) -> float:
-    return float(np.sum((b - A @ x) ** 2))
+def _ratio(estimate: Estimate, without: Sequence[int]) -> float:
+    """Mean square of some parameters in deviations, F-distributed where they are zero."""
+    values = estimate.values[list(without)]
+    covariance = estimate.covariance[np.ix_(without, without)]
+    return float(values @ np.linalg.solve(covariance, values)) / len(values)
 
 
 def _estimate(

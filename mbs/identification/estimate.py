@@ -43,13 +43,6 @@ class Estimate(NamedValues):
     rounds: int = 1
 
     @property
-    def percent(self) -> Array:
-        """(k,) standard deviations in percent of the values; infinite for a value of zero."""
-        sizes = np.abs(self.values)
-        ratio = self.deviations / np.where(sizes > 0, sizes, 1.0)
-        return np.where(sizes > 0, 100 * ratio, np.inf)
-
-    @property
     def residuals(self) -> Residuals:
         """What it leaves unexplained of the observations that it was found from."""
         return self.residuals_on(self.observations)

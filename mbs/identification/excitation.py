@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -27,7 +27,9 @@ from mbs.identification.excitation_limits import (
 )
 from mbs.identification.excitation_programme import Programme
 from mbs.identification.excitation_trajectory import Trajectory
+from mbs.identification.follower import Watch
 from mbs.messages import did_you_mean
+from mbs.progress import progress
 
 Array = npt.NDArray[np.float64]
 
@@ -89,6 +91,7 @@ def excitation(
     starts: int = 3,
     rounds: int = 150,
     seed: int = 1,
+    quiet: bool = False,
 ) -> Trajectory:
     """A periodic motion from rest to rest that shows the parameters well within the limits.
 
@@ -108,7 +111,8 @@ def excitation(
             other; `base_parameters(system)` when left out.
         series: period, harmonics and samples.
         position: limits of the m independent joints [rad or m]; the ranges of the joints when
-            left out. A number is meant as +-; a sequence gives each joint its own.
+            left out. A number is meant as +-; a sequence gives each joint its own; a dict names
+            joints, those that follow the independent ones included.
         velocity: likewise [rad/s or m/s], none when left out.
         acceleration: likewise [rad/s2 or m/s2].
         effort: likewise [N m or N].
@@ -118,6 +122,7 @@ def excitation(
         starts: random motions that are improved; the best goes on.
         rounds: largest number of steps of the last search.
         seed: of the random motions.
+        quiet: no progress bar.
 
     Raises:
         ModelError: a limit, a name or a number has no sense.
@@ -125,7 +130,14 @@ def excitation(
     """
     require_system(system)
     _check(system, objective, starts)
-    limits = limits_of(system, position, velocity, acceleration, effort, planes)
+    limits = limits_of(
+        system,
+        position,
+        velocity=velocity,
+        acceleration=acceleration,
+        effort=effort,
+        planes=planes,
+    )
     form = series or Series()
     chosen = _columns(system, columns)
     smooth = _smoothed(system, limits, form)
@@ -133,29 +145,52 @@ def excitation(
     programme = Programme(
         form.period, form.harmonics, form.samples, function, CRITERIA[objective], limits
     )
-    x = _best(programme, np.random.default_rng(seed), starts)
-    return replace(_within(system, chosen, programme, x, rounds), objective=objective)
+    steps = _FIRST_ROUNDS * (starts if starts > 1 else 0)
+    with progress(f"{system.name}: excitation", 0.0, steps + rounds, quiet=quiet) as reached:
+        x = _best(programme, np.random.default_rng(seed), starts, reached)
+        found = _within(
+            programme,
+            lambda x: _measured(system, chosen, programme, x),
+            x,
+            rounds,
+            lambda part: reached(steps + part * rounds),
+        )
+    return replace(found, objective=objective)
 
 
-def _best(programme: Programme, rng: np.random.Generator, starts: int) -> Array:
-    """Variables of the random motion that leads furthest in a short search."""
+def _best(programme: Programme, rng: np.random.Generator, starts: int, reached: Watch) -> Array:
+    """Variables of the random motion that leads furthest in a short search.
+
+    Args:
+        programme: to be solved.
+        rng: of the random motions.
+        starts: how many there are.
+        reached: is told the steps that are over.
+    """
     x = [programme.start(rng) for _ in range(starts)]
     if starts == 1:
         return x[0]
     still = np.zeros(len(programme.limits.of_models))
-    found = [programme.improve(first, still, _FIRST_ROUNDS) for first in x]
+    found = []
+    for number, first in enumerate(x):
+        found.append(programme.improve(first, still, _FIRST_ROUNDS))
+        reached(_FIRST_ROUNDS * (number + 1))
     return min(found, key=lambda answer: (answer.violation > _ALLOWED, answer.value)).x
 
 
 def _within(
-    system: System, columns: tuple[Column, ...], programme: Programme, x: Array, rounds: int
+    programme: Programme,
+    measured: Callable[[Array], Trajectory],
+    x: Array,
+    rounds: int,
+    watch: Watch,
 ) -> Trajectory:
     """The motion at the minimum near x, efforts and planes kept between samples too."""
     narrowed = np.zeros(len(programme.limits.of_models))
     fixed = len(programme.limits.of_rates)
     for _ in range(_TRIES):
-        answer = programme.improve(x, narrowed, rounds)
-        trajectory = _measured(system, columns, programme, answer.x)
+        answer = programme.improve(x, narrowed, rounds, watch)
+        trajectory = measured(answer.x)
         excess = np.array([max(-margin.worst, 0.0) for margin in trajectory.margins[fixed:]])
         parts = np.array([margin.part for margin in trajectory.margins])
         if (parts >= -_ALLOWED).all():
@@ -163,9 +198,9 @@ def _within(
         narrowed, x = narrowed + 1.2 * excess, answer.x
     worst = min(trajectory.margins, key=lambda margin: margin.part)
     raise SolverError(
-        f"{system.name}: the {worst.limit.quantity} of {worst.limit.name} passes its limit by"
-        f" {-worst.worst:.3g} {worst.limit.unit} in the best motion that was found; give wider"
-        " limits, a longer period or more rounds"
+        f"{trajectory.system.name}: the {worst.limit.quantity} of {worst.limit.name} passes its"
+        f" limit by {-worst.worst:.3g} {worst.limit.unit} in the best motion that was found; give"
+        " wider limits, a longer period or more rounds"
     )
 
 
@@ -209,7 +244,8 @@ def _columns(system: System, columns: Kept | Sequence[Column] | None) -> tuple[C
 def _smoothed(system: System, limits: Limits, form: Series) -> System:
     """The system with dry friction that changes sign over a part of the largest velocity."""
     widths = {}
-    for k, position, velocity in zip(system.active, limits.position, limits.velocity, strict=True):
+    rows = zip(system.active, limits.position, limits.velocity, strict=True)
+    for k, position, velocity in rows:
         span = np.pi * (position.upper - position.lower) / form.period
         fastest = velocity.upper if velocity.is_finite else span
         widths[system.speeds[k].name] = SX(_SIGN_PART * fastest)
@@ -226,10 +262,10 @@ def _check(system: System, objective: str, starts: int) -> None:
         )
     if starts < 1:
         raise ModelError(f"excitation: {starts} starts give no motion; give 1 or more")
-    if system.nq != system.nv or tuple(system.free) != tuple(system.active):
+    if tuple(system.free) != tuple(system.active):
         raise ModelError(
-            f"{system.name}: a joint has a position that is not the integral of one velocity;"
-            " excitation is for revolute and prismatic joints"
+            f"{system.name}: some independent joints have velocities alone, such as discs that"
+            " roll; excitation is for positions that are independent too"
         )
 
 

@@ -5,22 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import casadi
-import numpy as np
-import numpy.typing as npt
 from casadi import DM, MX, Function
 
 from mbs.assembly import System
-from mbs.errors import ModelError, NoClosedForm
+from mbs.errors import ModelError
 from mbs.identification.columns import Column
 from mbs.identification.excitation_limits import Limits
+from mbs.identification.postures import is_explicit, posture_of
 from mbs.identification.regressor import regressor
-from mbs.loops.function import function as closed_form
-from mbs.loops.numeric import follow_active
 from mbs.messages import did_you_mean
 from mbs.models.geometry import transform
 from mbs.models.inverse_dynamics import inverse_dynamics
-
-Array = npt.NDArray[np.float64]
 
 
 def instant(system: System, columns: Sequence[Column], limits: Limits) -> Function:
@@ -43,7 +38,7 @@ def instant(system: System, columns: Sequence[Column], limits: Limits) -> Functi
     """
     m = len(system.active)
     q_a, v_a, a_a = (MX.sym(name, m) for name in ("q_a", "v_a", "a_a"))
-    q = _posture(system, q_a)
+    q = posture_of(system, q_a)
     D = _regressor(system, columns)(q, v_a, a_a)
     bounded = [*_efforts(system, limits, q, v_a, a_a), *(q[k] for k, _ in limits.passive)]
     for plane in limits.planes:
@@ -52,35 +47,7 @@ def instant(system: System, columns: Sequence[Column], limits: Limits) -> Functi
     outputs = [D.T, casadi.vertcat(MX(0, 1), *bounded)]
     names = ["q_a", "v_a", "a_a"], ["D", "bounded"]
     function = Function("instant", [q_a, v_a, a_a], outputs, *names)
-    return function.expand() if _is_explicit(system) else function
-
-
-def positions(system: System, q_a: Array) -> Array:
-    """(n, nq) positions of the tree for independent ones (n, m)."""
-    x = MX.sym("q_a", len(system.active))
-    follow = Function("positions", [x], [_posture(system, x)])
-    return np.asarray(DM(follow.map(len(q_a))(q_a.T))).T
-
-
-def _posture(system: System, q_a: MX) -> MX:
-    if not system.is_closed:
-        return q_a
-    p = DM(system.parameter_values())
-    if _is_explicit(system):
-        inputs = [q_a, p] if system.parameters else [q_a]
-        return MX(Function.__call__(closed_form(system), *inputs))
-    return MX(follow_active(system)(q_a, p))
-
-
-def _is_explicit(system: System) -> bool:
-    """Whether no iteration is needed to close the loops."""
-    if not system.is_closed:
-        return True
-    try:
-        closed_form(system)
-    except NoClosedForm:
-        return False
-    return True
+    return function.expand() if is_explicit(system) else function
 
 
 def _efforts(system: System, limits: Limits, q: MX, v_a: MX, a_a: MX) -> list[MX]:

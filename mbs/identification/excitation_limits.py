@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +12,16 @@ import numpy.typing as npt
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
-from mbs.messages import quoted
+from mbs.identification.postures import active_places
+from mbs.messages import did_you_mean, quoted
 
 Array = npt.NDArray[np.float64]
 
-Bound = float | Sequence[float | tuple[float, float] | None] | None
-"""One number +- for all joints; or for each a number, (lower, upper), or None for no limit."""
+Range = float | tuple[float, float] | None
+"""A number +-, (lower, upper), or None for no limit."""
+
+Bound = float | Sequence[Range] | Mapping[str, Range] | None
+"""One number +- for all joints; or a range for each in turn; or ranges by name of the joint."""
 
 RATE_UNITS = {"rad": "rad/s", "m": "m/s"}
 
@@ -145,6 +150,7 @@ class Limits:
 def limits_of(
     system: System,
     position: Bound = None,
+    *,
     velocity: Bound = None,
     acceleration: Bound = None,
     effort: Bound = None,
@@ -153,40 +159,62 @@ def limits_of(
     """The limits of a motion of a system, ranges of positions those of the joints by default.
 
     Raises:
-        ModelError: a limit has not as many values as there are independent joints, it is empty, or
-            a joint has no range of positions.
+        ModelError: a limit has not as many values as there are independent joints, it is empty or
+            of no joint, or an independent joint has no range of positions.
     """
-    places = list(system.active)
+    places = active_places(system)
     joints = [system.coordinates[k] for k in places]
-    own: Bound = [joint.limits for joint in joints] if position is None else position
-    names = [joint.name for joint in joints]
-    units = [joint.unit for joint in joints]
-    rates = [RATE_UNITS[unit] for unit in units]
+    rates = [RATE_UNITS[joint.unit] for joint in joints]
 
     def rows(quantity: str, bound: Bound, units: Sequence[str]) -> tuple[Limit, ...]:
+        names = [joint.name for joint in joints]
         pairs = _pairs(system, quantity, bound, names)
         return tuple(Limit(quantity, *row) for row in _joined(names, units, pairs))
 
-    positions = rows("position", own, units)
+    own, others = _positions(system, position, places)
+    positions = rows("position", own, [joint.unit for joint in joints])
     for limit in positions:
         if not (np.isfinite(limit.lower) and np.isfinite(limit.upper)):
             raise ModelError(
                 f"{system.name}: joint {limit.name} has no range of positions; give position="
                 " with (lower, upper) for each independent joint"
             )
-    passive = [
-        (k, Limit("position", c.name, c.unit, *c.limits))
-        for k, c in enumerate(system.coordinates)
-        if k not in places and c.limits is not None
-    ]
     return Limits(
         positions,
         rows("velocity", velocity, rates),
         rows("acceleration", acceleration, [ACCELERATION_UNIT[unit] for unit in rates]),
         rows("effort", effort, [EFFORT_UNIT[unit] for unit in rates]),
-        tuple(passive),
+        others,
         tuple(planes),
     )
+
+
+def _positions(
+    system: System, bound: Bound, places: Sequence[int]
+) -> tuple[Bound, tuple[tuple[int, Limit], ...]]:
+    """Ranges of the independent joints, and limits of the others with their places in q."""
+    ranges: dict[str, Range] = {c.name: c.limits for c in system.coordinates}
+    known = [c.name for c in system.coordinates if c.unit in RATE_UNITS]
+    if isinstance(bound, Mapping):
+        _check_names(system, "position", bound, known)
+        ranges |= bound
+    passive = []
+    for k, c in enumerate(system.coordinates):
+        if k not in places and ranges[c.name] is not None:
+            lower, upper = _pair(system, "position", ranges[c.name], c.name)
+            passive.append((k, Limit("position", c.name, c.unit, lower, upper)))
+    if bound is None or isinstance(bound, Mapping):
+        bound = [ranges[system.coordinates[k].name] for k in places]
+    return bound, tuple(passive)
+
+
+def _check_names(system: System, what: str, given: Mapping[str, Any], known: Sequence[str]) -> None:
+    for name in given:
+        if name not in known:
+            raise ModelError(
+                f"{system.name}: the {what} names {quoted(name)}, which is none of its joints;"
+                f" {did_you_mean(name, known)}"
+            )
 
 
 def _joined(
@@ -200,6 +228,9 @@ def _pairs(
     system: System, quantity: str, bound: Bound, names: Sequence[str]
 ) -> list[tuple[float, float]]:
     """(lower, upper) of each joint."""
+    if isinstance(bound, Mapping):
+        _check_names(system, quantity, bound, names)
+        bound = [bound.get(name) for name in names]
     values = bound if isinstance(bound, Sequence | np.ndarray) else [bound] * len(names)
     if len(values) != len(names):
         raise ModelError(
@@ -209,9 +240,7 @@ def _pairs(
     return [_pair(system, quantity, x, name) for x, name in zip(values, names, strict=True)]
 
 
-def _pair(
-    system: System, quantity: str, value: float | tuple[float, float] | None, name: str
-) -> tuple[float, float]:
+def _pair(system: System, quantity: str, value: Range, name: str) -> tuple[float, float]:
     if value is None:
         return -np.inf, np.inf
     ends = np.asarray(value, dtype=float).ravel()

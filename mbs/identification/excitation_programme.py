@@ -14,6 +14,7 @@ from casadi import DM, MX, Function
 from mbs.errors import SolverError
 from mbs.identification.excitation_criterion import Criterion, CriterionFunction
 from mbs.identification.excitation_limits import Limit, Limits
+from mbs.identification.follower import Follower, Watch
 from mbs.identification.fourier_series import (
     FourierSeries,
     between_samples,
@@ -111,13 +112,14 @@ class Programme:
         most = (np.abs(moved).max(axis=2) / room.reshape(3, m)).max(axis=0)
         return np.concatenate([middle, (filled * Y / most[:, None]).ravel()])
 
-    def improve(self, x: Array, tightened: Array, rounds: int) -> Found:
+    def improve(self, x: Array, tightened: Array, rounds: int, watch: Watch | None = None) -> Found:
         """Variables at a minimum of the criterion within the limits.
 
         Args:
             x: to start from.
             tightened: (r,) by how much the ranges of the models' quantities are narrowed.
             rounds: largest number of steps.
+            watch: is told the part of the steps that is over, between 0 and 1.
 
         Returns:
             the last variables, also where they are no minimum.
@@ -131,7 +133,9 @@ class Programme:
         lower = np.concatenate([rates[1], np.tile(ends[:, 0], self.samples)]) / scale
         upper = np.concatenate([rates[2], np.tile(ends[:, 1], self.samples)]) / scale
         programme: dict[str, Any] = {"x": variables, "f": criterion(W @ W.T), "g": g / DM(scale)}
-        solver = casadi.nlpsol("excitation", "ipopt", programme, _options(rounds))
+        follower = Follower(programme, rounds, watch)
+        options = follower.options | _options(rounds)
+        solver = casadi.nlpsol("excitation", "ipopt", programme, options)
         answer = solver(x0=x, lbg=lower, ubg=upper)
         status = solver.stats()
         reached = np.array(answer["g"]).ravel()

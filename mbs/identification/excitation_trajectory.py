@@ -11,9 +11,9 @@ from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT
 from mbs.errors import ModelError
 from mbs.identification.columns import Column
-from mbs.identification.excitation_instant import positions
 from mbs.identification.excitation_limits import RATE_UNITS, Margin
 from mbs.identification.fourier_series import FourierSeries
+from mbs.identification.postures import active_places, positions
 from mbs.result import Result
 
 Array = npt.NDArray[np.float64]
@@ -91,7 +91,7 @@ class Trajectory:
         span = periods * self.series.period
         time = np.linspace(0.0, span, round(span * rate) + 1)
         values = np.hstack([self.q(time), self.v(time), self.a(time)])
-        joints = [self.system.coordinates[k] for k in self.system.active]
+        joints = [self.system.coordinates[k] for k in active_places(self.system)]
         rates = [RATE_UNITS[joint.unit] for joint in joints]
         units = {f"{joint.name}.q": joint.unit for joint in joints}
         units |= {f"{j.name}.v": unit for j, unit in zip(joints, rates, strict=True)}

@@ -18,12 +18,14 @@ from mbs.result import optional_module
 Array = npt.NDArray[np.float64]
 
 _SETTLED = 15.0
+_ROWS = 2.0
 
 
 def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observations:
     """F tau = (F' D1 + F D2) K with F = a^2 / (s + a)^2 and F' = s F.
 
-    The time in which the filter forgets its start is left out.
+    The time in which the filter forgets its start is left out, and rows that come sooner after
+    another than two of its time constants, since their errors are alike.
 
     Source: Khalil & Creusot 1997, eq. 44-46; the filter by the bilinear transform.
 
@@ -45,12 +47,12 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
     D1, D2 = evaluated(filtered, samples)
     tau = samples.tau - known_of(filtered, samples)
     plain, slope = ([0.0, 0.0, corner**2], [0.0, corner**2, 0.0])
-    W = _filtered(D1, slope, corner, rate) + _filtered(D2, plain, corner, rate)
-    y = _filtered(tau, plain, corner, rate)
+    keep = slice(settled, None, max(round(_ROWS * rate / corner), 1))
+    W = _filtered(D1, slope, corner, rate)[keep] + _filtered(D2, plain, corner, rate)[keep]
     return Observations(
-        samples.time[settled:],
-        W[settled:],
-        y[settled:],
+        samples.time[keep],
+        W,
+        _filtered(tau, plain, corner, rate)[keep],
         tuple(filtered.columns),
         samples.efforts,
         samples.effort_units,

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 from casadi import DM, SX
 
 from mbs.assembly import System
@@ -15,30 +13,23 @@ from mbs.errors import ModelError
 from mbs.identification.base.application import with_parameters
 from mbs.identification.base_parameters import BaseParameters, base_parameters
 from mbs.identification.columns import Joints
-from mbs.identification.consistent import HEAVIEST, consistent, consistent_weighted
-from mbs.identification.estimate import Estimate, Estimator, held_out
+from mbs.identification.consistent import consistent, consistent_weighted
+from mbs.identification.equations import EQUATIONS
+from mbs.identification.essential import LARGEST_PERCENT, Essential, essential
+from mbs.identification.estimate import Estimate, Estimator, cross_validated, held_out
 from mbs.identification.filters import Samples, smoothed
-from mbs.identification.least_squares import least_squares
-from mbs.identification.observations import Observations, observe_filtered
+from mbs.identification.methods import METHODS, Setting
+from mbs.identification.observations import Observations
+from mbs.identification.prior import Prior
 from mbs.identification.record import Record
 from mbs.identification.regressor import regressor
-from mbs.identification.report import report
+from mbs.identification.report import identification_report
 from mbs.identification.residuals import Residuals
-from mbs.identification.robust import robust
-from mbs.identification.weighted import reweighted, weighted
 from mbs.messages import did_you_mean, quoted
+from mbs.progress import progress
 
-Array = npt.NDArray[np.float64]
-
-METHODS: Mapping[str, Estimator] = MappingProxyType(
-    {
-        "least_squares": least_squares,
-        "weighted": weighted,
-        "reweighted": reweighted,
-        "robust": robust,
-    }
-)
-"""Methods for base parameters by name."""
+TRAINED = 0.75
+"""Part of a record from which parameters are found that the rest tests."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +39,9 @@ class Identification:
     Attributes:
         system: as it was described.
         base: its base parameters.
+        bandwidth: of the filters [Hz].
         observations: the equations in the full set of parameters.
+        estimator: the method, a function of equations in base parameters.
         estimate: of the base parameters.
         bodies: the full set that bodies can have.
         validation: errors in the last quarter of base parameters found from the rest.
@@ -56,10 +49,20 @@ class Identification:
 
     system: System
     base: BaseParameters
+    bandwidth: float
     observations: Observations
+    estimator: Estimator
     estimate: Estimate
     bodies: Estimate
     validation: Residuals
+
+    def essential(self, largest_percent: float = LARGEST_PERCENT) -> Essential:
+        """The base parameters that the record needs; see `essential`."""
+        return essential(self.estimate, largest_percent)
+
+    def cross_validated(self, count: int = 4) -> Residuals:
+        """Errors of every part of the record, of parameters found from the other parts."""
+        return cross_validated(self.estimator, self.estimate.observations, count)
 
     def identified_system(self) -> System:
         """The system with the identified bodies, rotors and friction, as `simulate` takes it."""
@@ -68,8 +71,13 @@ class Identification:
 
     def text(self) -> str:
         """Both sets of parameters, their deviations and errors, in plain lines."""
-        tests = ("last quarter, from the rest", self.validation)
-        return f"{report(self.estimate, tests)}\n\n{report(self.bodies)}"
+        title = (
+            f"{self.system.name}: {self.base.count} base parameters of {len(self.base.columns)},"
+            f" bandwidth {self.bandwidth:g} Hz"
+        )
+        tests = (f"last {100 * (1 - TRAINED):g} %, found from the rest", self.validation)
+        told = identification_report(self.estimate, self.essential(), self.bodies, tests)
+        return f"{title}\n\n{told}"
 
 
 def identify(
@@ -78,12 +86,13 @@ def identify(
     bandwidth: float,
     method: str = "weighted",
     *,
+    equations: str = "dynamic",
     smoothing: Callable[[Record, float], Samples] = smoothed,
     rotors: bool = True,
     offsets: bool = False,
     couplings: Sequence[Joints] = (),
-    guess: Array | None = None,
-    heaviest: float = HEAVIEST,
+    prior: Prior | None = None,
+    quiet: bool = False,
 ) -> Identification:
     """Identify a system from a record of its motion.
 
@@ -91,31 +100,49 @@ def identify(
 
     Args:
         system: geometry and friction law; its inertial parameters and friction are not used.
-        record: of all its joints.
+        record: of all its joints, or of the independent ones of a closed system.
         bandwidth: of the filters [Hz]; five to ten times the highest frequency of the motion.
-        method: "least_squares", "weighted", "reweighted" or "robust", for the base parameters.
+        method: "least_squares", "weighted", "reweighted", "robust", "instrumental" or
+            "consistent", for the base parameters.
+        equations: "dynamic" (efforts), "filtered" or "energy"; the last two take no accelerations.
         smoothing: `smoothed`, or `smoothed_with_velocity` for measured velocities.
         rotors: see `columns_of`.
         offsets: see `columns_of`.
         couplings: see `columns_of`.
-        guess: see `consistent`, in the order of the columns.
-        heaviest: bound on the mass of a link [kg].
+        prior: what is known of the bodies; a guess is in the order of the columns.
+        quiet: no progress bar.
 
     Raises:
         ModelError: the method is unknown, or the record does not show every base parameter.
         SolverError: a search did not end.
     """
-    if method not in METHODS:
+    _check(system, "method", method, METHODS)
+    _check(system, "equations", equations, EQUATIONS)
+    known, options = prior or Prior(), _options(rotors, offsets, couplings)
+    with progress(f"{system.name}: identification", 0.0, 1.0, quiet=quiet) as reached:
+        D = regressor(system, **options)
+        base = base_parameters(system, columns=D.columns)
+        reached(0.1)
+        samples = smoothing(record, bandwidth)
+        full = EQUATIONS[equations](system, samples, bandwidth, options)
+        grouped = full.grouped(base)
+        reached(0.3)
+        physical = consistent if method == "least_squares" else consistent_weighted
+        bodies = physical(full, known, lambda part: reached(0.3 + 0.4 * part))
+        reached(0.7)
+        estimator = METHODS[method](Setting(D, base, samples, full, bodies, known))
+        estimate = estimator(grouped)
+        reached(0.85)
+        validation = held_out(estimator, grouped, TRAINED)
+    return Identification(system, base, bandwidth, full, estimator, estimate, bodies, validation)
+
+
+def _options(rotors: bool, offsets: bool, couplings: Sequence[Joints]) -> dict[str, Any]:
+    return {"rotors": rotors, "offsets": offsets, "couplings": couplings}
+
+
+def _check(system: System, what: str, given: str, known: Mapping[str, object]) -> None:
+    if given not in known:
         raise ModelError(
-            f"{system.name}: the method is {quoted(method)}; {did_you_mean(method, METHODS)}"
+            f"{system.name}: the {what} is {quoted(given)}; {did_you_mean(given, known)}"
         )
-    estimator = METHODS[method]
-    D = regressor(system, rotors=rotors, offsets=offsets, couplings=couplings)
-    base = base_parameters(system, columns=D.columns)
-    observations = observe_filtered(D, smoothing(record, bandwidth))
-    grouped = observations.grouped(base)
-    estimate = estimator(grouped)
-    physical = consistent if method == "least_squares" else consistent_weighted
-    bodies = physical(observations, guess, heaviest)
-    validation = held_out(estimator, grouped, 0.75)
-    return Identification(system, base, observations, estimate, bodies, validation)

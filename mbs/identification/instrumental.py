@@ -9,6 +9,7 @@ from mbs.errors import ModelError
 from mbs.identification.estimate import Estimate
 from mbs.identification.excitation_quality import require_visible
 from mbs.identification.observations import Observations
+from mbs.identification.residuals import repetition
 
 Array = npt.NDArray[np.float64]
 
@@ -40,12 +41,22 @@ def instrumental(
     w = np.broadcast_to(used, observations.y.shape).reshape(-1)
     (W, y), (Z, _) = observations.rows, instruments.rows
     lengths = np.linalg.norm(Z * w[:, None], axis=0)
-    Z, W, y = Z * w[:, None] / lengths, W * w[:, None] / lengths, y * w
-    inverse = np.linalg.inv(Z.T @ W)
-    x = inverse @ (Z.T @ y)
-    error = y - W @ x
-    variance = float(error @ error) / max(len(y) - len(x), 1)
-    covariance = variance * inverse @ (Z.T @ Z) @ inverse.T / np.outer(lengths, lengths)
-    return Estimate(
-        "instrumental variables", observations.columns, x / lengths, covariance, used, observations
+    A = (Z * w[:, None] / lengths).T @ (W * w[:, None] / lengths)
+    inverse = np.linalg.inv(A) / lengths[:, None]
+    x = inverse @ ((Z * (w * w)[:, None] / lengths).T @ y)
+    covariance = _covariance(
+        instruments, inverse / lengths, used, observations.y - observations.W @ x
     )
+    return Estimate(
+        "instrumental variables", observations.columns, x, covariance, used, observations
+    )
+
+
+def _covariance(instruments: Observations, inverse: Array, weights: Array, error: Array) -> Array:
+    """(k, k) of the parameters (Z' W)^-1 Z' y, every effort with the deviation of its error."""
+    n, m = error.shape
+    left = max(n - inverse.shape[0] / m, 1.0)
+    deviations = np.sqrt(np.sum(error**2, axis=0) * repetition(error) / left)
+    spread = np.einsum("j,njk,ik->nji", weights**2 * deviations, instruments.W, inverse)
+    rows = spread.reshape(-1, spread.shape[2])
+    return np.asarray(rows.T @ rows, dtype=float)

@@ -9,13 +9,13 @@ from casadi import SX
 
 from mbs.assembly.tree import CarriedRotor, Link, Tree
 from mbs.identification.columns import COUPLED, Column
-from mbs.recursions.accelerations import Acceleration, resting_base
+from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.joint_efforts import rotor_and_friction
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regressor import work
 from mbs.recursions.regressor_twists import Twist, path_twist_rates, path_twists
 from mbs.recursions.rotors import rotor_efforts, rotor_moments
-from mbs.recursions.velocities import Velocity
+from mbs.recursions.velocities import Velocity, link_velocities
 from mbs.spatial import zeros
 
 _INERTIAS = ("Ia", "Iam", "Jm")
@@ -30,25 +30,32 @@ class JointColumns:
         poses: each with respect to its antecedent.
         v: (nv, 1) joint velocities.
         velocities: of the links.
+        base: velocity of the base; None at rest.
     """
 
     tree: Tree
     poses: list[LinkPose]
     v: SX
     velocities: list[Velocity]
+    base: Velocity | None
 
-    def effort(self, column: Column, a: SX, motions: list[Acceleration]) -> SX:
+    @staticmethod
+    def of(tree: Tree, poses: list[LinkPose], v: SX, base: Velocity | None = None) -> JointColumns:
+        """With the velocities of the links that follow."""
+        return JointColumns(tree, poses, v, link_velocities(tree, poses, v, base), base)
+
+    def effort(self, column: Column, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
         """(nv, 1) efforts for a unit of a parameter.
 
         Args:
             column: the parameter.
             a: (nv, 1) joint accelerations.
             motions: of the links.
+            base: its motion.
         """
         if column.kind != "Jm":
             return self._own(column, self.v, a)
         alone = self._with_one_rotor(column)
-        base = resting_base(zeros())
         total = rotor_efforts(alone, a, motions, base)
         for c, moment in rotor_moments(alone, self.v, a, motions).items():
             total += self._along(self._twists(c), moment)
@@ -122,9 +129,8 @@ class JointColumns:
 
     def _spin(self, rotor: CarriedRotor) -> SX:
         """Momentum that the turning of the carrier gives the rotor."""
-        if rotor.carrier < 0:
-            return SX(0)
-        return SX(casadi.dot(rotor.momentum, self.velocities[rotor.carrier].w))
+        carrier = self.velocities[rotor.carrier] if rotor.carrier >= 0 else self.base
+        return SX(0) if carrier is None else SX(casadi.dot(rotor.momentum, carrier.w))
 
     def _twists(self, carrier: int) -> list[Twist]:
         return path_twists(self.tree, self.poses)[carrier]

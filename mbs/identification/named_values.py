@@ -46,3 +46,15 @@ class NamedValues:
     def deviations(self) -> Array:
         """(k,) standard deviations, in the unit of each parameter."""
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=float)
+
+    @property
+    def percent(self) -> Array:
+        """(k,) standard deviations in percent of the values; infinite for a value of zero."""
+        return percent_of(self.values, self.covariance)
+
+
+def percent_of(values: Array, covariance: Array) -> Array:
+    """(k,) standard deviations in percent of the values; infinite for a value of zero."""
+    sizes = np.abs(values)
+    share = 100 * np.sqrt(np.diag(covariance)) / np.where(sizes > 0, sizes, 1.0)
+    return np.asarray(np.where(sizes > 0, share, np.inf), dtype=float)

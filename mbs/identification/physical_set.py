@@ -21,6 +21,8 @@ from casadi import DM, SX
 
 from mbs.errors import ModelError, SolverError
 from mbs.identification.columns import INERTIAL, Column
+from mbs.identification.follower import Follower, Watch
+from mbs.identification.prior import Prior
 from mbs.identification.triangle import compressed
 from mbs.spatial.inertia import Inertia
 from mbs.spatial.pseudo_inertia import PseudoInertia
@@ -32,6 +34,18 @@ FREE_KINDS = ("offset",)
 
 _MASS = 1.0
 _RADIUS = 0.1
+_ROUNDS = 500
+_OPTIONS = {
+    "ipopt": {
+        "print_level": 0,
+        "sb": "yes",
+        "max_iter": _ROUNDS,
+        "tol": 1e-7,
+        "bound_relax_factor": 0.0,
+    },
+    "print_time": False,
+    "error_on_fail": False,
+}
 _SMALLEST_ROOT = -7.0
 _LARGEST_ROOT = 7.0
 _OFF_DIAGONAL = tuple((r, c) for r in range(4) for c in range(r))
@@ -97,38 +111,27 @@ def consistent_links(columns: Sequence[Column], values: Array) -> list[int]:
 
 
 def likeliest(
-    misfit: Misfit,
-    columns: Sequence[Column],
-    guess: Array | None,
-    heaviest: float,
-    emphasis: float,
+    misfit: Misfit, columns: Sequence[Column], prior: Prior, watch: Watch | None = None
 ) -> tuple[Array, Array]:
-    """The set of parameters of least misfit plus `emphasis` times the divergence from the guess.
+    """The set of parameters of least misfit plus the weighted divergence from the guess.
 
     Args:
         misfit: of the k columns.
         columns: with all ten inertial parameters of every link; rotors and friction are kept from
             being negative.
-        guess: (k,) a physically consistent set; balls of 1 kg at the origins when None.
-        heaviest: bound on the mass of a link [kg].
-        emphasis: weight of the divergence; 1 lets it count as one equation.
+        prior: guess and bounds.
+        watch: is told the part of the search that is over, between 0 and 1.
 
     Returns:
         (k,) values and (k, k) their covariance, the guess taken as a measurement.
 
     Raises:
-        ModelError: the guess is no consistent set, or a bound is not positive.
+        ModelError: the guess is no consistent set, or the bounds do not fit.
         SolverError: the search did not end.
     """
-    if not (heaviest > 0 and emphasis > 0):
-        raise ModelError(
-            f"physical consistency: heaviest is {heaviest:g} kg and emphasis {emphasis:g}; give"
-            " more than zero"
-        )
-    roots = _guessed_roots(columns, guess)
-    problem = _Problem(misfit, tuple(columns), roots, heaviest, emphasis)
-    values = problem.solved()
-    return values, _covariance(misfit, columns, values, emphasis)
+    problem = _Problem(misfit, tuple(columns), _guessed_roots(columns, prior.guess), prior)
+    values = problem.solved(watch)
+    return values, _covariance(misfit, columns, values, prior.emphasis)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,10 +141,10 @@ class _Problem:
     misfit: Misfit
     columns: tuple[Column, ...]
     roots: dict[int, Array]
-    heaviest: float
-    emphasis: float
+    prior: Prior
 
-    def solved(self) -> Array:
+    def solved(self, watch: Watch | None) -> Array:
+        """(k,) the parameters at the minimum."""
         own = [c for c in self.columns if c.kind not in INERTIAL]
         scale = self._scales(own)
         x, z = SX.sym("x", 10, len(self.roots)), SX.sym("z", len(own))
@@ -151,25 +154,18 @@ class _Problem:
         distance = sum((_divergence(x[:, k]) for k in range(x.shape[1])), SX(0))
         masses = casadi.vertcat(SX(0, 1), *(ten[9] for ten in links.values()))
         variables = casadi.vertcat(casadi.vec(x), z)
-        cost = 0.5 * casadi.sumsqr(error) + self.emphasis * distance
+        cost = 0.5 * casadi.sumsqr(error) + self.prior.emphasis * distance
         at = casadi.Function("parameters", [variables], [K])
-        return _numbers(at(self._minimum(variables, cost, masses, own)))[:, 0]
-
-    def _minimum(self, variables: SX, cost: SX, masses: SX, own: list[Column]) -> DM:
-        options: dict[str, Any] = {
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "max_iter": 500,
-                "tol": 1e-7,
-                "bound_relax_factor": 0.0,
-            },
-            "print_time": False,
-            "error_on_fail": False,
-        }
+        if self.prior.total_mass is not None:
+            masses = casadi.vertcat(masses, casadi.sum1(masses))
         programme = {"x": variables, "f": cost, "g": masses}
-        solver = casadi.nlpsol("physical", "ipopt", programme, options)
+        return _numbers(at(self._minimum(programme, own, watch)))[:, 0]
+
+    def _minimum(self, programme: dict[str, SX], own: list[Column], watch: Watch | None) -> DM:
         links = len(self.roots)
+        total = [] if self.prior.total_mass is None else [self.prior.total_mass]
+        follower = Follower(programme, _ROUNDS, watch)
+        solver = casadi.nlpsol("physical", "ipopt", programme, follower.options | _OPTIONS)
         lower = [_SMALLEST_ROOT] * 4 + [-np.inf] * 6
         upper = [_LARGEST_ROOT] * 4 + [np.inf] * 6
         least = [-np.inf if c.kind in FREE_KINDS else 0.0 for c in own]
@@ -177,8 +173,8 @@ class _Problem:
             x0=[0.0] * (10 * links) + [0.0 if low < 0 else 0.1 for low in least],
             lbx=lower * links + least,
             ubx=upper * links + [np.inf] * len(own),
-            lbg=0.0,
-            ubg=self.heaviest,
+            lbg=[-np.inf] * links + total,
+            ubg=[*self.prior.masses(links), *total],
         )
         status = solver.stats()
         if not status["success"]:
@@ -223,13 +219,19 @@ def _divergence(x: SX) -> SX:
     return casadi.sumsqr(_triangle(x)) - 2 * casadi.sum1(x[:4]) - 4
 
 
-def _guessed_roots(columns: Sequence[Column], guess: Array | None) -> dict[int, Array]:
+def _guessed_roots(columns: Sequence[Column], guess: npt.ArrayLike | None) -> dict[int, Array]:
     """For each link C with C C' the guessed pseudo-inertia."""
     if guess is None:
         ball = np.diag([np.sqrt(_MASS / 5) * _RADIUS] * 3 + [np.sqrt(_MASS)])
         return {link: ball for link in whole_links(columns)}
+    values = np.asarray(guess, dtype=float)
+    if values.shape != (len(columns),):
+        raise ModelError(
+            f"physical consistency: the guess has the shape {values.shape} for {len(columns)}"
+            " columns; give one value for each"
+        )
     roots: dict[int, Array] = {}
-    for link, P in pseudo_inertias(columns, guess).items():
+    for link, P in pseudo_inertias(columns, values).items():
         if np.linalg.eigvalsh(P)[0] <= 0:
             raise ModelError(
                 f"physical consistency: the guess for link {link} is no body, its pseudo-inertia"

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mbs.assembly import System
+from mbs.assembly import Coordinate, System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError
+from mbs.identification.postures import active_places
 from mbs.identification.record_rules import check_record
 from mbs.identification.record_table import column, csv_table
 from mbs.messages import quoted
@@ -27,7 +28,8 @@ class Record:
     """What sensors gave during a motion, in SI units on the joint's side of the gears.
 
     The constructor refuses what cannot be a record of a robot; see `check_record`. Positions are
-    those of all joints of the tree; efforts those of the independent joints.
+    those of all joints of the tree, or of the independent ones; efforts those of the independent
+    joints.
 
     Attributes:
         time: (n,) [s], increasing, not necessarily in equal steps.
@@ -85,28 +87,28 @@ class Record:
         """A record of a system: names, units and ranges of the joints are those of the system.
 
         Args:
-            system: open or closed, its joints of one degree of freedom.
+            system: open or closed, its measured joints of one degree of freedom.
             time: (n,) [s].
-            q: (n, nq) positions.
+            q: (n, nq) positions, or (n, m) those of the independent joints of a closed system,
+                which the others follow.
             tau: (n, m) efforts of the independent joints.
-            v: (n, nq) velocities, or None.
+            v: velocities of the same joints, or None.
             **options: other attributes of the record.
 
         Raises:
             ModelError: the numbers are no record of this system.
         """
         require_system(system)
-        turning = [c for c in system.coordinates if c.unit not in ("rad", "m")]
-        if turning:
-            raise ModelError(
-                f"{system.name}: {turning[0].name} is a {turning[0].kind}; records are of revolute"
-                " and prismatic joints"
-            )
+        width = np.shape(q)[1] if np.ndim(q) == 2 else system.nq
+        alone = system.is_closed and width == len(system.active) != system.nq
+        places = active_places(system) if alone else range(system.nq)
+        joints = [system.coordinates[k] for k in places]
+        _check_joints(system, joints, width)
         speeds = [system.speeds[k] for k in system.active]
         described = {
-            "names": tuple(c.name for c in system.coordinates),
-            "units": tuple(c.unit for c in system.coordinates),
-            "limits": tuple(c.limits for c in system.coordinates),
+            "names": tuple(c.name for c in joints),
+            "units": tuple(c.unit for c in joints),
+            "limits": tuple(c.limits for c in joints),
             "efforts": tuple(c.name for c in speeds),
             "effort_units": tuple(EFFORT_UNIT[c.unit] for c in speeds),
         }
@@ -220,6 +222,22 @@ def joint_side(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
             " give the ratio of every joint"
         )
     return np.asarray(np.linalg.solve(matrix, q.T).T, dtype=float), tau @ matrix
+
+
+def _check_joints(system: System, joints: Sequence[Coordinate], width: int) -> None:
+    turning = [c for c in joints if c.unit not in ("rad", "m")]
+    if turning:
+        remedy = ", or give the independent joints alone" if system.is_closed else ""
+        raise ModelError(
+            f"{system.name}: {turning[0].name} is a {turning[0].kind}; records are of revolute"
+            f" and prismatic joints{remedy}"
+        )
+    if width != len(joints):
+        names = ", ".join(c.name for c in joints)
+        raise ModelError(
+            f"{system.name}: q has {width} columns, the system has {len(joints)} joints: {names};"
+            " give one column for each, in this order"
+        )
 
 
 def _numbers(name: str, values: Any) -> Array:

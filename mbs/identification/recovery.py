@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from mbs.errors import ModelError
 from mbs.identification.columns import Column
-from mbs.identification.consistent import HEAVIEST
 from mbs.identification.estimate import Estimate
 from mbs.identification.named_values import NamedValues
 from mbs.identification.physical_set import Misfit, likeliest
+from mbs.identification.prior import Prior
 
 Array = npt.NDArray[np.float64]
 
@@ -44,8 +44,7 @@ def recovered(
     estimate: Estimate,
     columns: Sequence[Column],
     matrix: Array,
-    guess: Array | None = None,
-    heaviest: float = HEAVIEST,
+    prior: Prior | None = None,
 ) -> FullSet:
     """The full set nearest to the guess among those that explain the base parameters.
 
@@ -58,8 +57,7 @@ def recovered(
         estimate: of base parameters.
         columns: the full set.
         matrix: (count, k) base parameters from full ones, `BaseParameters.matrix`.
-        guess: (k,) full set to stay near, such as that of a drawing; balls of 1 kg when None.
-        heaviest: bound on the mass of a link [kg].
+        prior: full set to stay near, and bounds; `Prior()` when None.
 
     Raises:
         ModelError: the matrix does not fit, or the estimate has no covariance.
@@ -76,6 +74,6 @@ def recovered(
     correlation = estimate.covariance / np.outer(deviations, deviations)
     root = np.linalg.inv(np.linalg.cholesky(correlation)) / deviations
     data = Misfit(root @ matrix, root @ estimate.values)
-    values, covariance = likeliest(data, columns, guess, heaviest, 1.0)
+    values, covariance = likeliest(data, columns, prior or Prior())
     misfit = (matrix @ values - estimate.values) / deviations
     return FullSet(tuple(columns), values, covariance, estimate.names, misfit)

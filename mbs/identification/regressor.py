@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import casadi
 import numpy as np
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function
-from mbs.identification.columns import INERTIAL, Column, Joints, columns_of
+from mbs.identification.columns import INERTIAL, Column, ColumnChoice, chosen_columns
 from mbs.identification.joint_columns import JointColumns
+from mbs.models.surroundings import surroundings
 from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
-from mbs.recursions.accelerations import link_accelerations, resting_base
+from mbs.recursions.accelerations import link_accelerations
 from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.joint_efforts import spring_effort
 from mbs.recursions.regressor import inertial_regressor
-from mbs.recursions.velocities import link_velocities
 
 
 class Regressor(ModelFunction):
@@ -66,52 +66,51 @@ class Regressor(ModelFunction):
 
 def regressor(
     system: System,
+    columns: Sequence[Column] | None = None,
     *,
-    rotors: bool = True,
-    friction: bool = True,
-    offsets: bool = False,
-    couplings: Sequence[Joints] = (),
     coordinates: str = "independent",
+    moving_base: bool = False,
+    **choice: Unpack[ColumnChoice],
 ) -> Regressor:
     """``regressor(q, v, a) -> D``: joint efforts as D K, with K the dynamic parameters.
 
-    Springs of the joints and force elements have no column; see `known_efforts`.
+    Springs of the joints and force elements have no column; see `known_efforts`. A base that
+    floats is a free joint, with six rows of its own.
 
     Source: Khalil & Creusot 1997, eq. 39.
 
     Args:
         system: open or closed; q must close the loops.
-        rotors: see `columns_of`.
-        friction: see `columns_of`.
-        offsets: see `columns_of`.
-        couplings: see `columns_of`.
+        columns: the parameters, such as `BaseParameters.columns_in_base`; left out, those of
+            `columns_of`.
         coordinates: of a closed system, "independent" for D(q, v_a, a_a) with D = G' D_tree, or
             "tree".
+        moving_base: add the inputs v_0, a_0 and R_0 of `mbs.models.inverse_dynamics`.
+        choice: rotors, friction, offsets, couplings; see `columns_of`.
 
     Returns:
-        Function of q (nq, 1), v and a (m, 1); D (m, n) with `columns`.
+        Function of q (nq, 1), v and a (m, 1), v_0, a_0, R_0; D (m, n) with `columns`.
 
     Raises:
-        ModelError: as `columns_of`.
+        ModelError: as `columns_of`, or a column is no parameter of the system.
     """
-    columns = columns_of(
-        system, rotors=rotors, friction=friction, offsets=offsets, couplings=couplings
-    )
+    taken = chosen_columns(system, columns, choice)
 
     def build(s: ModelSymbols) -> tuple[Named, Named]:
         name, a = s.input("a")
         a_tree, tree = s.tree_acceleration(a), system.tree
-        motions = link_accelerations(tree, s.poses, s.v_tree, a_tree, resting_base(tree.gravity))
-        velocities = link_velocities(tree, s.poses, s.v_tree)
-        joints = JointColumns(tree, s.poses, s.v_tree, velocities)
+        around = surroundings(system, moves=moving_base)
+        motions = link_accelerations(tree, s.poses, s.v_tree, a_tree, around.base)
+        joints = JointColumns.of(tree, s.poses, s.v_tree)
         D = side_by_side(
-            columns,
+            taken,
             inertial_regressor(tree, s.poses, motions),
-            lambda column: joints.effort(column, a_tree, motions),
+            lambda column: joints.effort(column, a_tree, motions, around.base),
         )
-        return [(name, a)], [("D", s.reduced_effort(D))]
+        return [(name, a), *around.inputs], [("D", s.reduced_effort(D))]
 
-    return regressor_function(system, "regressor", columns, build, coordinates)
+    key = ("regressor", moving_base, coordinates)
+    return regressor_function(system, key, taken, build)
 
 
 def known_efforts(system: System, coordinates: str = "independent") -> Function:
@@ -139,20 +138,20 @@ def known_efforts(system: System, coordinates: str = "independent") -> Function:
 
 def regressor_function(
     system: System,
-    name: str,
+    key: tuple[str, bool, str],
     columns: tuple[Column, ...],
     build: Callable[[ModelSymbols], tuple[Named, Named]],
-    coordinates: str,
 ) -> Regressor:
-    """The model of this name, made the first time it is asked for.
+    """The model with these columns, made the first time it is asked for.
 
     Args:
         system: whose model it is.
-        name: of the Function.
+        key: name of the Function, whether the base moves, and the coordinates, of a closed
+            system "independent" or "tree".
         columns: of its outputs.
         build: gives the inputs that follow q and v, and the outputs.
-        coordinates: of a closed system, "independent" or "tree".
     """
+    coordinates = key[-1]
     check_coordinates(system, coordinates)
 
     def both() -> tuple[Named, Named]:
@@ -161,7 +160,7 @@ def regressor_function(
         return [("q", s.q), ("v" + s.suffix, s.v), *inputs], outputs
 
     check = posture_check(system, coordinates)
-    model: Any = model_function(system, (name, columns, coordinates), both, check)
+    model: Any = model_function(system, (*key, columns), both, check)
     return Regressor(model, columns)
 
 

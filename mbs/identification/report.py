@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from mbs.identification.columns import INERTIAL
+from mbs.identification.essential import Essential
 from mbs.identification.estimate import Estimate
 from mbs.identification.excitation_quality import ExcitationQuality, excitation_quality
 from mbs.identification.physical_set import pseudo_inertias
 from mbs.identification.residuals import Residuals
 
 _POOR = 30.0
+_SURE = 3.0
 
 
 def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
@@ -37,7 +39,28 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
     for title, residuals in tests:
         lines += ["", *_residuals(f"Errors, {title}", residuals)]
     quality = excitation_quality(observations)
-    return "\n".join([*lines, "", *_excitation(quality), *_consistency(estimate)])
+    remarks = [*_excitation(quality), *_consistency(estimate), *_signs(estimate)]
+    return "\n".join([*lines, "", *remarks])
+
+
+def identification_report(
+    estimate: Estimate, essential: Essential, bodies: Estimate, *tests: tuple[str, Residuals]
+) -> str:
+    """The account of base parameters, the essential ones among them, and bodies.
+
+    Args:
+        estimate: of base parameters.
+        essential: the same in the parameters that the record needs.
+        bodies: a full set.
+        *tests: further errors of the base parameters with a title each.
+    """
+    few = essential.estimate
+    lines = [
+        f"Essential: {len(few.names)} of {len(estimate.names)} parameters, errors with them alone"
+        f" {few.residuals.total_percent:.2f} %; {essential.reason}",
+        f"Not needed: {', '.join(essential.dropped) or 'none'}",
+    ]
+    return "\n".join([report(estimate, *tests), "", *lines, "", report(bodies)])
 
 
 def _parameters(estimate: Estimate) -> list[str]:
@@ -55,12 +78,21 @@ def _parameters(estimate: Estimate) -> list[str]:
 
 
 def _residuals(title: str, residuals: Residuals) -> list[str]:
-    lines = [f"{title}: {residuals.total_percent:.2f} % of all efforts"]
+    lines = [
+        f"{title}: {residuals.total_percent:.2f} % of all efforts",
+        f"{'effort':<12}{'error':>10}{'rms':>12}  {'unit':<6}{'independent rows':>18}",
+    ]
     rows = zip(
-        residuals.efforts, residuals.percent, residuals.rms, residuals.effort_units, strict=True
+        residuals.efforts,
+        residuals.percent,
+        residuals.rms,
+        residuals.effort_units,
+        len(residuals.time) / residuals.repetition,
+        strict=True,
     )
     return lines + [
-        f"{name:<12}{percent:>8.2f} %{rms:>12.4g} {u}" for name, percent, rms, u in rows
+        f"{name:<12}{percent:>8.2f} %{rms:>12.4g}  {unit:<6}{count:>18.0f}"
+        for name, percent, rms, unit, count in rows
     ]
 
 
@@ -84,6 +116,16 @@ def _consistency(estimate: Estimate) -> list[str]:
     if not bad:
         return [f"Bodies: all {len(least)} pseudo-inertias are positive definite"]
     return [f"Bodies: no body has the parameters of link {', '.join(bad)}"]
+
+
+def _signs(estimate: Estimate) -> list[str]:
+    """Friction and rotors that are surely negative, which no robot has."""
+    rows = zip(estimate.columns, estimate.values, estimate.deviations, strict=True)
+    kinds = ("Ia", "Iam", "Jm", "Fv", "Fvm", "Fs", "Fsm")
+    bad = [c.name for c, x, s in rows if c.kind in kinds and x < -_SURE * s]
+    if not bad:
+        return []
+    return [f"Below zero: {', '.join(bad)}; check the signs of the efforts and the friction law"]
 
 
 def _bodies(estimate: Estimate) -> dict[int, np.typing.NDArray[np.float64]]:

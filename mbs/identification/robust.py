@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import SolverError
+from mbs.identification.effort_equations import EffortEquations
 from mbs.identification.estimate import Estimate
 from mbs.identification.observations import Observations
-from mbs.identification.triangle import solve
+from mbs.identification.triangle import solved as solve
 from mbs.identification.weighted import weighted
 
 Array = npt.NDArray[np.float64]
@@ -39,28 +40,55 @@ def robust(
         ModelError: the parameters that they do not show.
         SolverError: the parameters did not settle.
     """
-    estimate = weighted(observations)
+    start = weighted(observations)
+    equations, values = EffortEquations.of(observations), start.values
     for number in range(1, most + 1):
-        scale = _deviations(estimate.residuals.error)
-        size = np.abs(estimate.residuals.error) / scale
-        trust = np.sqrt(np.minimum(1.0, bound / np.maximum(size, bound * _FLOOR)))
-        following = _solved(observations, 1 / scale, trust / scale, number)
-        change = np.abs(following.values - estimate.values) / following.deviations
-        estimate = following
+        error = observations.y - observations.W @ values
+        scale = _deviations(error)
+        following = _solved(observations, np.sqrt(_trust(error / scale, bound)) / scale)
+        change = np.abs(following - values) / start.deviations
+        values = following
         if change.max() < tolerance:
-            return estimate
+            covariance = _covariance(observations, equations, values, bound)
+            method = "robust least squares (Huber)"
+            return Estimate(
+                method, observations.columns, values, covariance, 1 / scale, observations, number
+            )
     raise SolverError(
         f"robust least squares: the parameters still change by {change.max():.2g} deviations after"
         f" {most} rounds; use a larger bound or tolerance"
     )
 
 
-def _solved(observations: Observations, weights: Array, rows: Array, number: int) -> Estimate:
+def _trust(size: Array, bound: float) -> Array:
+    """(n, m) weight of each error, given in deviations: one up to the bound, less beyond."""
+    return np.asarray(bound / np.maximum(np.abs(size), bound), dtype=float)
+
+
+def _solved(observations: Observations, rows: Array) -> Array:
+    """(k,) least squares with a weight for each row and effort, (n, m)."""
     W, y = observations.rows
     w = rows.reshape(-1)
-    x, covariance = solve(W * w[:, None], y * w, len(y) - len(observations.columns))
-    method = "robust least squares (Huber)"
-    return Estimate(method, observations.columns, x, covariance, weights, observations, number)
+    A, lengths = W * w[:, None], np.linalg.norm(W * w[:, None], axis=0)
+    return np.asarray(solve(A / lengths, y * w) / lengths, dtype=float)
+
+
+def _covariance(
+    observations: Observations, equations: EffortEquations, values: Array, bound: float
+) -> Array:
+    """(k, k) covariance of the parameters, the part of trusted errors taken for each effort.
+
+    Source: Huber 1964 (variance of his estimator); Street, Carroll & Ruppert 1988.
+    """
+    error = observations.y - observations.W @ values
+    scale = _deviations(error)
+    trusted = np.mean(np.abs(error) < bound * scale, axis=0)
+    kept = error * _trust(error / scale, bound)
+    weights = np.sqrt(trusted) / scale
+    fit = equations.solved(weights)
+    left = np.maximum(len(error) - fit.own, 1.0)
+    deviations = np.sqrt(np.sum(kept**2, axis=0) / left) / trusted
+    return equations.with_errors(kept).covariance(fit, weights, deviations)
 
 
 def _deviations(error: Array) -> Array:

@@ -28,20 +28,13 @@ def compressed(A: Array, b: Array) -> tuple[Array, Array]:
     return T[:, :-1], T[:, -1]
 
 
-def solve(A: Array, b: Array, freedom: int) -> tuple[Array, Array]:
-    """Least squares by QR of columns scaled to length one.
+def solved(A: Array, b: Array) -> Array:
+    """(k,) least squares by QR.
 
     Args:
-        A: (n, k) of full rank.
+        A: (n, k) of full rank, its columns alike in length.
         b: (n,).
-        freedom: equations less parameters, where rows were compressed before.
-
-    Returns:
-        (k,) solution and (k, k) its covariance, from the variance of the error.
     """
     k = A.shape[1]
-    lengths = np.linalg.norm(A, axis=0)
-    T = triangle(np.column_stack([A / lengths, b]))
-    inverse = np.linalg.inv(T[:k, :k]) / lengths[:, None]
-    variance = float(np.sum(T[k:, k] ** 2)) / max(freedom, 1)
-    return inverse @ T[:k, k], variance * inverse @ inverse.T
+    T = triangle(np.column_stack([A, b]))
+    return np.asarray(np.linalg.solve(T[:k, :k], T[:k, k]), dtype=float)

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-import numpy.typing as npt
 
 from mbs.errors import SolverError
+from mbs.identification.effort_equations import EffortEquations
 from mbs.identification.estimate import Estimate
-from mbs.identification.least_squares import least_squares
+from mbs.identification.excitation_quality import require_visible
+from mbs.identification.least_squares import weighted_solution
 from mbs.identification.observations import Observations
-from mbs.identification.triangle import solve, triangle
-
-Array = npt.NDArray[np.float64]
-
-_FLOOR = 1e-9
 
 
 def weighted(observations: Observations) -> Estimate:
@@ -29,10 +23,11 @@ def weighted(observations: Observations) -> Estimate:
     Raises:
         ModelError: the parameters that they do not show.
     """
-    first = least_squares(observations)
-    joints = _joints(observations)
-    weights = _weights(joints, first.values, len(observations.time))
-    return _solved(observations, joints, weights, "weighted least squares", 1)
+    require_visible(observations)
+    equations = EffortEquations.of(observations)
+    first = equations.solved(np.ones(observations.y.shape[1]))
+    weights = 1 / equations.deviations(first)
+    return weighted_solution(observations, equations, weights, "weighted least squares", 1)
 
 
 def reweighted(observations: Observations, tolerance: float = 1e-3, most: int = 50) -> Estimate:
@@ -52,39 +47,17 @@ def reweighted(observations: Observations, tolerance: float = 1e-3, most: int = 
         ModelError: the parameters that they do not show.
         SolverError: the weights did not settle.
     """
-    joints, n = _joints(observations), len(observations.time)
-    weights = _weights(joints, least_squares(observations).values, n)
-    method, change = "iteratively re-weighted least squares", np.inf
+    require_visible(observations)
+    equations, change = EffortEquations.of(observations), np.inf
+    weights = 1 / equations.deviations(equations.solved(np.ones(observations.y.shape[1])))
     for number in range(1, most + 1):
-        estimate = _solved(observations, joints, weights, method, number)
-        following = _weights(joints, estimate.values, n)
+        following = 1 / equations.deviations(equations.solved(weights))
         change = float(np.abs(following / weights - 1).max())
         if change < tolerance:
-            return estimate
+            method = "iteratively re-weighted least squares"
+            return weighted_solution(observations, equations, weights, method, number)
         weights = following
     raise SolverError(
         f"re-weighted least squares: the weights still change by {change:.2g} after {most} rounds;"
         " use weighted(), or a larger tolerance"
     )
-
-
-def _joints(observations: Observations) -> list[Array]:
-    """For each effort its equations [W y] in as few rows as they have columns."""
-    W, y = observations.W, observations.y
-    return [triangle(np.column_stack([W[:, j], y[:, j]])) for j in range(y.shape[1])]
-
-
-def _weights(joints: Sequence[Array], values: Array, n: int) -> Array:
-    """(m,) one over the deviation of the error of each effort [1/(N m) or 1/N]."""
-    with_effort = np.append(values, -1.0)
-    rms = np.array([np.linalg.norm(T @ with_effort) for T in joints]) / np.sqrt(n)
-    return np.asarray(1.0 / np.maximum(rms, _FLOOR * max(float(rms.max()), _FLOOR)), dtype=float)
-
-
-def _solved(
-    observations: Observations, joints: Sequence[Array], weights: Array, method: str, rounds: int
-) -> Estimate:
-    rows = np.vstack([w * T for w, T in zip(weights, joints, strict=True)])
-    freedom = len(observations) - len(observations.columns)
-    x, covariance = solve(rows[:, :-1], rows[:, -1], freedom)
-    return Estimate(method, observations.columns, x, covariance, weights, observations, rounds)

@@ -1,7 +1,8 @@
 """Numbers of base parameters of robots, against ranks that are known."""
 
+import numpy as np
 import pytest
-from support.base_counts import OPEN
+from support.base_counts import CATALOGUE, ELBOW, OBLIQUE, OPEN, TWO_ROOTS, under
 from support.base_robots import system
 
 import mbs
@@ -11,27 +12,34 @@ from mbs.identification.columns import columns_of
 CHOICES = ({"rotors": False, "friction": False}, {"friction": False}, {})
 
 
+def counts(robot):
+    """By rules, each the rank of the regressor; the last one by the numeric method too."""
+    choices = [columns_of(robot, **only) for only in CHOICES]
+    found = [base_parameters(robot, columns=columns) for columns in choices]
+    assert all(base.check.agrees and base.check.rank == base.count for base in found)
+    ranked = base_parameters(robot, "numeric", columns=choices[-1])
+    assert ranked.kept == found[-1].kept
+    assert ranked.matrix == pytest.approx(found[-1].matrix, abs=1e-9)
+    return tuple(base.count for base in found)
+
+
 @pytest.mark.parametrize("name", OPEN)
 def test_counts_of_inertial_parameters_then_rotors_then_friction(name):
     frames, gravity, expected = OPEN[name]
-    robot = system(name, frames, gravity)
-    found = [base_parameters(robot, columns=columns_of(robot, **only)) for only in CHOICES]
-    assert tuple(base.count for base in found) == expected
-    assert all(base.check.agrees and base.check.rank == base.count for base in found)
+    assert counts(system(name, frames, gravity)) == expected
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [("puma560", 52), ("rx90", 52), ("stanford", 49), ("scara", 19), ("panda", 62)],
-)
-def test_counts_of_the_catalogue(name, expected):
-    robot = mbs.load(name).assemble()
-    base, ranked = base_parameters(robot), base_parameters(robot, "numeric")
-    assert base.count == ranked.count == base.check.rank == expected
-    assert base.names == tuple(
-        f"{c.name}R" if n.endswith("R") else c.name
-        for c, n in zip(ranked.kept, ranked.names, strict=True)
-    )
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_counts_of_the_catalogue(name):
+    gravity, expected = CATALOGUE[name]
+    robot = mbs.load(name.split("_")[0]).assemble()
+    assert counts(robot if gravity is None else under(robot, gravity)) == expected
+
+
+def test_a_tree_of_two_roots_has_the_sum_of_both():
+    robot = system("two_roots", TWO_ROOTS, OBLIQUE)
+    alone = [system("arm", rows, OBLIQUE) for rows in (TWO_ROOTS[:2], [TWO_ROOTS[2], ELBOW])]
+    assert counts(robot) == tuple(np.sum([counts(arm) for arm in alone], axis=0))
 
 
 def test_a_floating_base_keeps_its_own_ten_parameters():

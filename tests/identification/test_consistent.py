@@ -9,6 +9,7 @@ from mbs.identification.consistent import consistent, consistent_weighted, uncon
 from mbs.identification.least_squares import least_squares
 from mbs.identification.observations import observe
 from mbs.identification.physical_set import consistent_links, pseudo_inertias
+from mbs.identification.prior import Prior
 from mbs.identification.recovery import recovered
 
 DEVIATIONS = np.array([0.3, 0.1, 0.02])
@@ -35,7 +36,7 @@ def test_bodies_explain_the_efforts_as_well_as_base_parameters():
 
 def test_a_good_guess_is_kept_where_the_record_says_nothing():
     truth = np.array(mbs_values(equations()[0].columns))
-    bodies = consistent(full_observations(0.05), guess=truth)
+    bodies = consistent(full_observations(0.05), Prior(guess=truth))
     assert bodies["M1"] == pytest.approx(6.0, rel=0.05)
     assert bodies["MZ2"] == pytest.approx(truth[bodies.names.index("MZ2")], abs=0.05)
     assert bodies.residuals.rms == pytest.approx([0.05] * 3, rel=0.1)
@@ -60,19 +61,95 @@ def test_negative_friction_and_impossible_bodies_are_avoided():
 
 
 def test_masses_are_bounded():
-    free, bounded = (consistent(full_observations(), heaviest=m) for m in (100.0, 1.5))
+    free, bounded = (
+        consistent(full_observations(), Prior(heaviest=m)) for m in (100.0, (1.5, 1.5, 1.5))
+    )
     assert max(free[f"M{j}"] for j in (1, 2, 3)) > 1.6
     assert all(bounded[f"M{j}"] <= 1.5 + 1e-6 for j in (1, 2, 3))
+
+
+def test_a_total_mass_that_was_weighed_is_kept():
+    full = full_observations()
+    free, weighed = consistent(full), consistent(full, Prior(total_mass=12.0))
+    masses = [sum(found[f"M{j}"] for j in (1, 2, 3)) for found in (free, weighed)]
+    assert masses[1] == pytest.approx(12.0, abs=1e-6)
+    assert abs(masses[0] - 12.0) > 1.0
+    assert weighed.residuals.rms == pytest.approx(free.residuals.rms, rel=0.02)
+
+
+def test_the_search_tells_how_far_it_is():
+    parts = []
+    full = full_observations()
+    watched = consistent(full, watch=parts.append)
+    assert 5 < len(parts) < 500
+    assert parts == pytest.approx(np.arange(1, len(parts) + 1) / 500)
+    assert watched.values == pytest.approx(consistent(full).values, abs=1e-9)
+
+
+def test_it_is_the_answer_of_a_conic_solver():
+    """With little weight on the guess: the least error over positive semi-definite matrices."""
+    clarabel = pytest.importorskip("clarabel")
+    full = full_observations(0.05)
+    wrong = replace(full, y=full.y - 0.3 * full.W[:, :, [full.names.index("XX3")]][:, :, 0])
+    least = least_by_cones(clarabel, wrong)
+    free = float(np.linalg.norm(least_squares(wrong.grouped(equations()[1])).residuals.error))
+    ours = consistent(wrong, Prior(emphasis=1e-3))
+    found = float(np.linalg.norm(ours.residuals.error))
+    assert least > 1.01 * free
+    assert least * (1 - 1e-4) <= found <= least * 1.001
+
+
+def least_by_cones(clarabel, full):
+    """Norm of the errors at the optimum, masses up to 100 kg, by an interior-point conic solver."""
+    from scipy import sparse
+
+    W, y = full.rows
+    k = W.shape[1]
+    R, scale = np.linalg.qr(np.column_stack([W, y]), mode="r"), np.linalg.norm(y)
+    b, cones, rows = [], [], []
+    columns = full.columns
+    for j in (1, 2, 3):
+        basis = [
+            pseudo_inertias(columns, np.eye(k)[n])[j] if columns[n].link == j else np.zeros((4, 4))
+            for n in range(k)
+        ]
+        upper = [(r, c) for c in range(4) for r in range(c + 1)]
+        rows += [[-(P[r, c] * (1 if r == c else np.sqrt(2))) for P in basis] for r, c in upper]
+        b += [0.0] * 10
+        cones.append(clarabel.PSDTriangleConeT(4))
+    signs = [n for n, c in enumerate(columns) if c.kind in ("Ia", "Fv", "Fs")]
+    rows += [[-float(n == s) for n in range(k)] for s in signs]
+    masses = [n for n, c in enumerate(columns) if c.kind == "M"]
+    rows += [[float(n == s) for n in range(k)] for s in masses]
+    b += [0.0] * len(signs) + [100.0] * len(masses)
+    cones.append(clarabel.NonnegativeConeT(len(signs) + len(masses)))
+    A, r = R[:, :-1] / scale, R[:, -1] / scale
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    P = sparse.csc_matrix(np.triu(A.T @ A))
+    problem = clarabel.DefaultSolver(
+        P, -A.T @ r, sparse.csc_matrix(np.array(rows)), np.array(b), cones, settings
+    )
+    x = np.array(problem.solve().x)
+    return float(np.linalg.norm(W @ x - y))
 
 
 def test_what_cannot_be_a_full_set_is_refused():
     full, (_, base, _) = full_observations(), equations()
     with pytest.raises(ModelError, match="give the observations of the full set"):
         consistent(full.grouped(base))
-    with pytest.raises(ModelError, match="heaviest is 0 kg"):
-        consistent(full, heaviest=0.0)
+    with pytest.raises(ModelError, match=r"heaviest is 0\.0 kg and emphasis 1; give more"):
+        Prior(heaviest=0.0)
+    with pytest.raises(ModelError, match="total mass is -1 kg"):
+        Prior(total_mass=-1.0)
+    with pytest.raises(ModelError, match="2 bounds on masses are given for 3 links"):
+        consistent(full, Prior(heaviest=[1.0, 2.0]))
+    with pytest.raises(ModelError, match="total mass is 9 kg and the links may have 6 kg"):
+        consistent(full, Prior(heaviest=2.0, total_mass=9.0))
     with pytest.raises(ModelError, match="guess for link 1 is no body"):
-        consistent(full, guess=np.zeros(len(full.columns)))
+        consistent(full, Prior(guess=np.zeros(len(full.columns))))
+    with pytest.raises(ModelError, match=r"the guess has the shape \(3,\) for 39 columns"):
+        consistent(full, Prior(guess=np.ones(3)))
     W = full.W.copy()
     W[:, :, full.names.index("Fv2")] = 0.0
     with pytest.raises(ModelError, match="Fv2 cannot be seen in this record; move the joint"):
@@ -99,7 +176,7 @@ def test_full_set_from_base_parameters():
     assert found.misfit == pytest.approx(expected)
     assert found["Fv1"] == pytest.approx(0.8, abs=4 * found.deviations[found.names.index("Fv1")])
     truth = np.array(mbs_values(D.columns))
-    near = recovered(estimate, D.columns, base.matrix, guess=truth)
+    near = recovered(estimate, D.columns, base.matrix, Prior(guess=truth))
     assert near["M1"] == pytest.approx(6.0, rel=0.05)
     with pytest.raises(ModelError, match="no parameter 'M9'"):
         found["M9"]

@@ -12,6 +12,8 @@ from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
 from mbs.identification.base_parameters import base_parameters
 from mbs.identification.excitation import Plane, Series, Trajectory, excitation
+from mbs.identification.postures import active_places
+from mbs.loops.closing import Closing
 
 FORM = Series(period=6.0, harmonics=3, samples=40)
 
@@ -168,7 +170,7 @@ def test_loops_without_closed_form_are_followed(monkeypatch: pytest.MonkeyPatch)
         "rounds": 3,
     }
     explicit = excitation(system, **options)
-    monkeypatch.setattr("mbs.identification.excitation_instant.closed_form", refused)
+    monkeypatch.setattr("mbs.identification.postures.closed_form", refused)
     followed = excitation(system, **options)
     t = np.linspace(0, 6, 9)
     assert followed.posture(t) == pytest.approx(explicit.posture(t), abs=1e-4)
@@ -218,3 +220,75 @@ def test_wrong_series_and_planes_are_told() -> None:
         Plane("tool", (0, 0, 0), (0, 0, 0), 1.0)
     with pytest.raises(ModelError, match="no seven finite numbers"):
         Plane("tool", (0, 0, 0), (0, 0, float("nan")), 1.0)
+
+
+def gap(system: System, postures: np.ndarray) -> float:
+    """Largest error with which postures close the loops."""
+    closing = Closing(system, np.array(system.parameter_values()))
+    return max(float(np.abs(closing.rows(q)[0]).max()) for q in postures)
+
+
+@pytest.mark.parametrize(
+    ("name", "half", "passive"),
+    [("four_bar", 1.5, ("j4", 1.0, 1.7)), ("sr400", 0.5, ("q3", 2.74, 3.44))],
+)
+def test_passive_joints_of_closed_robots_keep_their_limits(
+    name: str, half: float, passive: tuple[str, float, float]
+) -> None:
+    system, (joint, low, high) = system_of(name), passive
+    coordinates = [c.name for c in system.coordinates]
+    places = active_places(system)
+    ranges = {coordinates[k]: (system.posture[k] - half, system.posture[k] + half) for k in places}
+    found = excitation(
+        system,
+        series=Series(period=6.0, harmonics=3, samples=24),
+        position=ranges | {joint: (low, high)},
+        velocity=dict.fromkeys(ranges, 3.0),
+        effort=400.0,
+        starts=1,
+        rounds=4,
+        quiet=True,
+    )
+    t = np.linspace(0, 6, 601)
+    postures = found.posture(t)
+    turned = postures[:, coordinates.index(joint)]
+    assert turned.min() >= low - 1e-3
+    assert turned.max() <= high + 1e-3
+    assert np.ptp(turned) > 0.3
+    assert np.abs(np.diff(postures, axis=0)).max() < 0.1
+    assert gap(system, postures[::20]) < 1e-9
+    for k, place in enumerate(places):
+        assert postures[:, place].min() >= ranges[coordinates[place]][0]
+        assert postures[:, place].max() <= ranges[coordinates[place]][1]
+        assert np.abs(found.v(t)[:, k]).max() <= 3.0
+    v, a = found.v(t[::5]), found.a(t[::5])
+    model = mbs.models.inverse_dynamics(system)
+    tau = np.array(model.map(len(v))(postures[::5].T, v.T, a.T))
+    assert np.abs(tau).max() <= 400.0 * (1 + 1e-3)
+
+
+def test_a_platform_that_follows_keeps_its_height() -> None:
+    system = system_of("delta")
+    found = excitation(
+        system,
+        series=Series(period=4.0, harmonics=2, samples=8),
+        position={"q1": 0.4, "q2": 0.4, "q3": 0.4, "platform.z": (-0.55, -0.42)},
+        velocity=3.0,
+        starts=1,
+        rounds=1,
+        quiet=True,
+    )
+    postures = found.posture(np.linspace(0, 4, 41))
+    height = postures[:, [c.name for c in system.coordinates].index("platform.z")]
+    assert height.min() >= -0.55 - 1e-3
+    assert height.max() <= -0.42 + 1e-3
+    assert gap(system, postures) < 1e-9
+    assert found.table(10.0).names[:3] == ("q1.q", "q2.q", "q3.q")
+
+
+def test_limits_of_unknown_joints_are_refused() -> None:
+    system = system_of("five_bar")
+    with pytest.raises(ModelError, match=r"position names 'q9', which is none of its joints"):
+        excitation(system, position={"q9": 1.0})
+    with pytest.raises(ModelError, match="velocity names 'q2', which is none"):
+        excitation(system, position=1.0, velocity={"q2": 1.0})

@@ -3,7 +3,17 @@
 import casadi
 import numpy as np
 import pytest
-from support.regressor_states import CLOSED, OPEN, ROTORS, TREES, Motion, state_of, system_of
+from casadi import SX
+from support.regressor_states import (
+    CLOSED,
+    OPEN,
+    ROTORS,
+    TREES,
+    Motion,
+    moving,
+    state_of,
+    system_of,
+)
 from symbolic_robots import symbolic_robot
 
 from mbs.identification import energy_regressor, filtered_regressor, regressor
@@ -69,3 +79,23 @@ def test_first_joint_has_no_centrifugal_rest():
     inertial = [k for k in inertial if not filtered.names[k].startswith(("Fvm", "Fsm"))]
     D2 = np.array(filtered(q, v)[1])
     assert not D2[0, inertial].any()
+
+
+@pytest.mark.parametrize("name", ["scara", "four_bar", "free_base", "turret"])
+def test_a_base_that_moves_needs_no_acceleration(name):
+    system, (v_0, a_0, R_0) = moving(name)
+    motion, state = Motion(system), state_of(system)
+    v_b, R_b = SX.sym("v_0", 6), SX.sym("R_0", 3, 3)
+    q, v, a, V, w = motion.q, motion.v, motion.a, v_b[:3], v_b[3:]
+    D1, D2 = filtered_regressor(system, moving_base=True)(q, v, v_b, R_b)
+    A = SX(a_0)
+    turning = casadi.mtimes(R_b, casadi.skew(w))
+    pairs = [(v_b, casadi.vertcat(A[:3] - casadi.cross(w, V), A[3:])), (R_b, turning)]
+    rate = motion.rate(D1) + sum(
+        casadi.reshape(casadi.jtimes(casadi.vec(D1), casadi.vec(x), casadi.vec(change)), *D1.shape)
+        for x, change in pairs
+    )
+    D = regressor(system, moving_base=True)(q, v, a, v_b, A, R_b)
+    error = casadi.Function("error", [q, v, a, v_b, R_b], [rate + D2 - D, D])
+    found, expected = (np.array(x) for x in error(*state, v_0, R_0))
+    assert np.abs(found).max() < 1e-12 * np.abs(expected).max()

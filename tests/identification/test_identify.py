@@ -6,11 +6,15 @@ from support.measured_arm import arm, motion, noisy_record, true_efforts
 import mbs
 from mbs.errors import ModelError
 from mbs.identification.base_parameters import base_parameters
-from mbs.identification.columns import values_of
+from mbs.identification.columns import numbers_of, values_of
+from mbs.identification.excitation import Series, excitation
 from mbs.identification.filters import Samples
 from mbs.identification.identify import identify
 from mbs.identification.least_squares import least_squares
+from mbs.identification.methods import METHODS
 from mbs.identification.observations import observe
+from mbs.identification.postures import active_places
+from mbs.identification.record import Record
 from mbs.identification.regressor import regressor
 
 
@@ -28,12 +32,87 @@ def test_an_arm_identified_from_a_noisy_record_predicts_another_motion():
     text = found.text()
     assert "weighted least squares" in text
     assert "physically consistent" in text
-    assert "last quarter, from the rest" in text
+    assert "Errors, last 25 %, found from the rest" in text
+    assert "measured_arm: 22 base parameters of 39, bandwidth 8 Hz" in text
+    essential = found.essential()
+    assert f"Essential: {len(essential.estimate.names)} of 22 parameters" in text
+    assert len(found.cross_validated().time) == len(found.estimate.observations.time)
 
 
-def test_the_method_is_one_of_four():
-    with pytest.raises(ModelError, match="did you mean 'weighted'"):
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_every_method_finds_the_arm(method):
+    found = identify(arm(), noisy_record(), 8.0, method, quiet=True)
+    truth = found.base.matrix @ numbers_of(arm(), found.base.columns)
+    errors = (found.estimate.values - truth) / found.estimate.deviations
+    assert np.sqrt(np.mean(errors**2)) < 1.6
+    assert np.abs(errors).max() < 4.5
+    assert found.validation.rms == pytest.approx([0.04] * 3, rel=0.3)
+
+
+@pytest.mark.parametrize("equations", ["filtered", "energy"])
+def test_equations_without_accelerations_find_the_arm(equations):
+    found = identify(arm(), noisy_record(), 8.0, equations=equations, quiet=True)
+    truth = found.base.matrix @ numbers_of(arm(), found.base.columns)
+    errors = (found.estimate.values - truth) / found.estimate.deviations
+    assert np.sqrt(np.mean(errors**2)) < 2
+    assert found.estimate["Fv1"] == pytest.approx(0.8, rel=0.15)
+    assert found.estimate["MX2R"] == pytest.approx(
+        truth[found.estimate.names.index("MX2R")], rel=0.05
+    )
+
+
+def test_instruments_take_out_the_bias_of_rough_positions():
+    record = noisy_record(position=6e-3)
+    plain, free = (
+        identify(arm(), record, 12.0, method, quiet=True) for method in ("weighted", "instrumental")
+    )
+    truth = free.base.matrix @ numbers_of(arm(), free.base.columns)
+    k = free.estimate.names.index("Ia3")
+    assert plain.estimate.values[k] < truth[k] - 0.02
+    assert abs(free.estimate.values[k] - truth[k]) < 0.5 * abs(plain.estimate.values[k] - truth[k])
+
+
+def test_methods_and_equations_have_names():
+    with pytest.raises(ModelError, match="the method is 'weigthed'; did you mean 'weighted'"):
         identify(arm(), noisy_record(), 8.0, "weigthed")
+    with pytest.raises(ModelError, match="the equations is 'dynamics'; did you mean 'dynamic'"):
+        identify(arm(), noisy_record(), 8.0, equations="dynamics")
+    with pytest.raises(ModelError, match=r"instruments are for .*; use equations='dynamic'"):
+        identify(arm(), noisy_record(), 8.0, "instrumental", equations="energy", quiet=True)
+
+
+def test_efforts_of_the_wrong_sign_are_told():
+    record = noisy_record()
+    turned = Record.of(arm(), record.time, record.q, -record.tau)
+    text = identify(arm(), turned, 8.0, "weighted", quiet=True).text()
+    assert "Below zero: Fv1, Fs1, " in text
+    assert "check the signs of the efforts" in text
+
+
+@pytest.mark.parametrize("method", ["weighted", "instrumental"])
+def test_a_closed_robot_is_identified_from_its_independent_joints(method):
+    system = mbs.load("five_bar").assemble()
+    places = active_places(system)
+    motion = excitation(
+        system,
+        series=Series(period=4.0, harmonics=3, samples=24),
+        position=[(system.posture[k] - 0.5, system.posture[k] + 0.5) for k in places],
+        velocity=3.0,
+        starts=1,
+        rounds=10,
+        quiet=True,
+    )
+    t = np.arange(0, 12, 0.005)
+    q, v, a = motion.posture(t), motion.v(t), motion.a(t)
+    tau = np.array(mbs.models.inverse_dynamics(system).map(len(t))(q.T, v.T, a.T)).T
+    tau += 0.01 * np.random.default_rng(2).normal(size=tau.shape)
+    record = Record.of(system, t, motion.q(t), tau)
+    assert record.names == tuple(system.coordinates[k].name for k in places)
+    found = identify(system, record, 10.0, method, quiet=True)
+    truth = found.base.matrix @ numbers_of(system, found.base.columns)
+    errors = (found.estimate.values - truth) / found.estimate.deviations
+    assert np.sqrt(np.mean(errors**2)) < 2
+    assert found.validation.rms.max() < 0.01
 
 
 def driven(t, q, v):

@@ -6,9 +6,11 @@ from support.measured_arm import equations, noisy_record, noisy_samples
 
 from mbs.errors import ModelError, SolverError
 from mbs.identification.estimate import cross_validated, held_out
-from mbs.identification.filters import smoothed
+from mbs.identification.filters import smoothed, zero_phase
+from mbs.identification.instrumental import instrumental
 from mbs.identification.least_squares import least_squares
 from mbs.identification.observations import observe, observe_filtered
+from mbs.identification.residuals import repetition
 from mbs.identification.robust import robust
 from mbs.identification.weighted import reweighted, weighted
 
@@ -39,6 +41,39 @@ def test_deviations_are_those_of_many_records():
     errors = np.array([(e.values - equations()[2]) / e.deviations for e in alike])
     assert np.mean(errors**2) == pytest.approx(1.0, abs=0.2)
     assert np.abs(errors).max() < 5
+
+
+def filtered_records(count, deviations, bandwidth=8.0):
+    """Equations of filtered records that differ in the white noise of their efforts alone."""
+    D, base, _ = equations()
+    record = noisy_record(position=0.0, effort=0.0)
+    exact = observe_filtered(D, smoothed(record, bandwidth)).grouped(base)
+    rows = np.searchsorted(record.time, exact.time - 1e-9)
+    for seed in range(count):
+        noise = np.random.default_rng((12, seed)).normal(size=record.tau.shape) * deviations
+        yield replace(exact, y=exact.y + zero_phase(noise, 400.0, bandwidth)[rows])
+
+
+def by_motion(observations):
+    """Instrumental variables, the instruments being the exact motion."""
+    return instrumental(observations, observations, np.array([1.0, 3.0, 20.0]))
+
+
+@pytest.mark.parametrize("method", [least_squares, weighted, reweighted, robust, by_motion])
+def test_deviations_are_those_of_200_filtered_records(method):
+    found = [method(record) for record in filtered_records(200, np.array([1.0, 0.3, 0.05]))]
+    values = np.array([estimate.values for estimate in found])
+    predicted = np.sqrt(np.mean([estimate.deviations**2 for estimate in found], axis=0))
+    ratio = values.std(axis=0, ddof=1) / predicted
+    assert np.abs(ratio - 1).max() < 0.2
+    assert abs(ratio.mean() - 1) < 0.06
+
+
+def test_rows_that_repeat_each_other_count_as_fewer():
+    white = np.random.default_rng(4).normal(size=(4000, 2))
+    slow = zero_phase(white, 400.0, 10.0)
+    assert repetition(white) == pytest.approx([1, 1], abs=0.1)
+    assert repetition(slow) == pytest.approx([400 / (1.796 * 10)] * 2, rel=0.35)
 
 
 def test_weights_use_what_is_known_of_each_joint():

@@ -4,6 +4,7 @@ from support.measured_arm import arm, motion, noisy_record, true_efforts
 
 import mbs
 from mbs.errors import ModelError
+from mbs.identification.filters import smoothed
 from mbs.identification.record import Record, joint_side
 from mbs.result import Result
 
@@ -126,3 +127,37 @@ def test_records_are_of_joints_of_one_degree_of_freedom():
     with pytest.raises(ModelError, match="is a quaternion; records are of revolute"):
         Record.of(m.assemble(), TIME, Q, TAU)
     assert noisy_record().v is None
+
+
+def test_columns_that_are_not_the_joints_of_the_system_are_refused():
+    with pytest.raises(ModelError, match=r"q has 2 columns, .* 3 joints: q1, q2, q3; give one"):
+        Record.of(arm(), TIME, Q[:, :2], TAU)
+    with pytest.raises(ModelError, match="2 effort_units are given for 3 columns"):
+        Record(TIME, Q, TAU, effort_units=("N", "N"))
+
+
+def test_a_closed_robot_is_recorded_at_its_independent_joints():
+    system = mbs.load("delta").assemble()
+    record = Record.of(system, TIME, 0.1 * Q, TAU)
+    assert record.names == record.efforts == ("q1", "q2", "q3")
+    whole = np.zeros((len(TIME), system.nq))
+    with pytest.raises(ModelError, match=r"is a \w+; records .* or give the independent joints"):
+        Record.of(system, TIME, whole, TAU)
+
+
+def test_unequal_steps_give_the_same_parameters():
+    rng = np.random.default_rng(6)
+    steps = rng.uniform(0.3, 1.7, len(TIME)) / 400
+    time = np.cumsum(steps)
+    time = time[time < TIME[-1]]
+    bent = [np.column_stack([np.interp(time, TIME, x) for x in values.T]) for values in (Q, TAU)]
+    even, uneven = (
+        smoothed(record, 8.0)
+        for record in (Record.of(arm(), TIME, Q, TAU), Record.of(arm(), time, *bent))
+    )
+    inside = (uneven.time > even.time[0]) & (uneven.time < even.time[-1])
+    for name in ("q", "v", "tau"):
+        expected = np.column_stack(
+            [np.interp(uneven.time[inside], even.time, x) for x in getattr(even, name).T]
+        )
+        assert getattr(uneven, name)[inside] == pytest.approx(expected, abs=0.1)

@@ -3,7 +3,7 @@
 import casadi
 import numpy as np
 import pytest
-from support.regressor_states import CLOSED, OPEN, ROTORS, TREES, state_of, system_of
+from support.regressor_states import CLOSED, OPEN, ROTORS, TREES, moving, state_of, system_of
 from symbolic_robots import ROBOTS, symbolic_robot
 
 import mbs
@@ -19,7 +19,14 @@ from mbs.components import (
     ShaftInertia,
 )
 from mbs.errors import ModelError
-from mbs.identification import columns_of, known_efforts, numbers_of, regressor
+from mbs.identification import (
+    Column,
+    base_parameters,
+    columns_of,
+    known_efforts,
+    numbers_of,
+    regressor,
+)
 from mbs.operations import count, simplify
 
 BOUNDS = {
@@ -178,3 +185,54 @@ def test_coordinates_must_be_known():
 def test_columns_follow_the_options():
     system = system_of("puma560")
     assert regressor(system, friction=False).columns == columns_of(system, friction=False)
+
+
+MOVING = ("puma560", "two_branch_tree", "four_bar", "ball_base", "turret")
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_efforts_on_a_base_that_moves(name):
+    system, base = moving(name)
+    state = state_of(system)
+    D = regressor(system, moving_base=True)
+    tau = np.array(mbs.models.inverse_dynamics(system, moving_base=True)(*state, *base)).ravel()
+    found = np.array(D(*state, *base)) @ numbers_of(system, D.columns)
+    still = np.array(regressor(system)(*state)) @ numbers_of(system, D.columns)
+    assert np.abs(found - tau).max() < 1e-12 * np.abs(tau).max()
+    assert np.abs(still - tau).max() > 1e-2 * np.abs(tau).max()
+
+
+def test_base_parameters_have_columns_of_their_own():
+    system = system_of("puma560")
+    base = base_parameters(system)
+    D = regressor(system, base.columns_in_base)
+    assert D.names == base.names
+    assert "ZZ1R" in D.names
+    state = state_of(system)
+    tau = np.array(regressor(system)(*state)) @ numbers_of(system, base.columns)
+    found = np.array(D(*state)) @ (base.matrix @ numbers_of(system, base.columns))
+    assert np.abs(found - tau).max() < 1e-11 * np.abs(tau).max()
+    assert count(D).total < count(regressor(system)).total
+
+
+def test_columns_in_any_order_and_number():
+    system = system_of("scara")
+    every = regressor(system)
+    few = [every.columns[k] for k in (20, 3, 12)]
+    state = state_of(system)
+    found = np.array(regressor(system, few)(*state))
+    assert np.array_equal(found, np.array(every(*state))[:, [20, 3, 12]])
+
+
+@pytest.mark.parametrize(
+    ("columns", "options", "told"),
+    [
+        ([Column("M7", "M", 7, "kg")], {}, "'M7' is no parameter of the system; use one of"),
+        ([Column("Jm1", "Jm", 1, "kg.m2")], {}, "'Jm1' is no parameter of the system"),
+        ([Column("M1", "M", 1, "kg")] * 2, {}, "'M1' is given twice"),
+        ([Column("M1", "M", 1, "kg")], {"friction": False}, "columns were given and 'friction'"),
+    ],
+)
+def test_columns_must_be_those_of_the_system(columns, options, told):
+    with pytest.raises(ModelError, match=told):
+        regressor(system_of("puma560"), columns, **options)

@@ -15,6 +15,8 @@ import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
 
+from mbs.identification.base.quotient import quotient
+
 Terms = Mapping[int, SX]
 """Coefficients of some of the columns, by their numbers from 0."""
 
@@ -92,8 +94,19 @@ def related(
     if not left:
         return grouping
     pivot = max(left, key=lambda k: (ranks(k), alive[k]))
-    terms = {k: -rest[k] / rest[pivot] for k in left if k != pivot}
+    terms = {k: -quotient(rest[k], rest[pivot]) for k in left if k != pivot}
     return grouping.replaced(pivot, terms)
+
+
+def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:
+    """The grouping without coefficients whose symbols cancel, though they are still written."""
+    columns = []
+    for terms in grouping.columns:
+        written = {k: x for k, x in terms.items() if not x.is_constant()}
+        sizes = np.max(np.abs(sampled(list(written.values()))), axis=0) if written else np.zeros(0)
+        zero = {k for k, size in zip(written, sizes, strict=True) if size <= _CANCELLED}
+        columns.append({k: x for k, x in terms.items() if k not in zero})
+    return Grouping(tuple(columns))
 
 
 def coefficients(grouping: Grouping) -> Iterable[tuple[int, int, SX]]:

@@ -1,8 +1,8 @@
 """Relations between the parameters of a mechanism with closed loops.
 
-Either side of a cut joint may carry a body that looks the same from both. Links that never turn
-relative to each other share their inertia tensors, and joints whose velocities keep a constant
-ratio share rotors and friction.
+Either side of a cut joint may carry a body that looks the same from both, and links that never
+turn relative to each other share their inertia tensors. For the rates of links and joints see
+`turning`.
 
 Source: Khalil & Bennis 1995 and Bennis & Khalil 1990 for parallelograms; cut joints as there.
 """
@@ -19,19 +19,16 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
-from mbs.assembly.tree import Link
 from mbs.components import ConstantVelocity, Fixed
 from mbs.components.constraints import Constraint
 from mbs.components.motion import Freedom, Motion
 from mbs.identification.base.lambda_transform import lambda_transform
 from mbs.identification.base.rules import Key, on_link
-from mbs.loops.reduction import reduction_matrix
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose, align_z, snapped
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 Array = NDArray[np.float64]
-_OF_THE_JOINT = ("Ia", "Fv", "Fs", "offset")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,47 +139,3 @@ def _link_poses(system: System, postures: Postures) -> tuple[Array, Array]:
 
 def _constant(values: Array) -> bool:
     return bool(np.max(np.abs(values - values[0])) < _SAME)
-
-
-def speed_relations(system: System, postures: Sequence[Postures]) -> Iterator[Relation]:
-    """Joints whose velocities keep a constant ratio share rotors, friction and constant efforts.
-
-    Args:
-        system: with closed loops.
-        postures: on the branch; more than one set where lengths are symbols.
-    """
-    G = np.concatenate([_slopes(system, each) for each in postures])
-    links = system.tree.links
-    single = [(j, G[:, link.v.start]) for j, link in enumerate(links) if link.motion.nv == 1]
-    for number, (k, row) in enumerate(single):
-        if np.max(np.abs(row)) < _SAME:
-            yield from ({(k, kind): SX(1)} for kind in _OF_THE_JOINT)
-            continue
-        for j, other in single[:number]:
-            ratio = float(np.sum(row * other) / max(float(np.sum(other * other)), 1e-30))
-            if np.max(np.abs(row - ratio * other)) < _SAME * max(1.0, abs(ratio)):
-                yield from _shared_by_joints(links[j], links[k], (j, k), _plain(ratio))
-
-
-def _plain(ratio: float) -> float:
-    """A whole ratio without its rounding."""
-    return float(round(ratio)) if abs(ratio - round(ratio)) < _SAME else ratio
-
-
-def _shared_by_joints(
-    first: Link, second: Link, numbers: tuple[int, int], ratio: float
-) -> Iterator[Relation]:
-    """The second joint moves `ratio` times as fast as the first one."""
-    j, k = numbers
-    shares = {"Ia": ratio**2, "Fv": ratio**2, "offset": ratio}
-    if (second.Fs_width - abs(ratio) * first.Fs_width).is_zero():
-        shares["Fs"] = abs(ratio)
-    for kind, share in shares.items():
-        yield {(k, kind): SX(1), (j, kind): SX(-share)}
-
-
-def _slopes(system: System, postures: Postures) -> Array:
-    """(postures, nv, m) velocities of the tree from the independent ones."""
-    at = reduction_matrix(system)
-    p = [postures.p] if postures.p.size else []
-    return np.array([np.array(at(position, *p)) for position in postures.q.T])

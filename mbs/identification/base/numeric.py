@@ -15,12 +15,9 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.identification.base.check import Check
 from mbs.identification.base.grouping import Grouping
-from mbs.identification.base.rank import Dependence, dependence
-from mbs.identification.base.sampled_regressor import (
-    sampled_on_moving_base,
-    sampled_regressor,
-)
-from mbs.identification.base.states import States, random_states
+from mbs.identification.base.rank import Dependence, dependence, plain
+from mbs.identification.base.sampled_regressor import sampled_regressor
+from mbs.identification.base.states import random_states
 from mbs.identification.base.text import equation
 from mbs.identification.columns import Column
 
@@ -29,6 +26,8 @@ Array = NDArray[np.float64]
 _ZERO = 1e-8
 _EXACT = 1e-7
 """Largest error of a grouped regressor that is rounding, by the longest column."""
+_NARROW = 1e4
+"""A smaller gap of the singular values leaves the rank in doubt."""
 _PREFERRED = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY", "YY", "MZ", "M")
 """Inertial parameters of a link in the order in which they are kept."""
 
@@ -46,22 +45,14 @@ class Sample:
     W: Array
 
     @staticmethod
-    def of(system: System, columns: Sequence[Column], p: Array, seed: int) -> Sample:
+    def of(
+        system: System, columns: Sequence[Column], p: Array, seed: int, *, base_moves: bool = False
+    ) -> Sample:
         """At least three rows for every column."""
-        states = _states(system, columns, p, seed)
+        count = 8 + -(-3 * len(columns) // max(len(system.active), 1))
+        states = random_states(system, p, count, seed)
+        states = states.on_moving_base(seed) if base_moves else states
         return Sample(tuple(columns), sampled_regressor(system, columns, states, p))
-
-    @staticmethod
-    def on_moving_base(system: System, columns: Sequence[Column], p: Array, seed: int) -> Sample:
-        """The same for a base that moves anyhow."""
-        states = _states(system, columns, p, seed)
-        W = sampled_on_moving_base(system, columns, states, p, seed)
-        return Sample(tuple(columns), W)
-
-
-def _states(system: System, columns: Sequence[Column], p: Array, seed: int) -> States:
-    count = 8 + -(-3 * len(columns) // max(len(system.active), 1))
-    return random_states(system, p, count, np.random.default_rng(seed))
 
 
 def preferred_order(columns: Sequence[Column], first: Sequence[int] = ()) -> list[int]:
@@ -100,7 +91,7 @@ def applied(
     for k, column in enumerate(found.dependent):
         terms = zip(found.independent, found.factors[:, k], strict=True)
         grouping = grouping.replaced(
-            numbers[column], {numbers[i]: SX(_plain(x)) for i, x in terms if abs(x) > _ZERO}
+            numbers[column], {numbers[i]: SX(plain(x)) for i, x in terms if abs(x) > _ZERO}
         )
     return grouping
 
@@ -140,7 +131,7 @@ def relation_texts(
     lines = []
     for k, column in enumerate(found.dependent):
         pairs = zip(found.independent, found.factors[:, k], strict=True)
-        terms = {f"D({columns[kept[i]].name})": SX(_plain(x)) for i, x in pairs if abs(x) > _ZERO}
+        terms = {f"D({columns[kept[i]].name})": SX(plain(x)) for i, x in pairs if abs(x) > _ZERO}
         lines.append(equation(f"D({columns[kept[column]].name})", terms))
     return tuple(lines)
 
@@ -158,13 +149,11 @@ def _verdict(count: int, rank: int, relations: Sequence[str], error: float) -> s
 
 
 def _gap(found: Dependence) -> str:
-    return "" if np.isinf(found.gap) else f" (gap of the singular values {found.gap:.1e})"
+    if np.isinf(found.gap):
+        return ""
+    doubt = ", so narrow that the rank is in doubt" if found.gap < _NARROW else ""
+    return f" (gap of the singular values {found.gap:.1e}{doubt})"
 
 
 def _sentence(text: str) -> str:
     return text[0].upper() + text[1:]
-
-
-def _plain(x: float) -> float:
-    """A whole number without its rounding."""
-    return float(round(x)) if abs(x - round(x)) < _ZERO else float(x)

@@ -18,6 +18,8 @@ _NO_EFFECT = 1e-9
 _FLOOR = 1e-16
 _LARGEST_ZERO = 1e-6
 """A singular value above this part of the largest is not rounding."""
+_ROUNDING = 1e-8
+"""A factor so near to a whole number is one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,3 +84,8 @@ def _rank(values: Array) -> tuple[int, float]:
         return len(values), float("inf")
     k = int(np.argmax(np.where(small, ratios, 0.0)))
     return k + 1, float(ratios[k])
+
+
+def plain(x: float) -> float:
+    """A whole number without its rounding."""
+    return float(round(x)) if abs(x - round(x)) < _ROUNDING else float(x)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from casadi import Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
@@ -31,22 +32,43 @@ class States:
     Attributes:
         q: (nq, states).
         v, a: (m, states).
+        base: v_0 and a_0, (6, states) each, and R_0, (3, 3 states), of a base that moves.
     """
 
     q: Array
     v: Array
     a: Array
+    base: tuple[Array, Array, Array] | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of states."""
+        return int(self.q.shape[1])
+
+    def on_moving_base(self, seed: int) -> States:
+        """The same while the base moves anyhow."""
+        rng = np.random.default_rng(seed)
+        v_0, a_0 = rng.uniform(-3, 3, (6, self.count)), rng.uniform(-5, 5, (6, self.count))
+        turns = np.linalg.qr(rng.standard_normal((self.count, 3, 3)))[0]
+        turns *= np.sign(np.linalg.det(turns))[:, None, None]
+        return replace(self, base=(v_0, a_0, np.hstack(list(turns))))
 
 
-def random_states(system: System, p: Array, count: int, rng: np.random.Generator) -> States:
+def random_states(system: System, p: Array, count: int, seed: int) -> States:
     """States that show every parameter that has an effect.
+
+    Args:
+        system: open or closed.
+        p: (np,) its parameters.
+        count: number of states.
+        seed: of the random numbers.
 
     Raises:
         ModelError: a closed mechanism cannot leave its assembled posture.
     """
-    m = len(system.active)
+    m, rng = len(system.active), np.random.default_rng(seed)
     if system.is_closed:
-        postures = closed_positions(system, p, min(count, _POSTURES), rng)
+        postures = closed_positions(system, p, _POSTURES, seed)
         q = postures[:, np.arange(count) % postures.shape[1]]
     else:
         q = _any(system, count, rng)
@@ -59,21 +81,32 @@ def _any(system: System, count: int, rng: np.random.Generator) -> Array:
     return _normalised(system, q)
 
 
-def closed_positions(system: System, p: Array, count: int, rng: np.random.Generator) -> Array:
+def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
     """(nq, count) closed postures, met on a random walk from the assembled one.
 
     Steps are small and each is closed again, so that the walk stays on its branch; where the
-    independent joints hardly lead the others it turns back.
+    independent joints hardly lead the others it turns back. The system keeps them.
+
+    Args:
+        system: closed.
+        p: (np,) its parameters.
+        count: number of postures.
+        seed: of the random numbers.
 
     Raises:
         ModelError: the loops cannot be closed at these parameters.
     """
-    walk = _Walk.of(system, p)
-    q, postures = walk.start, list[Array]()
-    for _ in range(count):
-        q = walk.moved(q, rng)
-        postures.append(q)
-    return np.array(postures).T
+
+    def walked() -> Array:
+        walk, rng = _Walk.of(system, p), np.random.default_rng(seed)
+        q, postures = walk.start, list[Array]()
+        for _ in range(count):
+            q = walk.moved(q, rng)
+            postures.append(q)
+        return np.array(postures).T
+
+    positions: Array = system.cached(("closed_positions", p.tobytes(), count, seed), walked)
+    return positions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +115,7 @@ class _Walk:
 
     system: System
     closing: Closing
+    G: Function
     values: dict[str, float]
     start: Array
     least: float
@@ -99,7 +133,8 @@ class _Walk:
         names = [parameter.name for parameter in system.parameters]
         values = dict(zip(names, p.tolist(), strict=True))
         leads = examine(system, found.q.tolist(), parameters=values).leads
-        return _Walk(system, closing, values, found.q, min(_LEAST_LEAD, leads / 4))
+        G = Function(reduction_matrix(system))
+        return _Walk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
 
     def moved(self, q: Array, rng: np.random.Generator) -> Array:
         """The posture after some steps in one direction, or back in the other."""
@@ -115,7 +150,7 @@ class _Walk:
     def _step(self, q: Array, direction: Array) -> Array | None:
         p = self.closing.p
         arguments = (q, p) if p.size else (q,)
-        G = np.array(reduction_matrix(self.system)(*arguments))
+        G = np.array(self.G(*arguments))
         rate = np.array(self.system.qdot(q, G @ direction)).ravel()
         ahead = q + rate * (_STEP / max(float(np.max(np.abs(rate))), 1e-9))
         found = self.closing.nearest(ahead)

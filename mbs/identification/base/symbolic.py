@@ -8,16 +8,16 @@ import casadi
 from casadi import SX
 
 from mbs.assembly import System
-from mbs.identification.base.grouping import Grouping, Terms, related
+from mbs.identification.base.grouping import Grouping, Terms, related, without_zeros
 from mbs.identification.base.loops import (
     Postures,
     cut_relations,
     pair_relations,
-    speed_relations,
 )
 from mbs.identification.base.rules import Key, tree_rules
 from mbs.identification.base.samples import sampler
 from mbs.identification.base.structure import Structure
+from mbs.identification.base.turning import turning_relations
 from mbs.identification.columns import Column
 
 
@@ -37,19 +37,19 @@ def grouped_by_rules(
     """
     places = _places(columns)
     grouping = _by_tree(structure, Grouping.none(len(columns)), places)
-    if not system.is_closed:
-        return grouping
     sampled = sampler(system)
+    if not system.is_closed:
+        return without_zeros(grouping, sampled)
     relations = [
         *cut_relations(system),
         *pair_relations(system, postures, base_moves=structure.base_moves),
-        *speed_relations(system, postures),
+        *turning_relations(system, postures, base_moves=structure.base_moves),
     ]
     for relation in relations:
         terms = _terms(relation, places)
         if terms is not None:
             grouping = related(grouping, terms, lambda k: columns[k].link, sampled)
-    return grouping
+    return without_zeros(grouping, sampled)
 
 
 def _by_tree(structure: Structure, grouping: Grouping, places: Mapping[Key, int]) -> Grouping:

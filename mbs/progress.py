@@ -13,16 +13,16 @@ PATIENCE = 2.0
 def progress(
     label: str, start: float, stop: float, *, quiet: bool = False
 ) -> Iterator[Callable[[float], None]]:
-    """A function to call with the time reached; after two seconds it shows a bar on a terminal.
+    """A function to call with what was reached; after two seconds it shows a bar on a terminal.
 
     Args:
         label: what is running.
-        start: simulated time at the beginning, s.
-        stop: simulated time at the end, s.
+        start: what is reached at the beginning, such as a simulated time, s.
+        stop: what is reached at the end.
         quiet: never show anything.
 
     Yields:
-        a function of the simulated time reached, s.
+        a function of what was reached.
     """
     bar = _Bar(label, start, stop, shown=not quiet and sys.stderr.isatty())
     try:

@@ -2,7 +2,7 @@ import io
 import subprocess
 import sys
 
-from mbs.simulate import progress as module
+from mbs import progress as module
 
 
 class Terminal(io.StringIO):

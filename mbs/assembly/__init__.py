@@ -1,7 +1,18 @@
 """From connected components to a frozen `System`: graph, spanning tree, Khalil frames, tables."""
 
+from mbs.assembly.symbolic import symbolic
 from mbs.assembly.system import System
 from mbs.assembly.tables import BodyRow, Closure, Coordinate, LinkRow, LoopRow
 from mbs.assembly.tree import Link, Tree
 
-__all__ = ["BodyRow", "Closure", "Coordinate", "Link", "LinkRow", "LoopRow", "System", "Tree"]
+__all__ = [
+    "BodyRow",
+    "Closure",
+    "Coordinate",
+    "Link",
+    "LinkRow",
+    "LoopRow",
+    "System",
+    "Tree",
+    "symbolic",
+]

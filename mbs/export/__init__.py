@@ -1,8 +1,10 @@
-"""Files that other tools run: C source, FMUs."""
+"""Files that other tools run: C source, FMUs, systems of FMUs."""
 
 from mbs.export.c_library import c_library
 from mbs.export.code import code
+from mbs.export.fmu.c_law import CController
 from mbs.export.fmu.system_fmu import fmu
 from mbs.export.par import par
+from mbs.export.ssp import ssp
 
-__all__ = ["c_library", "code", "fmu", "par"]
+__all__ = ["CController", "c_library", "code", "fmu", "par", "ssp"]

@@ -55,6 +55,8 @@ class ContactEquations:
         values: (2 k, 1) symbols of their modes.
         modes: the same by name.
         a: (nv, 1) accelerations.
+        driven: numbers of the m velocities that drives move.
+        drives: (m, 1) efforts that do so, in their order.
         tau: (nv, 1) joint efforts, those of drives included and those of contacts left out.
         efforts: (2 k, 1) of the stops, then of friction.
         indicators: (5 k, 1) as of `Contacts.indicators`.
@@ -64,6 +66,8 @@ class ContactEquations:
     values: SX
     modes: Modes
     a: SX
+    driven: tuple[int, ...]
+    drives: SX
     tau: SX
     efforts: SX
     indicators: SX
@@ -103,4 +107,6 @@ def contact_equations(
     y = made[m:]
     efforts = casadi.vertcat(*contacts.efforts(modes, y))
     indicators = contacts.indicators(q, v, modes, y, inertia[m:])
-    return ContactEquations(contacts, values, modes, a, every, efforts, indicators)
+    return ContactEquations(
+        contacts, values, modes, a, tuple(driven), made[:m], every, efforts, indicators
+    )

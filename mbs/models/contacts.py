@@ -20,10 +20,11 @@ from mbs.components.contacts_joint import CoulombFriction, JointContact, RigidSt
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_sx
 from mbs.models.hybrid_dynamics import are_independent
-from mbs.models.prescribed import Prescribed
 
 CREEP = 1e-10
 """Velocity below which a coordinate does not move [rad/s or m/s]."""
+_BEYOND = 1e-9
+"""How far beyond a limit a start may be by rounding, relative to the limit where it is large."""
 _ADHESION = 1e-9
 """Acceleration that a contact may pull with before it opens [rad/s^2 or m/s^2]."""
 KINDS = ("lower", "upper", "pulled", "pushed", "stopped")
@@ -94,6 +95,30 @@ class Contacts:
         sticks = self.has_friction * (slide == 0)
         return Modes(place, slide, casadi.fmax(place**2, sticks))
 
+    def first(self, q: SX, v: SX) -> tuple[SX, SX]:
+        """Modes at a start: what rests at a limit touches it, what moves slides.
+
+        Args:
+            q: (nq, 1) positions.
+            v: (nv, 1) velocities.
+
+        Returns:
+            (2 k, 1) modes; (2 k, 1) how far the coordinates are below their lower limits, then
+            above the upper ones, by more than rounding where positive.
+        """
+        x, speed = self.position(q), self.velocity(v)
+        way = casadi.if_else(casadi.fabs(speed) > CREEP, casadi.sign(speed), 0)
+        place, beyond = SX.zeros(len(self)), []
+        for side, limit, given in (
+            (-1, self.bounds[0], self.has_lower),
+            (1, self.bounds[1], self.has_upper),
+        ):
+            outside, slack = side * (x - limit), _BEYOND * casadi.fmax(1, casadi.fabs(limit))
+            rests = given * (outside >= -slack) * (way == 0)
+            place = casadi.if_else(rests, side, place)
+            beyond.append(casadi.if_else(given, outside - slack, -1))
+        return casadi.vertcat(place, way * self.has_friction), casadi.vertcat(*beyond)
+
     def distance(self, q: SX, place: SX) -> SX:
         """(k, 1) how far a coordinate is from the limit that it is at, zero between limits."""
         x = self.position(q)
@@ -157,13 +182,17 @@ def require_no_contacts(system: System, what: str) -> None:
             )
 
 
-def require_undriven(system: System, contacts: Contacts, motions: Sequence[Prescribed]) -> None:
+def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) -> None:
     """Refuse motions that are prescribed where a contact acts.
+
+    Args:
+        system: open or closed.
+        contacts: its contacts.
+        driven: numbers of the velocities whose motion is prescribed.
 
     Raises:
         ModelError: which, and the remedy.
     """
-    driven = [motion.velocity for motion in motions]
     for name, number in zip(contacts.names, contacts.velocities, strict=True):
         if number in driven:
             raise ModelError(
@@ -175,6 +204,20 @@ def require_undriven(system: System, contacts: Contacts, motions: Sequence[Presc
                 f"{system.name}: the motions that are prescribed move {name} through the loops, on"
                 " which a rigid stop or dry friction acts; use a JointStop or JointFriction there"
             )
+
+
+def require_lasting_rows(system: System, contacts: Contacts) -> None:
+    """Refuse contacts on loops whose independent rows change with the posture.
+
+    Raises:
+        ModelError: which contact, and the remedy.
+    """
+    if len(contacts) and system.closure is not None and system.closure.varies:
+        raise ModelError(
+            f"{system.name}: the independent rows of its loops change with the posture, which"
+            f" the contact on {contacts.names[0]} does not follow; use a JointStop or"
+            " JointFriction there"
+        )
 
 
 def _contacts(system: System) -> Contacts:

@@ -24,7 +24,7 @@ from mbs.components.sensors_joint import JointSensor, PowerSensor, WrenchSensor
 from mbs.errors import ModelError
 from mbs.models.cut_coordinates import cut_coordinate
 from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
-from mbs.models.surroundings import surroundings
+from mbs.models.surroundings import Surroundings, surroundings
 from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
 from mbs.recursions.accelerations import Acceleration, link_accelerations, resting_base
 from mbs.recursions.frame_motion import (
@@ -70,15 +70,30 @@ def measurements(system: System, coordinates: str = "independent") -> Function:
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         inputs, a, tau = motion_inputs(system, s)
-        state = _observed(system, s, a, tau)
-        outputs: list[tuple[str, SX]] = []
-        for attached in system.sensors:
-            read = _READ[type(attached.sensor)](state, attached)
-            outputs += [(name, read[quantity.name]) for name, quantity in attached.outputs]
-        return inputs, outputs
+        return inputs, readings(system, s, a, tau, surroundings(system))
 
     check = posture_check(system, coordinates)
     return model_function(system, ("measurements", coordinates), build, check)
+
+
+def readings(
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+) -> list[tuple[str, SX]]:
+    """The outputs of `measurements`, also where wrenches act from outside.
+
+    Args:
+        system: open or closed.
+        s: its symbols.
+        a: (nv, 1) accelerations of the tree.
+        tau: (nv, 1) efforts of the tree; None where the independent joints have all of them.
+        around: what acts from outside.
+    """
+    state = _observed(system, s, a, tau, around)
+    outputs: list[tuple[str, SX]] = []
+    for attached in system.sensors:
+        read = _READ[type(attached.sensor)](state, attached)
+        outputs += [(name, read[quantity.name]) for name, quantity in attached.outputs]
+    return outputs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,9 +121,11 @@ class _Observed:
         return {name: casadi.mtimes(R, vector) for name, vector in vectors.items()}
 
 
-def _observed(system: System, s: ModelSymbols, a: SX, tau: SX | None) -> _Observed:
+def _observed(
+    system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
+) -> _Observed:
     transmits = any(attached.joint is not None for attached in system.sensors)
-    wrenches = wrenches_of_joints(system, s, a, tau, surroundings(system)) if transmits else []
+    wrenches = wrenches_of_joints(system, s, a, tau, around) if transmits else []
     return _Observed(
         system,
         s,

@@ -6,134 +6,238 @@ It is what an importer of an FMU expects: states that may be set freely, and no 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from itertools import accumulate
 
 import casadi
 import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.rates import norm_rows, normalised, position_rate, quaternion_slices
-from mbs.errors import ModelError
+from mbs.assembly.rates import norm_rows, position_rate, quaternion_slices
 from mbs.loops.closure import closure_rows, facing, square_closure
-from mbs.loops.reduction import reduction
-from mbs.models.composition import dense_function, outputs_of
+from mbs.models.composition import dense_function
+from mbs.models.contacts import contacts_of, require_lasting_rows
 from mbs.models.devices import device_equations, state_count
-from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.geometry import terminal_frame
+from mbs.models.minimal_accelerations import Accelerations, minimal_accelerations
+from mbs.models.minimal_contacts import MinimalEvents, at_limits, few_modes, minimal_events
+from mbs.models.minimal_controller import Equations, controlled
+from mbs.models.minimal_drive import Drive
+from mbs.models.minimal_layout import MinimalLayout, minimal_layout
+from mbs.models.minimal_motion import (
+    TreeMotion,
+    input_motions,
+    load_of,
+    tree_motion,
+    wrenches_of,
+)
 from mbs.recursions.route import relative_pose
-from mbs.solvers.small_linear import solve_square
+from mbs.solvers.newton_step import newton_step
+from mbs.spatial import Wrench
 
-Observe = Callable[[SX, SX, SX], Sequence[SX]]
-"""What is seen of positions q, and of velocities and accelerations of the independent joints."""
+__all__ = ["Drive", "MinimalState", "Observe", "Seen", "consistent_start", "minimal_state"]
 
 _NORM_RATE = 10.0
 """How fast a quaternion returns to unit length [1/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MinimalState:
-    """State x = [q_a; v_a; states of devices], with dependent positions z.
+class Seen:
+    """A motion and what makes it, for outputs.
 
     Attributes:
-        positions: numbers in q of the first part of x.
-        dependents: numbers in q of z.
-        inputs: numbers in v of the efforts that u starts with; the inputs of devices follow.
-        rhs: `rhs(t, x, z, u, p) -> (xdot, y)`, y = [accelerations of x; positions z, velocities
-            and accelerations of the dependent joints; origin (3) and orientation (9, by rows) of
-            the terminal frame; outputs of devices; what is observed].
-        closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
+        t: time [s].
+        p: (np, 1) parameters of the system.
+        q: (nq, 1) positions, quaternions of unit length.
+        v: (nv, 1) velocities of the tree.
+        a: (nv, 1) accelerations of the tree.
+        v_a: (m, 1) velocities of the independent joints.
+        a_a: (m, 1) accelerations of the independent joints.
+        tau: (nv, 1) joint efforts: motors, devices, prescribed motions and contacts.
+        external: for some links the wrench that they exert on what pushes them, about and in their
+            frames.
     """
 
-    positions: tuple[int, ...]
-    dependents: tuple[int, ...]
-    inputs: tuple[int, ...]
+    t: SX
+    p: SX
+    q: SX
+    v: SX
+    a: SX
+    v_a: SX
+    a_a: SX
+    tau: SX
+    external: dict[int, Wrench]
+
+
+Observe = Callable[[Seen], Sequence[SX]]
+"""What else is seen of a motion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MinimalState(MinimalLayout):
+    """A state equation; what stands where in x, z, u and y tells `MinimalLayout`.
+
+    Attributes:
+        rhs: `rhs(t, x, z, u, p) -> (xdot, y)`; p are the parameters, here and in `events` with the
+            modes behind them.
+        closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
+        events: of rigid stops and dry friction; None where there are none.
+    """
+
     rhs: Function
     closure: Function | None
+    events: MinimalEvents | None
 
 
-def minimal_state(system: System, observe: Observe | None = None) -> MinimalState:
+def minimal_state(
+    system: System, observe: Observe | None = None, drive: Drive | None = None
+) -> MinimalState:
     """The state equation of the independent joints.
 
     Args:
         system: open or closed.
         observe: what else the outputs end with.
+        drive: what drives it beside, or in place of, the efforts of motors and the inputs of
+            devices.
 
     Raises:
         ModelError: an independent velocity of a loop belongs to a quaternion joint, so that no
-            position stands for it.
+            position stands for it; a drive does not fit the system; or the independent rows of
+            the loops change with the posture, which contacts do not follow.
     """
-    positions = _free_positions(system)
-    dependents = tuple(k for k in range(system.nq) if k not in positions)
-    by_devices = [device.velocity for device in system.devices]
-    motors = [k for k in system.active if system.speeds[k].actuated]
-    driven = tuple(k for k in motors if k not in by_devices)
-    t, u = SX.sym("t"), SX.sym("u", len(driven) + len(by_devices))
-    nq, n = len(positions), len(positions) + len(system.active)
-    x, z = SX.sym("x", n + state_count(system)), SX.sym("z", len(dependents))
-    q, v, v_a = SX.zeros(system.nq), SX.zeros(system.nv), x[nq:n]
-    q[list(positions)], q[list(dependents)], v[list(system.active)] = x[:nq], z, v_a
-    efforts, rates, shown = device_equations(system, v, x[n:], u[len(driven) :])
-    for column, k in enumerate(driven):
-        efforts[k] = u[column]
-    tau = efforts[list(system.active)]
-    unit = q if system.is_closed else normalised(system.tree, q)
-    (a,) = outputs_of(system, direct_dynamics(system), unit, v_a, tau)
-    rest = _dependent_motion(system, q, v_a, a) if system.is_closed else []
-    rate = _free_rate(system, v_a, rest[0]) if rest else _steadied_rate(system, q, v_a)
-    seen = () if observe is None else observe(unit, v_a, a)
-    y = casadi.vertcat(a, z, *rest, _terminal_pose(system, unit), shown, *seen)
+    require_lasting_rows(system, contacts_of(system))
+    drive = Drive() if drive is None else drive
+    layout = minimal_layout(system, drive)
+    equations = _equations(system, observe, layout, drive)
+    if drive.effort is not None or drive.device is not None:
+        equations = controlled(equations, drive, layout.extra)
     return MinimalState(
-        positions=positions,
-        dependents=dependents,
-        inputs=driven,
-        rhs=dense_function("rhs", [t, x, z, u, system.p], [casadi.vertcat(rate, a, rates), y]),
-        closure=_closure_step(system, q, x, z, dependents) if dependents else None,
+        **{field.name: getattr(layout, field.name) for field in fields(layout)},
+        rhs=equations.rhs,
+        closure=_closure_step(system, layout) if layout.dependents else None,
+        events=equations.events,
     )
 
 
-def _free_positions(system: System) -> tuple[int, ...]:
-    if not system.is_closed:
-        return tuple(range(system.nq))
-    names = [coordinate.name for coordinate in system.coordinates]
-    missing = [system.speeds[k].name for k in system.free if system.speeds[k].name not in names]
-    if missing:
-        raise ModelError(
-            f"{system.name}: {', '.join(missing)} of a quaternion joint would be independent, which"
-            " has no position of its own; replace a ball joint of a rod that can spin by a"
-            " Universal, or actuate other joints of the loop"
-        )
-    return tuple(names.index(system.speeds[k].name) for k in system.free)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    """Symbols, and the parts of x and u."""
+
+    t: SX
+    x: SX
+    z: SX
+    u: SX
+    q: SX
+    v: SX
+    states: SX
+    efforts: SX
+    inputs: SX
+    wrenches: SX
+    motions: SX
 
 
-def _steadied_rate(system: System, q: SX, v: SX) -> SX:
-    """The rate of the positions, quaternions drawn back to unit length."""
-    raw = position_rate(system.tree, q, v)
-    rate = position_rate(system.tree, normalised(system.tree, q), v)
+def _point(system: System, layout: MinimalLayout, motors: Sequence[int]) -> _Point:
+    in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
+    in_u = [len(motors), len(system.devices), 6 * len(layout.frames)]
+    in_u.append(sum(motion.size for motion in layout.motions))
+    x, u = SX.sym("x", sum(in_x)), SX.sym("u", sum(in_u))
+    parts = (*_split(x, in_x), *_split(u, in_u))
+    return _Point(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
+
+
+def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
+    return list(casadi.vertsplit(values, [0, *accumulate(sizes)]))
+
+
+def _equations(
+    system: System, observe: Observe | None, layout: MinimalLayout, drive: Drive
+) -> Equations:
+    """The functions, where u has no w, and all efforts and inputs of devices that laws give."""
+    motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
+    s = _point(system, layout, motors)
+    laws = input_motions(layout.motions, s.motions)
+    motion = _motion(system, layout, s, laws)
+    tau, rates, shown = device_equations(system, motion.v, s.states, s.inputs)
+    for column, number in enumerate(motors):
+        tau[number] += s.efforts[column]
+    external = wrenches_of(system, motion.q, layout.frames, s.wrenches)
+    given = {m.velocity: law[2] for m, law in zip(layout.motions, laws, strict=True)}
+    load = load_of(system, motion.q, external)
+    moved = minimal_accelerations(system, motion, tau, load, given)
+    rate = _rate(system, layout, motion, moved, rates)
+    y = _outputs(system, layout, motion, moved, shown)
+    if observe is not None:
+        vectors = motion.q, motion.v, moved.a, motion.v_a, moved.a_a, moved.every_effort
+        y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *vectors, external)))
+    point = [s.t, s.x, s.z, s.u, system.p]
+    contact, states = moved.contact, (layout.positions, layout.velocities)
+    events = minimal_events(system, contact, motion, point, states) if contact else None
+    if contact:
+        point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
+    return Equations(
+        rhs=dense_function("rhs", point, [rate, y]),
+        motion=dense_function("motion", [s.t, s.x, s.z, s.u, system.p], [motion.q, motion.v]),
+        events=events,
+        sizes=(len(motors), len(system.devices), s.u.numel() - len(motors) - len(system.devices)),
+    )
+
+
+def _motion(
+    system: System, layout: MinimalLayout, s: _Point, laws: Sequence[tuple[SX, SX, SX]]
+) -> TreeMotion:
+    """The motion of the tree, from states, dependent positions and prescribed motions."""
+    q, v = SX.zeros(system.nq), SX.zeros(system.nv)
+    q[list(layout.positions)], q[list(layout.dependents)] = s.q, s.z
+    v[list(layout.velocities)] = s.v
+    for motion, law in zip(layout.motions, laws, strict=True):
+        if motion.position is not None:
+            q[motion.position], v[motion.velocity] = law[0], law[1]
+    return tree_motion(system, q, v[list(system.active)])
+
+
+def _rate(
+    system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, devices: SX
+) -> SX:
+    """The rate of x; quaternions are drawn back to unit length."""
+    if system.is_closed:
+        v = SX(motion.v)
+        v[list(system.active)] += at_limits(system, moved.contact, motion)
+        positions = v[list(system.free)]
+    else:
+        positions = _rows(_steadied_rate(system, motion), layout.positions)
+    return casadi.vertcat(positions, _rows(moved.a, layout.velocities), devices)
+
+
+def _steadied_rate(system: System, motion: TreeMotion) -> SX:
+    raw = position_rate(system.tree, motion.raw, motion.v)
+    rate = position_rate(system.tree, motion.q, motion.v)
     for part in quaternion_slices(system.tree):
-        rate[part] = raw[part] + _NORM_RATE * (1 - casadi.sumsqr(q[part])) * q[part]
+        q = motion.raw[part]
+        rate[part] = raw[part] + _NORM_RATE * (1 - casadi.sumsqr(q)) * q
     return rate
 
 
-def _free_rate(system: System, v_a: SX, v_passive: SX) -> SX:
-    """The rate of the free positions, in a system of joints whose positions match velocities."""
-    v = SX.zeros(system.nv)
-    assert system.closure is not None
-    v[list(system.closure.active)], v[list(system.closure.passive)] = v_a, v_passive
-    return v[list(system.free)]
+def _outputs(
+    system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, shown: SX
+) -> SX:
+    """The outputs y that every state equation has."""
+    efforts = moved.contact.efforts if moved.contact else SX(0, 1)
+    return casadi.vertcat(
+        _rows(moved.a, layout.accelerations),
+        _rows(motion.q, layout.dependents),
+        _rows(motion.v, layout.passive),
+        _rows(moved.a, layout.passive),
+        _terminal_pose(system, motion.q),
+        shown,
+        _rows(moved.tau, layout.efforts),
+        _rows(efforts, [effort.row for effort in layout.contacts]),
+    )
 
 
-def _dependent_motion(system: System, q: SX, v_a: SX, a_a: SX) -> list[SX]:
-    """Velocities and accelerations of the dependent joints."""
-    assert system.closure is not None
-    passive = list(system.closure.passive)
-    m = len(system.active)
-    symbols, speeds, rates = SX.sym("q", system.nq), SX.sym("v", m), SX.sym("a", m)
-    reduced = reduction(system, symbols, speeds)
-    assert reduced.gamma is not None
-    v = casadi.mtimes(reduced.G, speeds)[passive]
-    a = (casadi.mtimes(reduced.G, rates) + reduced.gamma)[passive]
-    return [SX(x) for x in casadi.substitute([v, a], [symbols, speeds, rates], [q, v_a, a_a])]
+def _rows(vector: SX, numbers: Sequence[int]) -> SX:
+    """Some elements of a vector; none of a vector (1, 1) are (1, 0), which would count as a row."""
+    return vector[list(numbers)] if numbers else SX(0, 1)
 
 
 def _terminal_pose(system: System, q: SX) -> SX:
@@ -143,23 +247,27 @@ def _terminal_pose(system: System, q: SX) -> SX:
     return casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
 
 
-def _closure_step(system: System, q: SX, x: SX, z: SX, dependents: Sequence[int]) -> Function:
-    symbols = SX.sym("q", system.nq)
+def _closure_step(system: System, layout: MinimalLayout) -> Function:
+    """`closure` of the state equation."""
+    dependents, s = list(layout.dependents), _point(system, layout, ())
+    symbols, q, z = SX.sym("q", system.nq), SX.zeros(system.nq), s.z
+    q[list(layout.positions)], q[dependents] = s.q, z
     norms = norm_rows(system.tree, symbols)
     kept = square_closure(system, symbols, dependents)
     every = casadi.vertcat(closure_rows(system, symbols), norms)
     kept, every = casadi.substitute([kept, every], [symbols], [q])
-    z_next = z - solve_square(casadi.jacobian(kept, z), kept)
     cosines = casadi.substitute(facing(system, symbols), symbols, q)
     opposed = casadi.mmin(cosines) <= 0 if cosines.numel() else SX(0)
     residual = casadi.mmax(casadi.fabs(casadi.vertcat(every, opposed)))
-    return dense_function("closure", [x, z, system.p], [z_next, residual])
+    point = [s.x, z, system.p]
+    slopes = Function("slopes", point, [casadi.jacobian(kept, z)], {"cse": True})
+    return newton_step(dense_function("rows", point, [kept, residual]), slopes)
 
 
-def consistent_start(system: System, state: MinimalState) -> tuple[list[float], list[float]]:
+def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float], list[float]]:
     """State x and dependents z of the assembled posture at rest."""
     posture = np.array(system.posture)
-    rest = [0.0] * (len(system.active) + state_count(system))
+    rest = [0.0] * (len(state.velocities) + state_count(system))
     x = [*posture[list(state.positions)], *rest]
     return [float(value) for value in x], [
         float(value) for value in posture[list(state.dependents)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,6 +12,8 @@ from mbs.native.operators import expression, operand
 from mbs.native.schedule import LANES, Batch, Step, gives, needs
 from mbs.native.slots import Leaving, Slots
 from mbs.operations.graph import Graph
+
+_POINTERS = re.compile(r"\b[io]\d+\b")  # of inputs and outputs
 
 _MANY_ZEROS = 4  # in a row, from which they are stored at once
 
@@ -33,15 +36,22 @@ class BlockCode:
 
     def block(self, name: str, number: int, steps: Sequence[Step]) -> str:
         """A C function: loads what earlier ones left, computes, stores what later ones need."""
-        inputs, outputs = range(len(self.graph.inputs)), range(len(self.graph.outputs))
-        lines = [
+        lines = self._body(number, steps)
+        used = set(_POINTERS.findall("\n".join(lines)))
+        inputs = (k for k in range(len(self.graph.inputs)) if f"i{k}" in used)
+        outputs = (k for k in range(len(self.graph.outputs)) if f"o{k}" in used)
+        head = [
             f"static {'NOINLINE ' if self.where.blocks > 1 else ''}void {name}"
             f"(const double *const *in, {self.kind} *const *out, {self.kind} *restrict w)",
             "{",
+            "  (void)in, (void)out, (void)w;",
             *(f"  {self.input(k)};" for k in inputs),
             *(f"  {self.kind} *restrict o{k} = out[{k}];" for k in outputs),
-            *self._stores(self.where.moved.get(number, ())),
         ]
+        return "\n".join([*head, *lines, "}"])
+
+    def _body(self, number: int, steps: Sequence[Step]) -> list[str]:
+        lines = self._stores(self.where.moved.get(number, ()))
         known: set[int] = set()
         of = self.where.of
         for step in steps:
@@ -51,7 +61,7 @@ class BlockCode:
             for n in gives(step):
                 lines += [f"  w[{of[n]}] = t{n};"] if n in of else []
                 lines += self._stores(self.where.outputs.get(n, ()))
-        return "\n".join([*lines, "}"])
+        return lines
 
     def _loads(self, step: Step, known: set[int]) -> list[str]:
         of = self.where.of

@@ -23,8 +23,9 @@ def compiled(
     vector, in about a microsecond: arrays of doubles whose columns follow each other in memory are
     neither converted nor copied. `out=` takes arrays for the outputs. Any other call is as before.
 
-    Without a compiler, or when the Function holds a node that CasADi cannot write as C, the
-    given Function stays interpreted: the answers are the same, only slower.
+    Without a compiler, or when the Function holds a node that CasADi cannot write as C or calls
+    an external function, the given Function stays interpreted: the answers are the same, only
+    slower.
 
     Args:
         function: any Function without free symbols.
@@ -55,6 +56,8 @@ def compiled(
 
 def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
     """The library of a Function and its derivatives; None when they cannot be written as C."""
+    if calls_machine_code([function]):
+        return None
     functions = [function, *_all_derivatives(function, derivatives)]
     library = kernel_library(functions) if fast else None
     if library is not None:
@@ -93,6 +96,15 @@ def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
     for function in functions:
         generator.add(function)
     return str(generator.dump())
+
+
+def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
+    """Whether one of these calls an external function, which C text of it would not contain.
+
+    Args:
+        functions: any Functions.
+    """
+    return any(part.is_a("External") for f in functions for part in f.find_functions())
 
 
 def unwritten(source: str) -> str:

@@ -64,6 +64,12 @@ def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
     return [*steps, *_take(range(len(graph.nodes)), pending)]
 
 
+def plain_order(graph: Graph) -> list[Step]:
+    """Every node that the outputs need and that is computed, in the order of the graph."""
+    live = graph.live()
+    return [k for k, node in enumerate(graph.nodes) if live[k] and node.op not in _FREE]
+
+
 def phases(graph: Graph, late: Mapping[int, int]) -> list[int]:
     """For each node the phase in which it can be computed.
 

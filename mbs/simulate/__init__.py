@@ -2,6 +2,7 @@
 
 from mbs.simulate.fmu import fmu
 from mbs.simulate.run import run
-from mbs.simulate.sweep import Sweep, sweep
+from mbs.simulate.sweep import sweep
+from mbs.simulate.swept import Sweep
 
 __all__ = ["Sweep", "fmu", "run", "sweep"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,9 @@ from pathlib import Path
 from mbs.errors import ExportError, ModelError
 from mbs.files import path_of, write_text
 from mbs.messages import quoted
+from mbs.result import Result
+
+_INDEX = "study.json"
 
 Case = dict[str, float]
 Grid = Mapping[str, Iterable[float]] | Sequence[Mapping[str, float]]
@@ -69,7 +73,7 @@ class Folder:
             ExportError: it cannot be written.
         """
         folder = Folder(_made(path_of(path)))
-        index = folder.path / "study.json"
+        index = folder.path / _INDEX
         text = json.dumps(study, indent=1, sort_keys=True) + "\n"
         known = index.read_bytes() if index.exists() else None
         if known == text.encode():
@@ -86,9 +90,44 @@ class Folder:
         """The file of a case."""
         return self.path / f"case_{number:06d}.npz"
 
+    def keep(self, number: int, answer: Result | str) -> None:
+        """Write the result of a case, or why it failed.
+
+        Raises:
+            ExportError: the folder cannot be written.
+        """
+        said = self._complaint(number)
+        if isinstance(answer, str):
+            write_text(answer, said)
+        else:
+            answer.save(self.file(number))
+            said.unlink(missing_ok=True)
+
+    def complained(self, number: int) -> str:
+        """Why a case has no result."""
+        said = self._complaint(number)
+        return said.read_text(encoding="utf-8") if said.is_file() else "not simulated yet"
+
+    def known(self) -> tuple[str, tuple[Case, ...]]:
+        """The name of the model that is studied here, and the cases.
+
+        Raises:
+            ModelError: there is no study.
+        """
+        try:
+            study = json.loads((self.path / _INDEX).read_text(encoding="utf-8"))
+            return str(study["model"]), tuple(dict(case) for case in study["cases"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise ModelError(
+                f"sweep: {self.path} holds no study; give the folder that a sweep was given"
+            ) from error
+
+    def _complaint(self, number: int) -> Path:
+        return self.path / f"case_{number:06d}.txt"
+
     def missing(self, count: int) -> list[int]:
-        """The numbers of the cases, of so many, that have no result yet."""
-        return [number for number in range(count) if not self.file(number).exists()]
+        """The numbers of the cases, of so many, that have no whole result yet."""
+        return [number for number in range(count) if not zipfile.is_zipfile(self.file(number))]
 
 
 def _made(folder: Path) -> Path:

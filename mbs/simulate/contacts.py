@@ -6,20 +6,23 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from casadi import Function
+from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError
-from mbs.models.contacts import CREEP, Contacts, contacts_of, require_undriven
+from mbs.models.contacts import (
+    Contacts,
+    contacts_of,
+    require_lasting_rows,
+    require_undriven,
+)
 from mbs.models.prescribed import Prescribed
 from mbs.solvers.events import Event
 
 Array = NDArray[np.float64]
 
-_BEYOND = 1e-9
-"""How far beyond a limit a start may be by rounding, relative to the limit where it is large."""
 _LIMITS = {-1: "lower", 1: "upper"}
 
 
@@ -46,13 +49,8 @@ def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> 
             or the loops are over-constrained in a way that changes with the posture.
     """
     contacts = contacts_of(system)
-    require_undriven(system, contacts, motions)
-    if len(contacts) and system.closure is not None and system.closure.varies:
-        raise ModelError(
-            f"{system.name}: the independent rows of its loops change with the posture, which"
-            f" the contact on {contacts.names[0]} does not follow; use a JointStop or"
-            " JointFriction there"
-        )
+    require_undriven(system, contacts, [motion.velocity for motion in motions])
+    require_lasting_rows(system, contacts)
 
 
 def first_modes(system: System, x0: Array, p: Sequence[float]) -> Array:
@@ -66,28 +64,22 @@ def first_modes(system: System, x0: Array, p: Sequence[float]) -> Array:
     Raises:
         ModelError: a coordinate starts beyond a limit.
     """
-    contacts = contacts_of(system)
-    v = x0[system.nq + np.array(contacts.velocities)]
-    way = np.where(np.abs(v) > CREEP, np.sign(v), 0.0)
-    place = np.zeros(len(contacts))
-    limits = Function("limits", [system.p], [*contacts.bounds])(p)
-    for side, values, given in (
-        (-1, limits[0], contacts.has_lower),
-        (1, limits[1], contacts.has_upper),
-    ):
-        for j, position in enumerate(contacts.positions):
-            if position is None or not given[j]:
-                continue
-            limit = float(values[j])
-            beyond, slack = side * (x0[position] - limit), _BEYOND * max(1.0, abs(limit))
-            if beyond > slack:
-                raise ModelError(
-                    f"{system.name}: {contacts.names[j]} starts at {x0[position]:g}, beyond the"
-                    f" {_LIMITS[side]} limit {limit:g} of its rigid stop; start inside, by q0"
-                )
-            if beyond >= -slack and way[j] == 0:
-                place[j] = side
-    return np.concatenate([place, way * np.array(contacts.has_friction)[:, 0]])
+    contacts, nq = contacts_of(system), system.nq
+    q, v = SX.sym("q", nq), SX.sym("v", system.nv)
+    start = Function("start", [q, v, system.p], [*contacts.first(q, v), *contacts.bounds])
+    modes, outside, *limits = (
+        np.array(value)[:, 0] for value in start(x0[:nq], x0[nq : nq + system.nv], p)
+    )
+    for number in np.flatnonzero(outside > 0):
+        side, j = divmod(int(number), len(contacts))
+        position = contacts.positions[j]
+        assert position is not None
+        raise ModelError(
+            f"{system.name}: {contacts.names[j]} starts at {x0[position]:g}, beyond the"
+            f" {_LIMITS[2 * side - 1]} limit {limits[side][j]:g} of its rigid stop; start inside,"
+            " by q0"
+        )
+    return modes
 
 
 def contact_columns(

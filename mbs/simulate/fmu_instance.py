@@ -7,6 +7,7 @@ function behind it still lives. So there is one function here that lives as long
 from __future__ import annotations
 
 import ctypes
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,7 +18,7 @@ Listener = Callable[[int, str], None]
 """Called with the status and the text of a message."""
 
 _LISTENERS: dict[int, Listener] = {}  # by thread
-_LOCK = threading.Lock()
+_LOCK, _LOADING = threading.Lock(), threading.Lock()
 
 
 @contextmanager
@@ -38,13 +39,14 @@ def heard(listener: Listener) -> Iterator[None]:
 
 
 @contextmanager
-def instance(description: Any, folder: str, kind: str) -> Iterator[Any]:
+def instance(description: Any, folder: str, kind: str, watch: Callable[..., None]) -> Iterator[Any]:
     """An instance of an FMU of FMI 2.0 or 3.0 whose messages are heard; it is freed at the end.
 
     Args:
         description: its model description.
         folder: where it was unpacked.
         kind: "CoSimulation" or "ModelExchange".
+        watch: called between communication points, in FMI 3.0 where the FMU offers it.
     """
     from fmpy import fmi2, fmi3
 
@@ -56,21 +58,45 @@ def instance(description: Any, folder: str, kind: str) -> Iterator[Any]:
         ("3", True): fmi3.FMU3Slave,
         ("3", False): fmi3.FMU3Model,
     }
-    fmu = kinds[description.fmiVersion[0], stepped](
-        guid=description.guid,
-        modelIdentifier=interface.modelIdentifier,
-        unzipDirectory=folder,
-        instanceName=description.modelName,
-    )
-    says_why = description.generationTool == "mbs"  # others, asked to log, say everything
+    with _kept_directory():
+        fmu = kinds[description.fmiVersion[0], stepped](
+            guid=description.guid,
+            modelIdentifier=interface.modelIdentifier,
+            unzipDirectory=folder,
+            instanceName=description.modelName,
+        )
+    says_why = str(description.generationTool).startswith(
+        "mbs"
+    )  # others, asked to log, say everything
     if newer:
-        fmu.instantiate(loggingOn=says_why, logMessage=_log_newer)
+        offers = _offered(interface, watch) if stepped else {}
+        fmu.instantiate(loggingOn=says_why, logMessage=_log_newer, **offers)
     else:
         fmu.instantiate(callbacks=_callbacks(), loggingOn=says_why)
     try:
         yield fmu
     finally:
         fmu.freeInstance()
+
+
+@contextmanager
+def _kept_directory() -> Iterator[None]:
+    """A library is loaded by fmpy from its folder: one thread at a time, and back again."""
+    with _LOADING:
+        before = os.getcwd()
+        try:
+            yield
+        finally:
+            os.chdir(before)
+
+
+def _offered(interface: Any, watch: Callable[..., None]) -> dict[str, Any]:
+    """What an instance for co-simulation of FMI 3.0 is told that its host can do."""
+    events = bool(interface.hasEventMode)
+    found: dict[str, Any] = {"eventModeUsed": events, "earlyReturnAllowed": events}
+    if interface.providesIntermediateUpdate:
+        found["intermediateUpdate"] = watch
+    return found
 
 
 @lru_cache(maxsize=1)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.messages import did_you_mean, quoted
-from mbs.simulate.effort import Effort
-from mbs.simulate.signal_function import Signal, signal_function
+from mbs.models.effort import Effort
+from mbs.models.signal_function import Signal, signal_function
 
 Array = NDArray[np.float64]
 

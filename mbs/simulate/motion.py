@@ -14,7 +14,7 @@ from mbs.loops.start import Values
 from mbs.messages import did_you_mean, quoted
 from mbs.models.hybrid_dynamics import hybrid_dynamics
 from mbs.models.prescribed import Prescribed
-from mbs.simulate.signal_function import untraceable
+from mbs.models.signal_function import untraceable
 
 Motion = Mapping[str, float | Function | Callable[[Any], Any]] | None
 _KINDS = ("q", "v", "a")

@@ -11,15 +11,15 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.loops.start import Values, start
+from mbs.models.effort import Effort, effort_function
 from mbs.models.full_state import full_state
+from mbs.progress import progress
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.contacts import contact_columns, every_effort, require_contacts_possible, told
-from mbs.simulate.effort import Effort, effort_function
 from mbs.simulate.inputs import device_columns, device_states, input_function
 from mbs.simulate.legs import Leg, integrated
 from mbs.simulate.motion import Motion, prescribed_motions, started
-from mbs.simulate.progress import progress
 from mbs.simulate.sensor_columns import sensor_columns
 
 Array = NDArray[np.float64]

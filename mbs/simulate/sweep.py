@@ -2,64 +2,44 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+import pickle
 import shutil
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from concurrent.futures import (
+    BrokenExecutor,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    as_completed,
+)
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mbs.assembly import System
-from mbs.errors import MbsError, ModelError
+from mbs.errors import MbsError, ModelError, SolverError
 from mbs.messages import did_you_mean, quoted
+from mbs.progress import progress
 from mbs.result import Result
 from mbs.simulate.cases import Case, Folder, Grid, cases_of
 from mbs.simulate.fmu import fmu
-from mbs.simulate.progress import progress
 from mbs.simulate.run import run
 from mbs.simulate.study import study_of
+from mbs.simulate.swept import Sweep
 
 _START = {".q": "q0", ".v": "v0", ".tau": "tau"}
+_OPTIONS = {
+    function.__name__: [n for n in inspect.signature(function).parameters if n != "quiet"][1:]
+    for function in (run, fmu)
+}
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sweep:
-    """The results of a parameter study; they are read from disk one by one.
-
-    Attributes:
-        cases: name to value, of each simulation.
-        folder: where the results are.
-        failures: number of a case that failed, and what it said.
-    """
-
-    cases: tuple[Case, ...]
-    folder: Folder
-    failures: Mapping[int, str]
-
-    def __repr__(self) -> str:
-        return f"<Sweep: {len(self.cases)} cases, {len(self.failures)} failed, {self.folder.path}>"
-
-    def __len__(self) -> int:
-        return len(self.cases)
-
-    def __iter__(self) -> Iterator[tuple[Case, Result]]:
-        """Each case that succeeded, with its result."""
-        return ((case, self[k]) for k, case in enumerate(self.cases) if k not in self.failures)
-
-    def __getitem__(self, number: int) -> Result:
-        """The result of a case.
-
-        Raises:
-            ModelError: it failed, or there is no such case.
-        """
-        if not isinstance(number, int) or not 0 <= number < len(self.cases):
-            raise ModelError(f"sweep: there is no case {number!r}; they are 0 to {len(self) - 1}")
-        if number in self.failures:
-            raise ModelError(f"sweep: case {number} failed: {self.failures[number]}")
-        return Result.load(self.folder.file(number))
+Answer = tuple[Any, ...] | str
+"""What a case comes to: the parts of a `Result`, which can be sent between processes, or what
+went wrong."""
 
 
 def sweep(
@@ -88,75 +68,173 @@ def sweep(
         duration: [s]; needed for a system.
         folder: where results are kept; one that lasts as long as the answer when left out.
         executor: any executor of `concurrent.futures`, also that of a cluster; this process when
-            left out. Executors of processes need the path of an FMU that all of them can read.
+            left out. Executors of processes need the path of an FMU that all of them can read; the
+            results are sent back and written here.
         quiet: no progress bar.
         **options: further arguments of `run` or `fmu`, the same for all cases.
 
     Returns:
-        the cases and their results.
+        the cases and their results. A case that fails, for whatever reason, does not end the study.
 
     Raises:
-        ModelError: the grid is empty, a name in it is unknown to the system, the folder holds
-            another study, there is no such FMU, a system has no duration, or the model cannot be
-            sent to other processes.
+        ModelError: the grid is empty, a name in it is unknown to the model, there is no such
+            option, the folder holds another study, there is no such FMU, a system has no duration,
+            or the model or an option cannot be sent to other processes.
         ExportError: the folder cannot be written.
+        SolverError: a process of the executor ended.
     """
     cases = cases_of(grid)
     if duration is not None:
         options["duration"] = duration
-    elif isinstance(model, System):
-        raise ModelError(
-            f"sweep: {model.name} is a system and has no duration; give one in seconds"
-        )
-    if not isinstance(executor, Executor | None):
-        raise ModelError(
-            f"sweep: executor is {quoted(executor)}; give one of concurrent.futures, such as"
-            " ThreadPoolExecutor(2)"
-        )
-    if isinstance(model, System):
-        _require_names(model, cases)
-        if executor is not None:
-            _require_threads(executor)
+    _check_options(model, options)
+    simulate = _simulation(model, cases)
+    if executor is not None:
+        _check_executor(model, executor, options)
     study = study_of(model, cases, options)
     kept = tempfile.mkdtemp(prefix="mbs-sweep-") if folder is None else folder
     place = Folder.opened(kept, study)
     if folder is None:
         weakref.finalize(place, shutil.rmtree, kept, ignore_errors=True)
-    tasks = {k: _Task(model, cases[k], options, place.file(k)) for k in place.missing(len(cases))}
+    tasks = {k: _Task(simulate, cases[k], options) for k in place.missing(len(cases))}
     label = f"{len(tasks)} simulations of {study['model']}"
+    failures: dict[int, str] = {}
     with progress(label, 0.0, len(tasks), quiet=quiet) as reached:
         answers = _in_turn(tasks) if executor is None else _spread(tasks, executor)
-        failures: dict[int, str] = {}
-        for done, (number, complaint) in enumerate(answers, start=1):
+        for done, (number, answer) in enumerate(answers, start=1):
+            place.keep(number, answer if isinstance(answer, str) else Result(*answer))
+            if isinstance(answer, str):
+                failures[number] = answer
             reached(float(done))
-            if complaint:
-                failures[number] = complaint
-    return Sweep(cases, place, dict(sorted(failures.items())))
+    numbers = tuple(range(len(cases)))
+    return Sweep(str(study["model"]), cases, place, dict(sorted(failures.items())), numbers)
 
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """One simulation, and the file of its result."""
+    """One simulation."""
 
-    model: System | str | os.PathLike[str]
+    simulate: Callable[[Case, Mapping[str, Any]], Result]
     case: Case
     options: Mapping[str, Any]
-    file: Path
 
-    def __call__(self) -> str:
-        """Simulate and write the result; what went wrong, or nothing."""
+    def __call__(self) -> Answer:
+        """Simulate; what went wrong is an answer too, so that the other cases go on."""
         try:
-            answer = _run(self) if isinstance(self.model, System) else _fmu(self)
+            r = self.simulate(self.case, self.options)
         except MbsError as error:
             return str(error)
-        answer.save(self.file)
-        return ""
+        except Exception as error:
+            return _said(error)
+        return r.time, r.values, dict(r.units), r.name, dict(r.info), r.events
 
 
-def _run(task: _Task) -> Result:
-    assert isinstance(task.model, System)
-    given = _arguments(task.model, task.case)
-    return run(task.model, quiet=True, **_merged(task.options, given))
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Simulation of a system."""
+
+    system: System
+
+    def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
+        given = _arguments(self.system, case)
+        return run(self.system, quiet=True, **_merged(options, given))
+
+
+@dataclass(frozen=True, slots=True)
+class _Fmu:
+    """Simulation of an FMU."""
+
+    path: Path
+    parameters: frozenset[str]
+
+    def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
+        given: dict[str, dict[str, float]] = {}
+        for name, value in case.items():
+            kind = "parameters" if name in self.parameters else "start"
+            given.setdefault(kind, {})[name] = value
+        return fmu(self.path, quiet=True, **_merged(options, given))
+
+
+def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
+    """What simulates a case.
+
+    Raises:
+        ModelError: there is no such model, or it does not have a name of the grid.
+    """
+    if isinstance(model, System):
+        _require_names(model.name, cases, _system_names(model))
+        return _Run(model)
+    if not isinstance(model, (str, os.PathLike)):
+        raise ModelError(f"sweep: {quoted(model)} is no model; give a System or the path of an FMU")
+    path = Path(os.fspath(model)).resolve()
+    if not path.is_file():
+        raise ModelError(f"sweep: {path} cannot be read (no such file); give the path of an FMU")
+    import fmpy
+
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:
+        raise ModelError(f"sweep: {path} is not an FMU: {' '.join(str(error).split())}") from error
+    known = {v.name: v.causality for v in description.modelVariables}
+    _require_names(str(description.modelName), cases, set(known))
+    return _Fmu(path, frozenset(name for name, kind in known.items() if kind == "parameter"))
+
+
+def _system_names(system: System) -> set[str]:
+    positions, speeds = (c.name for c in system.coordinates), [s.name for s in system.speeds]
+    known = {*system.symbol_table, *(f"{name}.q" for name in positions)}
+    return known | {f"{name}{ending}" for name in speeds for ending in (".v", ".tau")}
+
+
+def _require_names(model: str, cases: Sequence[Case], known: set[str]) -> None:
+    """Refuse a name that the model does not have, before anything is simulated."""
+    for name in dict.fromkeys(name for case in cases for name in case):
+        if name not in known:
+            raise ModelError(
+                f"sweep: {model} has no {name!r} to vary; {did_you_mean(name, sorted(known))}"
+            )
+
+
+def _check_options(model: object, options: Mapping[str, Any]) -> None:
+    """Refuse options that the simulation does not have."""
+    if isinstance(model, System) and "duration" not in options:
+        raise ModelError(
+            f"sweep: {model.name} is a system and has no duration; give one in seconds"
+        )
+    simulation = "run" if isinstance(model, System) else "fmu"
+    known = _OPTIONS[simulation]
+    for name in options:
+        if name not in known:
+            raise ModelError(
+                f"sweep: {simulation} has no argument {name!r}; {did_you_mean(name, known)}"
+            )
+
+
+def _check_executor(model: object, executor: object, options: Mapping[str, Any]) -> None:
+    """Refuse what is no executor, and what it cannot send to other processes."""
+    from concurrent.futures import ProcessPoolExecutor  # which loads multiprocessing
+
+    if not isinstance(executor, Executor):
+        raise ModelError(
+            f"sweep: executor is {quoted(executor)}; give one of concurrent.futures, such as"
+            " ThreadPoolExecutor(2)"
+        )
+    if isinstance(model, System) and not isinstance(executor, ThreadPoolExecutor):
+        raise ModelError(
+            "sweep: a System stays in its process; write it by mbs.export.fmu and give the path of"
+            " the FMU, or use a ThreadPoolExecutor"
+        )
+    if isinstance(executor, ProcessPoolExecutor):
+        try:
+            pickle.dumps(dict(options))
+        except Exception as error:
+            raise ModelError(
+                f"sweep: the options cannot be sent to other processes ({error}); give numbers,"
+                " arrays and functions that a module defines"
+            ) from error
 
 
 def _arguments(system: System, case: Case) -> dict[str, dict[str, float]]:
@@ -167,34 +245,6 @@ def _arguments(system: System, case: Case) -> dict[str, dict[str, float]]:
         ending = "" if known else next((e for e in _START if name.endswith(e)), "")
         given.setdefault(_START.get(ending, "parameters"), {})[name.removesuffix(ending)] = value
     return given
-
-
-def _require_names(system: System, cases: Sequence[Case]) -> None:
-    """Refuse a name that the system does not have, before anything is simulated.
-
-    Raises:
-        ModelError: says which one, and what there is.
-    """
-    coordinates = [c.name for c in system.coordinates], [s.name for s in system.speeds]
-    known = {*system.symbol_table, *(f"{name}.q" for name in coordinates[0])}
-    known |= {f"{name}{ending}" for name in coordinates[1] for ending in (".v", ".tau")}
-    for name in dict.fromkeys(name for case in cases for name in case):
-        if name not in known:
-            raise ModelError(
-                f"sweep: {system.name} has no {name!r} to vary; {did_you_mean(name, sorted(known))}"
-            )
-
-
-def _fmu(task: _Task) -> Result:
-    import fmpy
-
-    assert not isinstance(task.model, System)
-    description = fmpy.read_model_description(os.fspath(task.model), validate=False)
-    parameters = {v.name for v in description.modelVariables if v.causality == "parameter"}
-    given: dict[str, Any] = {}
-    for name, value in task.case.items():
-        given.setdefault("parameters" if name in parameters else "start", {})[name] = value
-    return fmu(task.model, quiet=True, **_merged(task.options, given))
 
 
 def _merged(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -211,28 +261,31 @@ def _merged(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, A
     return merged
 
 
-def _in_turn(tasks: Mapping[int, Callable[[], str]]) -> Iterator[tuple[int, str]]:
+def _in_turn(tasks: Mapping[int, _Task]) -> Iterator[tuple[int, Answer]]:
     return ((number, task()) for number, task in tasks.items())
 
 
-def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[int, str]]:
-    futures = {executor.submit(task): number for number, task in tasks.items()}
+def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[int, Answer]]:
+    futures: dict[Future[Answer], int] = {}
     try:
+        for number, task in tasks.items():
+            futures[executor.submit(task)] = number
         for future in as_completed(futures):
-            yield futures[future], future.result()
+            yield futures[future], _answered(future)
+    except BrokenExecutor as error:
+        raise SolverError(
+            f"sweep: a process of the executor ended ({error}); start the study again with the same"
+            " folder, and what was written is kept"
+        ) from error
     finally:  # those that have not begun when one breaks the study off
         for future in futures:
             future.cancel()
 
 
-def _require_threads(executor: Executor) -> None:
-    """Refuse a System where it would have to be sent to another process.
-
-    Raises:
-        ModelError: says what to give.
-    """
-    if not isinstance(executor, ThreadPoolExecutor):
-        raise ModelError(
-            "sweep: a System stays in its process; write it by mbs.export.fmu and give the path of"
-            " the FMU, or use a ThreadPoolExecutor"
-        )
+def _answered(future: Future[Answer]) -> Answer:
+    try:
+        return future.result()
+    except BrokenExecutor:
+        raise
+    except Exception as error:  # lost on the way, such as a worker of a cluster
+        return _said(error)

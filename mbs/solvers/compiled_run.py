@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from mbs.errors import SolverError
 from mbs.native import cached_library
-from mbs.native.compiled import generated, unwritten
+from mbs.native.compiled import calls_machine_code, generated, unwritten
 from mbs.native.compiler import flags_for
 from mbs.solvers.events import Event, fired_of
 from mbs.solvers.failures import failed
@@ -45,6 +45,8 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     Raises:
         CompilerError: the compiler refused the code.
     """
+    if calls_machine_code(equations.all):
+        return None
     source = generated(equations.all)
     if unwritten(source):
         return None

@@ -1,8 +1,39 @@
-"""Two models that the tests of FMUs share."""
+"""The models that the tests of FMUs share."""
+
+import dataclasses
+from typing import NamedTuple
 
 import casadi as ca
 
-from mbs.export.fmu.description import FmuModel, State, Variable
+from mbs.export.fmu.description import FmuModel, Jumps, State, Variable
+
+
+class Point(NamedTuple):
+    """The symbols of a model without loops."""
+
+    t: ca.SX
+    x: ca.SX
+    z: ca.SX
+    u: ca.SX
+    p: ca.SX
+
+
+def point_of(states: int, inputs: int, parameters: int) -> Point:
+    """Symbols of these sizes; the parameters are followed by the modes."""
+    sizes = (1, states, 0, inputs, parameters)
+    return Point(*(ca.SX.sym(name, n) for name, n in zip("txzup", sizes, strict=True)))
+
+
+def moving(name: str, unit: str, rate: str, description: str, **options: float) -> State:
+    """A state that is an output too."""
+    return State(
+        name=name,
+        unit=unit,
+        derivative_unit=rate,
+        description=description,
+        output=True,
+        **options,
+    )
 
 
 def pendulum() -> FmuModel:
@@ -132,4 +163,142 @@ def slider_crank() -> FmuModel:
         ),
         closure=closure,
         stop_time=2.0,
+    )
+
+
+def ball() -> FmuModel:
+    """A ball that falls on a floor, until it rests there."""
+    point = point_of(2, 0, 4)
+    (h, v), (g, e, slow, rest) = ca.vertsplit(point.x), ca.vertsplit(point.p)
+    fired, back = ca.SX.sym("fired"), -e * v
+    stays = back <= slow
+    return FmuModel(
+        name="ball",
+        description="A ball on a floor",
+        states=(
+            moving("h", "m", "m/s", "height", start=1.0),
+            moving("v", "m/s", "m/s2", "velocity"),
+        ),
+        outputs=(Variable(name="energy", unit="J", description="per mass"),),
+        parameters=(
+            Variable(name="g", unit="m/s2", start=10.0, description="gravity"),
+            Variable(name="e", start=0.8, min=0.0, max=1.0, description="restitution"),
+            Variable(name="slow", unit="m/s", start=1e-3, description="it rests below"),
+        ),
+        rhs=ca.Function("rhs", point, [ca.vertcat(v, -g * (1 - rest)), g * h + v**2 / 2]),
+        jumps=Jumps(
+            modes=(Variable(name="rests", description="1 on the floor"),),
+            first=ca.Function("first", point, [0, -h]),
+            indicators=ca.Function("indicators", point, [ca.if_else(rest, 1, h)]),
+            jump=ca.Function(
+                "jump",
+                [*point, fired],
+                [ca.if_else(stays, ca.SX(2, 1), ca.vertcat(h, ca.fmax(v, back))), stays],
+            ),
+            names=("floor",),
+        ),
+        stop_time=3.0,
+    )
+
+
+def clapper() -> FmuModel:
+    """A pendulum between two stops, which counts its impacts."""
+    point, fired = point_of(2, 1, 5), ca.SX.sym("fired", 2)
+    (q, w), (length, e, low, high, hits) = ca.vertsplit(point.x), ca.vertsplit(point.p)
+    outward = ca.if_else(fired[1], w, -w) > 0
+    xdot = ca.vertcat(w, point.u - 9.81 / length * ca.sin(q))
+    return FmuModel(
+        name="clapper",
+        description="A pendulum between stops",
+        states=(
+            moving("q", "rad", "rad/s", "angle", start=1.0),
+            moving("w", "rad/s", "rad/s2", "angular velocity", nominal=3.0),
+        ),
+        inputs=(Variable(name="push", unit="rad/s2", description="torque over inertia"),),
+        outputs=(Variable(name="energy", unit="J", description="over inertia"),),
+        parameters=(
+            Variable(name="length", unit="m", start=0.5, min=0.01, description="length"),
+            Variable(name="e", start=0.9, min=0.0, max=1.0, description="restitution"),
+            Variable(name="low", unit="rad", start=-0.5, description="lower stop"),
+            Variable(name="high", unit="rad", start=1.2, description="upper stop"),
+        ),
+        rhs=ca.Function("rhs", point, [xdot, w**2 / 2 - 9.81 / length * ca.cos(q)]),
+        jumps=Jumps(
+            modes=(Variable(name="hits", description="number of impacts"),),
+            first=ca.Function("first", point, [0, ca.vertcat(low - q, q - high)]),
+            indicators=ca.Function("indicators", point, [ca.vertcat(q - low, high - q)]),
+            jump=ca.Function(
+                "jump", [*point, fired], [ca.vertcat(q, ca.if_else(outward, -e * w, w)), hits + 1]
+            ),
+            names=("low stop", "high stop"),
+        ),
+        stop_time=3.0,
+    )
+
+
+def block() -> FmuModel:
+    """A block with Coulomb friction and a force on it."""
+    point, fired = point_of(2, 1, 3), ca.SX.sym("fired", 2)
+    (_, v), (mass, most, mode) = ca.vertsplit(point.x), ca.vertsplit(point.p)
+    force, slides = point.u, mode != 0
+    a = ca.if_else(slides, (force - most * mode) / mass, 0)
+    first = ca.if_else(slides, mode * v, most - force)
+    begins = ca.if_else(fired[0], 1, ca.if_else(fired[1], -1, 0))
+    return FmuModel(
+        name="block",
+        description="A block with friction",
+        states=(
+            moving("s", "m", "m/s", "way"),
+            moving("v", "m/s", "m/s2", "velocity", start=1.0),
+        ),
+        inputs=(Variable(name="force", unit="N", description="along the way"),),
+        outputs=(Variable(name="a", unit="m/s2", description="acceleration"),),
+        parameters=(
+            Variable(name="mass", unit="kg", start=2.0, min=1e-3, description="mass"),
+            Variable(name="most", unit="N", start=3.0, min=0.0, description="friction force"),
+        ),
+        rhs=ca.Function("rhs", point, [ca.vertcat(v, a), a]),
+        jumps=Jumps(
+            modes=(Variable(name="mode", description="0 sticks; 1, -1 slides"),),
+            first=ca.Function("first", point, [ca.sign(v), ca.SX(2, 1)]),
+            indicators=ca.Function(
+                "indicators", point, [ca.vertcat(first, ca.if_else(slides, 1, most + force))]
+            ),
+            jump=ca.Function(
+                "jump",
+                [*point, fired],
+                [ca.vertcat(point.x[0], ca.if_else(slides, 0, v)), ca.if_else(slides, 0, begins)],
+            ),
+            names=("block forwards", "block backwards"),
+        ),
+        stop_time=2.0,
+    )
+
+
+def stopped_crank() -> FmuModel:
+    """The slider-crank whose slider meets a stop: a limit of a dependent coordinate."""
+    model = slider_crank()
+    t, x, u = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("u")
+    z, p, fired = ca.SX.sym("z", 2), ca.SX.sym("p", 8), ca.SX.sym("fired")
+    point, (place, e, hits) = [t, x, z, u, p], ca.vertsplit(p[5:])
+    crank = p[0]
+    rate = -crank * ca.sin(x[0]) - crank * ca.cos(x[0]) * ca.tan(z[0])
+    turned = ca.if_else(rate * x[1] < 0, -e * x[1], x[1])
+    return dataclasses.replace(
+        model,
+        name="stopped_crank",
+        parameters=(
+            *model.parameters,
+            Variable(name="place", unit="m", start=0.35, description="of the stop"),
+            Variable(name="e", start=0.7, min=0.0, max=1.0, description="restitution"),
+        ),
+        rhs=ca.Function("rhs", point, model.rhs(t, x, z, u, p[:5])),
+        closure=ca.Function("closure", [x, z, p[:7]], model.closure(x, z, p[:5])),
+        jumps=Jumps(
+            modes=(Variable(name="hits", description="number of impacts"),),
+            first=ca.Function("first", point, [0, place - z[1]]),
+            indicators=ca.Function("indicators", point, [z[1] - place]),
+            jump=ca.Function("jump", [*point, fired], [ca.vertcat(x[0], turned), hits + 1]),
+            names=("slider stop",),
+        ),
     )

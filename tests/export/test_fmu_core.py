@@ -13,7 +13,8 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.validation import validate_fmu
-from fmu_models import pendulum, slider_crank
+from fmu_instances import Fmu
+from fmu_models import clapper, pendulum, slider_crank
 
 from mbs.errors import CompilerError, ExportError
 from mbs.export.fmu import fmi2_xml
@@ -24,55 +25,7 @@ from mbs.native import find_compiler
 from mbs.solvers import integrate
 
 SOURCES = FACES["2.0"].compiled("dopri5")
-MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}
-
-
-class Fmu:
-    """An unpacked FMU; `open` gives instances, all freed at the end."""
-
-    def __init__(self, path, folder):
-        self.path = path
-        self.folder = fmpy.extract(str(path), str(folder))
-        self.description = fmpy.read_model_description(self.folder)
-        self.references = {v.name: v.valueReference for v in self.description.modelVariables}
-
-    def open(self, kind, upto="run", start=None, tolerance=None, guid=None, callbacks=None):
-        instance = kind(
-            guid=guid or self.description.guid,
-            unzipDirectory=self.folder,
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName="instance",
-        )
-        instance.instantiate(callbacks=callbacks)
-        self.prepare(instance, upto, start, tolerance)
-        return instance
-
-    def prepare(self, instance, upto="run", start=None, tolerance=None):
-        self.set(instance, start or {})
-        if upto == "instantiated":
-            return
-        instance.setupExperiment(startTime=0.0, tolerance=tolerance)
-        instance.enterInitializationMode()
-        if upto == "initialization":
-            return
-        instance.exitInitializationMode()
-        if isinstance(instance, FMU2Model) and upto == "run":
-            instance.newDiscreteStates()
-            instance.enterContinuousTimeMode()
-
-    def get(self, instance, *names):
-        return np.array(instance.getReal([self.references[n] for n in names]))
-
-    def set(self, instance, values):
-        instance.setReal([self.references[n] for n in values], list(values.values()))
-
-    def step(self, instance, steps, h=0.01, begin=0.0):
-        rows = []
-        names = [v.name for v in self.description.modelVariables if v.causality == "output"]
-        for k in range(steps):
-            instance.doStep(begin + k * h, h)
-            rows.append(self.get(instance, *names))
-        return np.array(rows)
+MODELS = {"pendulum": pendulum, "slider_crank": slider_crank, "clapper": clapper}
 
 
 @pytest.fixture(scope="module")
@@ -312,7 +265,6 @@ def test_directional_derivatives_are_total(fmu):
     with pytest.raises(FMICallException):
         instance.getDirectionalDerivative([fmu.references[known[-1]]], [0], [1.0])
     instance.freeInstance()
-
 
 
 def test_communication_steps_do_not_matter(fmu):

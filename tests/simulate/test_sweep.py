@@ -1,14 +1,21 @@
 """Parameter studies over executors, interrupted and resumed."""
 
 import inspect
+import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import mbs
-from mbs.errors import ExportError, ModelError
+from mbs.errors import ExportError, ModelError, SolverError
+from mbs.result import Result
 
 
 def pendulum(m=2.0):
@@ -171,16 +178,197 @@ def test_a_folder_that_cannot_be_made(system, tmp_path):
         mbs.simulate.sweep(system, GRID, 0.1, folder=tmp_path / "taken", **OPTIONS)
 
 
-def test_a_broken_off_study_begins_no_further_case(system, monkeypatch):
+def test_a_broken_off_study_begins_no_further_case(system, tmp_path, monkeypatch):
     begun, first = [], threading.Event()
 
-    def broken(*arguments, **options):
+    def simulated(*arguments, **options):
         begun.append(options["parameters"])
-        if len(begun) == 1:
-            raise RuntimeError("broken")
-        first.wait(0.2)
+        first.wait(0.05)
+        return Result(np.zeros(1), np.zeros((1, 1)), {"x": "1"})
 
-    monkeypatch.setattr(inspect.getmodule(mbs.simulate.sweep), "run", broken)
-    with ThreadPoolExecutor(1) as executor, pytest.raises(RuntimeError, match="broken"):
+    def full(*arguments):
+        raise ExportError("the disk is full")
+
+    home = inspect.getmodule(mbs.simulate.sweep)
+    monkeypatch.setattr(home, "run", simulated)
+    monkeypatch.setattr(home.Folder, "keep", full)
+    with ThreadPoolExecutor(1) as executor, pytest.raises(ExportError, match="disk is full"):
         mbs.simulate.sweep(system, {"L": [0.1] * 50}, 0.1, executor=executor, **OPTIONS)
     assert len(begun) < 50
+
+
+def test_any_error_of_a_case_is_kept_with_its_sentence(system, tmp_path, monkeypatch):
+    def broken(*arguments, **options):
+        if options["parameters"]["L"] == 0.6:
+            raise ZeroDivisionError("no length")
+        return Result(np.zeros(1), np.zeros((1, 1)), {"x": "1"})
+
+    monkeypatch.setattr(inspect.getmodule(mbs.simulate.sweep), "run", broken)
+    grid = {"L": [0.4, 0.6, 0.8]}
+    study = mbs.simulate.sweep(system, grid, 0.1, folder=tmp_path / "s", **OPTIONS)
+    assert study.failures == {1: "ZeroDivisionError: no length"}
+    again = mbs.simulate.Sweep.open(tmp_path / "s")
+    assert again.failures == study.failures
+    monkeypatch.undo()
+    healed = mbs.simulate.sweep(system, grid, 0.1, folder=tmp_path / "s", **OPTIONS)
+    assert not healed.failures
+    assert not mbs.simulate.Sweep.open(tmp_path / "s").failures
+    assert healed[0].names == ("x",)  # that of before
+    assert "q1.q" in healed[1]
+
+
+def test_cases_are_counted_from_the_end_and_sliced(system):
+    study = mbs.simulate.sweep(system, {"m": [1.0, 0.0, 3.0]}, 0.1, q0={"q1": 0.3}, **OPTIONS)
+    assert np.array_equal(study[-1].values, study[2].values)
+    assert not np.array_equal(study[0]["q1.tau"], study[-1]["q1.q"])
+    part = study[1:]
+    assert part.cases == ({"m": 0.0}, {"m": 3.0})
+    assert list(part.failures) == [0]
+    assert np.array_equal(part[1].values, study[2].values)
+    assert np.array_equal(study[::-1][0].values, study[2].values)
+    assert len(study[:0]) == 0
+    assert study[np.int64(2)].name == "pendulum"
+    for wrong in (3, -4, "first", 1.0):
+        with pytest.raises(ModelError, match=r"there is no case .*; they are 0 to 2, or -1 for"):
+            study[wrong]
+
+
+def test_a_study_prints_its_cases(system):
+    study = mbs.simulate.sweep(system, {"m": [1.0, 0.0], "L": [0.5]}, 0.1, **OPTIONS)
+    lines = str(study).splitlines()
+    assert lines[0].startswith("Sweep of pendulum: 2 cases, 1 failed, ")
+    assert lines[1].split() == ["case", "m", "L"]
+    assert lines[2].split() == ["0", "1", "0.5"]
+    assert lines[3].split(maxsplit=3) == ["1", "0", "0.5", study.failures[1]]
+    many = mbs.simulate.Sweep("arm", tuple({"m": float(k)} for k in range(30)), None, {}, ())
+    assert "and 10 more" in str(replace(many, folder=study.folder))
+
+
+def test_one_number_of_each_case(system):
+    study = mbs.simulate.sweep(system, GRID | {"m": [2.0, 0.0]}, 0.2, **OPTIONS)
+    lowest = study.summary({"lowest": lambda result: result["q1.q"].min()})
+    assert list(lowest) == ["lowest"]
+    assert np.array_equal(np.isnan(lowest["lowest"]), [False, True] * 6)
+    assert lowest["lowest"][10] == study[10]["q1.q"].min()
+    ends = study.summary()
+    assert ends["q1.q.end"][4] == study[4]["q1.q"][-1]
+    with pytest.raises(ModelError, match=r"measure 'x' gives no number of case 0 \(.*'nothing'"):
+        study.summary({"x": lambda result: result["nothing"]})
+    with pytest.raises(ModelError, match="measure 'L' has the name of what varies; rename it"):
+        study.summary({"L": lambda result: 1.0})
+
+
+def test_tables_of_a_study(system):
+    pandas = pytest.importorskip("pandas")
+    xarray = pytest.importorskip("xarray")
+    study = mbs.simulate.sweep(system, GRID, 0.2, **OPTIONS)
+    frame = study.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert frame["L"].tolist() == [0.4] * 3 + [0.6] * 3
+    assert frame.loc[5, "q1.q.end"] == study[5]["q1.q"][-1]
+    table = study.to_xarray({"lowest": lambda result: result["q1.q"].min()})
+    assert isinstance(table, xarray.Dataset)
+    found = table["lowest"].sel({"L": 0.6, "q1.q": 0.2})
+    assert float(found) == study[4]["q1.q"].min()
+    listed = study[1:].to_xarray({"lowest": lambda result: result["q1.q"].min()})
+    assert listed["lowest"].dims == ("case",)
+    assert listed["L"].values.tolist() == [0.4, 0.4, 0.6, 0.6, 0.6]
+
+
+def test_without_pandas_the_message_says_what_to_install(system, monkeypatch):
+    study = mbs.simulate.sweep(system, {"L": [0.4]}, 0.1, **OPTIONS)
+    for name, method in (("pandas", study.to_pandas), ("xarray", study.to_xarray)):
+        monkeypatch.setitem(sys.modules, name, None)
+        with pytest.raises(ModelError, match=f"{name} is not installed; run: pip install {name}"):
+            method()
+
+
+def test_options_that_there_are_not(system, fmu):
+    with pytest.raises(ModelError, match="run has no argument 'stepp'; did you mean 'step'"):
+        mbs.simulate.sweep(system, GRID, 0.1, stepp=0.1)
+    with pytest.raises(ModelError, match="fmu has no argument 'q0'; use one of"):
+        mbs.simulate.sweep(fmu, GRID, 0.1, q0={})
+
+
+def test_names_that_an_fmu_does_not_have(fmu):
+    with pytest.raises(ModelError, match="pendulum has no 'mass' to vary; use one of"):
+        mbs.simulate.sweep(fmu, {"mass": [1.0]}, 0.1, **OPTIONS)
+
+
+def test_an_executor_that_cannot_have_the_options(fmu):
+    inputs = {"q1.tau": lambda time: time}
+    with ProcessPoolExecutor(1) as executor, pytest.raises(ModelError, match="cannot be sent to"):
+        mbs.simulate.sweep(fmu, GRID, 0.1, inputs=inputs, executor=executor, **OPTIONS)
+
+
+def test_a_process_that_ends_ends_the_study_and_what_is_written_stays(fmu, tmp_path):
+    folder = tmp_path / "study"
+    with ProcessPoolExecutor(1) as executor:
+        executor.submit(os._exit, 1)
+        with pytest.raises(SolverError, match="a process of the executor ended"):
+            mbs.simulate.sweep(fmu, GRID, 0.1, folder=folder, executor=executor, **OPTIONS)
+    assert not mbs.simulate.sweep(fmu, GRID, 0.1, folder=folder, **OPTIONS).failures
+
+
+KILLED = """
+import sys
+import mbs
+mbs.simulate.sweep(sys.argv[1], {"q1.q": [k / 100 for k in range(24)]}, 0.5, folder=sys.argv[2],
+    step=0.1, tolerance=1e-9, quiet=True)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such signal")
+def test_a_killed_study_loses_nothing(fmu, tmp_path):
+    folder = tmp_path / "study"
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(fmu), str(folder)]) as process:
+        while process.poll() is None and len(list(folder.glob("case_*.npz"))) < 4:
+            time.sleep(0.002)
+        process.kill()
+    assert process.returncode == -signal.SIGKILL
+    written = {file: file.stat().st_mtime_ns for file in folder.glob("case_*.npz")}
+    part = mbs.simulate.Sweep.open(folder)
+    assert 4 <= len(written) < 24
+    assert len(part.failures) == 24 - len(written)
+    assert set(part.failures.values()) == {"not simulated yet"}
+    assert len(list(part)) == len(written)  # each reads back
+    grid = {"q1.q": [k / 100 for k in range(24)]}
+    study = mbs.simulate.sweep(fmu, grid, 0.5, folder=folder, **OPTIONS)
+    assert not study.failures
+    assert {file: file.stat().st_mtime_ns for file in written} == written
+    alone = mbs.simulate.sweep(fmu, grid, 0.5, **OPTIONS)
+    assert all(np.array_equal(study[k].values, alone[k].values) for k in range(24))
+
+
+def test_a_result_that_was_cut_off_is_made_again(system, tmp_path):
+    study = mbs.simulate.sweep(system, GRID, 0.2, folder=tmp_path / "s", **OPTIONS)
+    whole = study[3]
+    file = study.folder.file(3)
+    file.write_bytes(file.read_bytes()[:500])
+    with pytest.raises(ModelError, match="is no saved result"):
+        study[3]
+    again = mbs.simulate.sweep(system, GRID, 0.2, folder=tmp_path / "s", **OPTIONS)
+    assert np.array_equal(again[3].values, whole.values)
+
+
+def test_folders_without_a_study(tmp_path):
+    with pytest.raises(ModelError, match="holds no study; give the folder that a sweep was given"):
+        mbs.simulate.Sweep.open(tmp_path)
+    (tmp_path / "study.json").write_text("[]")
+    with pytest.raises(ModelError, match="holds no study"):
+        mbs.simulate.Sweep.open(tmp_path)
+
+
+def test_a_cluster_simulates_an_fmu_and_gives_the_same_bits(fmu, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    options = {"dashboard_address": None, "local_directory": str(tmp_path)}
+    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options)
+    with cluster, distributed.Client(cluster) as client:
+        executor = client.get_executor()
+        grid = {**GRID, "m": [2.0, 0.0]}
+        study = mbs.simulate.sweep(fmu, grid, 0.5, executor=executor, **OPTIONS)
+    alone = mbs.simulate.sweep(fmu, grid, 0.5, **OPTIONS)
+    assert study.failures == alone.failures
+    assert len(study.failures) == 6
+    for (_, result), (_, same) in zip(study, alone, strict=True):
+        assert np.array_equal(result.values, same.values)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from casadi import DM, SX
 from support.base_robots import HALF, row, system
 
 UP, ALONG_Y, OBLIQUE, NONE = (0, 0, -9.81), (0, -9.81, 0), (3, -4, -7), (0, 0, 0)
@@ -33,6 +36,24 @@ RPP = [row(0), row(1, "prismatic"), row(2, "prismatic", alpha=HALF)]
 PRP = [row(0, "prismatic"), row(1), row(2, "prismatic", alpha=HALF)]
 PLANAR = [row(0), row(1, d=0.4), row(2, d=0.3)]
 CART_POLE = [row(0, "prismatic", alpha=HALF, theta=HALF), row(1, alpha=HALF)]
+TWO_ARMS = [
+    row(0),
+    row(1, gamma=0.4, b=0.3, alpha=HALF, d=0.2),
+    row(2, d=0.35),
+    row(3, alpha=HALF, r=0.1),
+    row(1, gamma=-0.4, b=0.3, alpha=HALF, d=0.2),
+    row(5, d=0.35),
+    row(6, alpha=HALF),
+]
+RP_BRANCH = [
+    row(0),
+    row(1, d=0.3),
+    row(2, alpha=HALF, d=0.3),
+    row(2, gamma=0.5, b=0.2, alpha=0.7, d=0.3),
+    row(4, "prismatic", alpha=HALF, theta=0.7, d=0.3),
+]
+TWO_ROOTS = [row(0), row(1, alpha=HALF), row(0, "prismatic", b=0.4, alpha=HALF), row(3, d=0.3)]
+ELBOW = row(1, d=0.3)
 PARALLELOGRAM = [
     row(0, actuated=True),
     row(1, d=0.5, actuated=False),
@@ -42,15 +63,22 @@ PARALLELOGRAM = [
 ]
 
 
-def parallelogram(gravity):
+def parallelogram(gravity, rows=PARALLELOGRAM, **values):
     """A parallelogram on the base, assembled away from the posture in which it is flat."""
     return system(
         "parallelogram",
-        PARALLELOGRAM,
+        rows,
         gravity,
         loop=[{"cut": [4, 5], "joint": "revolute"}],
         guess={"q1": 1.0, "q2": -1.0, "q3": 1.0},
+        **values,
     )
+
+
+def under(robot, gravity):
+    """The same system under another gravity."""
+    tree = replace(robot.tree, gravity=SX(DM(gravity)))
+    return replace(robot, tree=tree, _cache={})
 
 
 OPEN = {
@@ -73,6 +101,8 @@ OPEN = {
     "planar_2r": (PLANAR[:2], ALONG_Y, (6, 7, 11)),
     "planar_2r_level": (PLANAR[:2], LEVEL, (4, 5, 9)),
     "planar_3r": (PLANAR, ALONG_Y, (9, 11, 17)),
+    "two_arms": (TWO_ARMS, UP, (43, 47, 61)),
+    "rp_branch": (RP_BRANCH, UP, (22, 25, 35)),
     "cart_pole": (CART_POLE, UP, (4, 4, 8)),
     "hoist_pole": ([row(0, "prismatic"), row(1, alpha=HALF)], UP, (4, 5, 9)),
     "slider_level": (CART_POLE[:1], UP, (1, 1, 3)),
@@ -81,3 +111,16 @@ OPEN = {
     "pendulum": ([row(0)], ALONG_Y, (3, 3, 5)),
 }
 """Rows, gravity, and counts of inertial parameters, then with rotors, then with friction too."""
+
+CATALOGUE = {
+    "puma560": (None, (36, 40, 52)),
+    "puma560_oblique": (OBLIQUE, (38, 42, 54)),
+    "puma560_weightless": (NONE, (34, 38, 50)),
+    "rx90": (None, (36, 40, 52)),
+    "stanford": (None, (33, 37, 49)),
+    "stanford_oblique": (OBLIQUE, (35, 39, 51)),
+    "stanford_weightless": (NONE, (31, 35, 47)),
+    "scara": (None, (8, 11, 19)),
+    "panda": (None, (43, 48, 62)),
+}
+"""Robots of the catalogue, gravity if not their own, and the same counts."""

@@ -23,6 +23,7 @@ def four_bar(driven="j1"):
     m.connect(b.right, Revolute("j3"), c.right)
     m.connect(m.world.at(0.8), Revolute("j4", actuated=driven == "j4"), c.left)
     m.add(AbsoluteSensor("tip", b.at(0.5, 0.3, 0.1)))
+    m.add_frame("probe", b.at(0.5, 0.3, 0.1))
     m.add(RelativeSensor("seen", c, b.at(0.2, 0.1, 0)))
     m.add(DistanceSensor("reach", m.world, c.right))
     m.add(WrenchSensor("pin", "j3"))

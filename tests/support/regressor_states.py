@@ -55,6 +55,22 @@ def state_of(system, seed=0):
     return np.array(system.posture), rng.normal(size=n), rng.normal(size=n)
 
 
+def moving(name):
+    """A system, and a base that moves anyhow."""
+    system = turret() if name == "turret" else system_of(name)
+    rng = np.random.default_rng(11)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    return system, (*rng.uniform(-2, 2, (2, 6)), turn * np.linalg.det(turn))
+
+
+def turret():
+    """A rotor that stands on the base and spins with the first joint."""
+    m = Mechanism("turret", gravity=(1, 2, -9))
+    gun = m.add(Body("gun", mass=2, com=(0.1, 0.2, 0.3), inertia=(1, 2, 3)))
+    m.connect(m.world, Revolute("j", rotor=Rotor(inertia=0.1, ratio=30, axis="x")), gun)
+    return m.assemble()
+
+
 class Motion:
     """Symbols of a state, and derivatives in time along it."""
 

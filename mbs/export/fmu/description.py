@@ -1,18 +1,19 @@
 """The one description of an FMU, from which both its XML file and its C tables are written."""
 
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import casadi
 
-from mbs.errors import ExportError
-from mbs.units import UNITS
+from mbs.export.fmu.about import About
+from mbs.export.fmu.description_checks import check
 
 Solver = Literal["dopri5", "rodas", "rk4"]
-Kind = Literal["state", "derivative", "input", "output", "parameter", "mode", "dependent"]
+Kind = Literal[
+    "state", "derivative", "input", "output", "parameter", "mode", "dependent", "indicator"
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +28,7 @@ class Variable:
         min: least value; a parameter below it is refused.
         max: greatest value; a parameter above it is refused.
         description: one line for people.
+        fixed: a parameter that keeps its value once the motion has begun.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Variable:
     min: float | None = None
     max: float | None = None
     description: str = ""
+    fixed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +83,40 @@ class Jumps:
 
 
 @dataclass(frozen=True, slots=True)
+class Member:
+    """A variable of a terminal.
+
+    Attributes:
+        name: in the terminal, such as "torque".
+        variable: its name in the FMU.
+        kind: "signal"; "inflow" or "outflow" for a force or torque that two terminals share.
+    """
+
+    name: str
+    variable: str
+    kind: Literal["signal", "inflow", "outflow"] = "signal"
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """Variables that are connected together, as at a flange.
+
+    Attributes:
+        name: unique among terminals.
+        kind: what it may be connected to.
+        members: its variables.
+        matching: rule by which members of two terminals find each other.
+        description: one line for people.
+    """
+
+    name: str
+    kind: str
+    members: tuple[Member, ...]
+    matching: Literal["plug", "bus", "sequence"] = "bus"
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Entry:
     """A variable at its place: the value reference is the index in the table of entries."""
 
@@ -112,6 +149,9 @@ class FmuModel:
             equations; "rk4", with the fixed step `internal_step`.
         internal_step: length of the steps of "rk4", s.
         documentation: text for `documentation/index.html`; a blank line starts a paragraph.
+        terminals: variables that belong together.
+        sources: name and text of further C files, which are compiled with the FMU.
+        about: what people read and see of it; None where only its variables are known.
     """
 
     name: str
@@ -130,11 +170,12 @@ class FmuModel:
     solver: Solver = "dopri5"
     internal_step: float = 0.001
     documentation: str = ""
+    terminals: tuple[Terminal, ...] = ()
+    sources: tuple[tuple[str, str], ...] = ()
+    about: About | None = None
 
     def __post_init__(self) -> None:
-        _check_names(self)
-        _check_numbers(self)
-        _check_functions(self)
+        check(self)
 
     @property
     def identifier(self) -> str:
@@ -169,6 +210,7 @@ class FmuModel:
             ("parameter", len(self.parameters)),
             ("mode", len(self.modes)),
             ("dependent", len(self.dependents)),
+            ("indicator", len(self.jumps.names) if self.jumps else 0),
         )
         place = 0
         for name, count in order:
@@ -202,78 +244,6 @@ def _entries(model: FmuModel) -> Iterator[Entry]:
     yield from (Entry("parameter", v) for v in model.parameters)
     yield from (Entry("mode", v) for v in model.modes)
     yield from (Entry("dependent", v) for v in model.dependents)
-
-
-def _check_names(model: FmuModel) -> None:
-    if not model.name:
-        raise ExportError("FMU: the model has no name; give it one")
-    seen: set[str] = set()
-    for entry in model.entries:
-        name = entry.variable.name
-        if not name or not name.isprintable():
-            raise ExportError(f"FMU {model.name}: {name!r} is no name; use printable characters")
-        if name in seen:
-            raise ExportError(f"FMU {model.name}: two variables are called {name!r}; rename one")
-        seen.add(name)
-
-
-def _check_numbers(model: FmuModel) -> None:
-    if model.solver not in get_args(Solver):
-        raise ExportError(
-            f"FMU {model.name}: solver is {model.solver!r}; use {' or '.join(get_args(Solver))}"
-        )
-    for entry in model.entries:
-        v = entry.variable
-        place = f"FMU {model.name}: {v.name}"
-        if v.unit not in UNITS:
-            raise ExportError(f"{place} has unit {v.unit!r}; use one of {', '.join(UNITS)}")
-        if not math.isfinite(v.start):
-            raise ExportError(f"{place} starts at {v.start}; use a finite number")
-        if not (v.nominal > 0 and math.isfinite(v.nominal)):
-            raise ExportError(f"{place} has nominal {v.nominal}; use a positive number")
-        low = -math.inf if v.min is None else v.min
-        high = math.inf if v.max is None else v.max
-        if not low <= v.start <= high and entry.kind == "parameter":
-            raise ExportError(f"{place} starts at {v.start}, outside {low} to {high}; move one")
-    for what, value in (
-        ("stop time", model.stop_time),
-        ("tolerance", model.tolerance),
-        ("step size", model.step_size),
-        ("internal step", model.internal_step),
-    ):
-        if not (value > 0 and math.isfinite(value)):
-            raise ExportError(f"FMU {model.name}: {what} {value} must be positive")
-
-
-def _check_functions(model: FmuModel) -> None:
-    nx, nz, nu = len(model.states), len(model.dependents), len(model.inputs)
-    ny, n_p, n_m = len(model.outputs), len(model.parameters), len(model.modes)
-    _check_shape(model, "rhs", model.rhs, (1, nx, nz, nu, n_p + n_m), (nx, ny))
-    if (model.closure is None) != (nz == 0):
-        raise ExportError(
-            f"FMU {model.name}: {nz} dependent coordinates need "
-            f"{'a closure' if nz else 'no closure'}; give both or neither"
-        )
-    if model.closure is not None:
-        _check_shape(model, "closure", model.closure, (nx, nz, n_p), (nz, 1))
-    if model.jumps is not None:
-        point, k = (1, nx, nz, nu, n_p + n_m), len(model.jumps.names)
-        _check_shape(model, "first", model.jumps.first, point, (n_m, k))
-        _check_shape(model, "indicators", model.jumps.indicators, point, (k,))
-        _check_shape(model, "jump", model.jumps.jump, (*point, k), (nx, n_m))
-
-
-def _check_shape(
-    model: FmuModel,
-    what: str,
-    function: casadi.Function,
-    inputs: tuple[int, ...],
-    outputs: tuple[int, ...],
-) -> None:
-    found_in = tuple(function.numel_in(k) for k in range(function.n_in()))
-    found_out = tuple(function.numel_out(k) for k in range(function.n_out()))
-    if found_in != inputs or found_out != outputs:
-        raise ExportError(
-            f"FMU {model.name}: {what} has inputs of sizes {found_in} and outputs of sizes "
-            f"{found_out}; the variables ask for {inputs} and {outputs}"
-        )
+    for name in model.jumps.names if model.jumps else ():
+        text = f"positive between events: {name}"
+        yield Entry("indicator", Variable(name=f"indicator.{name}", description=text))

@@ -13,14 +13,17 @@ from mbs.native.cross import Platform
 _CORE = (
     "core.c",
     "values.c",
+    "inputs.c",
     "derivatives.c",
     "closure.c",
     "solver.c",
+    "switching.c",
     "exchange.c",
     "cosimulation.c",
     "saved.c",
 )
 _CORE_HEADERS = ("core.h", "internal.h", "closure.h", "solver.h")
+_RUNTIME = ("stepper", "events")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +42,7 @@ class Face:
 
     def compiled(self, solver: Solver) -> tuple[str, ...]:
         """The C files to compile with a solver, in the folder `sources` of the FMU."""
-        return ("model.c", *_CORE, "stepper.c", f"{solver}.c", *self.sources)
+        return ("model.c", *_CORE, *(f"{name}.c" for name in (*_RUNTIME, solver)), *self.sources)
 
     def fixed(self, solver: Solver) -> dict[str, str]:
         """The files that do not depend on the equations: name to text."""
@@ -48,7 +51,7 @@ class Face:
         standard = resources.files("fmpy") / "c-code"
         folders = (
             (own, (*_CORE, *_CORE_HEADERS, *self.sources, *self.headers)),
-            (runtime, tuple(name + end for name in ("stepper", solver) for end in (".c", ".h"))),
+            (runtime, tuple(f"{name}.{end}" for name in (*_RUNTIME, solver) for end in "ch")),
             (standard, self.standard),
         )
         return {

@@ -1,17 +1,29 @@
 """modelDescription.xml of FMI 2.0."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
+from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.xml_parts import (
+    TOOL,
+    Structure,
     add_categories_and_experiment,
     add_units,
+    naming_convention,
+    needs_accepted_steps,
     real_attributes,
     structure,
     text_of,
     variable_attributes,
+    yes_or_no,
 )
+
+_STEPPING = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "true",
+    "maxOutputDerivativeOrder": "1",
+}
 
 
 def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str:
@@ -25,15 +37,16 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
     Returns:
         its text.
     """
+    found = structure(model)
     root = Element(
         "fmiModelDescription",
         fmiVersion="2.0",
         modelName=model.name,
         guid=guid,
         description=model.description,
-        generationTool="mbs",
-        variableNamingConvention="flat",
-        numberOfEventIndicators="0",
+        generationTool=TOOL,
+        variableNamingConvention=naming_convention(model),
+        numberOfEventIndicators=str(len(found.indicators)),
     )
     files = list(sources)
     _interface(root, "ModelExchange", model, files)
@@ -45,9 +58,11 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
         real = real_attributes(entry)
         if entry.kind == "derivative":
             real["derivative"] = str(reference - len(model.states) + 1)
+        if reference in found.reset:
+            real["reinit"] = "true"
         scalar = SubElement(variables, "ScalarVariable", variable_attributes(reference, entry))
         SubElement(scalar, "Real", real)
-    _structure(root, model)
+    _structure(root, model, found)
     return text_of(root)
 
 
@@ -60,30 +75,35 @@ def _interface(root: Element, tag: str, model: FmuModel, files: list[str]) -> No
         "providesDirectionalDerivative": "true",
     }
     if tag == "CoSimulation":
-        attributes["canHandleVariableCommunicationStepSize"] = "true"
+        attributes |= _STEPPING
     else:
-        attributes["completedIntegratorStepNotNeeded"] = "false" if model.dependents else "true"
+        attributes["completedIntegratorStepNotNeeded"] = yes_or_no(not needs_accepted_steps(model))
     listed = SubElement(SubElement(root, tag, attributes), "SourceFiles")
     for name in files:
         SubElement(listed, "File", name=name)
 
 
-def _structure(root: Element, model: FmuModel) -> None:
-    found, time = structure(model), len(model.entries)
-    running, starting = (_without(time, known) for known in (found.running, found.starting))
+def _structure(root: Element, model: FmuModel, found: Structure) -> None:
+    fixed = range(model.first("parameter"), model.first("mode"))
+    time = len(model.entries)
+    running = {ref: _without((*fixed, time), known) for ref, known in found.running.items()}
+    starting = {ref: _without((time,), known) for ref, known in found.starting.items()}
     parent = SubElement(root, "ModelStructure")
     _unknowns(parent, "Outputs", found.outputs, running)
     _unknowns(parent, "Derivatives", found.derivatives, running)
     _unknowns(parent, "InitialUnknowns", found.initial, starting)
 
 
-def _without(time: int, known: Mapping[int, list[int]]) -> dict[int, list[int]]:
-    """No variable is time: the standard then takes it that everything depends on it."""
-    return {ref: [r for r in references if r != time] for ref, references in known.items()}
+def _without(references: Sequence[int], known: Known) -> Known:
+    """Without parameters, which do not change while a model runs, and time, which is no variable.
+
+    The standard takes it that everything depends on time where no variable is it.
+    """
+    return {ref: kind for ref, kind in known.items() if ref not in references}
 
 
 def _unknowns(
-    parent: Element, tag: str, references: list[int], depends: Mapping[int, list[int]]
+    parent: Element, tag: str, references: list[int], depends: Mapping[int, Known]
 ) -> None:
     if not references:
         return
@@ -95,5 +115,5 @@ def _unknowns(
             "Unknown",
             index=str(reference + 1),
             dependencies=" ".join(str(k + 1) for k in known),
-            dependenciesKind=" ".join("dependent" for _ in known),
+            dependenciesKind=" ".join(known.values()),
         )

@@ -3,15 +3,32 @@
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
+from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.xml_parts import (
+    TOOL,
+    Structure,
     add_categories_and_experiment,
     add_units,
+    naming_convention,
+    needs_accepted_steps,
     real_attributes,
     structure,
     text_of,
     variable_attributes,
+    yes_or_no,
 )
+
+_STEPPING = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "maxOutputDerivativeOrder": "1",
+    "providesIntermediateUpdate": "true",
+    "mightReturnEarlyFromDoStep": "true",
+    "canReturnEarlyAfterIntermediateUpdate": "true",
+    "hasEventMode": "true",
+}
+
+_SEEN_WITHIN_STEPS = ("state", "derivative", "output")
 
 
 def model_description(model: FmuModel, token: str) -> str:
@@ -30,19 +47,20 @@ def model_description(model: FmuModel, token: str) -> str:
         modelName=model.name,
         instantiationToken=token,
         description=model.description,
-        generationTool="mbs",
-        variableNamingConvention="flat",
+        generationTool=TOOL,
+        variableNamingConvention=naming_convention(model),
     )
     _interface(root, "ModelExchange", model)
     _interface(root, "CoSimulation", model)
     add_units(root, model)
     add_categories_and_experiment(root, model)
-    _variables(root, model)
     found = structure(model)
+    _variables(root, model, found)
     parent = SubElement(root, "ModelStructure")
     _unknowns(parent, "Output", found.outputs, found.running)
     _unknowns(parent, "ContinuousStateDerivative", found.derivatives, found.running)
     _unknowns(parent, "InitialUnknown", found.initial, found.starting)
+    _unknowns(parent, "EventIndicator", found.indicators, found.running)
     return text_of(root)
 
 
@@ -70,20 +88,24 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
         "providesAdjointDerivatives": "true",
     }
     if tag == "CoSimulation":
-        attributes["canHandleVariableCommunicationStepSize"] = "true"
+        attributes |= _STEPPING
         if model.solver == "rk4":
             attributes["fixedInternalStepSize"] = repr(float(model.internal_step))
     else:
-        attributes["needsCompletedIntegratorStep"] = "true" if model.dependents else "false"
+        attributes["needsCompletedIntegratorStep"] = yes_or_no(needs_accepted_steps(model))
     SubElement(root, tag, attributes)
 
 
-def _variables(root: Element, model: FmuModel) -> None:
+def _variables(root: Element, model: FmuModel, found: Structure) -> None:
     variables = SubElement(root, "ModelVariables")
     for reference, entry in enumerate(model.entries):
         attributes = variable_attributes(reference, entry) | real_attributes(entry)
         if entry.kind == "derivative":
             attributes["derivative"] = str(reference - len(model.states))
+        if reference in found.reset:
+            attributes["reinit"] = "true"
+        if entry.kind in _SEEN_WITHIN_STEPS:
+            attributes["intermediateUpdate"] = "true"
         SubElement(variables, "Float64", attributes)
     SubElement(
         variables,
@@ -98,7 +120,7 @@ def _variables(root: Element, model: FmuModel) -> None:
 
 
 def _unknowns(
-    parent: Element, tag: str, references: list[int], depends: Mapping[int, list[int]]
+    parent: Element, tag: str, references: list[int], depends: Mapping[int, Known]
 ) -> None:
     for reference in references:
         known = depends[reference]
@@ -107,5 +129,5 @@ def _unknowns(
             tag,
             valueReference=str(reference),
             dependencies=" ".join(str(k) for k in known),
-            dependenciesKind=" ".join("dependent" for _ in known),
+            dependenciesKind=" ".join(known.values()),
         )

@@ -11,15 +11,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mbs.errors import ExportError
-from mbs.export.fmu import fmi2_xml, fmi3_xml
+from mbs.export.fmu.contents import description, plain_files, standard_header
 from mbs.export.fmu.description import FmuModel
-from mbs.export.fmu.documentation import documentation
 from mbs.export.fmu.faces import FACES, folder_of, require_version
+from mbs.export.fmu.reference import reference_files
 from mbs.export.fmu.tables import header, source
 from mbs.files import path_of, write_bytes
 from mbs.native.cache import cached_library
-from mbs.native.compiler import flags_for
 from mbs.native.cross import Platform, cross_compiler, host_platform, platform_named
+from mbs.native.plain_source import plain_flags
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # equal models give equal files
 
@@ -30,6 +30,7 @@ def write_fmu(
     *,
     fmi: str = "2.0",
     platforms: Sequence[str] | None = None,
+    reference: bool = False,
 ) -> Path:
     """Write an FMU for model exchange and co-simulation, with sources and libraries.
 
@@ -39,41 +40,42 @@ def write_fmu(
         fmi: version of the standard, "2.0" or "3.0".
         platforms: names of `mbs.native.cross.PLATFORMS`, made with ziglang; this computer when
             left out, with its own compiler.
+        reference: whether to put in the results of the default experiment, see
+            `mbs.export.fmu.reference`.
 
     Returns:
         the file.
 
     Raises:
-        ExportError: the file cannot be written, a function cannot be written as C, or there is no
-            such version.
+        ExportError: the file cannot be written, a function cannot be written as C, there is no
+            such version, or the default experiment does not reach its end.
         CompilerError: there is no C compiler, or no such platform.
     """
     require_version(f"FMU {model.name}", fmi)
     goals = None if platforms is None else _platforms(model, platforms)
     target = path_of(path)
-    _check_target(target)
-    code = source(model)
-    unnamed = _description(model, fmi)
-    guid = _guid(unnamed, header(model, ""), code)
+    require_writable(target)
+    results = reference_files(model) if reference else {}
+    code, compiled = source(model), _compiled(model, fmi)
+    unnamed = description(model, fmi, "", compiled)
+    guid = _guid(unnamed, header(model, ""), code, *(text for _, text in model.sources))
     texts = {"model.c": code, "model.h": header(model, guid), **FACES[fmi].fixed(model.solver)}
+    texts.update(model.sources)
     files = {
         "modelDescription.xml": _identified(unnamed, guid).encode(),
-        "documentation/index.html": documentation(model).encode(),
+        **plain_files(model, fmi, texts[standard_header(fmi)], compiled),
+        **results,
         **_binaries(model, fmi, texts, goals),
         **{f"sources/{name}": text.encode() for name, text in texts.items()},
     }
-    if fmi != "2.0":
-        build = fmi3_xml.build_description(model, FACES[fmi].compiled(model.solver))
-        files["sources/buildDescription.xml"] = build.encode()
     write_bytes(_zipped(files), target)
     return target
 
 
-def _description(model: FmuModel, fmi: str) -> str:
-    """The model description without identity."""
-    if fmi == "2.0":
-        return fmi2_xml.model_description(model, "", FACES[fmi].compiled(model.solver))
-    return fmi3_xml.model_description(model, "")
+def _compiled(model: FmuModel, fmi: str) -> tuple[str, ...]:
+    """The C files to compile, those of the user last."""
+    own = (name for name, _ in model.sources if name.endswith(".c"))
+    return (*FACES[fmi].compiled(model.solver), *own)
 
 
 def _identified(unnamed: str, guid: str) -> str:
@@ -85,7 +87,7 @@ def _binaries(
     model: FmuModel, fmi: str, texts: Mapping[str, str], goals: Sequence[Platform] | None
 ) -> dict[str, bytes]:
     """The libraries: name in the FMU to content."""
-    flags = (*flags_for(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
+    flags = (*plain_flags(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
     libraries: dict[Platform, Path] = {}
     if goals is None:
         libraries[host_platform()] = cached_library(texts, flags)
@@ -115,7 +117,12 @@ def _guid(*texts: str) -> str:
     return "{" + "-".join((h[:8], h[8:12], h[12:16], h[16:20], h[20:32])) + "}"
 
 
-def _check_target(target: Path) -> None:
+def require_writable(target: Path) -> None:
+    """Refuse a place where no FMU can be written.
+
+    Raises:
+        ExportError: its folder is missing or closed, or it is a folder itself.
+    """
     if not target.parent.is_dir():
         raise ExportError(f"folder {target.parent} does not exist; create it or choose another one")
     if target.is_dir():

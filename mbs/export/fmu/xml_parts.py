@@ -1,13 +1,16 @@
 """What the model descriptions of FMI 2.0 and 3.0 have in common."""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from mbs.export.fmu.dependencies import dependencies
+from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
 from mbs.export.fmu.description import Entry, FmuModel, State
+from mbs.export.fmu.linearity import DependencyKind
 from mbs.units import UNITS
+from mbs.version import __version__
 
 _CAUSALITY = {"input": "input", "output": "output", "parameter": "parameter", "mode": "output"}
 _VARIABILITY = {"parameter": "tunable", "mode": "discrete"}
@@ -18,8 +21,14 @@ _INITIAL = {
     "parameter": "exact",
     "mode": "calculated",
     "dependent": "approx",
+    "indicator": "calculated",
 }
 _STARTS = ("state", "input", "parameter", "dependent")
+_PART = r"([A-Za-z_]\w*|'[^'\\]+')(\[\d+(,\d+)*\])?"
+_PATH = rf"{_PART}(\.{_PART})*"
+_STRUCTURED = re.compile(rf"{_PATH}|der\({_PATH}(,\d+)?\)", re.ASCII)
+_NOTHING: Known = {}
+TOOL = f"mbs {__version__}"
 CATEGORIES = {
     "logAll": "all messages",
     "logStatusDiscard": "a step or an evaluation without an answer",
@@ -34,30 +43,81 @@ class Structure:
     That of time is the number of entries.
 
     Attributes:
-        outputs: every output, states among them.
+        outputs: every output, states and modes among them.
         derivatives: of the states.
+        indicators: of events.
         initial: what initialization calculates.
-        running: states, inputs and time, where each output and derivative needs them.
-        starting: likewise of `initial`, and parameters.
+        running: what each output, derivative and indicator needs, without what is frozen between
+            events: modes, which need nothing then, and fixed parameters.
+        starting: likewise of `initial`, and how modes begin; only "constant" and "dependent".
+        reset: the states that events set anew.
     """
 
     outputs: list[int]
     derivatives: list[int]
+    indicators: list[int]
     initial: list[int]
-    running: Mapping[int, list[int]]
-    starting: Mapping[int, list[int]]
+    running: Mapping[int, Known]
+    starting: Mapping[int, Known]
+    reset: list[int]
 
 
 def structure(model: FmuModel) -> Structure:
     """The structure of a model."""
-    n, fixed = len(model.states), range(model.first("parameter"), model.first("dependent"))
-    starting = dict(dependencies(model))
-    running = {ref: [r for r in known if r not in fixed] for ref, known in starting.items()}
+    n, found = len(model.states), dependencies(model)
+    modes = range(model.first("mode"), model.first("dependent"))
+    places = enumerate(model.parameters, start=model.first("parameter"))
+    frozen = {*modes, *(ref for ref, parameter in places if parameter.fixed)}
+    running: dict[int, Known] = {
+        ref: _without(frozen, known) for ref, known in found.running.items()
+    }
     shown = [k for k, state in enumerate(model.states) if state.output]
-    running.update({k: [k] for k in shown})
-    calculated = list(range(model.first("output"), model.first("parameter")))
+    running |= dict.fromkeys(modes, _NOTHING)
+    running.update({k: {k: "constant"} for k in shown})
+    calculated = [*range(model.first("output"), model.first("parameter")), *modes]
     derivatives = list(range(n, 2 * n))
-    return Structure(shown + calculated, derivatives, derivatives + calculated, running, starting)
+    return Structure(
+        outputs=shown + calculated,
+        derivatives=derivatives,
+        indicators=list(range(model.first("indicator"), len(model.entries))),
+        initial=derivatives + calculated,
+        running=running,
+        starting={ref: _starting(ref, found, modes) for ref in derivatives + calculated},
+        reset=[k for k, known in found.jumping.items() if dict(known) != {k: "constant"}],
+    )
+
+
+def _without(references: Container[int], known: Known) -> dict[int, DependencyKind]:
+    return {ref: kind for ref, kind in known.items() if ref not in references}
+
+
+def _starting(reference: int, found: Dependencies, modes: range) -> Known:
+    """What a value depends on at the start, where modes stand for what finds them."""
+    known = found.first.get(reference) or found.running.get(reference, {})
+    direct: dict[int, DependencyKind] = {
+        ref: "constant" if kind == "constant" else "dependent"
+        for ref, kind in known.items()
+        if ref not in modes
+    }
+    for mode in (ref for ref in known if ref in modes):
+        direct |= dict.fromkeys((ref for ref in found.first[mode] if ref not in modes), "dependent")
+    return dict(sorted(direct.items()))
+
+
+def naming_convention(model: FmuModel) -> str:
+    """Whether names are paths such as `j1.q`, which tools show as a tree, or flat."""
+    fits = all(_STRUCTURED.fullmatch(entry.variable.name) for entry in model.entries)
+    return "structured" if fits else "flat"
+
+
+def yes_or_no(holds: object) -> str:
+    """A truth value of XML."""
+    return "true" if holds else "false"
+
+
+def needs_accepted_steps(model: FmuModel) -> bool:
+    """Whether it must hear of every step that an importer accepts: loops and events remember."""
+    return bool(model.dependents) or model.jumps is not None
 
 
 def variable_attributes(reference: int, entry: Entry) -> dict[str, str]:
@@ -67,7 +127,7 @@ def variable_attributes(reference: int, entry: Entry) -> dict[str, str]:
         "name": v.name,
         "valueReference": str(reference),
         "causality": _CAUSALITY.get(entry.kind, "local"),
-        "variability": _VARIABILITY.get(entry.kind, "continuous"),
+        "variability": "fixed" if v.fixed else _VARIABILITY.get(entry.kind, "continuous"),
     }
     if v.description:
         attributes["description"] = v.description

@@ -239,11 +239,14 @@ EXPORT double mbs_step(const driver *d) { return stepper_wanted_step(&d->solver)
 #ifdef MBS_EVENTS
 /* Before mbs_begin. 1: out of memory. */
 EXPORT int mbs_watch(driver *d, int count, int n_modes) {
-    size_t size = (size_t)n_modes + (size_t)EVENTS_WORK(d->solver.n, count);
-    d->event_work = array(size, sizeof *d->event_work);
+    static const events_model model = {indicators, rates, jump};
+    size_t memory = (size_t)EVENTS_MEMORY(count), work = (size_t)EVENTS_WORK(d->solver.n, count);
+    double *first;
+    d->event_work = array((size_t)n_modes + memory + work, sizeof *d->event_work);
     if (!d->event_work) return 1;
     d->n_modes = n_modes;
-    events_init(&d->events, &d->solver, count, indicators, rates, jump, d->event_work + n_modes);
+    first = d->event_work + n_modes;
+    events_init(&d->events, &d->solver, count, &model, first, first + memory);
     return 0;
 }
 

@@ -8,44 +8,51 @@ enum { LOOKS = 2, TANGENTS = 30, SECANTS = 20, MAX_JUMPS = 20, MAX_IDLE = 100 };
 
 static const double DEPARTURE = 1e-8; /* part of a step in which what rises may become positive */
 
+/* places in memory; then k values each of */
+enum { LAST, IDLE, PENDING, UNSEEN, ARRAYS };
+static double *kept(const events *e, int i) {
+    return e->memory + ARRAYS + (size_t)i * (size_t)e->count;
+}
+static double *armed(const events *e) { return kept(e, 0); }
+static double *due(const events *e) { return kept(e, 1); }
+static double *fired(const events *e) { return kept(e, 2); }
+static double *left(const events *e) { return kept(e, 3); }
+static double *overshot(const events *e) { return kept(e, 4); }
+static double *left_rate(const events *e) { return kept(e, 5); }
+
 /* work: a state, then k values each of */
 static double *part(const events *e, int i) {
-    return e->work + e->solver->n + (size_t)i * e->count;
+    return e->work + e->solver->n + (size_t)i * (size_t)e->count;
 }
-static double *left(const events *e) { return part(e, 0); }
-static double *right(const events *e) { return part(e, 1); }
-static double *middle(const events *e) { return part(e, 2); }
-static double *left_rate(const events *e) { return part(e, 3); }
-static double *right_rate(const events *e) { return part(e, 4); }
-static double *middle_rate(const events *e) { return part(e, 5); }
-static double *armed(const events *e) { return part(e, 6); }
-static double *due(const events *e) { return part(e, 7); }
-static double *fired(const events *e) { return part(e, 8); }
+static double *right(const events *e) { return part(e, 0); }
+static double *middle(const events *e) { return part(e, 1); }
+static double *right_rate(const events *e) { return part(e, 2); }
+static double *middle_rate(const events *e) { return part(e, 3); }
 static void copy(const events *e, double *to, const double *from) {
     memcpy(to, from, sizeof(double) * (size_t)e->count);
 }
 
-void events_init(events *e, stepper *solver, int count, events_values indicators,
-                 events_values rates, events_jump jump, double *work) {
-    memset(e, 0, sizeof *e);
+void events_init(events *e, stepper *solver, int count, const events_model *model, double *memory,
+                 double *work) {
     e->solver = solver;
     e->count = count;
-    e->indicators = indicators;
-    e->rates = rates;
-    e->jump = jump;
+    e->model = model;
+    e->memory = memory;
     e->work = work;
-    e->last = -HUGE_VAL;
 }
 
+int events_pending(const events *e) { return e->memory[PENDING] > 0.0; }
 const double *events_fired(const events *e) { return fired(e); }
+const double *events_armed(const events *e) { return armed(e); }
+const double *events_seen(const events *e) { return left(e); }
 
 /* rates: NULL, or how fast the indicators rise there. */
 static int look(const events *e, const double *x, double t, double *values, double *rates) {
     void *user = e->solver->user;
     int status = stepper_state(e->solver, x, t, e->work);
     if (status) return status;
-    if (e->indicators(user, t, e->work, values)) return EVENTS_INDICATORS_FAILED;
-    if (rates && e->rates(user, t, e->work, rates)) return EVENTS_INDICATORS_FAILED;
+    if (e->model->indicators(user, t, e->work, values)) return EVENTS_INDICATORS_FAILED;
+    if (rates && e->model->rates(user, t, e->work, rates)) return EVENTS_INDICATORS_FAILED;
     return stepper_all_finite(values, e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
 }
 
@@ -64,25 +71,58 @@ static void arm(const events *e, const double *values) {
         if (values[k] > 0.0) armed(e)[k] = 1.0;
 }
 
+/* The indicators at the present time, before it is known which of them are due. */
+static int look_here(events *e, const double *x) {
+    e->memory[PENDING] = e->memory[UNSEEN] = 0.0;
+    return look(e, x, stepper_time(e->solver), left(e), left_rate(e));
+}
+
+/* It is where an integrator outside had let it come, and a jump of velocities has not moved it. */
+static int is_overshot(const events *e, int k) {
+    double below = overshot(e)[k];
+    return below > 0.0 && fabs(left(e)[k] + below) <= 1e-9 * below;
+}
+
 /* Which indicators ask for a jump at the present state. One that is zero to the tolerance and does
  * not clearly fall waits: the first look at the next step tells whether it leaves zero. */
 static int judge(events *e, const double *x) {
     double t = stepper_time(e->solver), step = stepper_last_step(e->solver);
     double slack = fmax(1e3 * DBL_EPSILON * fabs(t), DEPARTURE * step), zero = e->solver->atol;
-    int k, status = look(e, x, t, left(e), left_rate(e));
+    int k, status = look_here(e, x);
     if (status) return status;
-    e->pending = 0;
     for (k = 0; k < e->count; k++) {
         double value = left(e)[k], rise = left_rate(e)[k];
         int waits = value >= -fmax(zero, rise * slack) && !(rise * step < -zero);
+        waits = waits || (rise >= 0.0 && is_overshot(e, k));
         armed(e)[k] = value > (rise > 0.0 ? zero : 0.0);
         due(e)[k] = value <= 0.0 && !waits;
-        if (due(e)[k] > 0.0) e->pending = 1;
+        if (due(e)[k] > 0.0) e->memory[PENDING] = 1.0;
     }
     return STEPPER_OK;
 }
 
-int events_start(events *e, const double *x) { return judge(e, x); }
+int events_start(events *e, const double *x) {
+    memset(e->memory, 0, sizeof(double) * (size_t)EVENTS_MEMORY(e->count));
+    e->memory[LAST] = -HUGE_VAL;
+    return judge(e, x);
+}
+
+void events_restart(events *e) { e->memory[UNSEEN] = 1.0; }
+
+int events_look(events *e, const double *x) {
+    return e->memory[UNSEEN] > 0.0 ? judge(e, x) : STEPPER_OK;
+}
+
+int events_found(events *e, const double *x, const double *offset) {
+    int k, status = look_here(e, x);
+    if (status) return status;
+    for (k = 0; k < e->count; k++) {
+        due(e)[k] = left(e)[k] + offset[k] <= 0.0;
+        overshot(e)[k] = fmax(0.0, -left(e)[k]);
+        if (due(e)[k] > 0.0) e->memory[PENDING] = 1.0;
+    }
+    return STEPPER_OK;
+}
 
 static int returned(const events *e) {
     int k;
@@ -177,14 +217,14 @@ static int stop_at_event(events *e, double *x, double a, double b) {
     int k, status = locate(e, x, a, &b);
     if (status) return status;
     for (k = 0; k < e->count; k++) due(e)[k] = armed(e)[k] > 0.0 && right(e)[k] <= 0.0;
-    e->pending = 1;
+    e->memory[PENDING] = 1.0;
     return stepper_rewind(e->solver, x, b);
 }
 
-/* One step, cut at its first event. */
-static int step(events *e, double *x, double limit) {
+int events_step(events *e, double *x, double limit) {
     double start = stepper_time(e->solver), from = start, end;
-    int number = 1, status = stepper_step(e->solver, x, limit);
+    int number = 1, status = events_look(e, x);
+    if (!status && !events_pending(e)) status = stepper_step(e->solver, x, limit);
     end = stepper_time(e->solver);
     while (!status && from < end) {
         double next = number < LOOKS ? start + number * (end - start) / LOOKS : end, to = next;
@@ -202,26 +242,25 @@ static int step(events *e, double *x, double limit) {
     return status;
 }
 
-/* Jumps until no indicator asks for another one. */
-static int settle(events *e, double *x, double limit) {
+int events_settle(events *e, double *x, double limit) {
     stepper *s = e->solver;
-    double t = stepper_time(s);
+    double *m = e->memory, t = stepper_time(s);
     int i, k, status;
     memset(fired(e), 0, sizeof(double) * (size_t)e->count);
     stepper_restart_afresh(s);
-    for (i = 0; e->pending; i++) {
+    for (i = 0; events_pending(e); i++) {
         for (k = 0; k < e->count; k++) fired(e)[k] = fmax(fired(e)[k], due(e)[k]);
         if (i == MAX_JUMPS) return EVENTS_DO_NOT_SETTLE;
-        if (e->jump(s->user, t, x, due(e)) || !stepper_all_finite(x, s->n))
+        if (e->model->jump(s->user, t, x, due(e)) || !stepper_all_finite(x, s->n))
             return EVENTS_JUMP_FAILED;
         if (s->project && (s->project(s->user, t, x) || !stepper_all_finite(x, s->n)))
             return STEPPER_PROJECTION_FAILED;
         status = judge(e, x);
         if (status) return status;
     }
-    e->idle = t - e->last <= 1e3 * DBL_EPSILON * fmax(fabs(t), fabs(limit)) ? e->idle + 1 : 0;
-    e->last = t;
-    return e->idle > MAX_IDLE ? EVENTS_STAND_STILL : EVENTS_FIRED;
+    m[IDLE] = t - m[LAST] <= 1e3 * DBL_EPSILON * fmax(fabs(t), fabs(limit)) ? m[IDLE] + 1.0 : 0.0;
+    m[LAST] = t;
+    return m[IDLE] > MAX_IDLE ? EVENTS_STAND_STILL : EVENTS_FIRED;
 }
 
 int events_table(events *e, double *x, const double *times, long count, double *table, long *done,
@@ -231,16 +270,16 @@ int events_table(events *e, double *x, const double *times, long count, double *
     int status = STEPPER_OK;
     while (*done < count && !status) {
         double t = times[*done], now = stepper_time(s);
-        if (t < now || (t == now && !e->pending)) {
+        if (t < now || (t == now && !events_pending(e))) {
             status = stepper_state(s, x, t, table + (size_t)*done * s->n);
             if (!status) ++*done;
             s->since_output = 0;
-        } else if (e->pending) {
-            status = settle(e, x, times[count - 1]);
+        } else if (events_pending(e)) {
+            status = events_settle(e, x, times[count - 1]);
         } else if (s->steps >= last) {
             return STEPPER_MORE;
         } else {
-            status = step(e, x, times[count - 1]);
+            status = events_step(e, x, times[count - 1]);
         }
     }
     return status;

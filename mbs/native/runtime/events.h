@@ -16,40 +16,66 @@
 
 #include "stepper.h"
 
-#define EVENTS_WORK(n, k) ((n) + 9 * (k))
+#define EVENTS_MEMORY(k) (4 + 6 * (k))
+#define EVENTS_WORK(n, k) ((n) + 4 * (k))
 
 enum {
-    EVENTS_FIRED = -1, /* the table ends at an event: read it and call again */
+    EVENTS_FIRED = -1, /* an event has just been settled; a table ends there: call again */
     EVENTS_INDICATORS_FAILED = STEPPER_NOT_FINITE + 1,
     EVENTS_JUMP_FAILED,
     EVENTS_DO_NOT_SETTLE, /* the jumps at one time do not come to an end */
     EVENTS_STAND_STILL    /* many events, and time hardly advances */
 };
 
-/* Indicators, or how fast they rise along the motion; 0 when they have values. */
+/* Indicators, or how fast they rise along the motion, asked right after the indicators at the same
+ * place; 0 when they have values. */
 typedef int (*events_values)(void *user, double t, const double *x, double *values);
 /* Changes x, and the modes that rhs, project and the indicators read; fired: 0 or 1 for each. */
 typedef int (*events_jump)(void *user, double t, double *x, const double *fired);
 
 typedef struct {
-    stepper *solver;
-    int count;
     events_values indicators, rates;
     events_jump jump;
-    double *work;
-    double last; /* time of the last event */
-    int idle;    /* events since time advanced */
-    int pending; /* a jump is due at the present time */
+} events_model;
+
+/* memory, which the caller owns, holds all that one step hands to the next, as in the stepper. */
+typedef struct {
+    stepper *solver;
+    int count;
+    const events_model *model;
+    double *memory, *work;
 } events;
 
-void events_init(events *e, stepper *solver, int count, events_values indicators,
-                 events_values rates, events_jump jump, double *work);
+void events_init(events *e, stepper *solver, int count, const events_model *model, double *memory,
+                 double *work);
 
 /* Look at the first state: an indicator may ask for a jump there. */
 int events_start(events *e, const double *x);
 
-/* Which indicators asked for jumps at the last event: 0 or 1 for each. */
+/* Something jumped (an input, a parameter): the next step, or events_look, looks at the present
+ * state anew, which may ask for a jump. */
+void events_restart(events *e);
+int events_look(events *e, const double *x);
+
+/* A jump is due at the present time: no step is made before it is settled. */
+int events_pending(const events *e);
+
+/* One accepted step, cut at its first event, which is then pending. No step at all where the state
+ * at its start asks for a jump. */
+int events_step(events *e, double *x, double limit);
+
+/* Jumps until no indicator asks for another one; then EVENTS_FIRED. */
+int events_settle(events *e, double *x, double limit);
+
+/* For an integrator outside, which sees indicators + offsets: what is not positive, is due. What the
+ * jump leaves where it is, but does not fall any more, waits: it was overshot. */
+int events_found(events *e, const double *x, const double *offset);
+
+/* Which indicators asked for jumps at the last event: 0 or 1 for each; which of them can fire; and
+ * their values when they were last looked at. */
 const double *events_fired(const events *e);
+const double *events_armed(const events *e);
+const double *events_seen(const events *e);
 
 /* As stepper_table; a row at the time of an event holds the state after it. */
 int events_table(events *e, double *x, const double *times, long count, double *table, long *done,

@@ -12,7 +12,7 @@
 
 #define RK4_WORK(n) (8 * (n))
 
-/* Call stepper_fix after stepper_start: it sets the length of all steps. */
+/* Call stepper_fix after it: that sets the length of all steps. */
 void rk4_init(stepper *s, int n, stepper_rhs rhs, void *user, double *memory, double *work);
 
 #endif

@@ -33,6 +33,7 @@ void stepper_start(stepper *s, double t) {
     memset(s->memory, 0, sizeof(double) * (size_t)STEPPER_MEMORY(s->n));
     s->memory[TIME] = s->memory[LAST_END] = t;
     s->memory[ERROR] = 1e-4;
+    s->memory[STEP] = s->fixed;
     s->steps = s->rejected = s->since_output = 0;
 }
 
@@ -42,11 +43,11 @@ void stepper_restart(stepper *s) {
     s->memory[ERROR] = 1e-4;
 }
 
-void stepper_fix(stepper *s, double h) { s->h_max = s->memory[STEP] = h; }
+void stepper_fix(stepper *s, double h) { s->h_max = s->fixed = h; }
 
 void stepper_restart_afresh(stepper *s) {
     stepper_restart(s);
-    s->memory[STEP] = 0.0;
+    s->memory[STEP] = s->fixed;
 }
 
 double stepper_time(const stepper *s) { return s->memory[TIME]; }

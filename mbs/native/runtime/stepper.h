@@ -58,6 +58,7 @@ struct stepper {
     stepper_jacobian jacobian; /* for implicit methods */
     void *user;
     double rtol, atol, h_max;
+    double fixed; /* length of all steps; 0: error control finds it */
     const double *nominal; /* typical size of each state, which scales atol; NULL: 1 */
     long max_steps;
     double *memory, *work;
@@ -74,10 +75,10 @@ void stepper_start(stepper *s, double t);
 /* Something jumped (an input, a parameter): the slope is computed anew, the step size is kept. */
 void stepper_restart(stepper *s);
 
-/* After stepper_start: begin with a step of this length, and make no longer one. */
+/* Before stepper_start: begin with steps of this length, and make no longer ones. */
 void stepper_fix(stepper *s, double h);
 
-/* The state jumped: the step size is found anew too. */
+/* The state jumped: the step size is found anew too, where it is not fixed. */
 void stepper_restart_afresh(stepper *s);
 
 double stepper_time(const stepper *s);

@@ -7,34 +7,57 @@
 
 #define RESIDUAL 1e-12   /* largest closure row, for coordinates of size 1 */
 #define MOVE 1e-9        /* largest last Newton move: the next one would be its square */
+#define NEXT 1e-15       /* largest next Newton move, as the last two of them foretell it */
 #define ITERATIONS 30
 #define REACH 0.5        /* largest Newton move, in nominal sizes, that stays on the branch */
 #define SMALLEST (1.0 / 1024)
 #define STEEPEST 1e4     /* nominal sizes that dependents move for one nominal size of the states */
+#define TRIALS 64        /* postures from which a branch is looked for */
+#define RANGE 3.14159265358979 /* of them about the start values, in nominal sizes */
+#define ALIKE 1e-3       /* weight of the coordinates that were not guessed */
+
+/* Where a Newton iteration stands: largest row before its last move, and that move. */
+typedef struct {
+    double residual, move;
+} progress;
+
+/* The closure holds; or rows and moves shrink together so fast that it does after this move. */
+static int converged(progress now, progress before, double size) {
+    double ratio = now.move / before.move;
+    if (now.residual < RESIDUAL * size && now.move < MOVE * size) return 1;
+    return now.residual < 10 * ratio * before.residual &&
+           now.move * ratio * ratio < NEXT * size;
+}
+
+/* One Newton step at x, z to next. */
+static int newton_step(core *c, const double *x, const double *z, double *next, double *residual) {
+    c->arg[0] = x;
+    c->arg[1] = z;
+    c->arg[2] = c->m.values + PARAMETERS;
+    c->res[0] = next;
+    c->res[1] = residual;
+    return mbs_closure(c->arg, c->res, c->iw, c->w, 0) || !isfinite(*residual);
+}
 
 /* Newton steps at x from z. reach: largest move that is trusted, in nominal sizes. */
 static int newton(core *c, const double *x, double *z, double reach) {
-    const double *p = c->m.values + PARAMETERS;
+    progress before = {0.0, HUGE_VAL};
     double next[NZ];
     int k, i;
     for (k = 0; k < ITERATIONS; k++) {
-        double residual = 0.0, move = 0.0, size = 1.0;
-        c->arg[0] = x;
-        c->arg[1] = z;
-        c->arg[2] = p;
-        c->res[0] = next;
-        c->res[1] = &residual;
-        if (mbs_closure(c->arg, c->res, c->iw, c->w, 0) || !isfinite(residual))
-            return CLOSURE_SINGULAR;
+        progress now = {0.0, 0.0};
+        double size = 1.0;
+        if (newton_step(c, x, z, next, &now.residual)) return CLOSURE_SINGULAR;
         for (i = 0; i < NZ; i++) {
             double step = fabs(next[i] - z[i]);
             if (!isfinite(step)) return CLOSURE_SINGULAR;
             if (step > reach * MODEL_NOMINAL[DEPENDENTS + i]) return CLOSURE_OPEN;
             size = fmax(size, fabs(next[i]));
-            move = fmax(move, step);
+            now.move = fmax(now.move, step);
         }
         memcpy(z, next, sizeof next);
-        if (residual < RESIDUAL * size && move < MOVE * size) return CLOSURE_OK;
+        if (converged(now, before, size)) return CLOSURE_OK;
+        before = now;
     }
     return CLOSURE_OPEN;
 }
@@ -62,15 +85,81 @@ int closure_solve(core *c, const double *x, double *z) {
     return CLOSURE_OK;
 }
 
-int closure_start(core *c, const double *x, double *z) {
-    memcpy(z, c->m.guess, NZ * sizeof *z);
-    if (!c->m.guessed && newton(c, MODEL_START + STATES, z, HUGE_VAL) == CLOSURE_OK) {
+/* z at x on the branch of the model's start values. */
+static int from_start(core *c, const double *x, double *z) {
+    const double *start = MODEL_START + DEPENDENTS;
+    memcpy(z, start, NZ * sizeof *z);
+    if (newton(c, MODEL_START + STATES, z, HUGE_VAL) == CLOSURE_OK) {
         memcpy(c->m.posture_x, MODEL_START + STATES, NX * sizeof *x);
         memcpy(c->m.posture_z, z, NZ * sizeof *z);
         if (closure_solve(c, x, z) == CLOSURE_OK) return CLOSURE_OK;
     }
-    memcpy(z, c->m.guess, NZ * sizeof *z);
+    memcpy(z, start, NZ * sizeof *z);
     return newton(c, x, z, HUGE_VAL);
+}
+
+static int guessed(const core *c, int i) { return c->m.guess[i] != MODEL_START[DEPENDENTS + i]; }
+
+/* How far z is from the guesses and, with little weight, from the start values of the others. */
+static double miss(const core *c, const double *z) {
+    double far = 0.0, unlike = 0.0;
+    int i;
+    for (i = 0; i < NZ; i++) {
+        double d = fabs(z[i] - c->m.guess[i]) / MODEL_NOMINAL[DEPENDENTS + i];
+        if (guessed(c, i))
+            far = fmax(far, d);
+        else
+            unlike = fmax(unlike, d);
+    }
+    return far + ALIKE * unlike;
+}
+
+/* Numbers from -1 to 1, the same in every run. */
+static double scattered(unsigned k, unsigned i) {
+    unsigned s = (k * 7919u + i * 104729u + 1u) & 0xffffffffu;
+    int turn;
+    for (turn = 0; turn < 3; turn++) {
+        s ^= (s << 13) & 0xffffffffu;
+        s ^= s >> 17;
+        s ^= (s << 5) & 0xffffffffu;
+    }
+    return s / 2147483648.0 - 1.0;
+}
+
+/* Where trial k starts: at the guesses; the other coordinates at the start values, near the posture
+ * that continues them, or anywhere. */
+static void trial_start(const core *c, int k, const double *near, double *z) {
+    int i;
+    for (i = 0; i < NZ; i++) {
+        z[i] = c->m.guess[i];
+        if (guessed(c, i)) continue;
+        if (k == 1) z[i] = near[i];
+        if (k > 1)
+            z[i] += RANGE * MODEL_NOMINAL[DEPENDENTS + i] * scattered((unsigned)k, (unsigned)i);
+    }
+}
+
+/* Of the posture on the start values' branch and of those that Newton steps reach from other
+ * places, the nearest to the guesses: a single guess is enough to choose a branch. */
+static int near_guesses(core *c, const double *x, double *z) {
+    double near[NZ], trial[NZ], best = HUGE_VAL;
+    int k, status = from_start(c, x, near);
+    if (status) memcpy(near, MODEL_START + DEPENDENTS, sizeof near);
+    memcpy(z, near, sizeof near);
+    if (status == CLOSURE_OK) best = miss(c, z);
+    for (k = 0; k < TRIALS; k++) {
+        trial_start(c, k, near, trial);
+        if (newton(c, x, trial, HUGE_VAL) == CLOSURE_OK && miss(c, trial) < best) {
+            best = miss(c, trial);
+            memcpy(z, trial, sizeof trial);
+            status = CLOSURE_OK;
+        }
+    }
+    return status;
+}
+
+int closure_start(core *c, const double *x, double *z) {
+    return c->m.guessed ? near_guesses(c, x, z) : from_start(c, x, z);
 }
 
 int closure_singular(core *c, const double *x, const double *z) {

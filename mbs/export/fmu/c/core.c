@@ -66,6 +66,7 @@ const char *core_mode_name(int mode) {
         case EVENT: return "in event mode";
         case CONTINUOUS: return "in continuous-time mode";
         case STEP: return "between steps";
+        case INTERMEDIATE: return "during an intermediate update";
         default: return "after termination";
     }
 }
@@ -80,7 +81,7 @@ void core_point(core *c, const double *t, const double *x, const double *z) {
     c->arg[0] = t;
     c->arg[1] = x;
     c->arg[2] = z;
-    c->arg[3] = c->m.values + INPUTS;
+    c->arg[3] = core_inputs(c, *t);
     c->arg[4] = c->m.values + PARAMETERS;
 }
 
@@ -109,12 +110,19 @@ core_status core_accept_posture(core *c, const double *x, const double *z) {
     return CORE_OK;
 }
 
+core_status core_accept_states(core *c) {
+    const double *x = c->m.values + STATES;
+    int status = closure_solve(c, x, c->z);
+    return status ? closure_failed(c, status) : core_accept_posture(c, x, c->z);
+}
+
 core_status core_refresh(core *c) {
     double *v = c->m.values, *x = v + STATES;
     int i, status;
     if (!c->m.stale) return CORE_OK;
     status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
     if (status) return closure_failed(c, status);
+    if (c->m.mode == INITIALIZATION && core_first_modes(c)) return CORE_ERROR;
     if (core_call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
         return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
                               c->m.time);
@@ -130,12 +138,15 @@ core_status core_refresh(core *c) {
 static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
 
 static int allocate(core *c) {
-    long long size[4] = {8, 3, 0, 0}, other[4];
+    long long size[4] = {9, 4, 0, 0}, other[4];
     int i, f;
     static int (*const work[])(long long *, long long *, long long *, long long *) = {
         mbs_rhs_work, mbs_tangent_work, mbs_adjoint_work,
 #if NZ > 0
         mbs_closure_work, mbs_sensitivity_work,
+#endif
+#if NK > 0
+        mbs_first_work, mbs_indicators_work, mbs_rates_work, mbs_jump_work,
 #endif
 #ifdef MODEL_RODAS
         mbs_jacobian_work,
@@ -178,6 +189,7 @@ core *core_new(const char *name, int cosimulation, core_logger log, void *host) 
     c->m.cosimulation = cosimulation;
     to_start(c);
     core_init_solver(c);
+    core_init_events(c);
     return c;
 }
 
@@ -210,14 +222,22 @@ core_status core_enter_initialization(core *c) {
 
 core_status core_exit_initialization(core *c) {
     core_status status;
+    int changed;
     if (!core_allowed(c, INITIALIZATION, "leaving initialization mode")) return CORE_ERROR;
     status = core_refresh(c);
     if (status) return status;
     status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     if (status) return status;
-    core_start_solver(c);
-    c->m.mode = c->m.cosimulation ? STEP : EVENT;
-    return CORE_OK;
+    stepper_start(&c->solver, c->m.time);
+    status = core_start_events(c);
+    if (status) return status;
+    if (!c->m.cosimulation || c->event_mode) {
+        c->m.mode = EVENT;
+        return CORE_OK;
+    }
+    status = core_settle(c, &changed);
+    if (!status) c->m.mode = STEP;
+    return status;
 }
 
 core_status core_terminate(core *c) {

@@ -18,9 +18,13 @@ enum {
     INPUTS = DERIVATIVES + NX,
     OUTPUTS = INPUTS + NU,
     PARAMETERS = OUTPUTS + NY,
-    DEPENDENTS = PARAMETERS + NP,
-    N_VALUES = DEPENDENTS + NZ
+    MODES = PARAMETERS + NP,
+    DEPENDENTS = MODES + NM,
+    INDICATORS = DEPENDENTS + NZ,
+    N_VALUES = INDICATORS + NK
 };
+
+#define INPUT_ORDERS 3 /* derivatives of an input that a communication step may follow */
 
 typedef enum { CORE_OK, CORE_DISCARD, CORE_ERROR } core_status;
 
@@ -30,20 +34,35 @@ typedef enum {
     EVENT = 4,
     CONTINUOUS = 8,
     STEP = 16,
-    TERMINATED = 32
+    TERMINATED = 32,
+    INTERMEDIATE = 64 /* within a communication step, where the host may look */
 } core_mode;
 
+/* Inputs are held; follow their derivatives; have followed them up to the present time. */
+typedef enum { INPUTS_HELD, INPUTS_MOVE, INPUTS_MOVED } core_input_motion;
+
 typedef void (*core_logger)(void *host, const char *name, core_status status, const char *message);
+/* Told after every internal step; 1: return at *until, or now where that has passed. */
+typedef int (*core_watch)(void *host, double time, int may_return, double *until);
+
+typedef struct {
+    int event, early; /* an event waits to be handled; the step ended before its end */
+} core_stop;
 
 typedef struct {
     int mode, cosimulation;
     int stale;   /* the calculated values do not belong to the others any more */
     int closed;  /* a posture that closes the loops is known */
     int guessed; /* the host gave guesses of the dependent coordinates, other than the start */
+    int inputs;  /* a core_input_motion */
     double time, tolerance;
     double values[N_VALUES + 1];
     double guess[NZ + 1];
     double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
+    double input_time;                  /* to which the inputs and their derivatives belong */
+    double slopes[INPUT_ORDERS * NU + 1]; /* first derivatives of all inputs, then second ones */
+    double offset[NK + 1]; /* added to an indicator that has not left zero yet: hysteresis */
+    double events[EVENTS_MEMORY(NK)];
     double solver[STEPPER_MEMORY(NX)];
 } core_memory;
 
@@ -53,8 +72,12 @@ typedef struct {
     core_logger log;
     void *host;
     int discards; /* messages of discarded calls are wanted; those of errors always are */
+    int event_mode, early_return; /* the host of a co-simulation handles events; takes part steps */
+    core_watch watch;             /* or NULL */
     stepper solver;
-    double work[SOLVER_WORK(NX) + 1], z[NZ + 1];
+    events events;
+    double work[SOLVER_WORK(NX) + 1], event_work[EVENTS_WORK(NX, NK) + 1];
+    double z[NZ + 1], u[NU + 1];
     const double **arg;
     double **res;
     long long *iw;
@@ -86,9 +109,11 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
                          const unsigned *known, size_t n_known, const double *seed,
                          double *answer);
 
-/* model exchange */
+/* events; changed: 1 where the states have jumped */
 core_status core_enter_event_mode(core *c);
-core_status core_update_discrete_states(core *c);
+core_status core_update_discrete_states(core *c, int *changed);
+
+/* model exchange */
 core_status core_enter_continuous_mode(core *c);
 core_status core_completed_step(core *c);
 core_status core_set_time(core *c, double time);
@@ -96,9 +121,16 @@ core_status core_set_states(core *c, const double *x, size_t n);
 core_status core_get_states(core *c, double *x, size_t n);
 core_status core_get_derivatives(core *c, double *xdot, size_t n);
 core_status core_get_nominals(core *c, double *nominal, size_t n);
+core_status core_get_indicators(core *c, double *indicators, size_t n);
 
-/* co-simulation */
-core_status core_do_step(core *c, double time, double h);
+/* co-simulation; derivatives of inputs are taken at the start of the next step, those of outputs
+ * are along the motion */
+core_status core_do_step(core *c, double time, double h, core_stop *stop);
+core_status core_enter_step_mode(core *c);
+core_status core_set_input_slopes(core *c, const unsigned *ref, size_t n, const int *order,
+                                  const double *values);
+core_status core_get_output_slopes(core *c, const unsigned *ref, size_t n, const int *order,
+                                   double *values);
 
 core_status core_save(core *c, core_state **state);
 core_status core_restore(core *c, const core_state *state);

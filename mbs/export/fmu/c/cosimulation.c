@@ -3,33 +3,55 @@
 
 #include <math.h>
 
-static core_status step_failed(core *c, int status) {
-    static const char *const reason[] = {
-        "", "", "too many steps", "the step size became too small",
-        "the loops cannot be closed or the equations have no solution (unclosable or singular "
-        "posture)", "the projection failed", "a derivative is not finite (singular posture?)"};
-    return core_no_answer(c, "%s: integration stopped at time %.9g with step %.3g: %s", c->name,
-                     c->m.time, stepper_wanted_step(&c->solver), reason[status]);
+/* The host looks at the model, and may ask for an earlier end. */
+static void let_look(core *c, double *end) {
+    double until = *end;
+    int asked;
+    if (!c->watch) return;
+    c->m.mode = INTERMEDIATE;
+    asked = c->watch(c->host, c->m.time, c->early_return, &until);
+    c->m.mode = STEP;
+    if (asked && c->early_return) *end = fmax(c->m.time, fmin(*end, until));
 }
 
-core_status core_do_step(core *c, double time, double h) {
-    double *x = c->m.values + STATES, end = time + h;
-    int status = STEPPER_OK;
+/* Internal steps up to the end, or to the first event where the host handles events. */
+static core_status run(core *c, double end, core_stop *stop) {
+    int hand_over = c->event_mode && c->early_return, changed;
+    double until = end;
+    core_status status = CORE_OK;
+    while (!status && !stop->event && (c->m.time < until || core_pending(c))) {
+        status = core_pending(c) ? core_settle(c, &changed) : core_step(c, until);
+        stop->event = !status && hand_over && core_pending(c);
+        if (!status) let_look(c, &until);
+    }
+    stop->early = !status && c->m.time < end;
+    return status;
+}
+
+core_status core_do_step(core *c, double time, double h, core_stop *stop) {
+    double end = time + h;
+    core_status status;
+    stop->event = stop->early = 0;
     if (!core_allowed(c, STEP, "a step")) return CORE_ERROR;
     if (!isfinite(end) || !(h > 0.0))
         return core_refuse(c, "%s: step %g at time %g must be positive", c->name, h, time);
     if (fabs(time - c->m.time) > 1e-9 * fmax(1.0, fabs(time)))
         return core_refuse(c, "%s: the step starts at time %.12g; the model is at %.12g", c->name,
                            time, c->m.time);
-    c->solver.rtol = c->solver.atol = c->m.tolerance;
-    c->solver.since_output = 0;
+    core_prepare_solver(c);
+    core_begin_inputs(c);
     c->m.stale = 1;
-    while (!status && stepper_time(&c->solver) < end) {
-        status = stepper_step(&c->solver, x, end);
-        c->m.time = stepper_time(&c->solver);
-        if (!status && core_accept_posture(c, x, c->z)) return CORE_ERROR;
-    }
-    if (status) return step_failed(c, status);
-    c->m.time = end;
-    return CORE_OK;
+    status = run(c, end, stop);
+    if (!status && !stop->early) c->m.time = end;
+    core_end_inputs(c);
+    return status;
+}
+
+core_status core_enter_step_mode(core *c) {
+    core_status status;
+    int changed;
+    if (!core_allowed(c, c->m.cosimulation ? EVENT : 0, "entering step mode")) return CORE_ERROR;
+    status = core_settle(c, &changed);
+    if (!status) c->m.mode = STEP;
+    return status;
 }

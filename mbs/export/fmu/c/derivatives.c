@@ -1,4 +1,4 @@
-/* Directional and adjoint derivatives, exact through closed loops. */
+/* Directional and adjoint derivatives and those by time, exact through closed loops. */
 #include "internal.h"
 
 #include <math.h>
@@ -6,13 +6,14 @@
 
 /* Numbers that belong to states, inputs, parameters and to what is calculated from them. */
 typedef struct {
-    double dx[NX + 1], du[NU + 1], dp[NP + 1], dxdot[NX + 1], dy[NY + 1], dz[NZ + 1];
+    double dt, dx[NX + 1], du[NU + 1], dp[NP + 1];
+    double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
 
 static double *known_of(tangents *d, unsigned ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref >= INPUTS && ref < OUTPUTS) return d->du + (ref - INPUTS);
-    if (ref >= PARAMETERS && ref < DEPENDENTS) return d->dp + (ref - PARAMETERS);
+    if (ref >= PARAMETERS && ref < MODES) return d->dp + (ref - PARAMETERS);
     return NULL;
 }
 
@@ -20,7 +21,9 @@ static double *unknown_of(tangents *d, unsigned ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref < INPUTS) return d->dxdot + (ref - DERIVATIVES);
     if (ref >= OUTPUTS && ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
-    if (ref >= DEPENDENTS && ref < N_VALUES) return d->dz + (ref - DEPENDENTS);
+    if (ref >= MODES && ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
+    if (ref >= DEPENDENTS && ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
+    if (ref >= INDICATORS && ref < N_VALUES) return d->dg + (ref - INDICATORS);
     return NULL;
 }
 
@@ -29,7 +32,7 @@ static core_status ready(core *c, const unsigned *unknown, size_t n_unknown, con
                          size_t n_known, const double *seed, size_t n_seed) {
     tangents d;
     size_t i;
-    if (!core_allowed(c, INITIALIZATION | RUNNING, "a derivative")) return CORE_ERROR;
+    if (!core_allowed(c, INITIALIZATION | RUNNING | INTERMEDIATE, "a derivative")) return CORE_ERROR;
     for (i = 0; i < n_known; i++)
         if (!known_of(&d, known[i]))
             return core_refuse(c, "%s: no derivative with respect to value reference %u; use "
@@ -54,6 +57,22 @@ static core_status finite_answer(core *c, unsigned ref, double value) {
                           MODEL_NAMES[ref], c->m.time);
 }
 
+/* What moves when the seeds are moved. */
+static core_status move(core *c, tangents *d) {
+    point(c);
+    c->arg[5] = &d->dt;
+    c->arg[6] = d->dx;
+    c->arg[7] = d->du;
+    c->arg[8] = d->dp;
+    c->res[0] = d->dxdot;
+    c->res[1] = d->dy;
+    c->res[2] = d->dz;
+    c->res[3] = d->dg;
+    if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0))
+        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+    return CORE_OK;
+}
+
 core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
                              const unsigned *known, size_t n_known, const double *seed,
                              double *answer) {
@@ -63,15 +82,7 @@ core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
     if (status) return status;
     memset(&d, 0, sizeof d);
     for (i = 0; i < n_known; i++) *known_of(&d, known[i]) += seed[i];
-    point(c);
-    c->arg[5] = d.dx;
-    c->arg[6] = d.du;
-    c->arg[7] = d.dp;
-    c->res[0] = d.dxdot;
-    c->res[1] = d.dy;
-    c->res[2] = d.dz;
-    if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0))
-        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+    status = move(c, &d);
     for (i = 0; i < n_unknown && !status; i++) {
         answer[i] = *unknown_of(&d, unknown[i]);
         status = finite_answer(c, unknown[i], answer[i]);
@@ -92,6 +103,7 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
     c->arg[5] = w.dxdot;
     c->arg[6] = w.dy;
     c->arg[7] = w.dz;
+    c->arg[8] = w.dg;
     c->res[0] = g.dx;
     c->res[1] = g.du;
     c->res[2] = g.dp;
@@ -101,6 +113,32 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
     for (i = 0; i < n_known && !status; i++) {
         answer[i] = *known_of(&g, known[i]);
         status = finite_answer(c, known[i], answer[i]);
+    }
+    return status;
+}
+
+/* Inputs follow what was given of their derivatives, else they are held. */
+core_status core_get_output_slopes(core *c, const unsigned *ref, size_t n, const int *order,
+                                   double *values) {
+    core_status status;
+    tangents d;
+    size_t i;
+    if (n && (!ref || !order || !values))
+        return core_refuse(c, "%s: the array is NULL", c->name);
+    status = ready(c, ref, n, NULL, 0, NULL, 0);
+    if (status) return status;
+    for (i = 0; i < n; i++)
+        if (order[i] != 1)
+            return core_refuse(c, "%s: derivative %d of %s is not known; use order 1", c->name,
+                               order[i], MODEL_NAMES[ref[i]]);
+    memset(&d, 0, sizeof d);
+    d.dt = 1.0;
+    memcpy(d.dx, c->m.values + DERIVATIVES, sizeof d.dx - sizeof *d.dx);
+    core_input_rates(c, c->m.time, d.du);
+    status = move(c, &d);
+    for (i = 0; i < n && !status; i++) {
+        values[i] = *unknown_of(&d, ref[i]);
+        status = finite_answer(c, ref[i], values[i]);
     }
     return status;
 }

@@ -1,21 +1,28 @@
-/* Model exchange: the integrator is outside. */
+/* Model exchange, where the integrator is outside; and event mode, which co-simulation has too. */
 #include "internal.h"
 
 #include <math.h>
 #include <string.h>
 
 core_status core_enter_event_mode(core *c) {
-    if (!core_allowed(c, CONTINUOUS, "entering event mode")) return CORE_ERROR;
+    int from = c->m.cosimulation ? STEP : CONTINUOUS;
+    if (c->m.cosimulation && !c->event_mode)
+        return core_refuse(c, "%s: the instance was made without event mode; its events are "
+                           "handled inside", c->name);
+    if (!core_allowed(c, from, "entering event mode")) return CORE_ERROR;
     c->m.mode = EVENT;
     return CORE_OK;
 }
 
-core_status core_update_discrete_states(core *c) {
-    return core_allowed(c, EVENT, "updating discrete states") ? CORE_OK : CORE_ERROR;
+core_status core_update_discrete_states(core *c, int *changed) {
+    *changed = 0;
+    if (!core_allowed(c, EVENT, "updating discrete states")) return CORE_ERROR;
+    return core_settle(c, changed);
 }
 
 core_status core_enter_continuous_mode(core *c) {
-    if (!core_allowed(c, EVENT, "entering continuous-time mode")) return CORE_ERROR;
+    if (!core_allowed(c, c->m.cosimulation ? 0 : EVENT, "entering continuous-time mode"))
+        return CORE_ERROR;
     c->m.mode = CONTINUOUS;
     return CORE_OK;
 }
@@ -23,8 +30,8 @@ core_status core_enter_continuous_mode(core *c) {
 core_status core_completed_step(core *c) {
     core_status status;
     if (!core_allowed(c, CONTINUOUS, "completing a step")) return CORE_ERROR;
-    if (!NZ) return CORE_OK;
-    status = core_refresh(c);
+    if (!NZ && !NK) return CORE_OK;
+    status = core_arm_indicators(c);
     return status ? status
                   : core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
 }
@@ -37,15 +44,17 @@ core_status core_set_time(core *c, double time) {
     return CORE_OK;
 }
 
-static int counted(core *c, const void *array, size_t n) {
-    if (n == NX && (array || !n)) return 1;
-    core_refuse(c, "%s: %d states were asked for; it has %d", c->name, (int)n, NX);
+#define NOT_STEPPING (INITIALIZATION | EVENT | CONTINUOUS | TERMINATED)
+
+static int counted(core *c, const void *array, size_t n, int count, const char *what) {
+    if (n == (size_t)count && (array || !n)) return 1;
+    core_refuse(c, "%s: %d %s were asked for; it has %d", c->name, (int)n, what, count);
     return 0;
 }
 
 core_status core_set_states(core *c, const double *x, size_t n) {
     size_t i;
-    if (!core_allowed(c, CONTINUOUS, "setting the states") || !counted(c, x, n)) return CORE_ERROR;
+    if (!core_allowed(c, CONTINUOUS, "setting the states") || !counted(c, x, n, NX, "states")) return CORE_ERROR;
     for (i = 0; i < n; i++)
         if (!isfinite(x[i]))
             return core_refuse(c, "%s: %s = %g is not finite", c->name, MODEL_NAMES[i], x[i]);
@@ -55,8 +64,8 @@ core_status core_set_states(core *c, const double *x, size_t n) {
 }
 
 core_status core_get_states(core *c, double *x, size_t n) {
-    if (!core_allowed(c, INITIALIZATION | EVENT | CONTINUOUS | TERMINATED, "getting the states") ||
-        !counted(c, x, n))
+    if (!core_allowed(c, NOT_STEPPING, "getting the states") ||
+        !counted(c, x, n, NX, "states"))
         return CORE_ERROR;
     memcpy(x, c->m.values + STATES, n * sizeof *x);
     return CORE_OK;
@@ -64,8 +73,8 @@ core_status core_get_states(core *c, double *x, size_t n) {
 
 core_status core_get_derivatives(core *c, double *xdot, size_t n) {
     core_status status;
-    if (!core_allowed(c, INITIALIZATION | EVENT | CONTINUOUS | TERMINATED, "getting derivatives") ||
-        !counted(c, xdot, n))
+    if (!core_allowed(c, NOT_STEPPING, "getting derivatives") ||
+        !counted(c, xdot, n, NX, "states"))
         return CORE_ERROR;
     status = core_refresh(c);
     memcpy(xdot, c->m.values + DERIVATIVES, n * sizeof *xdot);
@@ -73,7 +82,17 @@ core_status core_get_derivatives(core *c, double *xdot, size_t n) {
 }
 
 core_status core_get_nominals(core *c, double *nominal, size_t n) {
-    if (!counted(c, nominal, n)) return CORE_ERROR;
+    if (!counted(c, nominal, n, NX, "states")) return CORE_ERROR;
     memcpy(nominal, MODEL_NOMINAL + STATES, n * sizeof *nominal);
     return CORE_OK;
+}
+
+core_status core_get_indicators(core *c, double *indicators, size_t n) {
+    core_status status;
+    if (!core_allowed(c, NOT_STEPPING, "getting event indicators") ||
+        !counted(c, indicators, n, NK, "event indicators"))
+        return CORE_ERROR;
+    status = core_show_indicators(c);
+    memcpy(indicators, c->m.values + INDICATORS, n * sizeof *indicators);
+    return status;
 }

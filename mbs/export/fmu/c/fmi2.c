@@ -183,10 +183,14 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 /* ---- model exchange ---- */
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
+    int changed;
+    core_status status;
     NEED(c);
     if (!info) return refused(c, "the event information is NULL");
     memset(info, 0, sizeof *info);
-    return as_fmi(core_update_discrete_states(MODEL(c)));
+    status = core_update_discrete_states(MODEL(c), &changed);
+    info->valuesOfContinuousStatesChanged = changed ? fmi2True : fmi2False;
+    return as_fmi(status);
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_before,
@@ -218,32 +222,27 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
 VECTOR(fmi2GetContinuousStates, core_get_states)
 VECTOR(fmi2GetDerivatives, core_get_derivatives)
 VECTOR(fmi2GetNominalsOfContinuousStates, core_get_nominals)
-
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t n) {
-    (void)indicators;
-    return none(c, n, "the model has no event indicators");
-}
+VECTOR(fmi2GetEventIndicators, core_get_indicators)
 
 /* ---- co-simulation ---- */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real value[]) {
     NEED(c);
-    (void)vr, (void)n, (void)order, (void)value;
-    return refused(c, "inputs are not interpolated");
+    return as_fmi(core_set_input_slopes(MODEL(c), vr, n, order, value));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                         const fmi2Integer order[], fmi2Real value[]) {
     NEED(c);
-    (void)vr, (void)n, (void)order, (void)value;
-    return refused(c, "outputs have no derivatives of their own");
+    return as_fmi(core_get_output_slopes(MODEL(c), vr, n, order, value));
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean no_set_before) {
+    core_stop stop;
     NEED(c);
     (void)no_set_before;
-    return as_fmi(core_do_step(MODEL(c), time, h));
+    return as_fmi(core_do_step(MODEL(c), time, h, &stop));
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {

@@ -15,15 +15,14 @@ static void forward_log(void *host, const char *name, core_status status, const 
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
-static fmi3Instance no_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
-                                const char *message) {
+static void *no_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
+                         const char *message) {
     if (logger) logger(environment, fmi3Error, core_category(CORE_ERROR), message);
     return NULL;
 }
 
-static fmi3Instance instantiate(fmi3String name, fmi3String token, int cosimulation,
-                                fmi3Boolean logging, fmi3InstanceEnvironment environment,
-                                fmi3LogMessageCallback logger) {
+static face *instantiate(fmi3String name, fmi3String token, int cosimulation, fmi3Boolean logging,
+                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger) {
     face *f;
     if (!name || !*name) return no_instance(environment, logger, "the instance has no name");
     if (!token || strcmp(token, MODEL_GUID))
@@ -50,17 +49,35 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
     return instantiate(name, token, 0, logging, environment, logger);
 }
 
+/* Inputs are not set within a step; all variables can be read. */
+static int tell(void *host, double time, int may_return, double *until) {
+    face *f = host;
+    fmi3Boolean asked = fmi3False;
+    fmi3Float64 end = *until;
+    f->update(f->environment, time, fmi3False, fmi3True, fmi3True, may_return != 0, &asked, &end);
+    *until = end;
+    return asked;
+}
+
 fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
     fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
     const fmi3ValueReference intermediate[], size_t n_intermediate,
     fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
     fmi3IntermediateUpdateCallback update) {
-    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)update;
-    if (event_mode || n_intermediate)
-        return no_instance(environment, logger, "this model has neither an event mode in "
-                           "co-simulation nor intermediate variables");
-    return instantiate(name, token, 1, logging, environment, logger);
+    face *f;
+    size_t i;
+    (void)resources, (void)visible;
+    for (i = 0; i < n_intermediate; i++)
+        if (!intermediate || intermediate[i] > TIME)
+            return no_instance(environment, logger, "an intermediate variable is unknown");
+    f = instantiate(name, token, 1, logging, environment, logger);
+    if (!f) return NULL;
+    f->update = update;
+    f->model->watch = update ? tell : NULL;
+    f->model->event_mode = event_mode;
+    f->model->early_return = early_return;
+    return f;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(
@@ -105,7 +122,7 @@ FORWARD(fmi3Terminate, core_terminate)
 FORWARD(fmi3Reset, core_reset)
 FORWARD(fmi3EnterEventMode, core_enter_event_mode)
 FORWARD(fmi3EnterContinuousTimeMode, core_enter_continuous_mode)
-FORWARD(fmi3EvaluateDiscreteStates, core_update_discrete_states)
+FORWARD(fmi3EnterStepMode, core_enter_step_mode)
 
 /* Every variable has one element: as many values as references. */
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,

@@ -9,6 +9,7 @@ typedef struct {
     core *model;
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
+    fmi3IntermediateUpdateCallback update;
 } face;
 
 #define MODEL(c) (((face *)(c))->model)

@@ -60,12 +60,20 @@ DERIVATIVE(fmi3GetAdjointDerivative, core_adjoint, n_unknown, n_known)
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate,
                                     fmi3Boolean *nominals, fmi3Boolean *values,
                                     fmi3Boolean *next_defined, fmi3Float64 *next) {
+    core_status status;
+    int changed;
     NEED(c);
     if (!again || !terminate || !nominals || !values || !next_defined || !next)
         return refused(c, "a flag of the event is NULL");
     *again = *terminate = *nominals = *values = *next_defined = fmi3False;
     *next = 0.0;
-    return as_fmi(core_update_discrete_states(MODEL(c)));
+    status = core_update_discrete_states(MODEL(c), &changed);
+    *values = changed != 0;
+    return as_fmi(status);
+}
+
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
+    return refused(c, "discrete states are evaluated when they are updated");
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set_before,
@@ -96,11 +104,7 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t
 VECTOR(fmi3GetContinuousStates, core_get_states)
 VECTOR(fmi3GetContinuousStateDerivatives, core_get_derivatives)
 VECTOR(fmi3GetNominalsOfContinuousStates, core_get_nominals)
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t n) {
-    (void)indicators;
-    return none(c, n, "the model has no event indicators");
-}
+VECTOR(fmi3GetEventIndicators, core_get_indicators)
 
 static fmi3Status counted(fmi3Instance c, size_t *n, size_t count) {
     NEED(c);
@@ -109,7 +113,7 @@ static fmi3Status counted(fmi3Instance c, size_t *n, size_t count) {
     return fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) { return counted(c, n, 0); }
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) { return counted(c, n, NK); }
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) { return counted(c, n, NX); }
 
 /* ---- co-simulation ---- */
@@ -118,22 +122,22 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 h, fmi3Boole
                       fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early,
                       fmi3Float64 *last) {
     core_status status;
+    core_stop stop;
     NEED(c);
     (void)no_set_before;
     if (!event || !terminate || !early || !last) return refused(c, "a flag of the step is NULL");
     *event = *terminate = *early = fmi3False;
-    status = core_do_step(MODEL(c), time, h);
+    status = core_do_step(MODEL(c), time, h, &stop);
+    *event = stop.event != 0;
+    *early = stop.early != 0;
     *last = MODEL(c)->m.time;
     return as_fmi(status);
-}
-
-fmi3Status fmi3EnterStepMode(fmi3Instance c) {
-    return refused(c, "there is no event mode in co-simulation to leave");
 }
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                                     const fmi3Int32 orders[], fmi3Float64 values[],
                                     size_t n_values) {
-    (void)vr, (void)n, (void)orders, (void)values, (void)n_values;
-    return refused(c, "outputs have no derivatives of their own");
+    NEED(c);
+    if (n != n_values) return refused(c, "give one place for each derivative");
+    return as_fmi(core_get_output_slopes(MODEL(c), vr, n, orders, values));
 }

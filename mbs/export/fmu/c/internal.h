@@ -5,6 +5,7 @@
 #include "core.h"
 
 #define RUNNING (EVENT | CONTINUOUS | STEP)
+#define READABLE (INITIALIZATION | RUNNING | INTERMEDIATE | TERMINATED)
 
 /* 1 in one of these modes; otherwise a message, and 0. */
 int core_allowed(core *c, int modes, const char *action);
@@ -22,11 +23,41 @@ void core_point(core *c, const double *t, const double *x, const double *z);
 /* Derivatives and outputs; y may be NULL. 0, or anything else where they have no answer. */
 int core_call_rhs(core *c, double t, const double *x, const double *z, double *xdot, double *y);
 
-/* The solver of co-simulation: once for an instance, and at the start of each run. */
+/* Inputs at a time, and how fast they change there. */
+const double *core_inputs(core *c, double t);
+void core_input_rates(core *c, double t, double *du);
+
+/* A communication step begins, and ends: its inputs have followed their derivatives. */
+void core_begin_inputs(core *c);
+void core_end_inputs(core *c);
+
+/* The solver of co-simulation: once for an instance, and before it is used. */
 void core_init_solver(core *c);
-void core_start_solver(core *c);
+void core_prepare_solver(core *c);
+
+/* Events: once for an instance; the modes at the start; the first look. */
+void core_init_events(core *c);
+core_status core_first_modes(core *c);
+core_status core_start_events(core *c);
+
+/* What indicators and slopes depend on has changed. */
+void core_restart(core *c);
+
+/* One internal step towards limit, cut at its first event, which is then pending. */
+core_status core_step(core *c, double limit);
+int core_pending(const core *c);
+
+/* The jumps that the present state asks for; changed: 1 where they move the states. */
+core_status core_settle(core *c, int *changed);
+
+/* What an integrator outside sees; after its steps, what has left zero can fire. */
+core_status core_show_indicators(core *c);
+core_status core_arm_indicators(core *c);
 
 /* From here on loops are closed starting at this posture; refused where they lose rank. */
 core_status core_accept_posture(core *c, const double *x, const double *z);
+
+/* The same, of the present states, whose dependent coordinates are not at hand. */
+core_status core_accept_states(core *c);
 
 #endif

@@ -12,6 +12,7 @@ struct core_state {
 };
 
 core_status core_save(core *c, core_state **state) {
+    if (!core_allowed(c, ~INTERMEDIATE, "saving the state")) return CORE_ERROR;
     if (!state) return core_refuse(c, "%s: the place of the state is NULL", c->name);
     if (!*state) *state = calloc(1, sizeof **state);
     if (!*state) return core_refuse(c, "%s: no memory is left to save the state", c->name);
@@ -21,16 +22,21 @@ core_status core_save(core *c, core_state **state) {
     return CORE_OK;
 }
 
+/* A co-simulation that waits in event mode needs a host which handles events. */
+static int handled_here(const core *c, const core_memory *m) {
+    return m->mode != EVENT || !m->cosimulation || c->event_mode;
+}
+
 static int ours(core *c, const core_state *s) {
     if (s && s->size == sizeof *s && !memcmp(s->guid, MODEL_GUID, sizeof MODEL_GUID) &&
-        s->m.cosimulation == c->m.cosimulation)
+        s->m.cosimulation == c->m.cosimulation && handled_here(c, &s->m))
         return 1;
     core_refuse(c, "%s: the state was not saved by this model", c->name);
     return 0;
 }
 
 core_status core_restore(core *c, const core_state *state) {
-    if (!ours(c, state)) return CORE_ERROR;
+    if (!core_allowed(c, ~INTERMEDIATE, "restoring a state") || !ours(c, state)) return CORE_ERROR;
     memcpy(&c->m, &state->m, sizeof c->m);
     return CORE_OK;
 }
@@ -59,8 +65,8 @@ static int is_flag(int value) { return value == 0 || value == 1; }
 /* The mode is one that such an instance can be in. */
 static int possible_mode(const core_memory *m) {
     switch (m->mode) {
-        case INSTANTIATED: case INITIALIZATION: case TERMINATED: return 1;
-        case EVENT: case CONTINUOUS: return !m->cosimulation;
+        case INSTANTIATED: case INITIALIZATION: case EVENT: case TERMINATED: return 1;
+        case CONTINUOUS: return !m->cosimulation;
         case STEP: return m->cosimulation;
         default: return 0;
     }
@@ -68,8 +74,22 @@ static int possible_mode(const core_memory *m) {
 
 static int parameters_in_bounds(const double *v) {
     int i;
-    for (i = PARAMETERS; i < DEPENDENTS; i++)
+    for (i = PARAMETERS; i < MODES; i++)
         if (v[i] < MODEL_MIN[i] || v[i] > MODEL_MAX[i]) return 0;
+    return 1;
+}
+
+static int sane_inputs(const core_memory *m) {
+    return (m->inputs == INPUTS_HELD || m->inputs == INPUTS_MOVE || m->inputs == INPUTS_MOVED) &&
+           isfinite(m->input_time) && all_finite(m->slopes, INPUT_ORDERS * NU);
+}
+
+static int sane_events(const core_memory *m) {
+    int i;
+    for (i = 0; i < EVENTS_MEMORY(NK) - NK; i++) /* all but the rates */
+        if (isnan(m->events[i])) return 0;
+    for (i = 0; i < NK; i++)
+        if (!isfinite(m->offset[i]) || m->offset[i] < 0.0) return 0;
     return 1;
 }
 
@@ -81,11 +101,11 @@ static int sane(const core_memory *m) {
         return 0;
     if (!isfinite(m->time) || !isfinite(m->tolerance) || !(m->tolerance > 0.0)) return 0;
     if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU)) return 0;
-    if (!all_finite(v + PARAMETERS, NP)) return 0;
+    if (!all_finite(v + PARAMETERS, NP + NM)) return 0;
     if (!parameters_in_bounds(v)) return 0;
     if (!m->stale && !all_finite(v, N_VALUES)) return 0;
     if (!all_finite(m->guess, NZ) || !all_finite(m->posture_z, NZ)) return 0;
-    if (!all_finite(m->posture_x, NX)) return 0;
+    if (!all_finite(m->posture_x, NX) || !sane_inputs(m) || !sane_events(m)) return 0;
     for (i = 0; i < STEPPER_MEMORY(0); i++)
         if (isnan(m->solver[i])) return 0;
     return 1;

@@ -2,6 +2,7 @@
 #ifndef MBS_SOLVER_H
 #define MBS_SOLVER_H
 
+#include "events.h"
 #include "model.h"
 
 #if defined MODEL_RODAS

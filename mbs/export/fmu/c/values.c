@@ -10,19 +10,26 @@ static core_status known_reference(core *c, unsigned ref) {
                        (int)N_VALUES - 1);
 }
 
+/* 1 for what is there without calculation. */
+static int given(const core *c, unsigned ref) {
+    if (ref < DERIVATIVES || (ref >= INPUTS && ref < OUTPUTS)) return 1;
+    return ref >= PARAMETERS && ref < (c->m.mode == INITIALIZATION ? MODES : DEPENDENTS);
+}
+
 core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     core_status status = CORE_OK;
     size_t i;
-    if (!core_allowed(c, INITIALIZATION | RUNNING | TERMINATED, "getting values"))
-        return CORE_ERROR;
+    if (!core_allowed(c, READABLE, "getting values")) return CORE_ERROR;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
     for (i = 0; i < n && !status; i++) status = known_reference(c, ref[i]);
     for (i = 0; i < n && !status; i++) {
         unsigned r = ref[i];
-        int given = (r < DERIVATIVES) || (r >= INPUTS && r < OUTPUTS) ||
-                    (r >= PARAMETERS && r < DEPENDENTS);
-        if (!given) status = core_refresh(c);
-        values[i] = c->m.values[r];
+        if (r >= INDICATORS)
+            status = core_show_indicators(c);
+        else if (!given(c, r))
+            status = core_refresh(c);
+        values[i] = r >= INPUTS && r < OUTPUTS ? core_inputs(c, c->m.time)[r - INPUTS]
+                                               : c->m.values[r];
     }
     return status;
 }
@@ -34,8 +41,8 @@ static int settable(const core *c, unsigned ref) {
     if (ref < INPUTS) return 0;
     if (ref < OUTPUTS) return before | RUNNING;
     if (ref < PARAMETERS) return 0;
-    if (ref < DEPENDENTS) return before | EVENT | STEP;
-    return before;
+    if (ref < MODES) return MODEL_FIXED[ref] ? before : before | EVENT | STEP;
+    return ref >= DEPENDENTS && ref < INDICATORS ? before : 0;
 }
 
 static core_status settable_value(core *c, unsigned ref, double value) {
@@ -49,7 +56,7 @@ static core_status settable_value(core *c, unsigned ref, double value) {
         return core_refuse(c, "%s: %s cannot be set %s", c->name, name, core_mode_name(c->m.mode));
     if (!isfinite(value))
         return core_refuse(c, "%s: %s = %g is not finite", c->name, name, value);
-    if (ref >= PARAMETERS && ref < DEPENDENTS &&
+    if (ref >= PARAMETERS && ref < MODES &&
         (value < MODEL_MIN[ref] || value > MODEL_MAX[ref]))
         return core_refuse(c, "%s: parameter %s = %g is outside %g to %g", c->name, name, value,
                            MODEL_MIN[ref], MODEL_MAX[ref]);
@@ -62,7 +69,7 @@ static void changed(core *c) {
     if (c->m.mode & (INSTANTIATED | INITIALIZATION))
         c->m.closed = 0;
     else
-        stepper_restart(&c->solver);
+        core_restart(c);
 }
 
 /* A guess equal to the start value in the model description says nothing: many hosts write all. */

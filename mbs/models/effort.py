@@ -1,4 +1,4 @@
-"""Joint efforts of a simulation, in whatever form the user gives them."""
+"""Joint efforts that drive a motion, in whatever form the user gives them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.errors import ModelError
-from mbs.simulate.signal_function import Signal, signal_function
+from mbs.models.signal_function import Signal, signal_function
 
 Effort = Mapping[str, float] | Sequence[float] | Function | Callable[[Any, Any, Any], Any] | None
 

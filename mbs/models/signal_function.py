@@ -1,4 +1,4 @@
-"""Signals that drive a simulation, written as functions of time, positions and velocities."""
+"""Signals that drive a mechanism, written as functions of time, positions and velocities."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LONGEST_REASON = 200
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """What a user gives to drive a simulation with.
+    """What a user gives to drive a mechanism with.
 
     Attributes:
         name: of the argument.

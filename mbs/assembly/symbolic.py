@@ -1,0 +1,248 @@
+"""A system some of whose numbers are symbols: masses, inertias, lengths, friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi
+from casadi import SX
+
+from mbs.assembly.adjustable import GROUPS, PLACEMENT, Adjustable, adjustables
+from mbs.assembly.joint_rows import JointRow
+from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.model_function import require_system
+from mbs.assembly.sensors import AttachedSensor
+from mbs.assembly.system import System
+from mbs.assembly.tree import Frame, Link, Tree
+from mbs.errors import ModelError
+from mbs.expressions import Parameter
+from mbs.messages import did_you_mean, quoted
+from mbs.spatial import Inertia, Khalil, Pose, elements
+from mbs.spatial.inertia import TEN_PARAMETERS
+
+_Symbols = Mapping[str, SX]
+_OF_THE_JOINT = ("Ia", "Fv", "Fs")
+
+
+def symbolic(system: System, what: Sequence[str]) -> System:
+    """The same system with some of its numbers as symbols, whose defaults are these numbers.
+
+    The symbols follow the parameters that the system has already, in p of every model. Inertial
+    parameters are those of a whole link about the origin of its frame and in its axes, as SYMORO
+    names them: M3 alone changes the mass and leaves first moments and inertia where they are, so
+    that the centre of mass moves. Where Fixed joints divide a link, the change is one of the body
+    that none of them holds. Lengths are the Khalil parameters of the frames and the places of
+    joints that were cut; what is fixed on a link stays where it is on the link. The posture stays
+    too.
+
+    Args:
+        system: open or closed.
+        what: groups: "masses" (M), "first_moments" (MX, MY, MZ), "inertias" (XX .. ZZ), "lengths"
+            (b, d, r, cut joints), "angles" (gamma, alpha, theta), "friction" (Fv, Fs), "rotors"
+            (Ia, Jm), "gravity" (G1, G2, G3), whose exact zeros stay zero; single numbers such as
+            "M3", "XX2", "d4", "Fv1", also where they are zero; the name of a body for the ten
+            parameters of its link.
+
+    Returns:
+        a System of its own; the given one is unchanged.
+
+    Raises:
+        ModelError: there is no such group, number or body, something is given twice, or a number
+            is an expression of other symbols already.
+    """
+    require_system(system)
+    rows = _chosen(system, _names(system, what))
+    _check_welds(system, rows)
+    taken = {parameter.name for parameter in system.parameters}
+    for row in rows:
+        if row.name in taken:
+            raise ModelError(
+                f"{system.name}: {row.name} cannot become a symbol, since there is a parameter of"
+                " that name; rename the parameter"
+            )
+    symbols = {row.name: SX.sym(row.name) for row in rows}
+    parameters = [Parameter(r.name, float(r.value), r.unit, r.description) for r in rows]
+    return _with(system, rows, symbols, parameters)
+
+
+def _names(system: System, what: Sequence[str]) -> list[str]:
+    if not isinstance(what, (str, list, tuple)):
+        raise ModelError(
+            f"{system.name}: what is to be symbols is {quoted(what)}; give names such as"
+            " ['masses', 'd4']"
+        )
+    names = [what] if isinstance(what, str) else list(what)
+    for name in names:
+        if names.count(name) > 1:
+            raise ModelError(f"{system.name}: {quoted(name)} is to be a symbol twice; name it once")
+    return names
+
+
+def _chosen(system: System, names: Sequence[str]) -> list[Adjustable]:
+    """The numbers with these names or in these groups, in the order of the system."""
+    rows = adjustables(system)
+    single = {row.name: row for row in rows}
+    own = {parameter.name for parameter in system.parameters}
+    wanted: dict[str, None] = {}
+    for name in names:
+        if name in GROUPS:
+            kinds = GROUPS[name]
+            found = [r for r in rows if r.kind in kinds and _is_number(r) and float(r.value)]
+        elif name in single:
+            _check_number(system, single[name])
+            found = [single[name]]
+        else:
+            found = _of_body(system, rows, name)
+        wanted |= dict.fromkeys(row.name for row in found if not _is_itself(row, own))
+    return [row for row in rows if row.name in wanted]
+
+
+def _is_number(row: Adjustable) -> bool:
+    return bool(row.value.is_constant())
+
+
+def _is_itself(row: Adjustable, parameters: set[str]) -> bool:
+    """Whether the value is the symbol of that name already."""
+    return row.name in parameters and row.value.is_symbolic() and row.value.name() == row.name
+
+
+def _check_number(system: System, row: Adjustable) -> None:
+    own = {parameter.name for parameter in system.parameters}
+    if not _is_number(row) and not _is_itself(row, own):
+        names = ", ".join(dict.fromkeys(s.name() for s in casadi.symvar(row.value)))
+        raise ModelError(
+            f"{system.name}: {row.name} is an expression of {names} already; use these parameters"
+        )
+
+
+def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adjustable]:
+    """The ten parameters of the link of a body, those of no symbol."""
+    links = {body.name: body.link for body in system.bodies}
+    if name not in links:
+        known = [*GROUPS, *links, *(row.name for row in rows)]
+        raise ModelError(
+            f"{system.name}: there is nothing called {quoted(name)} that may become a symbol;"
+            f" {did_you_mean(name, known)}"
+        )
+    number = links[name]
+    others = [b.name for b in system.bodies if b.link == number and b.name != name and b.mass != 0]
+    if others:
+        raise ModelError(
+            f"{system.name}: {name} is one link with {', '.join(others)}, which has one mass; name"
+            f" parameters of the link, such as M{number}"
+        )
+    return [r for r in rows if r.owner == ("link", number - 1) and r.kind in TEN_PARAMETERS]
+
+
+def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
+    """Refuse inertial symbols of links every body of which some Fixed joint holds."""
+    for number in sorted({int(r.owner[1]) for r in rows if r.kind in TEN_PARAMETERS}):
+        held = [j for j in system.joints if j.part is not None and j.frame_b[0] == number]
+        bodies = [body.name for body in system.bodies if body.link == number + 1]
+        parts = [joint.part.ports for joint in held if joint.part is not None]
+        if held and all(any((body, "") in ports for ports in parts) for body in bodies):
+            raise ModelError(
+                f"{system.name}: the mass of link {number + 1} cannot become a symbol, since each"
+                f" of its bodies is held by {' or '.join(joint.name for joint in held)}; give the"
+                " body an mbs.Parameter where it is described"
+            )
+
+
+def _with(
+    system: System,
+    rows: Sequence[Adjustable],
+    symbols: _Symbols,
+    parameters: Sequence[Parameter],
+) -> System:
+    """The system with symbols in place of the numbers."""
+    given: dict[tuple[str, int | str], dict[str, SX]] = {}
+    for row in rows:
+        given.setdefault(row.owner, {})[row.kind] = symbols[row.name]
+    links = tuple(
+        _link(link, given.get(("link", j), {})) for j, link in enumerate(system.tree.links)
+    )
+    gravity = [given.get(("gravity", k), {}).get("G", system.tree.gravity[k]) for k in range(3)]
+    joints = tuple(_joint(row, system.cuts, given) for row in system.joints)
+    return replace(
+        system,
+        tree=Tree(links, casadi.vertcat(*gravity)),
+        cuts=tuple(_cut(cut, given) for cut in system.cuts),
+        joints=joints,
+        sensors=tuple(
+            sensor
+            if sensor.joint is None or joints[sensor.joint] is system.joints[sensor.joint]
+            else replace(
+                sensor, frames=(joints[sensor.joint].frame_a, joints[sensor.joint].frame_b)
+            )
+            for sensor in system.sensors
+        ),
+        parameters=(*system.parameters, *parameters),
+        p=casadi.vertcat(system.p, *symbols.values()),
+        _cache={},
+    )
+
+
+def _link(link: Link, values: _Symbols) -> Link:
+    if not values:
+        return link
+    ten = zip(TEN_PARAMETERS, elements(link.inertia.parameters), strict=True)
+    inertia = Inertia.from_parameters(casadi.vertcat(*(values.get(k, old) for k, old in ten)))
+    six = zip(PLACEMENT, link.placement.parameters, strict=True)
+    placement = Khalil(*(values.get(kind, old) for kind, old in six))
+    rotor = link.rotor
+    if rotor is not None and "Jm" in values:
+        rotor = replace(rotor, inertia=values["Jm"])
+    joint: dict[str, Any] = {name: values[name] for name in _OF_THE_JOINT if name in values}
+    return replace(link, inertia=inertia, placement=placement, rotor=rotor, **joint)
+
+
+_Given = Mapping[tuple[str, int | str], _Symbols]
+
+
+def _moved(pose: Pose, values: _Symbols) -> Pose:
+    if not values:
+        return pose
+    return Pose(pose.R, casadi.vertcat(*(values.get(k, pose.p[i]) for i, k in enumerate("xyz"))))
+
+
+def _sensor(sensor: AttachedSensor, joints: Sequence[JointRow]) -> AttachedSensor:
+    if sensor.joint is None:
+        return sensor
+    joint = joints[sensor.joint]
+    return replace(sensor, frames=(joint.frame_a, joint.frame_b))
+
+
+def _cut(cut: Cut, given: _Given) -> Cut:
+    name = cut.edge.joint.name
+    return replace(
+        cut,
+        pose_a=_moved(cut.pose_a, given.get((name, "a"), {})),
+        pose_b=_moved(cut.pose_b, given.get((name, "b"), {})),
+    )
+
+
+def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
+    """The row of a joint, its frames where the cut joint has them."""
+    moves = [m for cut in cuts if cut.edge.joint.name == row.name for m in _moves(cut, given)]
+    if not moves:
+        return row
+
+    def frame(old: Frame) -> Frame:
+        return next((new for was, new in moves if _is_same(was, old)), old)
+
+    return replace(row, frame_a=frame(row.frame_a), frame_b=frame(row.frame_b))
+
+
+def _moves(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
+    """Each frame of a cut that has symbols, and the same with them."""
+    for side, (link, pose) in zip("ab", cut.frames, strict=True):
+        values = given.get((cut.edge.joint.name, side), {})
+        if values:
+            yield (link, pose), (link, _moved(pose, values))
+
+
+def _is_same(one: Frame, other: Frame) -> bool:
+    same = casadi.is_equal(one[1].matrix, other[1].matrix, 3)
+    return one[0] == other[0] and bool(same)

@@ -1,0 +1,221 @@
+/* Events: modes, jumps, and indicators as an integrator outside sees them.
+ *
+ * An indicator that has not left zero, after a jump or at rest there, is shown with an offset, which
+ * is larger than any value that it had below zero: outside no sign changes until it is clearly
+ * positive, or falls again. It is never shown as zero.
+ */
+#include "internal.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "closure.h"
+
+static core_status step_failed(core *c, int status) {
+    static const char *const reason[] = {
+        "", "", "too many steps", "the step size became too small",
+        "the loops cannot be closed or the equations have no solution (unclosable or singular "
+        "posture)", "the projection failed", "a derivative is not finite (singular posture?)",
+        "an event indicator has no value (unclosable or singular posture)",
+        "a jump has no solution", "its jumps do not come to an end",
+        "chattering, events follow each other and time stands still"};
+    char names[512] = "";
+    size_t used = 0;
+    int k;
+    for (k = 0; k < NK && status >= EVENTS_JUMP_FAILED && used < sizeof names; k++)
+        if (events_fired(&c->events)[k] > 0.0)
+            used += (size_t)snprintf(names + used, sizeof names - used, "%s%s",
+                                     used ? ", " : "; it concerns ", MODEL_INDICATORS[k]);
+    if (status >= EVENTS_JUMP_FAILED)
+        return core_no_answer(c, "%s: the event at time %.9g cannot be handled: %s%s", c->name,
+                              c->m.time, reason[status], names);
+    return core_no_answer(c, "%s: integration stopped at time %.9g with step %.3g: %s", c->name,
+                          c->m.time, stepper_wanted_step(&c->solver), reason[status]);
+}
+
+#if NK > 0
+
+static int indicators(void *user, double t, const double *x, double *g) {
+    core *c = user;
+    if (closure_solve(c, x, c->z)) return 1;
+    core_point(c, &t, x, c->z);
+    c->res[0] = g;
+    return mbs_indicators(c->arg, c->res, c->iw, c->w, 0);
+}
+
+/* Right after the indicators at the same place: the dependent coordinates are there. */
+static int rates(void *user, double t, const double *x, double *rise) {
+    core *c = user;
+    double du[NU + 1];
+    core_point(c, &t, x, c->z);
+    core_input_rates(c, t, du);
+    c->arg[5] = du;
+    c->res[0] = rise;
+    return mbs_rates(c->arg, c->res, c->iw, c->w, 0);
+}
+
+static int jump(void *user, double t, double *x, const double *fired) {
+    core *c = user;
+    double next[NX + 1], modes[NM + 1];
+    if (closure_solve(c, x, c->z)) return 1;
+    core_point(c, &t, x, c->z);
+    c->arg[5] = fired;
+    c->res[0] = next;
+    c->res[1] = modes;
+    if (mbs_jump(c->arg, c->res, c->iw, c->w, 0) || !stepper_all_finite(modes, NM)) return 1;
+    memcpy(x, next, NX * sizeof *x);
+    memcpy(c->m.values + MODES, modes, NM * sizeof *modes);
+    return 0;
+}
+
+void core_init_events(core *c) {
+    static const events_model model = {indicators, rates, jump};
+    events_init(&c->events, &c->solver, NK, &model, c->m.events, c->event_work);
+}
+
+core_status core_first_modes(core *c) {
+    double beyond[NK], modes[NM + 1];
+    int k;
+    core_point(c, &c->m.time, c->m.values + STATES, c->z);
+    c->res[0] = modes;
+    c->res[1] = beyond;
+    if (mbs_first(c->arg, c->res, c->iw, c->w, 0) || !stepper_all_finite(modes, NM) ||
+        !stepper_all_finite(beyond, NK))
+        return core_no_answer(c, "%s: the first modes have no value at time %.9g", c->name,
+                              c->m.time);
+    memcpy(c->m.values + MODES, modes, NM * sizeof *modes);
+    for (k = 0; k < NK; k++)
+        if (beyond[k] > 0.0)
+            return core_no_answer(c, "%s: the start values lie beyond %s by %.3g; start inside",
+                                  c->name, MODEL_INDICATORS[k], beyond[k]);
+    return CORE_OK;
+}
+
+/* Where the integrator is outside, the solver only knows what time it is. */
+static void synchronize(core *c) {
+    core_prepare_solver(c);
+    if (!c->m.cosimulation) stepper_start(&c->solver, c->m.time);
+}
+
+/* Offsets of those that cannot fire yet. */
+static void set_offsets(core *c) {
+    const double *armed = events_armed(&c->events), *value = events_seen(&c->events);
+    int k;
+    for (k = 0; k < NK; k++)
+        c->m.offset[k] = armed[k] > 0.0 ? 0.0 : 2.0 * fmax(c->m.tolerance, -value[k]);
+}
+
+core_status core_start_events(core *c) {
+    int status;
+    synchronize(c);
+    status = events_start(&c->events, c->m.values + STATES);
+    if (status) return step_failed(c, status);
+    if (!c->m.cosimulation) set_offsets(c);
+    return CORE_OK;
+}
+
+void core_restart(core *c) {
+    stepper_restart(&c->solver);
+    events_restart(&c->events);
+}
+
+core_status core_step(core *c, double limit) {
+    int status = events_step(&c->events, c->m.values + STATES, limit);
+    c->m.time = stepper_time(&c->solver);
+    c->m.stale = 1;
+    return status ? step_failed(c, status) : core_accept_states(c);
+}
+
+int core_pending(const core *c) { return events_pending(&c->events); }
+
+/* Does the present state ask for a jump? */
+static int find(core *c) {
+    const double *x = c->m.values + STATES;
+    synchronize(c);
+    if (c->m.cosimulation || core_pending(c)) return events_look(&c->events, x);
+    return events_found(&c->events, x, c->m.offset);
+}
+
+core_status core_settle(core *c, int *changed) {
+    double *x = c->m.values + STATES, before[NX + 1];
+    int status = find(c);
+    if (status) return step_failed(c, status);
+    if (!core_pending(c)) return CORE_OK;
+    memcpy(before, x, NX * sizeof *x);
+    status = events_settle(&c->events, x, c->m.time);
+    c->m.stale = 1;
+    if (status != EVENTS_FIRED) return step_failed(c, status);
+    if (memcmp(before, x, NX * sizeof *x)) *changed = 1;
+    if (!c->m.cosimulation) set_offsets(c);
+    return core_accept_states(c);
+}
+
+core_status core_show_indicators(core *c) {
+    double *shown = c->m.values + INDICATORS;
+    core_status status = core_refresh(c);
+    int k;
+    if (status) return status;
+    core_point(c, &c->m.time, c->m.values + STATES, c->m.values + DEPENDENTS);
+    c->res[0] = shown;
+    if (mbs_indicators(c->arg, c->res, c->iw, c->w, 0))
+        return core_no_answer(c, "%s: the event indicators have no value at time %.9g", c->name,
+                              c->m.time);
+    for (k = 0; k < NK; k++) {
+        shown[k] += c->m.offset[k];
+        if (shown[k] == 0.0) shown[k] = -DBL_MIN;
+        if (!isfinite(shown[k]))
+            return core_no_answer(c, "%s: %s is not finite at time %.9g", c->name,
+                                  MODEL_NAMES[INDICATORS + k], c->m.time);
+    }
+    return CORE_OK;
+}
+
+core_status core_arm_indicators(core *c) {
+    core_status status = core_show_indicators(c);
+    int k;
+    for (k = 0; k < NK && !status; k++)
+        if (c->m.values[INDICATORS + k] - c->m.offset[k] > c->m.tolerance) c->m.offset[k] = 0.0;
+    return status;
+}
+
+#else
+
+void core_init_events(core *c) { (void)c; }
+
+core_status core_first_modes(core *c) {
+    (void)c;
+    return CORE_OK;
+}
+
+core_status core_start_events(core *c) {
+    (void)c;
+    return CORE_OK;
+}
+
+void core_restart(core *c) { stepper_restart(&c->solver); }
+
+core_status core_step(core *c, double limit) {
+    double *x = c->m.values + STATES;
+    int status = stepper_step(&c->solver, x, limit);
+    c->m.time = stepper_time(&c->solver);
+    c->m.stale = 1;
+    return status ? step_failed(c, status) : core_accept_posture(c, x, c->z);
+}
+
+int core_pending(const core *c) {
+    (void)c;
+    return 0;
+}
+
+core_status core_settle(core *c, int *changed) {
+    (void)c, (void)changed;
+    return CORE_OK;
+}
+
+core_status core_show_indicators(core *c) { return core_refresh(c); }
+
+core_status core_arm_indicators(core *c) { return core_refresh(c); }
+
+#endif

@@ -1,0 +1,177 @@
+"""The functions that an FMU evaluates, under the names that its C calls."""
+
+from collections.abc import Iterable, Sequence
+
+import casadi
+
+from mbs.export.fmu.description import FmuModel, Jumps, Variable
+
+
+def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
+    """The functions under the names that core.c calls, every input and output dense.
+
+    Args:
+        model: what the FMU computes.
+
+    Returns:
+        `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, p with the modes at its end;
+        `mbs_tangent(t, x, z, u, p, dt, dx, du, dp) -> (dxdot, dy, dz, dg)`, g the indicators and dp
+        of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gx, gu, gp)`.
+        Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
+        `mbs_sensitivity(x, z, p) -> steepness`. Where there are events, `mbs_first`,
+        `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
+        `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs. For
+        an implicit solver `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
+    """
+    t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
+    z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
+    p = casadi.MX.sym("p", len(model.parameters) + len(model.modes))
+    point, du = [t, x, z, u, p], casadi.MX.sym("du", u.numel())
+    answers = [
+        casadi.Function("mbs_rhs", point, _dense(model.rhs.call(point))),
+        _tangent(model, point),
+        _adjoint(model, point),
+    ]
+    if model.closure is not None:
+        loop, whole = [x, z, _own(model, p)], [x, z, p]
+        answers.append(casadi.Function("mbs_closure", whole, _dense(model.closure.call(loop))))
+        answers.append(casadi.Function("mbs_sensitivity", whole, [_steepness(model, loop)]))
+    if model.jumps is not None:
+        answers.extend(_events(model.jumps, point))
+        rates = _rates(model, point, du)
+        answers.append(casadi.Function("mbs_rates", [*point, du], _dense([rates])))
+    if model.solver == "rodas":
+        slopes = _dense(_jacobian(model, point, du))
+        answers.append(casadi.Function("mbs_jacobian", [*point, du], slopes))
+    return tuple(answers)
+
+
+def watched(model: FmuModel) -> tuple[str, ...]:
+    """What its event indicators watch, for messages.
+
+    Args:
+        model: what the FMU computes.
+    """
+    return model.jumps.names if model.jumps else ()
+
+
+def _jacobian(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> list[casadi.MX]:
+    """How xdot changes with x, column by column and through the closure, and with t."""
+    t, x, z, u, p = point
+    xdot = model.rhs.call(point)[0]
+    J = casadi.densify(casadi.jacobian(xdot, x))
+    if model.closure is not None:
+        moved = casadi.jacobian(model.closure.call([x, z, _own(model, p)])[0], x)
+        J += casadi.mtimes(casadi.jacobian(xdot, z), moved)
+    return [J, casadi.jacobian(xdot, t) + casadi.jtimes(xdot, u, du)]
+
+
+def _events(jumps: Jumps, point: list[casadi.MX]) -> list[casadi.Function]:
+    fired = casadi.MX.sym("fired", len(jumps.names))
+    g = jumps.indicators.call(point)
+    return [
+        casadi.Function("mbs_first", point, _dense(jumps.first.call(point))),
+        casadi.Function("mbs_indicators", point, _dense(g)),
+        casadi.Function("mbs_jump", [*point, fired], _dense(jumps.jump.call([*point, fired]))),
+    ]
+
+
+def _rates(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> casadi.MX:
+    """How fast the indicators rise along the motion."""
+    xdot, p = model.rhs.call(point)[0], casadi.MX(len(model.parameters), 1)
+    return _directions(model, point, [casadi.MX(1), xdot, du, p])[3]
+
+
+def _tangent(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
+    t, x, _, u, _ = point
+    sizes = (("dt", t), ("dx", x), ("du", u))
+    seeds = [casadi.MX.sym(name, v.numel()) for name, v in sizes]
+    seeds.append(casadi.MX.sym("dp", len(model.parameters)))
+    moves = _directions(model, point, seeds)
+    return casadi.Function("mbs_tangent", [*point, *seeds], _dense(moves))
+
+
+def _directions(
+    model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]
+) -> tuple[casadi.MX, casadi.MX, casadi.MX, casadi.MX]:
+    """dxdot, dy, dz and dg along a direction, the modes held.
+
+    At a solution of the closure, the derivative of one Newton step z - J^-1 r is -J^-1 dr: that
+    of the dependent coordinates themselves.
+    """
+    _, x, z, _, p = point
+    dt, dx, du, dp = seeds
+    dz, dg = casadi.MX(z.numel(), 1), casadi.MX(0, 1)
+    if model.closure is not None:
+        dz = _forward(model.closure, [x, z, _own(model, p)], [dx, dz, dp])[0]
+    along = [dt, dx, dz, du, casadi.vertcat(dp, casadi.MX(len(model.modes), 1))]
+    dxdot, dy = _forward(model.rhs, point, along)
+    if model.jumps is not None:
+        dg = _forward(model.jumps.indicators, point, along)[0]
+    return dxdot, dy, dz, dg
+
+
+def _adjoint(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
+    """The transpose of the tangent, by first derivatives: a foreign function has no others."""
+    _, x, z, _, p = point
+    sizes = (len(model.states), len(model.outputs), z.numel(), len(watched(model)))
+    names = ("wxdot", "wy", "wz", "wg")
+    weights = [casadi.MX.sym(name, size) for name, size in zip(names, sizes, strict=True)]
+    wxdot, wy, wz, wg = weights
+    _, gx, gz, gu, gp = _backward(model.rhs, point, [wxdot, wy])
+    if model.jumps is not None:
+        _, *more = _backward(model.jumps.indicators, point, [wg])
+        gx, gz, gu, gp = (a + b for a, b in zip((gx, gz, gu, gp), more, strict=True))
+    gp = _own(model, gp)
+    if model.closure is not None:
+        loop = [x, z, _own(model, p)]
+        hx, _, hp = _backward(model.closure, loop, [gz + wz, casadi.MX(1, 1)])
+        gx, gp = gx + hx, gp + hp
+    return casadi.Function("mbs_adjoint", [*point, *weights], _dense([gx, gu, gp]))
+
+
+def _own(model: FmuModel, p: casadi.MX) -> casadi.MX:
+    """The parameters, without the modes behind them."""
+    own: casadi.MX = casadi.vertsplit(p, [0, len(model.parameters), p.numel()])[0]
+    return own
+
+
+def _steepness(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
+    """How many nominal sizes z moves when x and p change by about their own size.
+
+    It is huge where rank is lost; p is there for postures where x and z lose it together.
+    """
+    assert model.closure is not None
+    _, z, p = loop
+    dx = casadi.DM(
+        [v.nominal * w for v, w in zip(model.states, _weights(model.states), strict=True)]
+    )
+    dp = p * casadi.DM(_weights(model.parameters))
+    dz = _forward(model.closure, loop, [casadi.MX(dx), casadi.MX(z.numel(), 1), dp])[0]
+    sizes = casadi.DM([v.nominal for v in model.dependents])
+    return casadi.norm_inf(casadi.vec(dz) / sizes)
+
+
+def _weights(variables: Sequence[Variable]) -> list[float]:
+    """Unequal numbers about one, so that effects of the variables do not cancel."""
+    return [1 + k / len(variables) for k in range(len(variables))]
+
+
+def _forward(
+    function: casadi.Function, point: list[casadi.MX], seeds: list[casadi.MX]
+) -> list[casadi.MX]:
+    values = function.call(point)
+    answer: list[casadi.MX] = function.forward(1).call([*point, *values, *seeds])
+    return answer
+
+
+def _backward(
+    function: casadi.Function, point: list[casadi.MX], weights: list[casadi.MX]
+) -> list[casadi.MX]:
+    values = function.call(point)
+    answer: list[casadi.MX] = function.reverse(1).call([*point, *values, *weights])
+    return answer
+
+
+def _dense(values: Iterable[casadi.MX]) -> list[casadi.MX]:
+    return [casadi.densify(casadi.vec(value)) for value in values]

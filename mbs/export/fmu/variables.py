@@ -1,0 +1,214 @@
+"""The variables of a mechanism's FMU: names, units, starts, typical sizes and bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from mbs.assembly import System
+from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
+from mbs.components.contacts_joint import CoulombFriction, JointContact, RigidStop
+from mbs.export.fmu.description import State, Variable
+from mbs.expressions import Parameter
+from mbs.models.geometry import terminal_frame
+from mbs.models.minimal_drive import InputMotion
+from mbs.models.minimal_state import MinimalState
+
+_NEVER_NEGATIVE = ("kg", "N.s/m", "N.m.s/rad")
+"""Units of numbers that are masses and viscous friction."""
+
+_CONTACT_BOUNDS: tuple[tuple[type[JointContact], str, float | None], ...] = (
+    (RigidStop, "restitution", 1.0),
+    (CoulombFriction, "sliding", None),
+    (CoulombFriction, "sticking", None),
+)
+"""Fields of contacts that are never negative, and their greatest value."""
+
+POSE = ("x", "y", "z", *(f"R{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)))
+"""Elements of the pose of a frame in the base."""
+
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Elements of a wrench."""
+
+
+def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple[State, ...]:
+    """Positions and velocities of the independent joints, and states of devices."""
+    rates = {speed.name: speed.unit for speed in system.speeds}
+    positions = [
+        State(
+            name=f"{coordinate.name}.q",
+            unit=coordinate.unit,
+            start=value,
+            nominal=_size(coordinate),
+            description=f"position of {coordinate.name}{_limits(coordinate)}",
+            derivative_unit=rates.get(coordinate.name, RATE_UNIT[coordinate.unit]),
+            output=True,
+        )
+        for coordinate, value in zip(
+            (system.coordinates[k] for k in state.positions), start, strict=False
+        )
+    ]
+    sizes = {coordinate.name: _size(coordinate) for coordinate in system.coordinates}
+    velocities = [
+        State(
+            name=f"{speed.name}.v",
+            unit=speed.unit,
+            nominal=sizes.get(speed.name, 1.0),
+            description=f"velocity of {speed.name}",
+            derivative_unit=ACCELERATION_UNIT[speed.unit],
+            output=True,
+        )
+        for speed in (system.speeds[k] for k in state.velocities)
+    ]
+    devices = [
+        State(
+            name=name,
+            unit=unit,
+            description=f"state of {device.name}",
+            derivative_unit=f"{unit}/s",
+            output=True,
+        )
+        for device in system.devices
+        for name, unit in device.states
+    ]
+    return (*positions, *velocities, *devices)
+
+
+def dependents(system: System, state: MinimalState, start: Sequence[float]) -> tuple[Variable, ...]:
+    """The positions that loops determine, whose starts are guesses."""
+    return tuple(
+        _position(system.coordinates[k], f"{system.coordinates[k].name}.solved", value)
+        for k, value in zip(state.dependents, start, strict=True)
+    )
+
+
+def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterator[Variable]:
+    """The elements of u but those of a controller; labels name the frames of the wrenches."""
+    for k in state.inputs:
+        name = system.speeds[k].name
+        yield _effort(system.speeds[k], f"effort of the motor of {name}")
+    for k in state.devices:
+        device = system.devices[k]
+        name, unit = device.input
+        yield Variable(name=name, unit=unit, description=f"input of {device.name}")
+    for label in labels:
+        for element in WRENCH:
+            unit, noun = ("N", "force") if element[0] == "f" else ("N.m", "torque")
+            text = f"{noun} on {label} along {element[1]} of the base"
+            yield Variable(name=f"{label}.{element}", unit=unit, description=text)
+    for motion in state.motions:
+        yield from _prescribed(system, motion)
+
+
+def _prescribed(system: System, motion: InputMotion) -> Iterator[Variable]:
+    speed = system.speeds[motion.velocity]
+    if motion.position is not None:
+        position, start = system.coordinates[motion.position], system.posture[motion.position]
+        yield _position(position, f"{position.name}.q", start, "prescribed ")
+        yield _velocity(speed, "prescribed ")
+    yield _acceleration(speed, "prescribed ")
+
+
+def outputs(system: System, state: MinimalState) -> Iterator[Variable]:
+    """The elements of y but those that are observed."""
+    speeds = system.speeds
+    yield from (_acceleration(speeds[k]) for k in state.accelerations)
+    for k in state.dependents:
+        yield _position(system.coordinates[k], f"{system.coordinates[k].name}.q")
+    yield from (_velocity(speeds[k]) for k in state.passive)
+    yield from (_acceleration(speeds[k]) for k in state.passive)
+    yield from pose("tool", frame_text(terminal_frame(system)))
+    for device in system.devices:
+        for name, unit in device.outputs:
+            yield Variable(name=name, unit=unit, description=f"of {device.name}")
+    for k in state.efforts:
+        yield _effort(speeds[k], f"effort that drives {speeds[k].name}")
+    for contact in state.contacts:
+        text = f"effort of {contact.name.removesuffix('.effort')}"
+        yield Variable(name=contact.name, unit=contact.unit, description=text)
+
+
+def pose(label: str, where: str) -> Iterator[Variable]:
+    """Origin, and orientation by rows, of a frame in the base."""
+    for name in POSE:
+        text = f"{name} of {where} in the base frame"
+        if name.startswith("R"):
+            text = f"orientation of {where} in the base frame"
+        yield Variable(
+            name=f"{label}.{name}", unit="1" if name.startswith("R") else "m", description=text
+        )
+
+
+def frame_text(frame: str | int) -> str:
+    """A frame in words."""
+    return f"link {frame}" if isinstance(frame, int) else frame
+
+
+def parameters(system: System) -> Iterator[Variable]:
+    """Every symbol of the system, with a value."""
+    bounds = _bounds(system)
+    for parameter, start in zip(system.parameters, system.parameter_values(), strict=True):
+        low, high = bounds.get(parameter.name, (None, None))
+        if low is None and parameter.unit in _NEVER_NEGATIVE:
+            low = 0.0
+        yield Variable(
+            name=parameter.name,
+            unit=parameter.unit,
+            start=start,
+            nominal=abs(start) or 1.0,
+            min=None if low is None or start < low else low,
+            max=None if high is None or start > high else high,
+            description=parameter.description or f"parameter {parameter.name}",
+        )
+
+
+def _bounds(system: System) -> dict[str, tuple[float | None, float | None]]:
+    """Bounds of the symbols that stand alone in an element of a contact."""
+    found: dict[str, tuple[float | None, float | None]] = {}
+    for force in system.forces:
+        for kind, name, high in _CONTACT_BOUNDS:
+            value = getattr(force.element, name) if isinstance(force.element, kind) else None
+            if isinstance(value, Parameter):
+                found[value.name] = (0.0, high)
+    return found
+
+
+def _size(coordinate: Coordinate) -> float:
+    """A typical size of a position: the larger limit of its joint, 1 where there is none."""
+    largest = max(map(abs, coordinate.limits or (1.0,)))
+    return largest if largest > 0 and math.isfinite(largest) else 1.0
+
+
+def _limits(coordinate: Coordinate) -> str:
+    """The limits in words: nothing in the model enforces them, so they are no min and max."""
+    if coordinate.limits is None:
+        return ""
+    low, high = coordinate.limits
+    return f", whose joint is limited to {low:g} .. {high:g} {coordinate.unit}"
+
+
+def _position(coordinate: Coordinate, name: str, start: float = 0.0, how: str = "") -> Variable:
+    return Variable(
+        name=name,
+        unit=coordinate.unit,
+        start=start,
+        nominal=_size(coordinate),
+        description=f"{how}position of {coordinate.name}",
+    )
+
+
+def _velocity(speed: Coordinate, how: str = "") -> Variable:
+    text = f"{how}velocity of {speed.name}"
+    return Variable(name=f"{speed.name}.v", unit=speed.unit, description=text)
+
+
+def _acceleration(speed: Coordinate, how: str = "") -> Variable:
+    return Variable(
+        name=f"{speed.name}.a",
+        unit=ACCELERATION_UNIT[speed.unit],
+        description=f"{how}acceleration of {speed.name}",
+    )
+
+
+def _effort(speed: Coordinate, text: str) -> Variable:
+    return Variable(name=f"{speed.name}.tau", unit=EFFORT_UNIT[speed.unit], description=text)

@@ -1,0 +1,277 @@
+"""A system of connected FMUs as one file: System Structure and Parameterization, SSP 1.0."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import re
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from mbs.errors import ExportError
+from mbs.export.ssp_xml import (
+    Connection,
+    Part,
+    ssp_kind,
+    structure_description,
+    unit_exponents,
+    unit_of,
+)
+from mbs.files import path_of, write_bytes
+from mbs.messages import did_you_mean, quoted
+
+Components = Mapping[str, str | os.PathLike[str]] | Sequence[str | os.PathLike[str]]
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # equal systems give equal files
+
+
+def ssp(
+    path: str | os.PathLike[str],
+    components: Components,
+    connections: Iterable[tuple[str, str]] = (),
+    *,
+    start: Mapping[str, float] | None = None,
+    name: str | None = None,
+    stop_time: float | None = None,
+) -> Path:
+    """Write FMUs and their connections as one SSP, which co-simulation tools open.
+
+    Every input and output is a connector with its unit. Variables are written
+    `component.variable`, such as `robot.j1.tau`; the name of a component has no dot.
+
+    Args:
+        path: file to write, such as cell.ssp; it is replaced as a whole, or left alone.
+        components: name of each component to the path of its FMU, of FMI 2.0 or 3.0 with
+            co-simulation; or paths, whose file names then name the components.
+        connections: (output, input) pairs, such as ("controller.tau1", "robot.j1.tau").
+        start: values of parameters, inputs and states before initialization, in the units of the
+            FMUs.
+        name: of the system; the name of the file when left out.
+        stop_time: default end of a simulation [s]; the latest that an FMU proposes when left out.
+
+    Returns:
+        the path written.
+
+    Raises:
+        ExportError: a file cannot be read or written, an FMU has no co-simulation, a name is
+            unknown, an input has two sources, or the two ends of a connection do not fit.
+    """
+    target = path_of(path)
+    files = _files(components)
+    contents = {part: _content(part, file) for part, file in files.items()}
+    sources = _sources(files, contents)
+    described = {part: _described(part, file) for part, file in files.items()}
+    values = _start_values(described, start or {})
+    parts = {
+        part: Part(part, sources[part], described[part], values.get(part, {})) for part in files
+    }
+    links = _connections(parts, connections)
+    title = target.stem if name is None else name
+    text = structure_description(title, parts.values(), links, _span(parts.values(), stop_time))
+    archive = {sources[part]: content for part, content in contents.items()}
+    write_bytes(_zipped({"SystemStructure.ssd": text.encode(), **archive}), target)
+    return target
+
+
+def _files(components: Any) -> dict[str, Path]:
+    """The path of each component."""
+    if not isinstance(components, Iterable):
+        raise ExportError(f"SSP: components is {quoted(components)}; give a dict of names to paths")
+    if isinstance(components, Mapping):
+        named = [(str(name), path_of(file)) for name, file in components.items()]
+    else:
+        given = [components] if isinstance(components, (str, os.PathLike)) else components
+        paths = [path_of(file) for file in given]
+        named = [(file.stem, file) for file in paths]
+    if not named:
+        raise ExportError("SSP: there is no component; give the path of one FMU at least")
+    found: dict[str, Path] = {}
+    for name, file in named:
+        if not name or "." in name or not name.isprintable():
+            raise ExportError(
+                f"SSP: {quoted(name)} is no name of a component; give a dict of names without dots"
+                " to paths"
+            )
+        if name in found:
+            raise ExportError(
+                f"SSP: two components are called {name!r}; give a dict of names to paths"
+            )
+        found[name] = file
+    return found
+
+
+def _content(part: str, file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise ExportError(
+            f"SSP: the FMU {file} of {part} cannot be read ({error.strerror}); write it by"
+            " mbs.export.fmu"
+        ) from error
+
+
+def _described(part: str, file: Path) -> Any:
+    import fmpy
+
+    try:
+        description = fmpy.read_model_description(str(file), validate=False)
+    except Exception as error:
+        problem = " ".join(str(error).split())
+        raise ExportError(f"SSP: {file} of {part} is not an FMU: {problem}") from error
+    if description.fmiVersion[0] not in "23" or description.coSimulation is None:
+        raise ExportError(
+            f"SSP: {file} of {part} is an FMU without co-simulation of FMI 2.0 or 3.0; export it"
+            " with it"
+        )
+    return description
+
+
+def _sources(files: Mapping[str, Path], contents: Mapping[str, bytes]) -> dict[str, str]:
+    """The place of each FMU in the archive; equal files are there once."""
+    places: dict[bytes, str] = {}
+    for part, file in files.items():
+        if contents[part] not in places:
+            stem = re.sub(r"[^A-Za-z0-9_-]", "_", file.stem)
+            plain = f"resources/{stem}.fmu"
+            taken = plain in places.values()
+            places[contents[part]] = f"resources/{stem}_{len(places)}.fmu" if taken else plain
+    return {part: places[contents[part]] for part in files}
+
+
+def _start_values(
+    described: Mapping[str, Any], start: Mapping[str, float]
+) -> dict[str, dict[str, float]]:
+    """Start values of each component, checked."""
+    found: dict[str, dict[str, float]] = {}
+    for address, value in start.items():
+        part, variable = _variable(described, "start", address)
+        if not _settable(variable):
+            raise ExportError(
+                f"SSP: start: {address} is calculated and cannot be set; give parameters, inputs or"
+                " states"
+            )
+        if not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ExportError(f"SSP: start: {address} is {quoted(value)}; give a finite number")
+        found.setdefault(part, {})[variable.name] = value
+    return found
+
+
+def _settable(variable: Any) -> bool:
+    if ssp_kind(variable) in (None, "String") or variable.variability == "constant":
+        return False
+    return variable.causality == "input" or variable.initial in ("exact", "approx")
+
+
+def _variable(described: Mapping[str, Any], what: str, address: object) -> tuple[str, Any]:
+    """The component and the variable that an address names."""
+    part, dot, name = address.partition(".") if isinstance(address, str) else ("", "", "")
+    if not dot:
+        raise ExportError(
+            f"SSP: {what}: {quoted(address)} is no variable; write component.variable"
+        )
+    if part not in described:
+        raise ExportError(
+            f"SSP: {what}: {address!r}: there is no component {part!r};"
+            f" {did_you_mean(part, described)}"
+        )
+    variables = {v.name: v for v in described[part].modelVariables}
+    if name not in variables:
+        raise ExportError(
+            f"SSP: {what}: {part} has no variable {name!r}; {did_you_mean(name, variables)}"
+        )
+    return part, variables[name]
+
+
+def _connections(
+    parts: Mapping[str, Part], connections: Iterable[tuple[str, str]]
+) -> list[Connection]:
+    described = {name: part.description for name, part in parts.items()}
+    fed: dict[tuple[str, str], str] = {}
+    links: list[Connection] = []
+    for pair in connections:
+        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+            raise ExportError(f"SSP: connection {quoted(pair)}: give a pair (output, input)")
+        given, taken = pair
+        source_part, source = _variable(described, "connection", given)
+        target_part, target = _variable(described, "connection", taken)
+        _check_causality(given, source, "output", "a connection begins at an output")
+        _check_causality(taken, target, "input", "a connection ends at an input")
+        address = (target_part, target.name)
+        if address in fed:
+            raise ExportError(
+                f"SSP: input {taken} has two sources, {fed[address]} and {given}; leave one out"
+            )
+        fed[address] = given
+        _check_types((given, source), (taken, target))
+        _check_units(
+            (given, source, described[source_part]), (taken, target, described[target_part])
+        )
+        links.append(Connection((source_part, source.name), address))
+    return links
+
+
+def _check_causality(address: str, variable: Any, wanted: str, rule: str) -> None:
+    if variable.causality != wanted:
+        what = (
+            "no input or output"
+            if variable.causality == "local"
+            else f"of causality {variable.causality}"
+        )
+        raise ExportError(f"SSP: connection: {address} is {what}; {rule}")
+    if ssp_kind(variable) is None:
+        raise ExportError(
+            f"SSP: connection: {address} is an array or a type that SSP 1.0 does not have; connect"
+            " scalars"
+        )
+
+
+def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
+    kinds = [ssp_kind(variable) for _, variable in (source, target)]
+    if kinds[0] != kinds[1]:
+        raise ExportError(
+            f"SSP: connection: {source[0]} is {kinds[0]} and {target[0]} is {kinds[1]}; connect"
+            " variables of one type"
+        )
+
+
+def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> None:
+    """Refuse units of different kind or size; where one end has none it is taken as it comes."""
+    ends = [(unit_of(variable), description) for _, variable, description in (source, target)]
+    (given, _), (wanted, _) = ends
+    if given is None or wanted is None:
+        return
+    defined = [unit_exponents(description, unit) for unit, description in ends if unit]
+    same = given == wanted if None in defined else defined[0] == defined[1]
+    if not same:
+        raise ExportError(
+            f"SSP: connection: {source[0]} is in {given} and {target[0]} in {wanted}; connect"
+            " variables of one unit"
+        )
+
+
+def _span(parts: Iterable[Part], stop_time: float | None) -> tuple[float, float]:
+    experiments = [part.description.defaultExperiment for part in parts]
+    begins = [float(getattr(e, "startTime", None) or 0.0) for e in experiments]
+    stops = [float(e.stopTime) for e in experiments if e is not None and e.stopTime is not None]
+    start = min(begins)
+    stop = max(stops, default=start + 1.0) if stop_time is None else stop_time
+    if not isinstance(stop, (int, float)) or not start < stop < math.inf:
+        raise ExportError(
+            f"SSP: stop_time is {quoted(stop_time)}; give a time after {start:g} s, finite"
+        )
+    return start, float(stop)
+
+
+def _zipped(files: Mapping[str, bytes]) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for file, content in files.items():
+            info = zipfile.ZipInfo(file, _EPOCH)
+            stored = file.endswith(".fmu")  # an archive itself
+            info.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, content)
+    return stream.getvalue()

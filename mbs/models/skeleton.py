@@ -1,0 +1,300 @@
+"""The skeleton of a mechanism: points, axes and lines to draw it with, at any posture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.joint_rows import JointRow
+from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.rates import normalised
+from mbs.assembly.tree import Frame
+from mbs.components.motion import Motion
+from mbs.models.geometry import terminal_frame
+from mbs.models.link_outline import link_outline
+from mbs.recursions.poses import base_poses, link_poses
+from mbs.spatial import Pose
+
+_AXES = (Motion.REVOLUTE, Motion.PRISMATIC)
+
+
+@dataclass(frozen=True, slots=True)
+class SkeletonAxis:
+    """An axis of a joint.
+
+    Attributes:
+        motion: about it or along it.
+        direction: its column in `directions`.
+    """
+
+    motion: Literal["revolute", "prismatic"]
+    direction: int
+
+
+@dataclass(frozen=True, slots=True)
+class SkeletonJoint:
+    """A joint or a constraint between two links.
+
+    Attributes:
+        name: of the joint.
+        kind: of joint, in lower case.
+        cut: whether it closes a loop.
+        links: numbers of the links that carry its frame_a and frame_b, 0 for the base.
+        points: columns in `points` of the origins of these frames. They are one place, but where
+            the joint slides, leaves them apart, or is a cut one in an open loop.
+        axes: of its rotations and translations; none where it has no special ones.
+    """
+
+    name: str
+    kind: str
+    cut: bool
+    links: tuple[int, int]
+    points: tuple[int, int]
+    axes: tuple[SkeletonAxis, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SkeletonLink:
+    """A rigid link, or the base.
+
+    Attributes:
+        number: of the link, 0 for the base.
+        bodies: names of the bodies that it carries.
+        segments: pairs of columns in `points`: a line from joint to joint, a polygon through three
+            joints or more, lines to frames and force elements, or to the centre of mass where one
+            point is all; none of the base.
+        mass_centre: column in `points`, None without mass.
+    """
+
+    number: int
+    bodies: tuple[str, ...]
+    segments: tuple[tuple[int, int], ...]
+    mass_centre: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SkeletonForce:
+    """A force element between two points.
+
+    Attributes:
+        name: of the element.
+        kind: of element, in lower case.
+        links: numbers of the links that carry its ends, 0 for the base.
+        points: columns in `points` of its ends.
+    """
+
+    name: str
+    kind: str
+    links: tuple[int, int]
+    points: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class SkeletonFrame:
+    """A frame that is shown: a named one, or the terminal frame.
+
+    Attributes:
+        name: of the frame.
+        link: that carries it, 0 for the base.
+        origin: column in `points`.
+        directions: columns in `directions` of its x, y and z axis.
+    """
+
+    name: str
+    link: int
+    origin: int
+    directions: tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skeleton:
+    """What a mechanism is drawn with; colours and sizes are the viewer's.
+
+    Attributes:
+        joints: in the order of the description.
+        links: the base, then the links of the tree.
+        forces: springs, dampers and other elements between two points.
+        frames: named frames and the terminal one.
+        function: `skeleton(q) -> points (3, n), directions (3, m)`, in the base frame, points in
+            m, directions of unit length; of q and p where the system has parameters.
+    """
+
+    joints: tuple[SkeletonJoint, ...]
+    links: tuple[SkeletonLink, ...]
+    forces: tuple[SkeletonForce, ...]
+    frames: tuple[SkeletonFrame, ...]
+    function: Function
+
+
+def skeleton(system: System) -> Skeleton:
+    """The points and axes of all joints, and the lines that stand for the links.
+
+    Args:
+        system: open or closed; every symbol in its geometry has a value.
+
+    Returns:
+        what to draw, with the Function that places it at positions q.
+
+    Raises:
+        ModelError: `system` is not a System, or a symbol has no value.
+    """
+    require_system(system)
+    answer: Skeleton = system.cached("skeleton", lambda: _built(system))
+    return answer
+
+
+@dataclass(slots=True)
+class _Marks:
+    """Points and directions on links, in the order of their columns."""
+
+    system: System
+    points: list[Frame] = field(default_factory=list)
+    directions: list[tuple[int, SX]] = field(default_factory=list)
+
+    def point(self, frame: Frame) -> int:
+        self.points.append(frame)
+        return len(self.points) - 1
+
+    def direction(self, link: int, axis: SX) -> int:
+        self.directions.append((link, axis))
+        return len(self.directions) - 1
+
+    def local(self, numbers: Sequence[int]) -> NDArray[np.float64]:
+        """(k, 3) points in the frames of their links, at the defaults of the parameters."""
+        places = casadi.horzcat(*(self.points[k][1].p for k in numbers))
+        p = self.system.parameter_values()
+        return np.array(Function("places", [self.system.p], [places])(p)).T
+
+
+def _built(system: System) -> Skeleton:
+    marks = _Marks(system)
+    joints = tuple(_joint(marks, row) for row in system.joints)
+    forces = tuple(
+        SkeletonForce(
+            force.element.name,
+            type(force.element).__name__.lower(),
+            (force.frames[0][0] + 1, force.frames[1][0] + 1),
+            (marks.point(force.frames[0]), marks.point(force.frames[1])),
+        )
+        for force in system.forces
+        if len(force.frames) == 2
+    )
+    frames = tuple(_frame(marks, name) for name in _shown_frames(system))
+    links = tuple(_link(marks, number, joints) for number in range(len(system.links) + 1))
+    return Skeleton(joints, links, forces, frames, _function(system, marks))
+
+
+def _joint(marks: _Marks, row: JointRow) -> SkeletonJoint:
+    (a, pose_a), (b, pose_b) = row.frame_a, row.frame_b
+    return SkeletonJoint(
+        name=row.name,
+        kind=row.kind,
+        cut=row.cut,
+        links=(a + 1, b + 1),
+        points=(marks.point((a, pose_a)), marks.point((b, pose_b))),
+        axes=_cut_axes(marks, row) if row.cut else _tree_axes(marks, row.name),
+    )
+
+
+def _tree_axes(marks: _Marks, name: str) -> tuple[SkeletonAxis, ...]:
+    """The z axes of the links that the joint moves."""
+    system = marks.system
+    moved = (
+        (j, link.motion)
+        for j, link in enumerate(system.tree.links)
+        if system.coordinates[link.q.start].joint == name and link.motion in _AXES
+    )
+    return tuple(_axis(marks, j, motion, SX([0, 0, 1])) for j, motion in moved)
+
+
+def _cut_axes(marks: _Marks, row: JointRow) -> tuple[SkeletonAxis, ...]:
+    """The first axis stands in frame_a, those after it turn with frame_b."""
+    cut = next(cut for cut in marks.system.cuts if cut.edge.joint.name == row.name)
+    frames = (row.frame_a, row.frame_b)
+    found = []
+    for k, freedom in enumerate(cut.edge.joint.freedoms):
+        if freedom.motion in _AXES:
+            link, pose = frames[min(k, 1)]
+            axis = casadi.mtimes(pose.R, SX(casadi.DM(freedom.axis)))
+            found.append(_axis(marks, link, freedom.motion, axis))
+    return tuple(found)
+
+
+def _axis(marks: _Marks, link: int, motion: Motion, axis: SX) -> SkeletonAxis:
+    kind: Literal["revolute", "prismatic"]
+    kind = "revolute" if motion is Motion.REVOLUTE else "prismatic"
+    return SkeletonAxis(kind, marks.direction(link, axis))
+
+
+def _shown_frames(system: System) -> list[str | int]:
+    return list(dict.fromkeys([*system.named_frames, terminal_frame(system)]))
+
+
+def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:
+    link, pose = marks.system.frame(name)
+    x, y, z = (marks.direction(link, pose.R[:, k]) for k in range(3))
+    label = f"link {name}" if isinstance(name, int) else name
+    return SkeletonFrame(label, link + 1, marks.point((link, pose)), (x, y, z))
+
+
+def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> SkeletonLink:
+    bodies = tuple(row.name for row in marks.system.bodies if row.link == number)
+    if number == 0:
+        return SkeletonLink(0, bodies, (), None)
+    every = [
+        (joint.kind, point)
+        for joint in joints
+        for link, point in zip(joint.links, joint.points, strict=True)
+        if link == number
+    ]
+    joined = [point for kind, point in every if kind != "free"]
+    taken = {point for _, point in every}
+    others = [
+        k for k, (link, _) in enumerate(marks.points) if link == number - 1 and k not in taken
+    ]
+    centre = _mass_centre(marks, number)
+    segments = _segments(marks, joined, others)
+    if not segments and centre is not None:
+        segments = _segments(marks, [*joined, *others], [centre])
+    return SkeletonLink(number, bodies, segments, centre)
+
+
+def _segments(
+    marks: _Marks, joined: Sequence[int], shown: Sequence[int]
+) -> tuple[tuple[int, int], ...]:
+    columns = [*joined, *shown]
+    if not columns:
+        return ()
+    lines = link_outline(marks.local(columns), len(joined))
+    return tuple((columns[a], columns[b]) for a, b in lines)
+
+
+def _mass_centre(marks: _Marks, number: int) -> int | None:
+    inertia = marks.system.tree.links[number - 1].inertia
+    mass = Function("mass", [marks.system.p], [inertia.m])(marks.system.parameter_values())
+    if not float(mass) > 0:
+        return None
+    return marks.point((number - 1, Pose.moved(inertia.ms / inertia.m)))
+
+
+def _function(system: System, marks: _Marks) -> Function:
+    def build() -> tuple[Named, Named]:
+        q = SX.sym("q", system.nq)
+        poses = base_poses(system.tree, link_poses(system.tree, normalised(system.tree, q)))
+        poses.append(Pose.identity())  # the base is link -1
+        points = [poses[j].p + casadi.mtimes(poses[j].R, at.p) for j, at in marks.points]
+        directions = [casadi.mtimes(poses[j].R, axis) for j, axis in marks.directions]
+        outputs = [
+            (name, casadi.horzcat(SX(3, 0), *columns))
+            for name, columns in (("points", points), ("directions", directions))
+        ]
+        return [("q", q)], outputs
+
+    return model_function(system, ("skeleton",), build)

@@ -1,0 +1,89 @@
+"""C99 text of Functions in short pieces, with the numbers of CasADi's own text to the last bit.
+
+Compilers take minutes for a straight line of fifty thousand statements; pieces take them a time
+that is linear in the length, at any level of optimization.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from casadi import Function
+
+from mbs.native.block_code import BlockCode
+from mbs.native.compiler import FLAGS
+from mbs.native.kernel_source import BLOCK
+from mbs.native.memory import Memory
+from mbs.native.schedule import Step, blocks, plain_order
+from mbs.native.slots import slots
+from mbs.operations.graph import Graph, graph_of
+
+_HEAD = """\
+#include <math.h>
+#include <string.h>
+#undef NOINLINE
+#ifdef __GNUC__
+#define NOINLINE __attribute__((noinline))
+#else
+#define NOINLINE
+#endif
+"""
+
+_LONG = 100_000  # lines for which -O2 takes a minute
+
+
+def plain_source(functions: Iterable[Function], block: int = BLOCK) -> str:
+    """One C file of Functions with different names, in CasADi's calling convention.
+
+    It holds `int NAME(const double **arg, double **res, long long *iw, double *w, int mem)` and
+    `int NAME_work(long long *arg, long long *res, long long *iw, long long *w)` for each.
+
+    Args:
+        functions: made of scalar operations, or to be expanded to them.
+        block: assignments in one piece.
+
+    Raises:
+        ModelError: some Function calls another that has no scalar operations, or has an operation
+            that C does not have.
+    """
+    return "\n".join([_HEAD, *(_function(function, block) for function in functions)])
+
+
+def plain_flags(source: str) -> tuple[str, ...]:
+    """The flags to compile such text with.
+
+    Args:
+        source: text of the longest C file.
+
+    Returns:
+        FLAGS with a lower level of optimization for very long text; the numbers are the same.
+    """
+    return ("-O1" if source.count("\n") > _LONG else FLAGS[0], *FLAGS[1:])
+
+
+def _function(function: Function, block: int) -> str:
+    name, graph = function.name(), graph_of(function)
+    pieces: list[list[Step]] = blocks(graph, plain_order(graph), block)
+    where = slots(graph, pieces)
+    code = BlockCode(graph, where, "")
+    memory = Memory(function, graph, where.count)
+    return "\n".join(
+        [
+            *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
+            f"int {name}(const double **arg, double **res, long long *iw, double *w, int mem) {{",
+            "  (void)iw, (void)mem;",
+            *memory.pointers(),
+            *(f"  {name}_part{k}(in, out, w);" for k in range(len(pieces))),
+            "  return 0;",
+            "}",
+            _work(name, graph, memory.size),
+        ]
+    )
+
+
+def _work(name: str, graph: Graph, size: int) -> str:
+    return (
+        f"int {name}_work(long long *arg, long long *res, long long *iw, long long *w) {{\n"
+        f"  *arg = {len(graph.inputs)}, *res = {len(graph.outputs)}, *iw = 0, *w = {size};\n"
+        "  return 0;\n}\n"
+    )

@@ -1,0 +1,91 @@
+"""Unpacked FMUs and what tests do with their instances."""
+
+import fmpy
+import numpy as np
+from fmpy.fmi2 import FMU2Model
+from fmpy.fmi3 import FMU3Model
+
+
+class Fmu:
+    """An unpacked FMU of FMI 2.0 and its instances."""
+
+    def __init__(self, path, folder):
+        self.path = path
+        self.folder = fmpy.extract(str(path), str(folder))
+        self.description = fmpy.read_model_description(self.folder)
+        self.references = {v.name: v.valueReference for v in self.description.modelVariables}
+
+    def open(self, kind, upto="run", start=None, tolerance=None, guid=None, callbacks=None):
+        instance = kind(
+            guid=guid or self.description.guid,
+            unzipDirectory=self.folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName="instance",
+        )
+        instance.instantiate(callbacks=callbacks)
+        self.prepare(instance, upto, start, tolerance)
+        return instance
+
+    def prepare(self, instance, upto="run", start=None, tolerance=None):
+        self.set(instance, start or {})
+        if upto == "instantiated":
+            return
+        instance.setupExperiment(startTime=0.0, tolerance=tolerance)
+        instance.enterInitializationMode()
+        if upto == "initialization":
+            return
+        instance.exitInitializationMode()
+        if isinstance(instance, FMU2Model) and upto == "run":
+            instance.newDiscreteStates()
+            instance.enterContinuousTimeMode()
+
+    def get(self, instance, *names):
+        return np.array(instance.getReal([self.references[n] for n in names]))
+
+    def set(self, instance, values):
+        instance.setReal([self.references[n] for n in values], list(values.values()))
+
+    def step(self, instance, steps, h=0.01, begin=0.0):
+        rows = []
+        names = [v.name for v in self.description.modelVariables if v.causality == "output"]
+        for k in range(steps):
+            instance.doStep(begin + k * h, h)
+            rows.append(self.get(instance, *names))
+        return np.array(rows)
+
+
+class Fmu3:
+    """An unpacked FMU of FMI 3.0 and its instances."""
+
+    def __init__(self, path, folder):
+        self.path, self.folder = path, fmpy.extract(str(path), str(folder))
+        self.description = fmpy.read_model_description(self.folder)
+        self.references = {v.name: v.valueReference for v in self.description.modelVariables}
+
+    def unborn(self, kind, token=None):
+        return kind(
+            guid=token or self.description.guid,
+            unzipDirectory=self.folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName="instance",
+        )
+
+    def open(self, kind, token=None):
+        instance = self.unborn(kind, token)
+        instance.instantiate()
+        return instance
+
+    def running(self, kind):
+        instance = self.open(kind)
+        instance.enterInitializationMode(tolerance=1e-9)
+        instance.exitInitializationMode()
+        if kind is FMU3Model:
+            instance.updateDiscreteStates()
+            instance.enterContinuousTimeMode()
+        return instance
+
+    def names(self, unknowns):
+        return [u.variable.name for u in unknowns]
+
+    def get(self, instance, names):
+        return np.array(instance.getFloat64([self.references[name] for name in names]))

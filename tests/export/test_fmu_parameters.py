@@ -1,0 +1,142 @@
+"""Numbers of a mechanism that are parameters of its FMU, and what its variables tell."""
+
+import numpy as np
+import pytest
+
+import mbs
+from mbs.components import Body, CoulombFriction, Revolute, RigidStop
+from mbs.errors import ExportError, ModelError
+from mbs.export.fmu.system_fmu import Contents, Settings, fmu_model
+
+TENSOR = ((0.02, 0.001, 0), (0.001, 0.03, 0.002), (0, 0.002, 0.04))
+
+
+def arm(d=0.4, M=2.0, Fv=0.2):
+    """Two links whose numbers are given."""
+    rows = [
+        {"antecedent": 0, "joint": "revolute", "limits": [-3, 2]},
+        {"antecedent": 1, "joint": "revolute", "alpha": "pi/2", "d": d},
+    ]
+    bodies = [
+        {"frame": 1, "ZZ": 0.5, "Ia": 0.05},
+        {"frame": 2, "XX": 0.3, "YY": 0.2, "ZZ": 0.4, "MX": 0.3, "M": M, "Fv": Fv},
+    ]
+    table = {"name": "arm", "gravity": [0, -9.81, 0], "frame": rows, "body": bodies}
+    return mbs.load(table).assemble()
+
+
+def four_bar(length=1.0):
+    """A four-bar whose coupler has this length, its centre of mass where it is."""
+    m = mbs.Mechanism("four_bar", gravity=(0, -9.81, 0))
+    a, b, c = (m.add(Body(n, mass=1.0, com=(0.3, 0, 0), inertia=TENSOR)) for n in "abc")
+    m.connect(m.world, Revolute("j1", axis="z", actuated=True), a)
+    m.connect(a.at(0.4), Revolute("j2", axis="z"), b)
+    m.connect(b.at(length), Revolute("j3", axis="z"), c.at(0.9))
+    m.connect(m.world.at(0.8), Revolute("j4", axis="z"), c)
+    return m.assemble(guess={"j1": 0.4, "j2": 0.7, "j4": 1.3})
+
+
+def test_other_parameters_give_the_equations_of_another_system() -> None:
+    wished = Contents(parameters=["masses", "lengths", "Fv2"], outputs=["energy", "cut_forces"])
+    model = fmu_model(arm(), wished)
+    plain = fmu_model(arm(0.6, 3.5, 0.9), Contents(outputs=["energy", "cut_forces"]))
+    other = {"d2": 0.6, "M2": 3.5, "Fv2": 0.9}
+    assert [v.name for v in model.parameters] == ["M2", "d2", "Fv2"]
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        x, u = rng.normal(size=4), rng.normal(size=2)
+        one = model.rhs(0, x, [], u, [other[v.name] for v in model.parameters])
+        for a, b in zip(one, plain.rhs(0, x, [], u, []), strict=True):
+            assert np.abs(np.array(a - b)).max() < 1e-11
+
+
+def test_the_fmu_of_a_loop_takes_a_longer_coupler(tmp_path) -> None:
+    path = mbs.export.fmu(
+        four_bar(), tmp_path / "bar.fmu", fmi="3.0", parameters=["lengths"], outputs=["closure"]
+    )
+    longer = four_bar(1.1)
+    fmu = mbs.simulate.fmu(
+        path,
+        0.4,
+        step=0.05,
+        start={"j1.q": longer.posture[0]},
+        parameters={"j3.frame_a.x": 1.1},
+        tolerance=1e-10,
+        quiet=True,
+    )
+    own = mbs.simulate.run(longer, 0.4, step=0.05, tolerance=1e-10, quiet=True)
+    assert np.abs(fmu["closure"]).max() < 1e-11
+    for name in ("j1.q", "j2.q", "j4.q", "j4.v", "j1.a"):
+        assert np.abs(fmu[name] - own[name]).max() < 1e-7 * (1 + np.abs(own[name]).max()), name
+    assert abs(own["j2.q"][0] - four_bar().posture[1]) > 0.05
+
+
+def test_what_variables_tell() -> None:
+    model = fmu_model(arm(), Contents(parameters=["masses", "inertias", "friction", "lengths"]))
+    by_name = {entry.variable.name: entry.variable for entry in model.entries}
+    assert (by_name["M2"].min, by_name["M2"].nominal, by_name["M2"].unit) == (0.0, 2.0, "kg")
+    assert (by_name["Fv2"].min, by_name["d2"].min) == (0.0, None)
+    assert by_name["q1.q"].nominal == by_name["q1.v"].nominal == 3.0
+    assert by_name["q2.q"].nominal == 1.0
+    for entry in model.entries:
+        assert entry.variable.nominal > 0
+        assert entry.variable.description
+
+
+def test_bounds_of_contacts() -> None:
+    m = mbs.Mechanism("hit", gravity=(0, -9.81, 0))
+    e, mu = mbs.Parameter("e", 0.8), mbs.Parameter("mu", 0.1, unit="N.m")
+    rod = m.add(Body("rod", mass=1.0, com=(0.3, 0, 0), inertia=TENSOR))
+    m.connect(m.world, Revolute("j1", axis="z", actuated=True), rod)
+    m.add(RigidStop("stop", "j1", lower=-1.0, restitution=e))
+    m.add(CoulombFriction("dry", "j1", sliding=mu))
+    model = fmu_model(m.assemble(), Contents(parameters=["masses"]))
+    by_name = {variable.name: variable for variable in model.parameters}
+    assert (by_name["e"].min, by_name["e"].max) == (0.0, 1.0)
+    assert (by_name["mu"].min, by_name["mu"].max) == (0.0, None)
+    assert by_name["M1"].min == 0.0
+    assert {"stop.effort", "dry.effort"} <= {y.name for y in model.outputs}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        (["M7"], "nothing called 'M7' that may become a symbol"),
+        (["masses", "masses"], "'masses' is to be a symbol twice"),
+    ],
+)
+def test_unknown_numbers_are_refused(parameters, message) -> None:
+    with pytest.raises(ModelError, match=f"arm: .*{message}|arm: {message}"):
+        fmu_model(arm(), Contents(parameters=parameters))
+
+
+def test_a_symbol_without_value_is_refused() -> None:
+    m = mbs.Mechanism("open")
+    rod = m.add(Body("rod", mass="m", com=(0.3, 0, 0), inertia=TENSOR))
+    m.connect(m.world, Revolute("j1", axis="z"), rod)
+    with pytest.raises(ModelError, match="open: parameter 'm' has no value; give it a default"):
+        fmu_model(m.assemble())
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"stop_time": "x"}, "stop time"),
+        ({"internal_step": "x"}, "internal step"),
+        ({"step_size": -1.0}, "step size"),
+        ({"tolerance": float("nan")}, "tolerance"),
+        ({"solver": "euler"}, "solver is 'euler'; use dopri5"),
+    ],
+)
+def test_settings_that_are_none_are_refused(settings, message) -> None:
+    with pytest.raises(ExportError, match=f"FMU arm: {message}"):
+        fmu_model(arm(), settings=Settings(**settings))
+
+
+def test_paths_and_versions_are_refused(tmp_path) -> None:
+    with pytest.raises(ExportError, match=r"arm: FMI version '4' is not written; use fmi='2.0'"):
+        mbs.export.fmu(arm(), tmp_path / "x.fmu", fmi="4")
+    with pytest.raises(ExportError, match="does not exist"):
+        mbs.export.fmu(arm(), tmp_path / "none" / "x.fmu")
+    with pytest.raises(ExportError, match="3 is not a path"):
+        mbs.export.fmu(arm(), 3)

@@ -168,7 +168,7 @@ class Result:
             ModelError: it is no such file.
         """
         try:
-            with np.load(path, allow_pickle=False) as archive:
+            with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
                 rest = json.loads(str(archive["rest"]))
                 events = tuple((t, name, words) for t, name, words in rest["events"])
                 time, values = archive["time"], archive["values"]

@@ -41,6 +41,14 @@ SMALL = {
         "Residual on the same motion": 0.6,
         "Residual on the other motion": 0.6,
     },
+    "05_co_simulation": {
+        "FMI 2.0 CoSimulation: largest difference of the angle": 1e-8,
+        "FMI 2.0 ModelExchange: largest difference of the angle": 1e-6,
+        "FMI 3.0 ModelExchange: largest difference of the angle": 1e-6,
+        "Time at which the hatch lifts - expected": 1e-8,
+        "Steps of 0.5 ms: difference": 3e-3,
+        "Half the step, ratio - 2": 0.05,
+    },
 }
 """What each example prints, and how large it may be."""
 
@@ -49,6 +57,7 @@ FILES = {
     "02_puma560": ["puma560.png", "puma560.fmu", "fall.csv", "models/models.h"],
     "03_inverse_geometry": ["postures.png", "igm.c", "equations.txt"],
     "04_identification": ["identification.png", "motion.csv"],
+    "05_co_simulation": ["co_simulation.png", "hatch3.fmu", "cell.ssp", "study/case_000014.npz"],
 }
 
 

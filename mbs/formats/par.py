@@ -142,7 +142,7 @@ def _bodies(
     file: ParFile, NL: int, NJ: int, frames: tuple[FrameRow, ...]
 ) -> tuple[InertiaRow, ...]:
     remarks = {kind: _remarks(file, kind, NJ) for kind in ("Fs_width", "rest")}
-    springs = _springs(file, NJ, frames)
+    springs, grouped = _springs(file, NJ, frames), _remarks(file, "grouped", NJ)
     rows = []
     for j in range(1, NJ + 1):
         values: dict[str, Any] = {kind: at[j] for kind, at in remarks.items() if j in at}
@@ -151,7 +151,7 @@ def _bodies(
         if j <= NL:
             values.update(_body(file, j, NL, fixed=frames[j - 1].sigma == 2))
         if values:
-            rows.append(InertiaRow(j, **values))
+            rows.append(InertiaRow(j, grouped=j in grouped, **values))
     return tuple(rows)
 
 

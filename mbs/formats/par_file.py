@@ -2,7 +2,8 @@
 
 A file holds `KEY = number` and `KEY = {value, ...}`, where a vector may run over several lines.
 `(* ... *)` is a comment; comments `(* Value L = 0.3 *)`, `(* Guess q2 = -1.57 *)` and
-`(* Fs_width 3 = 0.01 *)`, `(* rest 3 = 0.1 *)` say what the format has no key for.
+`(* Fs_width 3 = 0.01 *)`, `(* rest 3 = 0.1 *)`, `(* grouped 3 = 1 *)` say what the format
+has no key for.
 """
 
 from __future__ import annotations
@@ -64,7 +65,9 @@ _ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
 _COMMENT = re.compile(r"\(\*.*?\*\)", re.DOTALL)
 _NAME = re.compile(r"\(\*\s*Robotname\s*=\s*'([^'\n]*)'")
 _SOURCE = re.compile(r"\(\*\s*Source\s*=\s*'([^\n]*)'\s*\*\)")
-_REMARK = re.compile(r"\(\*\s*(Value|Guess|Fs_width|rest)\s+([\w.]+)\s*=\s*([^\n]*?)\s*\*\)")
+_REMARK = re.compile(
+    r"\(\*\s*(Value|Guess|Fs_width|rest|grouped)\s+([\w.]+)\s*=\s*([^\n]*?)\s*\*\)"
+)
 _SHORTEST_MISSPELT, _SIMILAR = 3, 0.75
 
 
@@ -76,7 +79,8 @@ class ParFile:
         path: of the file.
         name, source: of the robot, empty where the file does not say them.
         entries: key -> (line number, texts of the values).
-        remarks: (kind, name) -> (line number, text), the kind Value, Guess, Fs_width or rest.
+        remarks: (kind, name) -> (line number, text), the kind Value, Guess, Fs_width, rest or
+            grouped.
     """
 
     path: str

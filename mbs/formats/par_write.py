@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from mbs.components.bodies import KhalilBody
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar, expression, parameters_of, to_float
 from mbs.files import write_text
@@ -19,6 +20,7 @@ from mbs.formats.par_file import (
 )
 from mbs.formats.rows import FrameRow, InertiaRow
 from mbs.formats.table import RobotTable, require_table
+from mbs.spatial.inertia import TEN_PARAMETERS
 
 _GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
 _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
@@ -27,10 +29,11 @@ _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
 def write_par(table: RobotTable, path: str | Path) -> None:
     """Write the table as a .par file.
 
-    The format knows no names of joints and bodies, no limits, and no grouped bodies: these are
-    lost, and joint j is q<j> when the file is read again. Values of symbols, `guess`, `Fs_width`
-    and `rest` are written as comments, which `read_par` reads. The file says of every joint
-    whether a motor drives it: where the table leaves the choice to the assembly, what it chooses.
+    The format knows no names of joints and bodies and no limits: these are lost, and joint j is
+    q<j> when the file is read again. Values of symbols, `guess`, `Fs_width`, `rest` and which
+    inertial parameters no body can have are written as comments, which `read_par` reads. The file
+    says of every joint whether a motor drives it: where the table leaves the choice to the
+    assembly, what it chooses.
 
     Raises:
         DescriptionError: it is not a table, or a loop, a symbol, a rotor, or the drive of a cut
@@ -83,6 +86,16 @@ def _remarks(table: RobotTable, NJ: int) -> Iterator[str]:
             value, usual = expression(getattr(row, kind)), getattr(InertiaRow(row.frame), kind)
             if row.frame <= NJ and to_float(value) != usual:
                 yield f"(* {kind} {row.frame} = {_text(value)} *)"
+        if row.grouped and not _is_body(row):
+            yield f"(* grouped {row.frame} = 1 *)"
+
+
+def _is_body(row: InertiaRow) -> bool:
+    try:
+        KhalilBody("body", **{name: getattr(row, name) for name in TEN_PARAMETERS})
+    except DescriptionError:
+        return False
+    return True
 
 
 def _springs(table: RobotTable, NJ: int) -> Iterator[str]:

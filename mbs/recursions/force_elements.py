@@ -76,7 +76,7 @@ def element_efforts(
     It is the part that they have in the efforts of the inverse dynamic model.
     """
     wrenches = element_wrenches(tree, forces, poses, q, v)
-    return _transmitted(tree, poses, wrenches) + coordinate_efforts(tree, forces, q, v)
+    return wrench_efforts(tree, poses, wrenches) + coordinate_efforts(tree, forces, q, v)
 
 
 def element_energy(tree: Tree, forces: Sequence[AttachedForce], q: SX) -> SX:
@@ -118,7 +118,7 @@ def _on_frames(
     return [(a, (pull.force, pull.moment_a)), (b, opposite)]
 
 
-def _transmitted(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:
+def wrench_efforts(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:
     """(nv, 1) efforts along the motions that transmit wrenches of links to the base."""
     carried = transmitted(tree, poses, wrenches)
     efforts = (effort(link.motion, f, m) for link, (f, m) in zip(tree.links, carried, strict=True))

@@ -113,12 +113,12 @@ def test_a_motion_that_loops_hand_to_a_contact_is_refused():
     )
 
 
-def test_an_fmu_and_a_dae_are_refused(tmp_path):
+def test_a_dae_is_refused():
     refused(
         ModelError,
-        "the FMU has no events yet, which RigidStop end needs",
+        "dae has no events yet, which RigidStop end needs",
         "use a JointStop, or mbs.simulate.run",
-        by=lambda: mbs.export.fmu(rail(STOP), tmp_path / "rail.fmu"),
+        by=lambda: mbs.models.dae(rail(STOP)),
     )
     refused(
         ModelError,

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Box, CoulombFriction, Revolute, RigidStop, WrenchSensor
+from mbs.components import (
+    Box,
+    CoulombFriction,
+    JointFriction,
+    Revolute,
+    RigidStop,
+    WrenchSensor,
+)
 
 DENSITY, WIDTH = 2700.0, 0.05
 
@@ -191,3 +198,22 @@ def test_more_contacts_than_freedoms_come_to_rest_and_gain_no_energy():
         assert np.max(np.abs(result[f"{name}.q"] - posture[name])) < 0.1 + 1e-10
     assert result["kinetic_energy"][-1] < 1e-12
     assert np.max(result["closure_residual"]) < 1e-12
+
+
+def test_dry_friction_turns_round_at_the_dead_centres_of_its_pivot():
+    """Where the rocker turns back, its friction cannot hold it: the crank moves on."""
+    strengths = {"a1": 2.0, "b1": 3.0}
+    dry = [CoulombFriction(f"dry_{n}", joint=n, sliding=s) for n, s in strengths.items()]
+    rigid = run(bars(FOUR, 0.8, -9.81, *dry, guess=FOUR_GUESS), 2.0, v0={"a1": 3.0})
+    width = 1e-4
+    smooth = [
+        JointFriction(f"dry_{n}", joint=n, coulomb=s, width=width) for n, s in strengths.items()
+    ]
+    near = bars(FOUR, 0.8, -9.81, *smooth, guess=FOUR_GUESS)
+    other = mbs.simulate.run(near, 2.0, v0={"a1": 3.0}, method="rodas", quiet=True)
+    assert np.max(np.abs(rigid["a1.q"] - other["a1.q"])) < width
+    crank = np.array([time for time, name, _ in rigid.events if name == "dry_a1"])
+    turns = [(time, what) for time, name, what in rigid.events if name == "dry_b1"]
+    dead = [what for time, what in turns if np.min(np.abs(crank - time)) > 1e-3]
+    assert len(dead) >= 2
+    assert set(dead) == {"slides"}

@@ -242,6 +242,15 @@ int events_step(events *e, double *x, double limit) {
     return status;
 }
 
+/* What modes hold that last is projected; those in between may hold what they cannot. */
+static int projected(events *e, double *x) {
+    stepper *s = e->solver;
+    if (!s->project) return STEPPER_OK;
+    if (s->project(s->user, stepper_time(s), x) || !stepper_all_finite(x, s->n))
+        return STEPPER_PROJECTION_FAILED;
+    return judge(e, x);
+}
+
 int events_settle(events *e, double *x, double limit) {
     stepper *s = e->solver;
     double *m = e->memory, t = stepper_time(s);
@@ -253,9 +262,8 @@ int events_settle(events *e, double *x, double limit) {
         if (i == MAX_JUMPS) return EVENTS_DO_NOT_SETTLE;
         if (e->model->jump(s->user, t, x, due(e)) || !stepper_all_finite(x, s->n))
             return EVENTS_JUMP_FAILED;
-        if (s->project && (s->project(s->user, t, x) || !stepper_all_finite(x, s->n)))
-            return STEPPER_PROJECTION_FAILED;
         status = judge(e, x);
+        if (!status && !events_pending(e)) status = projected(e, x);
         if (status) return status;
     }
     m[IDLE] = t - m[LAST] <= 1e3 * DBL_EPSILON * fmax(fabs(t), fabs(limit)) ? m[IDLE] + 1.0 : 0.0;

@@ -6,6 +6,10 @@
 
 #include "sincos.h"
 
+#if MBS_LANES > 2
+#include <immintrin.h>
+#endif
+
 #define MBS_GROUP 8
 #define MBS_ROW (MBS_GROUP / MBS_LANES) /* vectors in a row */
 
@@ -45,16 +49,28 @@ static inline __attribute__((always_inline, unused)) void mbs_transpose(mbs_lane
 #endif
 #endif
 
+static inline __attribute__((always_inline)) int mbs_any(mbs_bits mask) {
+#if MBS_LANES == 8
+  return _mm512_movepi64_mask((__m512i)mask) != 0;
+#elif MBS_LANES == 4
+  return _mm256_movemask_pd((__m256d)mask) != 0;
+#else
+  return (mask[0] | mask[1]) != 0;
+#endif
+}
+
+#define MBS_IS_LARGE(x) ((mbs_bits)(x > MBS_LARGE) | ~(mbs_bits)(x >= -MBS_LARGE))
+
 static inline __attribute__((unused)) void mbs_sincos_wide(mbs_lanes x, mbs_lanes *sine,
                                                            mbs_lanes *cosine) {
-  int large = 0;
+  const mbs_bits large = MBS_IS_LARGE(x);
   mbs_sincos_lanes(x, sine, cosine);
-  for (int l = 0; l < MBS_LANES; ++l) large |= !(fabs(x[l]) <= MBS_LARGE);
-  if (__builtin_expect(large, 0))
-    for (int l = 0; l < MBS_LANES; ++l) {
-      (*sine)[l] = sin(x[l]);
-      (*cosine)[l] = cos(x[l]);
-    }
+  if (__builtin_expect(mbs_any(large), 0))
+    for (int l = 0; l < MBS_LANES; ++l)
+      if (large[l]) {
+        (*sine)[l] = sin(x[l]);
+        (*cosine)[l] = cos(x[l]);
+      }
 }
 
 /* Rows of lanes to the columns that they are of, a square of MBS_LANES rows at a time; the last

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from casadi import DM, SX
 
 from mbs.assembly import System
+from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.identification.base.application import with_parameters
-from mbs.identification.base_parameters import BaseParameters, base_parameters
-from mbs.identification.columns import Joints
-from mbs.identification.consistent import consistent, consistent_weighted
-from mbs.identification.equations import EQUATIONS
-from mbs.identification.essential import LARGEST_PERCENT, Essential, essential
-from mbs.identification.estimate import Estimate, Estimator, cross_validated, held_out
-from mbs.identification.filters import Samples, smoothed
-from mbs.identification.methods import METHODS, Setting
-from mbs.identification.observations import Observations
-from mbs.identification.prior import Prior
-from mbs.identification.record import Record
-from mbs.identification.regressor import regressor
+from mbs.identification.base.base_parameters import BaseParameters, base_parameters
+from mbs.identification.bodies.consistent import consistent, consistent_weighted
+from mbs.identification.bodies.prior import Prior
+from mbs.identification.estimation.essential import LARGEST_PERCENT, Essential, essential
+from mbs.identification.estimation.estimate import Estimate, Estimator, cross_validated, held_out
+from mbs.identification.estimation.methods import METHODS, Setting
+from mbs.identification.estimation.residuals import Residuals
+from mbs.identification.observations.equations import EQUATIONS
+from mbs.identification.observations.observations import Observations
+from mbs.identification.records.filters import Samples, smoothed
+from mbs.identification.records.record import Record
+from mbs.identification.regressors.columns import Joints
+from mbs.identification.regressors.dynamic import regressor
 from mbs.identification.report import identification_report
-from mbs.identification.residuals import Residuals
 from mbs.messages import did_you_mean, quoted
 from mbs.progress import progress
 
@@ -116,8 +117,7 @@ def identify(
         ModelError: the method is unknown, or the record does not show every base parameter.
         SolverError: a search did not end.
     """
-    _check(system, "method", method, METHODS)
-    _check(system, "equations", equations, EQUATIONS)
+    _check(system, method, equations)
     known, options = prior or Prior(), _options(rotors, offsets, couplings)
     with progress(f"{system.name}: identification", 0.0, 1.0, quiet=quiet) as reached:
         D = regressor(system, **options)
@@ -141,8 +141,16 @@ def _options(rotors: bool, offsets: bool, couplings: Sequence[Joints]) -> dict[s
     return {"rotors": rotors, "offsets": offsets, "couplings": couplings}
 
 
-def _check(system: System, what: str, given: str, known: Mapping[str, object]) -> None:
-    if given not in known:
+def _check(system: System, method: str, equations: str) -> None:
+    require_system(system)
+    choices = {"method": (method, METHODS), "equations": (equations, EQUATIONS)}
+    for what, (given, known) in choices.items():
+        if given not in known:
+            raise ModelError(
+                f"{system.name}: {what} is {quoted(given)}; {did_you_mean(given, known)}"
+            )
+    if method == "instrumental" and equations != "dynamic":
         raise ModelError(
-            f"{system.name}: the {what} is {quoted(given)}; {did_you_mean(given, known)}"
+            f"{system.name}: instruments are for the dynamic equations alone; use"
+            " equations='dynamic', or another method"
         )

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from mbs.identification.columns import INERTIAL
-from mbs.identification.essential import Essential
-from mbs.identification.estimate import Estimate
-from mbs.identification.excitation_quality import ExcitationQuality, excitation_quality
-from mbs.identification.physical_set import pseudo_inertias
-from mbs.identification.residuals import Residuals
+from mbs.identification.bodies.physical_set import consistent_links
+from mbs.identification.estimation.essential import Essential
+from mbs.identification.estimation.estimate import Estimate
+from mbs.identification.estimation.residuals import Residuals
+from mbs.identification.observations.quality import ExcitationQuality, excitation_quality
+from mbs.identification.regressors.columns import INERTIAL
 
 _POOR = 30.0
 _SURE = 3.0
@@ -111,10 +109,10 @@ def _consistency(estimate: Estimate) -> list[str]:
     links = {c.link for c in inertial}
     if len(inertial) < len(INERTIAL) * len(links) or not links:
         return []
-    least = {k: np.linalg.eigvalsh(P)[0] for k, P in _bodies(estimate).items()}
-    bad = [str(link) for link, value in least.items() if value <= 0]
+    good = consistent_links(estimate.columns, estimate.values)
+    bad = [str(link) for link in sorted(links) if link not in good]
     if not bad:
-        return [f"Bodies: all {len(least)} pseudo-inertias are positive definite"]
+        return [f"Bodies: all {len(good)} pseudo-inertias are positive definite"]
     return [f"Bodies: no body has the parameters of link {', '.join(bad)}"]
 
 
@@ -126,7 +124,3 @@ def _signs(estimate: Estimate) -> list[str]:
     if not bad:
         return []
     return [f"Below zero: {', '.join(bad)}; check the signs of the efforts and the friction law"]
-
-
-def _bodies(estimate: Estimate) -> dict[int, np.typing.NDArray[np.float64]]:
-    return pseudo_inertias(estimate.columns, estimate.values)

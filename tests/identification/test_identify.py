@@ -5,17 +5,17 @@ from support.measured_arm import arm, motion, noisy_record, true_efforts
 
 import mbs
 from mbs.errors import ModelError
-from mbs.identification.base_parameters import base_parameters
-from mbs.identification.columns import numbers_of, values_of
-from mbs.identification.excitation import Series, excitation
-from mbs.identification.filters import Samples
+from mbs.identification.base.base_parameters import base_parameters
+from mbs.identification.estimation.least_squares import least_squares
+from mbs.identification.estimation.methods import METHODS
+from mbs.identification.excitation.excitation import Series, excitation
 from mbs.identification.identify import identify
-from mbs.identification.least_squares import least_squares
-from mbs.identification.methods import METHODS
-from mbs.identification.observations import observe
+from mbs.identification.observations.observations import observe
 from mbs.identification.postures import active_places
-from mbs.identification.record import Record
-from mbs.identification.regressor import regressor
+from mbs.identification.records.filters import Samples
+from mbs.identification.records.record import Record
+from mbs.identification.regressors.columns import numbers_of, values_of
+from mbs.identification.regressors.dynamic import regressor
 
 
 def test_an_arm_identified_from_a_noisy_record_predicts_another_motion():
@@ -73,12 +73,13 @@ def test_instruments_take_out_the_bias_of_rough_positions():
 
 
 def test_methods_and_equations_have_names():
-    with pytest.raises(ModelError, match="the method is 'weigthed'; did you mean 'weighted'"):
+    with pytest.raises(ModelError, match="method is 'weigthed'; did you mean 'weighted'"):
         identify(arm(), noisy_record(), 8.0, "weigthed")
-    with pytest.raises(ModelError, match="the equations is 'dynamics'; did you mean 'dynamic'"):
+    with pytest.raises(ModelError, match="equations is 'dynamics'; did you mean 'dynamic'"):
         identify(arm(), noisy_record(), 8.0, equations="dynamics")
-    with pytest.raises(ModelError, match=r"instruments are for .*; use equations='dynamic'"):
-        identify(arm(), noisy_record(), 8.0, "instrumental", equations="energy", quiet=True)
+    for equations in ("filtered", "energy"):
+        with pytest.raises(ModelError, match=r"instruments are for .*; use equations='dynamic'"):
+            identify(arm(), noisy_record(), 8.0, "instrumental", equations=equations, quiet=True)
 
 
 def test_efforts_of_the_wrong_sign_are_told():

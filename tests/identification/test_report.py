@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from support.measured_arm import equations, noisy_samples
 
-from mbs.identification.consistent import consistent
-from mbs.identification.estimate import held_out
-from mbs.identification.observations import observe
+from mbs.identification.bodies.consistent import consistent
+from mbs.identification.estimation.estimate import held_out
+from mbs.identification.estimation.residual_plot import plot_residuals
+from mbs.identification.estimation.weighted import weighted
+from mbs.identification.observations.observations import observe
 from mbs.identification.report import report
-from mbs.identification.residual_plot import plot_residuals
-from mbs.identification.weighted import weighted
 
 
 def full():

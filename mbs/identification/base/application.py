@@ -11,7 +11,7 @@ from casadi import SX
 
 from mbs.assembly import System
 from mbs.assembly.tree import Link
-from mbs.identification.columns import INERTIAL, Column
+from mbs.identification.regressors.columns import INERTIAL, Column
 from mbs.spatial import Inertia, elements
 
 _OF_THE_JOINT = ("Ia", "Fv", "Fs")

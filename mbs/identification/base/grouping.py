@@ -75,8 +75,8 @@ def related(
 ) -> Grouping:
     """The grouping once a combination of columns is known to vanish.
 
-    The column of highest rank that still is kept leaves; among equals the one of the largest
-    coefficient, so that no quotient is large.
+    The column of highest rank that still is kept leaves, among those whose coefficient vanishes
+    for no sample; among equals the one of the largest coefficient, so that no quotient is large.
 
     Args:
         grouping: what is known so far.
@@ -88,14 +88,14 @@ def related(
     if not rest:
         return grouping
     sizes = np.abs(sampled(list(rest.values())))
-    alive = dict(zip(rest, np.min(sizes, axis=0), strict=True))
-    scale = max(1.0, float(np.max(sizes)))
-    left = [k for k, size in alive.items() if size > _ZERO * scale]
-    if not left:
+    least, most = (dict(zip(rest, f(sizes, axis=0), strict=True)) for f in (np.min, np.max))
+    zero = _ZERO * max(1.0, float(np.max(sizes)))
+    able = [k for k, size in least.items() if size > zero]
+    if not able:
         return grouping
-    pivot = max(left, key=lambda k: (ranks(k), alive[k]))
-    terms = {k: -quotient(rest[k], rest[pivot]) for k in left if k != pivot}
-    return grouping.replaced(pivot, terms)
+    pivot = max(able, key=lambda k: (ranks(k), least[k]))
+    left = [k for k, size in most.items() if k != pivot and size > zero]
+    return grouping.replaced(pivot, {k: -quotient(rest[k], rest[pivot]) for k in left})
 
 
 def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:

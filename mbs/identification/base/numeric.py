@@ -19,7 +19,7 @@ from mbs.identification.base.rank import Dependence, dependence, plain
 from mbs.identification.base.sampled_regressor import sampled_regressor
 from mbs.identification.base.states import random_states
 from mbs.identification.base.text import equation
-from mbs.identification.columns import Column
+from mbs.identification.regressors.columns import Column
 
 Array = NDArray[np.float64]
 
@@ -112,9 +112,10 @@ def checked(sample: Sample, grouping: Grouping, beta: Array, order: Sequence[int
     full = dependence(W, order)
     rank = len(full.independent)
     found = remainder(sample, grouping, order)
-    relations = relation_texts(sample.columns, kept, found)
-    agrees = error < _EXACT and rank == len(kept)
-    text = _verdict(len(kept), rank, relations, error)
+    exact = error < _EXACT
+    relations = relation_texts(sample.columns, kept, found) if exact else ()
+    agrees = exact and rank == len(kept)
+    text = _verdict(len(kept), rank, relations) if exact else _inexact(error)
     return Check(rank, agrees, relations, False, error, full.gap, _sentence(text + _gap(full)))
 
 
@@ -136,12 +137,14 @@ def relation_texts(
     return tuple(lines)
 
 
-def _verdict(count: int, rank: int, relations: Sequence[str], error: float) -> str:
-    if error >= _EXACT:
-        return (
-            f"the rules are not exact: the grouped regressor differs by {error:.2g} of its longest"
-            " column"
-        )
+def _inexact(error: float) -> str:
+    return (
+        f"the rules are not exact: the grouped regressor differs by {error:.2g} of its longest"
+        " column"
+    )
+
+
+def _verdict(count: int, rank: int, relations: Sequence[str]) -> str:
     if count == rank:
         return f"the rules keep {count} parameters, which is the rank of the regressor"
     told = "; ".join(relations)

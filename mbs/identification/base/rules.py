@@ -148,14 +148,15 @@ def _prismatic(structure: Structure, j: int) -> Iterator[Removal]:
 def _moments_across(structure: Structure, first: int, j: int) -> Removal:
     """Moments along the only direction of turning have no effect.
 
-    With (ax, ay, az) that direction in frame j: ax MX + ay MY + az MZ is the moment that leaves.
+    With (ax, ay, az) that direction in frame j: ax MX + ay MY + az MZ is the moment that leaves,
+    by its last parameter whose factor is zero for no value of the symbols.
     """
     axis = structure.seen_from_link(first, j).R[:, 2]
-    sizes = [float(np.max(np.abs(structure.axes_in(first, j)[:, k]))) for k in range(3)]
-    leaving = max((k for k in range(3) if sizes[k] > _LEAST), default=2)
-    effects = {
-        (j, _MOMENTS[k]): -axis[k] / axis[leaving] for k in range(leaving) if sizes[k] > _LEAST
-    }
+    sizes = np.abs(structure.axes_in(first, j))
+    least, most = np.min(sizes, axis=0), np.max(sizes, axis=0)
+    leaving = max(k for k in range(3) if least[k] > _LEAST)
+    others = (k for k in range(3) if k != leaving and most[k] > _LEAST)
+    effects = {(j, _MOMENTS[k]): -axis[k] / axis[leaving] for k in others}
     return Removal((j, _MOMENTS[leaving]), effects)
 
 

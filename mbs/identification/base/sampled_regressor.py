@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.identification.base.states import States
-from mbs.identification.columns import Column, every_column, numbers_among
-from mbs.identification.regressor import regressor
+from mbs.identification.regressors.columns import Column, every_column, numbers_among
+from mbs.identification.regressors.dynamic import regressor
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from mbs.identification.base.rules import Key, tree_rules
 from mbs.identification.base.samples import sampler
 from mbs.identification.base.structure import Structure
 from mbs.identification.base.turning import turning_relations
-from mbs.identification.columns import Column
+from mbs.identification.regressors.columns import Column
 
 
 def grouped_by_rules(

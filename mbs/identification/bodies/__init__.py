@@ -1,0 +1,1 @@
+"""Full sets of parameters that bodies can have."""

@@ -1,0 +1,1 @@
+"""Methods that find parameters from equations, how sure these are, and what they leave."""

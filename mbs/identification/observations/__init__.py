@@ -1,0 +1,1 @@
+"""The equations that a record gives, and how well they show the parameters."""

@@ -1,0 +1,1 @@
+"""Measured motions, what they may not be, and their filters."""

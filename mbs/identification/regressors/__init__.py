@@ -1,0 +1,1 @@
+"""Models that are linear in the dynamic parameters, and the parameters as named columns."""

@@ -238,10 +238,10 @@ def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
 
 
 def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> None:
-    """Refuse units of different kind or size; where one end has none it is taken as it comes."""
+    """Refuse units of different kind or size; an end without one, or in 1, takes any."""
     ends = [(unit_of(variable), description) for _, variable, description in (source, target)]
     (given, _), (wanted, _) = ends
-    if given is None or wanted is None:
+    if {given, wanted} & {None, "1"}:
         return
     defined = [unit_exponents(description, unit) for unit, description in ends if unit]
     same = given == wanted if None in defined else defined[0] == defined[1]

@@ -2,8 +2,13 @@
 
 import fmpy
 import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
-from fmpy.fmi3 import FMU3Model
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+SOLVERS = pytest.mark.parametrize("solver", ["dopri5", "rodas", "rk4"])
+TIGHT = 1e-11
 
 
 class Fmu:
@@ -89,3 +94,27 @@ class Fmu3:
 
     def get(self, instance, names):
         return np.array(instance.getFloat64([self.references[name] for name in names]))
+
+
+def refused(call, *arguments):
+    with pytest.raises(FMICallException):
+        call(*arguments)
+
+
+def slave(fmu, events=True, early=True, update=None):
+    instance = fmu.unborn(FMU3Slave)
+    instance.instantiate(eventModeUsed=events, earlyReturnAllowed=early, intermediateUpdate=update)
+    instance.enterInitializationMode(tolerance=TIGHT)
+    instance.exitInitializationMode()
+    if events:
+        instance.updateDiscreteStates()
+        instance.enterStepMode()
+    return instance
+
+
+def slopes(instance, fmu, **orders):
+    """Derivatives of one input: order to value."""
+    name, values = next(iter(orders.items()))
+    instance.setRealInputDerivatives(
+        [fmu.references[name]] * len(values), list(values), list(values.values())
+    )

@@ -4,8 +4,10 @@ import dataclasses
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from mbs.export.fmu.description import FmuModel, Jumps, State, Variable
+from mbs.solvers import integrate
 
 
 class Point(NamedTuple):
@@ -302,3 +304,55 @@ def stopped_crank() -> FmuModel:
             names=("slider stop",),
         ),
     )
+
+
+def fall(times, e=0.8, g=10.0, slow=1e-3):
+    """Height of the ball, which falls from 1 m, and its energy; at rest once it is slow."""
+    rows, begin, speed = [], -np.sqrt(2 / g), np.sqrt(2 * g)
+    for t in times:
+        while speed and t > begin + 2 * speed / g:
+            begin, speed = begin + 2 * speed / g, e * speed if e * speed > slow else 0.0
+        flight = t - begin if speed else 0.0
+        rows.append([speed * flight - g / 2 * flight**2, speed**2 / 2])
+    return np.array(rows)
+
+
+def impact_times(count, e=0.8, g=10.0):
+    """When the ball hits the ground."""
+    flights = 2 * np.sqrt(2 / g) * e ** np.arange(count)
+    return np.sqrt(2 / g) + np.concatenate(([0], np.cumsum(flights[1:])))
+
+
+def logarithm() -> FmuModel:
+    """A falling number whose indicator, its logarithm plus five, has no value below zero."""
+    symbols, fired = point_of(1, 0, 1), ca.SX.sym("fired")
+    functions = {
+        "first": [ca.SX(0), ca.SX(-1)],
+        "indicators": [ca.log(symbols.x) + 5],
+        "jump": [ca.SX(1), 1 - symbols.p],
+    }
+    made = {
+        name: ca.Function(name, [*symbols, fired] if name == "jump" else symbols, values)
+        for name, values in functions.items()
+    }
+    return FmuModel(
+        name="logarithm",
+        states=(State(name="x", start=1.0, output=True),),
+        rhs=ca.Function("rhs", symbols, [ca.SX(-1), ca.SX(0, 1)]),
+        jumps=Jumps(modes=(Variable(name="x.mode"),), names=("x",), **made),
+    )
+
+
+def crank_reference(times, torque=0.1, **parameters):
+    """The slider-crank without a closure to solve: the rod angle is an arc sine."""
+    model = slider_crank()
+    t, x = ca.SX.sym("t"), ca.SX.sym("x", 2)
+    values = [parameters.get(v.name, v.start) for v in model.parameters]
+    angle = ca.asin(values[0] / values[1] * ca.sin(x[0]))
+    z = ca.vertcat(angle, values[0] * ca.cos(x[0]) + values[1] * ca.cos(angle))
+    xdot, _ = model.rhs(t, x, z, torque, values)
+    return integrate(ca.Function("f", [t, x], [xdot]), [0.3, 6.0], times, rtol=1e-12, atol=1e-12)
+
+
+EVENTFUL = (ball, block, clapper, logarithm, stopped_crank)
+MODELS = {make.__name__: make for make in (*EVENTFUL, pendulum, slider_crank)}

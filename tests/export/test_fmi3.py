@@ -89,13 +89,20 @@ def test_model_exchange_equals_co_simulation(fmu):
         assert np.allclose(me[name], cs[name], rtol=1e-6, atol=1e-6), name
 
 
+def put(fmu, instance, name, value):
+    if name == "time":
+        instance.setTime(value)
+    else:
+        instance.setFloat64([fmu.references[name]], [value])
+
+
 def test_derivatives_along_and_against_agree_with_differences(fmu):
     rng = np.random.default_rng(SEED)
     instance = fmu.running(FMU3Model)
     d = fmu.description
     states = [v.derivative.name for v in d.modelVariables if v.derivative is not None]
     inputs = [v.name for v in d.modelVariables if v.causality == "input"]
-    known = [*states, *inputs]
+    known = [*states, *inputs, "time"]
     unknown = fmu.names([*d.derivatives, *d.outputs])
     rows, columns = ([fmu.references[name] for name in names] for names in (unknown, known))
     J = np.array(
@@ -106,12 +113,13 @@ def test_derivatives_along_and_against_agree_with_differences(fmu):
         value = fmu.get(instance, [name])[0]
         ends = []
         for side in (h, -h):
-            instance.setFloat64([fmu.references[name]], [value + side])
+            put(fmu, instance, name, value + side)
             ends.append(fmu.get(instance, unknown))
-        instance.setFloat64([fmu.references[name]], [value])
+        put(fmu, instance, name, value)
         moved = np.array([n != name or n not in states for n in unknown])
         slope = (ends[0] - ends[1]) / (2 * h)
         assert np.allclose(slope[moved], J[moved, k], rtol=1e-5, atol=1e-6), name
+    assert np.any(J[:, -1]) == (fmu.path.stem == "pendulum")  # a push that depends on time
     w = rng.standard_normal(len(rows))
     against = instance.getAdjointDerivative(rows, columns, list(w), len(columns))
     assert np.allclose(against, w @ J, rtol=1e-12, atol=1e-12)

@@ -142,14 +142,14 @@ def test_inputs_of_a_function_are_named_and_keep_their_defaults() -> None:
     assert "j1.tau" in [y.name for y in model.outputs]
 
 
-def _law(sizes, outputs, names=None):
+def _law(sizes, outputs, names=None, inputs=None):
     symbols = [ca.SX.sym(f"i{k}", *size) for k, size in enumerate(sizes)]
     values = [ca.SX.zeros(n) for n in outputs]
     return ca.Function(
         "law",
         symbols,
         values,
-        [f"i{k}" for k in range(len(sizes))],
+        inputs or [f"i{k}" for k in range(len(sizes))],
         names or [f"o{k}" for k in range(len(outputs))],
     )
 
@@ -157,6 +157,10 @@ def _law(sizes, outputs, names=None):
 @pytest.mark.parametrize(
     ("controller", "message"),
     [
+        (
+            _law([(1,), (2,), (2,)], [2], inputs=["t", "v", "q"]),
+            r"has inputs t, v, q; give t, q and v first",
+        ),
         (_law([(1,), (3,), (2,)], [2]), r"starts with inputs of sizes \[1, 3, 2\]; give t, q"),
         (_law([(1,), (2,), (2,), (2, 2)], [2]), r"input i3 of the controller law has 2 columns"),
         (_law([(1,), (2,), (2,)], [3]), r"gives 3 values of tau, the system has 2"),
@@ -186,12 +190,36 @@ def test_sources_that_are_none_are_refused(tmp_path, sources) -> None:
     ):
         with pytest.raises(ExportError, match=message):
             fmu_model(arm(), Contents(controller="pd", sources=given))
-    (tmp_path / "core.c").write_text(LAW)
-    with pytest.raises(ExportError, match=r"core\.c .*rename"):
-        fmu_model(arm(), Contents(sources=[tmp_path / "core.c"]))
+    for name in ("core.c", "mbs_law_pd.c"):
+        (tmp_path / name).write_text(LAW)
+        with pytest.raises(ExportError, match=rf"{name} .*rename"):
+            fmu_model(arm(), Contents(controller="pd", sources=[tmp_path / name, sources[1]]))
     law = CController("other", inputs={"q_ref": 2})
     with pytest.raises(CompilerError, match="other"):
         mbs.export.fmu(arm(), tmp_path / "x.fmu", controller=law, sources=sources)
+
+
+@pytest.mark.parametrize("name", ["core_step", "stepper_table", "mbs_rhs", "fmi2DoStep"])
+def test_a_function_that_is_called_as_one_of_the_fmu_is_refused(tmp_path, sources, name) -> None:
+    path = tmp_path / "law.c"
+    path.write_text(LAW.replace("void pd(", f"void {name}("))
+    with pytest.raises(ExportError, match=rf"law\.c defines {name}, which is a function"):
+        fmu_model(arm(), Contents(controller=name, sources=[path, sources[1]]))
+    path.write_text(
+        LAW.replace("void pd(", f"static double {name}(void) {{ return 1; }}\nvoid pd(")
+    )
+    fmu_model(arm(), Contents(sources=[path, sources[1]]))
+
+
+@pytest.mark.parametrize("name", ["gather", "evaluate", "differentiate"])
+def test_a_law_in_c_may_have_any_other_name(tmp_path, sources, name) -> None:
+    path = tmp_path / "law_pd.c"
+    path.write_text(LAW.replace("void pd(", f"void {name}("))
+    law = CController(name, inputs={"q_ref": 2}, jacobian="pd_slopes")
+    rhs = fmu_model(arm(), Contents(controller=law, sources=[path, sources[1]])).rhs
+    twin = fmu_model(arm(), Contents(controller=pd_function())).rhs
+    point = 0.3, [0.2, 0.5, 1.0, -2.0], [], [0.7, -0.4], []
+    assert np.abs(np.array(rhs(*point)[0] - twin(*point)[0])).max() < 1e-13
 
 
 def _values(model, function_output):

@@ -1,5 +1,6 @@
 """Numbers of a mechanism that are parameters of its FMU, and what its variables tell."""
 
+import fmpy
 import numpy as np
 import pytest
 
@@ -140,3 +141,25 @@ def test_paths_and_versions_are_refused(tmp_path) -> None:
         mbs.export.fmu(arm(), tmp_path / "none" / "x.fmu")
     with pytest.raises(ExportError, match="3 is not a path"):
         mbs.export.fmu(arm(), 3)
+
+
+def test_a_fixed_parameter_keeps_its_value_once_the_motion_has_begun(tmp_path) -> None:
+    model = fmu_model(arm(), Contents(parameters=["M2", "d2"], fixed=["M2"]))
+    assert [(v.name, v.fixed) for v in model.parameters] == [("M2", True), ("d2", False)]
+    path = mbs.export.fmu(arm(), tmp_path / "arm.fmu", parameters=["M2", "d2"], fixed=["M2"])
+    variables = fmpy.read_model_description(path).modelVariables
+    found = {v.name: v.variability for v in variables if v.causality == "parameter"}
+    assert found == {"M2": "fixed", "d2": "tunable"}
+
+
+@pytest.mark.parametrize(
+    ("fixed", "message"),
+    [
+        (["M3"], "fixed names 'M3', which is no parameter; use one of M2"),
+        (["M2", "M2"], "fixed name 'M2' twice"),
+        (3, "fixed is 3; give a list of texts"),
+    ],
+)
+def test_what_is_no_parameter_cannot_be_fixed(fixed, message) -> None:
+    with pytest.raises(ModelError, match=f"arm: {message}"):
+        fmu_model(arm(), Contents(parameters=["M2"], fixed=fixed))

@@ -22,6 +22,10 @@ from mbs.native.cache import cached_library
 from mbs.native.compiler import flags_for
 
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_DEFINED = re.compile(
+    r"^(?P<type>[A-Za-z_][\w *]*?[ *])(?P<name>[A-Za-z_]\w*)\s*\([^;{}()]*\)\s*\{", re.ASCII | re.M
+)
+_PREFIXES = ("fmi2", "fmi3", "mbs_")
 _POINT = "double t, const double *q, const double *v, const double *w"
 
 Sources = tuple[tuple[str, str], ...]
@@ -68,32 +72,54 @@ def read_sources(paths: Sequence[PathLike]) -> Sources:
     """The user's C files.
 
     Raises:
-        ExportError: one cannot be read, is given twice or is no C file.
+        ExportError: one cannot be read, is given twice, is no C file, or is called as a part of
+            the FMU is or defines a function that is.
     """
     if not isinstance(paths, Iterable) and not isinstance(paths, os.PathLike):
         raise ExportError(f"sources: {quoted(paths)} is no list of paths; name C files")
     given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
     texts: dict[str, str] = {}
-    taken = _own_files() if given else set()
+    taken = _own_files() if given else {}
+    functions = _functions(taken.values())
     for path in map(path_of, given):
         if path.suffix not in (".c", ".h"):
             raise ExportError(f"sources: {path} is no C file; give files that end in .c or .h")
         if path.name in texts:
             raise ExportError(f"sources: {path.name} is given twice; give each file once")
-        if path.name in taken:
+        if path.name in taken or path.name.startswith(_PREFIXES):
             raise ExportError(f"sources: {path.name} is a file of every FMU; rename yours")
         try:
             texts[path.name] = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or "it is not UTF-8"
             raise ExportError(f"sources: {path} cannot be read ({reason})") from error
+        _check_functions(path.name, _functions([texts[path.name]]), functions)
     return tuple(texts.items())
 
 
-def _own_files() -> set[str]:
-    """Names of the files that FMUs have in their folder of sources."""
+def _own_files() -> dict[str, str]:
+    """The files that FMUs have in their folder of sources."""
     fixed = (face.fixed(solver) for face in FACES.values() for solver in get_args(Solver))
-    return {"model.c", "model.h", *(name for files in fixed for name in files)}
+    return {"model.c": "", "model.h": "", **{k: v for files in fixed for k, v in files.items()}}
+
+
+def _functions(texts: Iterable[str]) -> set[str]:
+    """The functions that C files define for other files."""
+    return {
+        found["name"]
+        for text in texts
+        for found in _DEFINED.finditer(text)
+        if "static" not in found["type"].split()
+    }
+
+
+def _check_functions(file: str, found: set[str], taken: set[str]) -> None:
+    """Refuse what a linker would confuse with a part of the FMU."""
+    for name in sorted(found):
+        if name in taken or name.startswith(_PREFIXES):
+            raise ExportError(
+                f"sources: {file} defines {name}, which is a function of every FMU; rename yours"
+            )
 
 
 def c_function(
@@ -115,7 +141,7 @@ def c_function(
             f"{system.name}: the controller {law.function} is a C function without source; name"
             " its file in sources"
         )
-    name = f"law_{law.function}"
+    name = f"mbs_law_{law.function}"
     glue = f"{name}.c", _glue(name, law, (system.nq, system.nv, sum(law.inputs.values())))
     files = dict((*sources, glue))
     complete = ("-Wl,-z,defs",) if sys.platform == "linux" else ()  # refuses what is not defined
@@ -138,21 +164,21 @@ static const long long SIZES[4][3] = {{{{1, 1, 1}}, {{N_Q, 1, 1}}, {{N_V, 1, 1}}
 static const long long BLOCKS[4][3] = {{
     {{N_V, 1, 1}}, {{N_V, N_Q, 1}}, {{N_V, N_V, 1}}, {{N_V, N_W, 1}}}};
 
-static void gather(const double **arg, double *in) {{
+static void mbs_gather(const double **arg, double *in) {{
     const int sizes[] = {{1, N_Q, N_V, N_W}};
     for (int k = 0; k < 4; ++k)
         for (int i = 0; i < sizes[k]; ++i) *in++ = arg[k] ? arg[k][i] : 0;
 }}
 
-static void evaluate(const double *in, double *tau) {{
+static void mbs_evaluate(const double *in, double *tau) {{
     {function}(in[0], in + 1, in + 1 + N_Q, in + 1 + N_Q + N_V, tau);
 }}
 
 {differentiate}
 int {name}(const double **arg, double **res, long long *iw, double *w, int mem) {{
     (void)iw, (void)mem;
-    gather(arg, w);
-    if (res[0]) evaluate(w, res[0]);
+    mbs_gather(arg, w);
+    if (res[0]) mbs_evaluate(w, res[0]);
     return 0;
 }}
 
@@ -160,8 +186,8 @@ int jac_{name}(const double **arg, double **res, long long *iw, double *w, int m
     const int sizes[] = {{1, N_Q, N_V, N_W}};
     double *J = w + N_IN;
     (void)iw, (void)mem;
-    gather(arg, w);
-    differentiate(w, J, J + N_V * N_IN);
+    mbs_gather(arg, w);
+    mbs_differentiate(w, J, J + N_V * N_IN);
     for (int k = 0; k < 4; ++k)
         for (int i = 0; i < N_V * sizes[k]; ++i, ++J)
             if (res[k]) res[k][i] = *J;
@@ -187,20 +213,20 @@ int jac_{name}_work(long long *arg, long long *res, long long *iw, long long *w)
 """
 _DIFFERENCES = """\
 /* Central differences; `room` holds 2 N_V numbers. */
-static void differentiate(double *in, double *J, double *room) {
+static void mbs_differentiate(double *in, double *J, double *room) {
     for (int k = 0; k < N_IN; ++k, J += N_V) {
         const double x = in[k], h = 6e-6 * fmax(1, fabs(x)), up = x + h, down = x - h;
         in[k] = up;
-        evaluate(in, room);
+        mbs_evaluate(in, room);
         in[k] = down;
-        evaluate(in, room + N_V);
+        mbs_evaluate(in, room + N_V);
         in[k] = x;
         for (int i = 0; i < N_V; ++i) J[i] = (room[i] - room[N_V + i]) / (up - down);
     }
 }
 """
 _GIVEN = """\
-static void differentiate(double *in, double *J, double *room) {{
+static void mbs_differentiate(double *in, double *J, double *room) {{
     (void)room;
     {jacobian}(in[0], in + 1, in + 1 + N_Q, in + 1 + N_Q + N_V, J);
 }}

@@ -20,6 +20,8 @@ from mbs.models.effort import effort_function
 Law = Function | Callable[[Any, Any, Any], Any] | CController | str | None
 """A law as a user gives it."""
 
+_POINT = ("t", "q", "v")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Controller:
@@ -112,6 +114,12 @@ def _check_inputs(system: System, law: Function) -> None:
         raise ExportError(
             f"{system.name}: the controller {law.name()} starts with inputs of sizes {sizes}; give"
             f" t, q and v of sizes {wanted}, then further inputs"
+        )
+    names = law.name_in()
+    if any(name in _POINT and name != _POINT[k] for k, name in enumerate(names[:3])):
+        raise ExportError(
+            f"{system.name}: the controller {law.name()} has inputs {', '.join(names)};"
+            " give t, q and v first, in this order"
         )
     for k in range(3, law.n_in()):
         if law.size2_in(k) != 1:

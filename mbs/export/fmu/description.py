@@ -136,7 +136,7 @@ class FmuModel:
         states: x.
         inputs: u.
         outputs: y, those that are not states.
-        parameters: p, tunable.
+        parameters: p, tunable or fixed.
         dependents: z, the coordinates that closed loops determine.
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest

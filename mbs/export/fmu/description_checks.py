@@ -14,6 +14,9 @@ from mbs.units import UNITS
 if TYPE_CHECKING:
     from mbs.export.fmu.description import FmuModel
 
+TIME = "time"
+"""What the independent variable is called, in FMI 3.0 and in results."""
+
 SOLVERS = ("dopri5", "rodas", "rk4")
 
 
@@ -36,6 +39,8 @@ def _check_names(model: FmuModel) -> None:
         name = entry.variable.name
         if not name or not name.isprintable():
             raise ExportError(f"FMU {model.name}: {name!r} is no name; use printable characters")
+        if name == TIME:
+            raise ExportError(f"FMU {model.name}: {name!r} is the name of time itself; use another")
         if name in seen:
             raise ExportError(f"FMU {model.name}: two variables are called {name!r}; rename one")
         seen.add(name)

@@ -9,7 +9,7 @@ import casadi
 import numpy as np
 
 from mbs.assembly import System
-from mbs.export.fmu import symbols
+from mbs.export.fmu import signs
 from mbs.export.fmu.figure import Figure, Point, Stroke, Style
 from mbs.export.fmu.labels import placed
 from mbs.export.fmu.projection import Array, Projection, projection
@@ -81,13 +81,13 @@ def _links(scene: _Scene) -> Iterator[Stroke]:
             yield Stroke("link", tuple((float(x), float(y)) for x, y in path), closed=True)
             continue
         for start, end in link.segments:
-            yield symbols.line("link", scene.at(start), scene.at(end))
+            yield signs.line("link", scene.at(start), scene.at(end))
         if link.mass_centre is not None and _is_alone(scene, link):
-            yield symbols.disc("link", scene.at(link.mass_centre), 12.0)
+            yield signs.disc("link", scene.at(link.mass_centre), 12.0)
     for joint in scene.parts.joints:
         a, b = (scene.at(k) for k in joint.points)
         if joint.kind not in _HIDDEN and np.linalg.norm(a - b) > _SAME:
-            yield symbols.line("link", a, b)
+            yield signs.line("link", a, b)
 
 
 def _is_alone(scene: _Scene, link: SkeletonLink) -> bool:
@@ -98,14 +98,14 @@ def _is_alone(scene: _Scene, link: SkeletonLink) -> bool:
 
 def _forces(scene: _Scene) -> Iterator[Stroke]:
     for force in scene.parts.forces:
-        yield symbols.zigzag(*(scene.at(k) for k in force.points))
+        yield signs.zigzag(*(scene.at(k) for k in force.points))
 
 
 def _frames(scene: _Scene) -> Iterator[Stroke]:
-    yield from symbols.tripod(scene.view, np.zeros(2), np.eye(3), 9.0)
+    yield from signs.tripod(scene.view, np.zeros(2), np.eye(3), 9.0)
     for frame in scene.parts.frames:
         axes = scene.directions[list(frame.directions)]
-        yield from symbols.tripod(scene.view, scene.at(frame.origin), axes, 7.0)
+        yield from signs.tripod(scene.view, scene.at(frame.origin), axes, 7.0)
 
 
 def _joints(scene: _Scene) -> Iterator[Stroke]:
@@ -117,11 +117,11 @@ def _joints(scene: _Scene) -> Iterator[Stroke]:
             at = scene.at(column)
             if number == 0 and all(np.linalg.norm(at - g) > _SAME for g in grounded):
                 grounded.append(at)
-                yield from symbols.ground(at)
+                yield from signs.ground(at)
     for force in scene.parts.forces:
         for number, column in zip(force.links, force.points, strict=True):
             if number == 0:
-                yield from symbols.ground(scene.at(column))
+                yield from signs.ground(scene.at(column))
     for joint in scene.parts.joints:
         yield from _sign(scene, joint)
 
@@ -130,12 +130,12 @@ def _sign(scene: _Scene, joint: SkeletonJoint) -> Iterator[Stroke]:
     style = _style(joint)
     a, b = (scene.at(k) for k in joint.points)
     for axis in joint.axes:
-        draw = symbols.cylinder if axis.motion == "revolute" else symbols.slide
+        draw = signs.cylinder if axis.motion == "revolute" else signs.slide
         yield from draw(style, scene.view, a, scene.directions[axis.direction])
     if not joint.axes and joint.kind not in _HIDDEN:
-        yield symbols.disc(style, a, 1.5)
+        yield signs.disc(style, a, 1.5)
         if np.linalg.norm(a - b) > _SAME:
-            yield symbols.disc(style, b, 1.5)
+            yield signs.disc(style, b, 1.5)
 
 
 def _style(joint: SkeletonJoint) -> Style:
@@ -145,7 +145,7 @@ def _style(joint: SkeletonJoint) -> Style:
 def _masses(scene: _Scene) -> Iterator[Stroke]:
     for link in scene.parts.links:
         if link.mass_centre is not None:
-            yield symbols.disc("mass", scene.at(link.mass_centre), 0.8)
+            yield signs.disc("mass", scene.at(link.mass_centre), 0.8)
 
 
 def _names(scene: _Scene) -> Iterator[tuple[Style, str, Point]]:

@@ -16,7 +16,8 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
     Returns:
         `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, p with the modes at its end;
         `mbs_tangent(t, x, z, u, p, dt, dx, du, dp) -> (dxdot, dy, dz, dg)`, g the indicators and dp
-        of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gx, gu, gp)`.
+        of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu,
+        gp)`.
         Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
         `mbs_sensitivity(x, z, p) -> steepness`. Where there are events, `mbs_first`,
         `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
@@ -118,16 +119,17 @@ def _adjoint(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
     names = ("wxdot", "wy", "wz", "wg")
     weights = [casadi.MX.sym(name, size) for name, size in zip(names, sizes, strict=True)]
     wxdot, wy, wz, wg = weights
-    _, gx, gz, gu, gp = _backward(model.rhs, point, [wxdot, wy])
+    back = _backward(model.rhs, point, [wxdot, wy])
     if model.jumps is not None:
-        _, *more = _backward(model.jumps.indicators, point, [wg])
-        gx, gz, gu, gp = (a + b for a, b in zip((gx, gz, gu, gp), more, strict=True))
+        more = _backward(model.jumps.indicators, point, [wg])
+        back = [a + b for a, b in zip(back, more, strict=True)]
+    gt, gx, gz, gu, gp = back
     gp = _own(model, gp)
     if model.closure is not None:
         loop = [x, z, _own(model, p)]
         hx, _, hp = _backward(model.closure, loop, [gz + wz, casadi.MX(1, 1)])
         gx, gp = gx + hx, gp + hp
-    return casadi.Function("mbs_adjoint", [*point, *weights], _dense([gx, gu, gp]))
+    return casadi.Function("mbs_adjoint", [*point, *weights], _dense([gt, gx, gu, gp]))
 
 
 def _own(model: FmuModel, p: casadi.MX) -> casadi.MX:

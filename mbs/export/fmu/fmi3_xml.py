@@ -5,6 +5,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import FmuModel
+from mbs.export.fmu.description_checks import TIME
 from mbs.export.fmu.xml_parts import (
     TOOL,
     Structure,
@@ -110,7 +111,7 @@ def _variables(root: Element, model: FmuModel, found: Structure) -> None:
     SubElement(
         variables,
         "Float64",
-        name="time",
+        name=TIME,
         valueReference=str(len(model.entries)),
         causality="independent",
         variability="continuous",

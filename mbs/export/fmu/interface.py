@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +10,7 @@ from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.export.fmu.controller import Controller
 from mbs.export.fmu.description import Member, Terminal, Variable
+from mbs.export.fmu.names import once
 from mbs.export.fmu.variables import POSE, WRENCH
 from mbs.messages import did_you_mean, quoted
 from mbs.models.geometry import terminal_frame
@@ -90,23 +91,6 @@ def interface_of(system: System, inputs: Sequence[str], flanges: Sequence[str]) 
     once(system, "wrenches of inputs and flanges", wrenches)
     once(system, "motions in inputs", [name for name, _ in motions])
     return Interface(tuple(wrenches), tuple(motions), tuple(frames))
-
-
-def once(system: System, what: str, names: Sequence[str]) -> list[str]:
-    """Names as a list.
-
-    Raises:
-        ModelError: one is no text or is given twice.
-    """
-    if not isinstance(names, Iterable):
-        raise ModelError(f"{system.name}: {what} is {quoted(names)}; give a list of texts")
-    given = [names] if isinstance(names, str) else list(names)
-    for name in given:
-        if not isinstance(name, str):
-            raise ModelError(f"{system.name}: {what} name {quoted(name)}; give texts")
-        if given.count(name) > 1:
-            raise ModelError(f"{system.name}: {what} name {name!r} twice; name it once")
-    return given
 
 
 def _possible(system: System) -> Iterator[str]:

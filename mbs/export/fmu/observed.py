@@ -12,7 +12,8 @@ from mbs.assembly import System
 from mbs.assembly.tree import Frame
 from mbs.errors import ModelError
 from mbs.export.fmu.description import Variable
-from mbs.export.fmu.interface import MOTION, frame_of, once
+from mbs.export.fmu.interface import MOTION, frame_of
+from mbs.export.fmu.names import once
 from mbs.export.fmu.variables import frame_text, pose
 from mbs.loops.closure import closure_rows
 from mbs.messages import did_you_mean

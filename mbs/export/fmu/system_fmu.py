@@ -31,6 +31,7 @@ def fmu(
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
     parameters: Sequence[str] = (),
+    fixed: Sequence[str] = (),
     flanges: Sequence[str] = (),
     controller: Law = None,
     sources: Sequence[PathLike] = (),
@@ -50,7 +51,7 @@ def fmu(
     `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`, and efforts and
     modes of rigid stops and dry friction, `stop.effort`, `stop.mode`. States are the independent
     joints; in a closed system the others are solved for at every evaluation, so that loops cannot
-    drift. Every symbol of the system is a tunable parameter. A solver for Co-Simulation is inside.
+    drift. Every symbol of the system is a parameter. A solver for Co-Simulation is inside.
     Directional derivatives, and in FMI 3.0 adjoint ones, are exact through closed loops.
 
     Args:
@@ -68,6 +69,8 @@ def fmu(
             "wrench:j2".
         parameters: numbers that are to be parameters too, as `mbs.assembly.symbolic` takes them:
             "masses", "inertias", "lengths", "friction", "M3", "d4".
+        fixed: names of parameters that keep their values once the motion has begun; all others may
+            be tuned.
         flanges: frames where another part of a mechanism is coupled: their poses, velocities and
             accelerations are outputs, the wrenches on them inputs; in FMI 3.0 a terminal holds
             them.
@@ -99,7 +102,7 @@ def fmu(
     require_system(system)
     require_version(system.name, fmi)
     require_writable(path_of(path))
-    wished = Contents(inputs, outputs, parameters, flanges, controller, sources)
+    wished = Contents(inputs, outputs, parameters, fixed, flanges, controller, sources)
     settings = Settings(stop_time, step_size, tolerance, solver, internal_step)
     model = fmu_model(system, wished, settings)
     return write_fmu(model, path, fmi=fmi, platforms=platforms, reference=reference)
@@ -112,6 +115,7 @@ class Contents:
     inputs: Sequence[str] = ()
     outputs: Sequence[str] = ()
     parameters: Sequence[str] = ()
+    fixed: Sequence[str] = ()
     flanges: Sequence[str] = ()
     controller: Law = None
     sources: Sequence[PathLike] = ()
@@ -163,7 +167,7 @@ def fmu_model(
         states=x_variables,
         inputs=u_variables,
         outputs=y_variables,
-        parameters=tuple(parameters(system)),
+        parameters=tuple(parameters(system, wished.fixed)),
         dependents=dependents(system, state, z),
         rhs=state.rhs,
         closure=state.closure,

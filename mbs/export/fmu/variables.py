@@ -8,8 +8,11 @@ from collections.abc import Iterator, Sequence
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
 from mbs.components.contacts_joint import CoulombFriction, JointContact, RigidStop
+from mbs.errors import ModelError
 from mbs.export.fmu.description import State, Variable
+from mbs.export.fmu.names import once
 from mbs.expressions import Parameter
+from mbs.messages import did_you_mean
 from mbs.models.geometry import terminal_frame
 from mbs.models.minimal_drive import InputMotion
 from mbs.models.minimal_state import MinimalState
@@ -144,9 +147,18 @@ def frame_text(frame: str | int) -> str:
     return f"link {frame}" if isinstance(frame, int) else frame
 
 
-def parameters(system: System) -> Iterator[Variable]:
-    """Every symbol of the system, with a value."""
-    bounds = _bounds(system)
+def parameters(system: System, fixed: Sequence[str] = ()) -> Iterator[Variable]:
+    """Every symbol of the system, with a value.
+
+    Args:
+        system: open or closed.
+        fixed: names of those that keep their values once the motion has begun.
+
+    Raises:
+        ModelError: there is no parameter of such a name, or it is given twice.
+    """
+    bounds, kept = _bounds(system), once(system, "fixed", fixed)
+    _check_known(system, kept)
     for parameter, start in zip(system.parameters, system.parameter_values(), strict=True):
         low, high = bounds.get(parameter.name, (None, None))
         if low is None and parameter.unit in _NEVER_NEGATIVE:
@@ -159,7 +171,18 @@ def parameters(system: System) -> Iterator[Variable]:
             min=None if low is None or start < low else low,
             max=None if high is None or start > high else high,
             description=parameter.description or f"parameter {parameter.name}",
+            fixed=parameter.name in kept,
         )
+
+
+def _check_known(system: System, fixed: Sequence[str]) -> None:
+    known = [parameter.name for parameter in system.parameters]
+    for name in fixed:
+        if name not in known:
+            raise ModelError(
+                f"{system.name}: fixed names {name!r}, which is no parameter;"
+                f" {did_you_mean(name, known)}"
+            )
 
 
 def _bounds(system: System) -> dict[str, tuple[float | None, float | None]]:

@@ -127,7 +127,7 @@ core_status core_refresh(core *c) {
         return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
                               c->m.time);
     memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
-    for (i = 0; i < N_VALUES; i++)
+    for (i = 0; i < INDICATORS; i++) /* those are looked at when they are shown */
         if (!isfinite(v[i]))
             return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular "
                                   "posture or a zero mass", c->name, MODEL_NAMES[i], c->m.time);
@@ -247,6 +247,7 @@ core_status core_terminate(core *c) {
 }
 
 core_status core_reset(core *c) {
+    if (!core_allowed(c, ~INTERMEDIATE, "a reset")) return CORE_ERROR;
     to_start(c);
     return CORE_OK;
 }

@@ -21,7 +21,8 @@ enum {
     MODES = PARAMETERS + NP,
     DEPENDENTS = MODES + NM,
     INDICATORS = DEPENDENTS + NZ,
-    N_VALUES = INDICATORS + NK
+    N_VALUES = INDICATORS + NK,
+    TIME_REFERENCE = N_VALUES /* the independent variable, where the face has it as a variable */
 };
 
 #define INPUT_ORDERS 3 /* derivatives of an input that a communication step may follow */
@@ -72,6 +73,7 @@ typedef struct {
     core_logger log;
     void *host;
     int discards; /* messages of discarded calls are wanted; those of errors always are */
+    int timed;    /* TIME_REFERENCE is a value reference */
     int event_mode, early_return; /* the host of a co-simulation handles events; takes part steps */
     core_watch watch;             /* or NULL */
     stepper solver;

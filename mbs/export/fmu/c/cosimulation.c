@@ -39,6 +39,7 @@ core_status core_do_step(core *c, double time, double h, core_stop *stop) {
         return core_refuse(c, "%s: the step starts at time %.12g; the model is at %.12g", c->name,
                            time, c->m.time);
     core_prepare_solver(c);
+    c->solver.since_output = 0;
     core_begin_inputs(c);
     c->m.stale = 1;
     status = run(c, end, stop);

@@ -10,10 +10,11 @@ typedef struct {
     double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
 
-static double *known_of(tangents *d, unsigned ref) {
+static double *known_of(const core *c, tangents *d, unsigned ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref >= INPUTS && ref < OUTPUTS) return d->du + (ref - INPUTS);
     if (ref >= PARAMETERS && ref < MODES) return d->dp + (ref - PARAMETERS);
+    if (ref == TIME_REFERENCE && c->timed) return &d->dt;
     return NULL;
 }
 
@@ -32,9 +33,10 @@ static core_status ready(core *c, const unsigned *unknown, size_t n_unknown, con
                          size_t n_known, const double *seed, size_t n_seed) {
     tangents d;
     size_t i;
-    if (!core_allowed(c, INITIALIZATION | RUNNING | INTERMEDIATE, "a derivative")) return CORE_ERROR;
+    if (!core_allowed(c, INITIALIZATION | RUNNING | INTERMEDIATE, "a derivative"))
+        return CORE_ERROR;
     for (i = 0; i < n_known; i++)
-        if (!known_of(&d, known[i]))
+        if (!known_of(c, &d, known[i]))
             return core_refuse(c, "%s: no derivative with respect to value reference %u; use "
                                "states, inputs and parameters", c->name, known[i]);
     for (i = 0; i < n_unknown; i++)
@@ -54,7 +56,7 @@ static void point(core *c) {
 static core_status finite_answer(core *c, unsigned ref, double value) {
     if (isfinite(value)) return CORE_OK;
     return core_no_answer(c, "%s: the derivative of or by %s is not finite at time %.9g", c->name,
-                          MODEL_NAMES[ref], c->m.time);
+                          ref < N_VALUES ? MODEL_NAMES[ref] : "time", c->m.time);
 }
 
 /* What moves when the seeds are moved. */
@@ -81,7 +83,7 @@ core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
     core_status status = ready(c, unknown, n_unknown, known, n_known, seed, n_known);
     if (status) return status;
     memset(&d, 0, sizeof d);
-    for (i = 0; i < n_known; i++) *known_of(&d, known[i]) += seed[i];
+    for (i = 0; i < n_known; i++) *known_of(c, &d, known[i]) += seed[i];
     status = move(c, &d);
     for (i = 0; i < n_unknown && !status; i++) {
         answer[i] = *unknown_of(&d, unknown[i]);
@@ -104,14 +106,15 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
     c->arg[6] = w.dy;
     c->arg[7] = w.dz;
     c->arg[8] = w.dg;
-    c->res[0] = g.dx;
-    c->res[1] = g.du;
-    c->res[2] = g.dp;
+    c->res[0] = &g.dt;
+    c->res[1] = g.dx;
+    c->res[2] = g.du;
+    c->res[3] = g.dp;
     if (mbs_adjoint(c->arg, c->res, c->iw, c->w, 0))
         return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
     for (i = 0; i < NX; i++) g.dx[i] += w.dx[i]; /* a state may be an output */
     for (i = 0; i < n_known && !status; i++) {
-        answer[i] = *known_of(&g, known[i]);
+        answer[i] = *known_of(c, &g, known[i]);
         status = finite_answer(c, known[i], answer[i]);
     }
     return status;

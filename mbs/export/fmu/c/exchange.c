@@ -37,7 +37,8 @@ core_status core_completed_step(core *c) {
 }
 
 core_status core_set_time(core *c, double time) {
-    if (!core_allowed(c, EVENT | CONTINUOUS, "setting the time")) return CORE_ERROR;
+    if (!core_allowed(c, c->m.cosimulation ? 0 : EVENT | CONTINUOUS, "setting the time"))
+        return CORE_ERROR;
     if (!isfinite(time)) return core_refuse(c, "%s: time %g is not finite", c->name, time);
     if (time != c->m.time) c->m.stale = 1;
     c->m.time = time;
@@ -54,7 +55,8 @@ static int counted(core *c, const void *array, size_t n, int count, const char *
 
 core_status core_set_states(core *c, const double *x, size_t n) {
     size_t i;
-    if (!core_allowed(c, CONTINUOUS, "setting the states") || !counted(c, x, n, NX, "states")) return CORE_ERROR;
+    if (!core_allowed(c, CONTINUOUS, "setting the states") || !counted(c, x, n, NX, "states"))
+        return CORE_ERROR;
     for (i = 0; i < n; i++)
         if (!isfinite(x[i]))
             return core_refuse(c, "%s: %s = %g is not finite", c->name, MODEL_NAMES[i], x[i]);

@@ -4,7 +4,6 @@
 
 #include "fmi3_face.h"
 
-#define TIME ((fmi3ValueReference)N_VALUES) /* the independent variable */
 #define WRONG_COUNT "an array is NULL or too short; give one value for each reference"
 
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
@@ -38,6 +37,7 @@ static face *instantiate(fmi3String name, fmi3String token, int cosimulation, fm
         return no_instance(environment, logger, "no memory is left");
     }
     f->model->discards = logging;
+    f->model->timed = 1;
     return f;
 }
 
@@ -69,7 +69,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     size_t i;
     (void)resources, (void)visible;
     for (i = 0; i < n_intermediate; i++)
-        if (!intermediate || intermediate[i] > TIME)
+        if (!intermediate || intermediate[i] > TIME_REFERENCE)
             return no_instance(environment, logger, "an intermediate variable is unknown");
     f = instantiate(name, token, 1, logging, environment, logger);
     if (!f) return NULL;
@@ -133,7 +133,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     if (n != n_values || (n && (!vr || !value))) return refused(c, WRONG_COUNT);
     if (!n) return as_fmi(core_get(MODEL(c), NULL, 0, NULL));
     for (i = 0; i <= n && !status; i++) {
-        if (i < n && vr[i] != TIME) continue;
+        if (i < n && vr[i] != TIME_REFERENCE) continue;
         status = as_fmi(core_get(MODEL(c), vr + first, i - first, value + first));
         if (i < n && !status) value[i] = MODEL(c)->m.time;
         first = i + 1;

@@ -103,7 +103,7 @@ static int sane(const core_memory *m) {
     if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU)) return 0;
     if (!all_finite(v + PARAMETERS, NP + NM)) return 0;
     if (!parameters_in_bounds(v)) return 0;
-    if (!m->stale && !all_finite(v, N_VALUES)) return 0;
+    if (!m->stale && !all_finite(v, INDICATORS)) return 0;
     if (!all_finite(m->guess, NZ) || !all_finite(m->posture_z, NZ)) return 0;
     if (!all_finite(m->posture_x, NX) || !sane_inputs(m) || !sane_events(m)) return 0;
     for (i = 0; i < STEPPER_MEMORY(0); i++)

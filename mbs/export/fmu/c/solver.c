@@ -39,5 +39,4 @@ void core_init_solver(core *c) {
 
 void core_prepare_solver(core *c) {
     c->solver.rtol = c->solver.atol = c->m.tolerance;
-    c->solver.since_output = 0;
 }

@@ -196,12 +196,22 @@ core_status core_start_events(core *c) {
 
 void core_restart(core *c) { stepper_restart(&c->solver); }
 
+/* The dependent coordinates are at hand where a step ends with an evaluation at its end. */
+static core_status accept_end(core *c, const double *x) {
+#ifdef MODEL_RODAS
+    (void)x;
+    return core_accept_states(c);
+#else
+    return core_accept_posture(c, x, c->z);
+#endif
+}
+
 core_status core_step(core *c, double limit) {
     double *x = c->m.values + STATES;
     int status = stepper_step(&c->solver, x, limit);
     c->m.time = stepper_time(&c->solver);
     c->m.stale = 1;
-    return status ? step_failed(c, status) : core_accept_posture(c, x, c->z);
+    return status ? step_failed(c, status) : accept_end(c, x);
 }
 
 int core_pending(const core *c) {

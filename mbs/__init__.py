@@ -14,6 +14,7 @@ from mbs.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from mbs import (
+        bridges,
         components,
         errors,
         export,
@@ -42,6 +43,7 @@ _NAMES = {
     "load": "mbs.robots",
 }
 _MODULES = (
+    "bridges",
     "components",
     "errors",
     "export",
@@ -61,6 +63,7 @@ __all__ = [
     "Parameter",
     "Result",
     "System",
+    "bridges",
     "components",
     "errors",
     "export",

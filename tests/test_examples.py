@@ -49,6 +49,33 @@ SMALL = {
         "Steps of 0.5 ms: difference": 3e-3,
         "Half the step, ratio - 2": 0.05,
     },
+    "06_acrobot": {
+        "Least integral of the torque squared - 53.527": 1e-3,
+        "Compiled - interpreted": 1e-6,
+    },
+    "07_panda": {
+        "Least effort in 1.5 s - 0.12717": 1e-4,
+        "Least time - 0.66227": 1e-3,
+    },
+    "08_four_bar_motion": {
+        "reduced: least integral of the torque squared - 28.1827": 2e-4,
+        "index2: least integral of the torque squared - 28.1827": 2e-4,
+        "ggl: least integral of the torque squared - 28.1827": 2e-4,
+        "Largest difference of positions between reduced and ggl": 1e-3,
+    },
+    "09_sr400_pick_and_place": {
+        "Least effort - 0.02592": 1e-4,
+        "Largest gap of the loop": 1e-12,
+    },
+    "10_quadruped_jump": {
+        "Least effort - 0.01351": 1e-4,
+        "Feet in stance move by": 0.01,
+    },
+    "11_chain": {
+        "1 link: cost - 114.595": 1e-2,
+        "2 links: cost - 134.967": 1e-2,
+        "4 links: cost - 129.933": 1e-2,
+    },
 }
 """What each example prints, and how large it may be."""
 
@@ -58,6 +85,12 @@ FILES = {
     "03_inverse_geometry": ["postures.png", "igm.c", "equations.txt"],
     "04_identification": ["identification.png", "motion.csv"],
     "05_co_simulation": ["co_simulation.png", "hatch3.fmu", "cell.ssp", "study/case_000014.npz"],
+    "06_acrobot": ["acrobot.png"],
+    "07_panda": ["panda.png"],
+    "08_four_bar_motion": ["four_bar_motion.png"],
+    "09_sr400_pick_and_place": ["sr400.png"],
+    "10_quadruped_jump": ["quadruped.png"],
+    "11_chain": ["chain.png"],
 }
 
 

@@ -1,0 +1,130 @@
+"""Direct collocation into `casadi.Opti`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import MX, Function, Opti
+
+from mbs.bridges.explicit import Model, explicit
+from mbs.bridges.opti import Grid, Transcription, parameter_values
+from mbs.errors import ModelError
+from mbs.messages import quoted
+from mbs.models.dae import Dae
+
+SCHEMES = ("radau", "legendre")
+
+
+def collocation(
+    opti: Opti,
+    model: Model,
+    grid: Grid,
+    *,
+    points: int = 3,
+    scheme: str = "radau",
+    p: Any = None,
+) -> Transcription:
+    """Polynomials of states on each stage that fulfil the equations at the collocation points.
+
+    The equations at one point are a Function, compiled once and mapped over all points; the
+    polynomials are a few products of matrices for all stages together. For every form of
+    `mbs.models.dae`; those of index 2 and 3 want "radau". With "radau" the last point of a stage
+    is the next knot, which then is no variable of its own.
+
+    Source: Hairer and Wanner 1996, IV.5; Biegler 2010, chapter 10.
+
+    Args:
+        opti: takes the variables and constraints; cost, ends and limits are the caller's. The
+            invariants of a Dae are not among them: ask them at one knot, see `invariants`.
+        model: a Dae, or a Function of (x, u) or (x, u, p) that gives dx/dt.
+        grid: stages, their duration, how they are evaluated.
+        points: K of each stage, 1 to 9.
+        scheme: "radau", of order 2K - 1 and stiffly accurate, or "legendre", of order 2K.
+        p: parameters, numbers or an expression of `opti`; the defaults of a Dae when left out.
+
+    Returns:
+        the variables.
+
+    Raises:
+        ModelError: there is no such scheme, or parameters have no values.
+    """
+    nodes = _nodes(points, scheme)
+    slopes, ends, weights = (np.array(c) for c in casadi.collocation_coeff(list(nodes)))
+    residual, count = _residual(model), grid.stages
+    x, z, u = (opti.variable(residual.size1_in(n), w) for n, w in _widths(points, count, scheme))
+    inside = opti.variable(x.shape[0], points * count)
+    last = inside[:, points - 1 :: points]
+    knots = casadi.horzcat(x, last) if scheme == "radau" else x
+    basis = [knots[:, :-1], *(inside[:, k::points] for k in range(points))]
+    u_points = u[:, [k for k in range(count) for _ in range(points)]]
+    p = parameter_values(model, residual.size1_in("p"), p)
+    rates = casadi.vertcat(*(_combined(basis, slopes[:, k]) for k in range(points)))
+    total = points * count
+    rates = casadi.reshape(rates, x.shape[0], total)
+    fixed = [casadi.repmat(value, 1, total) for value in (p, grid.step)]
+    (rows,) = grid.mapped(residual, total).call([inside, rates, z, u_points, *fixed])
+    opti.subject_to(casadi.vec(rows) == 0)
+    if scheme != "radau":
+        opti.subject_to(casadi.vec(knots[:, 1:] - _combined(basis, ends.ravel())) == 0)
+    return Transcription(
+        opti=opti,
+        x=knots,
+        u=u,
+        p=p,
+        step=grid.step,
+        x_points=inside,
+        z_points=z,
+        u_points=u_points,
+        weights=weights.ravel(),
+        nodes=nodes,
+        variables={"x": x, "u": u, "z": z, "x_points": inside},
+    )
+
+
+def invariants(model: Dae, x: MX, p: MX) -> MX:
+    """What is zero along every motion, at one knot; ask it there only, where x is not given.
+
+    Args:
+        model: whose states they are.
+        x: (nx, 1) a knot.
+        p: (np, 1) parameters.
+    """
+    function = Function("invariants", [model.x, model.p], [model.invariants], {"cse": True})
+    rows: MX = function(x, p)
+    return rows
+
+
+def _nodes(points: int, scheme: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    if scheme not in SCHEMES:
+        raise ModelError(f"scheme is {quoted(scheme)}; use one of {', '.join(SCHEMES)}")
+    if not isinstance(points, int) or not 1 <= points <= 9:
+        raise ModelError(f"points is {quoted(points)}; use 1 to 9")
+    return np.array(casadi.collocation_points(points, scheme))
+
+
+def _widths(points: int, count: int, scheme: str) -> list[tuple[str, int]]:
+    """How many columns x, z and u have; knots that are points are no variables."""
+    return [("x", 1 if scheme == "radau" else count + 1), ("z", points * count), ("u", count)]
+
+
+def _residual(model: Model) -> Function:
+    """``residual(x, rate, z, u, p, h)``: h dx/dt - rate of the stage's own time, then alg."""
+    names = ["x", "rate", "z", "u", "p", "h"]
+    if isinstance(model, Dae):
+        rate, h = casadi.SX.sym("rate", model.x.numel()), casadi.SX.sym("h")
+        rows = casadi.vertcat(h * model.ode - rate, model.alg)
+        given = [model.x, rate, model.z, model.u, model.p, h]
+        return Function("residual", given, [rows], names, ["rows"], {"cse": True})
+    ode = explicit(model)
+    kind: Any = casadi.SX if ode.is_a("SXFunction") else MX
+    x, u, p = (kind.sym(n, ode.size1_in(n)) for n in ("x", "u", "p"))
+    speed, h, z = kind.sym("rate", x.numel()), kind.sym("h"), kind.sym("z", 0)
+    return Function("residual", [x, speed, z, u, p, h], [h * ode(x, u, p) - speed], names, ["rows"])
+
+
+def _combined(basis: list[MX], weights: np.ndarray[Any, Any]) -> MX:
+    terms = [float(w) * b for w, b in zip(weights, basis, strict=True)]
+    total: MX = sum(terms[1:], terms[0])
+    return total

@@ -1,0 +1,56 @@
+"""Explicit equations dx/dt = f(x, u, p), of whatever a user has of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from casadi import MX, SX, Function
+
+from mbs.errors import ModelError
+from mbs.messages import quoted
+from mbs.models.dae import Dae
+
+Model = Dae | Function
+"""Equations: a `Dae`, or a Function of (x, u) or (x, u, p) that gives dx/dt."""
+
+
+def explicit(model: Model) -> Function:
+    """``ode(x, u, p) -> dx/dt`` of equations without algebraic states.
+
+    Args:
+        model: a Dae with no z; or a Function of (x, u) or (x, u, p) whose first output is dx/dt.
+
+    Raises:
+        ModelError: there are algebraic states, or the Function has other inputs.
+    """
+    names = ["x", "u", "p"], ["ode"]
+    if isinstance(model, Dae):
+        if model.z.numel():
+            raise ModelError(
+                f"form {quoted(model.form)} has {model.z.numel()} algebraic states; use"
+                " mbs.bridges.collocation, or the form 'reduced'"
+            )
+        given = [model.x, model.u, model.p]
+        return Function("ode", given, [model.ode], *names, {"cse": True})
+    _check(model)
+    kind: Any = SX if model.is_a("SXFunction") else MX
+    x, u = (kind.sym(n, model.size1_in(k)) for k, n in enumerate("xu"))
+    p = kind.sym("p", model.size1_in(2) if model.n_in() == 3 else 0)
+    rate, *_ = model.call([x, u, p][: model.n_in()])
+    return Function("ode", [x, u, p], [rate], *names)
+
+
+def _check(model: Function) -> None:
+    if not isinstance(model, Function):
+        raise ModelError(f"{quoted(model)} has no equations; give an mbs.models.dae or a Function")
+    columns = [model.size2_in(k) for k in range(model.n_in())]
+    if model.n_in() not in (2, 3) or columns != [1] * len(columns):
+        raise ModelError(
+            f"{model.name()}: its inputs are {', '.join(model.name_in())}; give a Function of the"
+            " vectors (x, u) or (x, u, p)"
+        )
+    if model.size_out(0) != model.size_in(0):
+        raise ModelError(
+            f"{model.name()}: its first output has the shape {model.size_out(0)}, x has"
+            f" {model.size_in(0)}; give dx/dt first"
+        )

@@ -1,0 +1,62 @@
+"""Direct multiple shooting into `casadi.Opti`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import MX, Opti
+
+from mbs.bridges.explicit import Model, explicit
+from mbs.bridges.opti import Grid, Transcription, parameter_values
+from mbs.bridges.step import advanced
+
+
+def multiple_shooting(
+    opti: Opti, model: Model, grid: Grid, *, substeps: int = 1, p: Any = None
+) -> Transcription:
+    """States at knots, efforts on stages, and x[k + 1] = step(x[k], u[k]) as constraints.
+
+    The equations are compiled once and mapped over the stages; the method of Runge and Kutta
+    runs on all stages at once, so that the graph of the problem is as small as that of one step.
+    For explicit equations that are not stiff: open chains, and loops with a closed form, on
+    which the state then stays exactly.
+
+    Source: Bock and Plitt 1984; Kutta 1901.
+
+    Args:
+        opti: takes the variables and constraints; cost, ends and limits are the caller's.
+        model: a Dae without algebraic states, or a Function of (x, u) or (x, u, p) that gives
+            dx/dt.
+        grid: stages, their duration, how they are evaluated.
+        substeps: steps of the classical method of order 4 within a stage.
+        p: parameters, numbers or an expression of `opti`; the defaults of a Dae when left out.
+
+    Returns:
+        the variables.
+
+    Raises:
+        ModelError: the model has algebraic states, or parameters without values.
+    """
+    ode, count = explicit(model), grid.stages
+    x = opti.variable(ode.size1_in("x"), count + 1)
+    u = opti.variable(ode.size1_in("u"), count)
+    p = parameter_values(model, ode.size1_in("p"), p)
+    every = casadi.repmat(p, 1, count)
+    rates = grid.mapped(ode, count)
+    ends = advanced(lambda at: rates(at, u, every), x[:, :-1], grid.step, substeps)
+    opti.subject_to(casadi.vec(x[:, 1:] - ends) == 0)
+    return Transcription(
+        opti=opti,
+        x=x,
+        u=u,
+        p=p,
+        step=grid.step,
+        x_points=x[:, :-1],
+        z_points=MX(0, count),
+        u_points=u,
+        weights=np.ones(1),
+        nodes=np.zeros(1),
+        variables={"x": x, "u": u},
+    )

@@ -1,0 +1,74 @@
+"""Equations of motion on an `rockit.Ocp` or one of its stages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from casadi import DM, MX
+
+from mbs.bridges.opti import CODES
+from mbs.errors import ModelError
+from mbs.messages import quoted
+from mbs.models.dae import Dae
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RockitStage:
+    """Signals of a stage.
+
+    Attributes:
+        x: (nx, 1) differential states.
+        z: (nz, 1) algebraic states.
+        u: (nu, 1) efforts.
+        p: (np, 1) parameters, set to the values of the start.
+        q: (nq, 1) positions of the tree, for constraints on paths and poses.
+        v: (nv, 1) velocities of the tree.
+        invariants: ask `stage.at_t0(invariants) == 0` where x is not given at the start.
+    """
+
+    x: MX
+    z: MX
+    u: MX
+    p: MX
+    q: MX
+    v: MX
+    invariants: MX
+
+
+def rockit_stage(stage: Any, dae: Dae, *, code: str = "interpreted") -> RockitStage:
+    """States, controls and parameters on a stage, with `set_der` and `add_alg` of a Dae.
+
+    rockit chooses the method afterwards: "reduced" goes with all of them, forms with algebraic
+    states with `DirectCollocation`. Initial guesses are the start of the Dae.
+
+    Args:
+        stage: `rockit.Ocp` or `rockit.Stage`.
+        dae: equations, of any form that the method takes.
+        code: "interpreted", or "compiled" for machine code of the equations with exact first and
+            second derivatives.
+
+    Returns:
+        the signals.
+
+    Raises:
+        ModelError: there is no such code.
+    """
+    if code not in CODES:
+        raise ModelError(f"code is {quoted(code)}; use one of {', '.join(CODES)}")
+    function = CODES[code](dae.function())
+    x = stage.state(dae.x.numel())
+    z = stage.algebraic(dae.z.numel()) if dae.z.numel() else MX(0, 1)
+    u = stage.control(dae.u.numel()) if dae.u.numel() else MX(0, 1)
+    p = stage.parameter(dae.p.numel()) if dae.p.numel() else MX(0, 1)
+    ode, alg, invariants, q, v = function(x, z, u, p)
+    stage.set_der(x, ode)
+    stage.set_initial(x, DM(dae.x0))
+    if dae.z.numel():
+        stage.add_alg(alg)
+        stage.set_initial(z, DM(dae.z0))
+    if dae.u.numel():
+        stage.set_initial(u, DM(dae.u0))
+    if dae.p.numel():
+        stage.set_value(p, DM(dae.p0))
+    return RockitStage(x, z, u, p, q, v, invariants)

@@ -13,6 +13,9 @@
 
 #include "closure.h"
 
+/* Events that rounding of a time this long [s] cannot tell apart count as standing still. */
+#define CHATTER_SPAN 1e3
+
 static core_status step_failed(core *c, int status) {
     static const char *const reason[] = {
         "", "", "too many steps", "the step size became too small",
@@ -144,7 +147,7 @@ core_status core_settle(core *c, int *changed) {
     if (status) return step_failed(c, status);
     if (!core_pending(c)) return CORE_OK;
     memcpy(before, x, NX * sizeof *x);
-    status = events_settle(&c->events, x, c->m.time);
+    status = events_settle(&c->events, x, fmax(c->m.time, CHATTER_SPAN));
     c->m.stale = 1;
     if (status != EVENTS_FIRED) return step_failed(c, status);
     if (memcmp(before, x, NX * sizeof *x)) *changed = 1;

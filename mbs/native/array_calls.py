@@ -24,7 +24,7 @@ def with_array_calls(function: Function, library: Path | None, like: Any = None)
     call = array_builtin(function, library, like is not None) if library else None
     result.__class__ = _class_with_arrays(type(result))
     result._arrays = call or _declined
-    result._last = None if like is None else _default_of_last(function, like)
+    result._last = None if like is None else default_of_last(function, like)
     result._inputs = function.n_in()
     return result  # type: ignore[no-any-return]
 
@@ -93,7 +93,7 @@ def _declined(*_: Any) -> None:
     """The answer of a builtin that takes nothing."""
 
 
-def _default_of_last(function: Function, like: Any) -> np.ndarray[Any, Any] | None:
+def default_of_last(function: Function, like: Any) -> np.ndarray[Any, Any] | None:
     """What a model takes for its last input p when it is left out; None when it must be given."""
     if function.n_in() == 0 or function.name_in(function.n_in() - 1) != "p":
         return None

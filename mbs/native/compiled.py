@@ -12,6 +12,7 @@ from mbs.native.array_calls import with_array_calls
 from mbs.native.cache import cached_library
 from mbs.native.compiler import compiler_found, flags_for
 from mbs.native.kernel import kernel_library
+from mbs.native.patterns import patterns_source
 
 
 def compiled(
@@ -59,11 +60,15 @@ def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | 
     if calls_machine_code([function]):
         return None
     functions = [function, *_all_derivatives(function, derivatives)]
-    library = kernel_library(functions) if fast else None
+    known = _products(function) if derivatives == 2 else []
+    patterns = {"patterns.c": patterns_source(known)} if known else {}
+    library = kernel_library(functions, patterns) if fast else None
     if library is not None:
         return library
     source = generated(functions)
-    return None if unwritten(source) else cached_library({"function.c": source}, flags_for(source))
+    if unwritten(source):
+        return None
+    return cached_library({"function.c": source, **patterns}, flags_for(source))
 
 
 def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
@@ -71,8 +76,8 @@ def c_source(function: casadi.Function, *, derivatives: int = 0) -> str:
 
     Args:
         function: any Function without free symbols.
-        derivatives: 0; 1 to add `jac_`, `fwd1_` and `adj1_` of it; 2 to add those of `fwd1_` and
-            `adj1_` too, from which CasADi makes Hessians.
+        derivatives: 0; 1 to add `jac_`, `fwd1_` and `adj1_` of it; 2 to add `fwd1_` and `adj1_`
+            of these two, from which CasADi makes Hessians, some directions at a time.
 
     Returns:
         one C file.
@@ -147,9 +152,11 @@ def _check_order(derivatives: object) -> None:
 def _all_derivatives(function: casadi.Function, order: int) -> list[casadi.Function]:
     if order == 0:
         return []
-    first = _derivatives(function)
-    return first if order == 1 else first + [d for f in first[1:] for d in _derivatives(f)]
+    products = _products(function)
+    second = [d for product in products for d in _products(product)] if order == 2 else []
+    return [function.jacobian(), *products, *second]
 
 
-def _derivatives(function: casadi.Function) -> list[casadi.Function]:
-    return [function.jacobian(), function.forward(1), function.reverse(1)]
+def _products(function: casadi.Function) -> list[casadi.Function]:
+    """The derivative along one direction, forward and reverse."""
+    return [function.forward(1), function.reverse(1)]

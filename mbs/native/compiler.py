@@ -153,7 +153,14 @@ def compile_library(
     command = [*compiler.command, *flags, *includes, *files, "-o", str(output), *libm]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)
     if answer.returncode != 0:
-        complaint = next((s for s in answer.stderr.splitlines() if "error" in s), answer.stderr)
+        complaint = _complaint(answer.stderr)
         names = ", ".join(source.name for source in sources)
         raise CompilerError(f"{compiler.command[0]} refused {names}: {complaint.strip()[:500]}")
     return output
+
+
+def _complaint(stderr: str) -> str:
+    """The line that says what is wrong; of a linker, the symbol that is missing."""
+    lines = stderr.splitlines()
+    found = (s for word in ("undefined reference", "error") for s in lines if word in s)
+    return next(found, stderr)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from casadi import Function
@@ -27,8 +27,14 @@ FAST_FLAGS = (
 """Contraction fuses multiplications and additions; nothing is assumed about infinities or NaN."""
 
 
-def kernel_library(functions: Sequence[Function]) -> Path | None:
+def kernel_library(
+    functions: Sequence[Function], further: Mapping[str, str] | None = None
+) -> Path | None:
     """The library of fast code of Functions with different names.
+
+    Args:
+        functions: what to compile.
+        further: file name to text of what else belongs to it.
 
     Returns:
         path of the library; None when some Function is not made of scalar operations that C has,
@@ -41,7 +47,8 @@ def kernel_library(functions: Sequence[Function]) -> Path | None:
         files = kernel_source(functions)
     except ModelError:
         return None
-    return cached_library({**files, "processor.h": f"/* {processor()} */\n"}, FAST_FLAGS)
+    notes = {"processor.h": f"/* {processor()} */\n"}
+    return cached_library({**files, **(further or {}), **notes}, FAST_FLAGS)
 
 
 @functools.cache

@@ -20,6 +20,9 @@ from mbs.operations.graph import Graph, graph_of
 BLOCK = 500
 """Assignments in one C function: longer ones compile slower and run no faster."""
 
+HEADERS = ("sincos.h", "lanes.h", "elementary.h")
+"""What the text includes."""
+
 _INLINE = 16  # batches of angles whose code stands in the function; more are called
 
 _SHORT = 2500  # operations up to which gcc gains by reordering them before it assigns registers
@@ -32,7 +35,7 @@ _GCC = """\
 _HEAD = """\
 #include <math.h>
 #include <string.h>
-#include "lanes.h"
+#include "elementary.h"
 #define casadi_int long long int
 #define NOINLINE __attribute__((noinline))
 #define ALIGNED __attribute__((aligned(64)))
@@ -61,7 +64,7 @@ def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str
         ModelError: some Function has no scalar operations, or one that C does not have.
     """
     runtime = resources.files("mbs.native").joinpath("runtime")
-    headers = {name: runtime.joinpath(name).read_text("utf-8") for name in ("sincos.h", "lanes.h")}
+    headers = {name: runtime.joinpath(name).read_text("utf-8") for name in HEADERS}
     return {**{f"{function.name()}.c": _file(function, block) for function in functions}, **headers}
 
 

@@ -9,14 +9,10 @@ from typing import ClassVar
 import casadi
 
 from mbs.native.block_code import BlockCode
+from mbs.native.lane_operators import FUNCTIONS
 from mbs.native.operators import expression, operand
 from mbs.native.schedule import LANES, Batch, Step
 from mbs.operations.graph import Graph
-
-_OF_VECTORS = frozenset(
-    getattr(casadi, f"OP_{name}")
-    for name in ("ADD", "SUB", "MUL", "DIV", "NEG", "SQ", "TWICE", "INV", "ASSIGN")
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +45,12 @@ class LaneCode(BlockCode):
         vectors = any(not self._is_scalar(n) for n in operands)
         if not vectors:
             return [f"  const mbs_lanes t{step} = mbs_all({expression(self.graph, step)});"]
-        if self.graph.nodes[step].op in _OF_VECTORS:
+        op = self.graph.nodes[step].op
+        if op in FUNCTIONS:
+            text = f"{FUNCTIONS[op]}({', '.join(map(self._vector, operands))})"
+        else:
             text = expression(self.graph, step, self._written)
-            return [f"  const mbs_lanes t{step} = {text};"]
-        return [
-            f"  mbs_lanes t{step};",
-            f"  for (int l = 0; l < MBS_LANES; ++l) t{step}[l] ="
-            f" {expression(self.graph, step, self._of_lane)};",
-        ]
+        return [f"  const mbs_lanes t{step} = {text};"]
 
     def _sincos(self, batch: Batch, lane: int) -> list[str]:
         angle = batch.angles[lane]
@@ -76,10 +70,6 @@ class LaneCode(BlockCode):
     def _vector(self, number: int) -> str:
         text = self._written(self.graph, number)
         return f"mbs_all({text})" if self._is_scalar(number) else text
-
-    def _of_lane(self, graph: Graph, number: int) -> str:
-        text = self._written(graph, number)
-        return text if self._is_scalar(number) else f"{text}[l]"
 
     def _written(self, graph: Graph, number: int) -> str:
         node = graph.nodes[number]

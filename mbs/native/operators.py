@@ -10,7 +10,7 @@ import casadi
 from mbs.errors import ModelError
 from mbs.operations.graph import Graph, Node
 
-_BINARY: Mapping[int, str] = {
+BINARY: Mapping[int, str] = {
     casadi.OP_ADD: "{} + {}",
     casadi.OP_SUB: "{} - {}",
     casadi.OP_MUL: "{} * {}",
@@ -32,6 +32,8 @@ _BINARY: Mapping[int, str] = {
     casadi.OP_ATAN2: "atan2({}, {})",
     casadi.OP_HYPOT: "hypot({}, {})",
 }
+"""C text of the operations of two numbers, by CasADi's codes."""
+
 _UNARY: Mapping[int, str] = {
     casadi.OP_ASSIGN: "{0}",
     casadi.OP_NEG: "-{0}",
@@ -39,7 +41,7 @@ _UNARY: Mapping[int, str] = {
     casadi.OP_TWICE: "{0} + {0}",
     casadi.OP_INV: "1.0 / {0}",
     casadi.OP_NOT: "!{0}",
-    casadi.OP_SIGN: "(double)(({0} > 0.0) - ({0} < 0.0))",
+    casadi.OP_SIGN: "({0} > 0.0 ? 1.0 : {0} < 0.0 ? -1.0 : {0})",
     **{
         getattr(casadi, f"OP_{name.upper()}"): f"{name}({{0}})"
         for name in (
@@ -50,7 +52,7 @@ _UNARY: Mapping[int, str] = {
 }
 
 
-ELEMENTWISE = frozenset((*_BINARY, *_UNARY))
+ELEMENTWISE = frozenset((*BINARY, *_UNARY))
 """CasADi's codes of the operations that C has."""
 
 
@@ -68,7 +70,7 @@ def expression(
         ModelError: the operation has no equivalent in C's library.
     """
     op = graph.nodes[number].op
-    form = _BINARY.get(op) or _UNARY.get(op)
+    form = BINARY.get(op) or _UNARY.get(op)
     if form is None:
         raise ModelError(
             f"{graph.name}: operation {op} of CasADi has no C equivalent; compile without fast"

@@ -96,6 +96,18 @@ def test_derivatives_of_an_order(order):
         assert a == pytest.approx(b, rel=1e-14)
 
 
+def test_second_derivatives_are_as_sparse_as_those_of_the_interpreter():
+    x, y = ca.MX.sym("x", 3), ca.MX.sym("y", 3)
+    exact, found = (
+        ca.hessian(ca.dot(y, h(x, 2.0)[0]), x)[0]
+        for h in (example(), compiled(example(), derivatives=2))
+    )
+    assert found.sparsity() == exact.sparsity()
+    assert found.nnz() < 9
+    a, b = (ca.Function("H", [x, y], [H])([0.3, 1, 2], [1, 2, 3]).full() for H in (exact, found))
+    assert a == pytest.approx(b, rel=1e-15)
+
+
 def test_second_derivatives_must_be_asked_for(capfd):
     x = ca.MX.sym("x", 3)
     y = ca.sumsqr(compiled(example())(x, 2.0)[0])

@@ -52,6 +52,13 @@ def test_refused_code_names_the_error(tmp_path):
         compile_library([source], output=tmp_path / "bad.so")
 
 
+def test_a_refused_link_names_the_missing_function(tmp_path):
+    source = tmp_path / "open.c"
+    source.write_text("int nowhere(void); int main(void) { return nowhere(); }")
+    with pytest.raises(CompilerError, match=r"refused open\.c: .*nowhere"):
+        compile_library([source], flags=["-O0"], output=tmp_path / "open")
+
+
 RUNTIME = ("stepper.c", "dopri5.c", "rodas.c", "events.c", "driver.c", "python_call.c")
 
 

@@ -6,10 +6,6 @@
 
 #include "sincos.h"
 
-#if MBS_LANES > 2
-#include <immintrin.h>
-#endif
-
 #define MBS_GROUP 8
 #define MBS_ROW (MBS_GROUP / MBS_LANES) /* vectors in a row */
 
@@ -61,8 +57,8 @@ static inline __attribute__((always_inline)) int mbs_any(mbs_bits mask) {
 
 #define MBS_IS_LARGE(x) ((mbs_bits)(x > MBS_LARGE) | ~(mbs_bits)(x >= -MBS_LARGE))
 
-static inline __attribute__((unused)) void mbs_sincos_wide(mbs_lanes x, mbs_lanes *sine,
-                                                           mbs_lanes *cosine) {
+static inline __attribute__((always_inline)) void mbs_sincos_wide(mbs_lanes x, mbs_lanes *sine,
+                                                                  mbs_lanes *cosine) {
   const mbs_bits large = MBS_IS_LARGE(x);
   mbs_sincos_lanes(x, sine, cosine);
   if (__builtin_expect(mbs_any(large), 0))
@@ -71,6 +67,11 @@ static inline __attribute__((unused)) void mbs_sincos_wide(mbs_lanes x, mbs_lane
         (*sine)[l] = sin(x[l]);
         (*cosine)[l] = cos(x[l]);
       }
+}
+
+static __attribute__((noinline, unused)) void mbs_sincos_wide_call(mbs_lanes x, mbs_lanes *sine,
+                                                                   mbs_lanes *cosine) {
+  mbs_sincos_wide(x, sine, cosine);
 }
 
 /* Rows of lanes to the columns that they are of, a square of MBS_LANES rows at a time; the last

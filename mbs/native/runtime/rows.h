@@ -13,6 +13,8 @@ typedef struct {
   long long row, column, stream;
 } mbs_port;
 
+#define MBS_AHEAD 32 /* states that are fetched early */
+
 #define MBS_ALWAYS static inline __attribute__((always_inline, unused))
 
 MBS_ALWAYS void mbs_store_past(double *to, mbs_lanes x) {
@@ -31,24 +33,50 @@ MBS_ALWAYS void mbs_store_end(void) {
 #endif
 }
 
-/* `count` numbers, at most MBS_LANES; nothing beyond them is touched. */
-MBS_ALWAYS mbs_lanes mbs_load_part(const double *from, int count) {
-  mbs_lanes x = {0};
+/* Four elements of MBS_LANES states: of rows in memory, and of vectors of states. */
 #if MBS_LANES == 8
-  x = (mbs_lanes)_mm512_maskz_loadu_pd((__mmask8)((1 << count) - 1), from);
-#else
-  memcpy(&x, from, (size_t)count * sizeof(double));
-#endif
-  return x;
+#define MBS_FOUR 4
+#define MBS_LOW _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13)
+#define MBS_HIGH _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15)
+MBS_ALWAYS void mbs_exchange(const __m512d *a, __m512d *b) {
+  b[0] = _mm512_permutex2var_pd(a[0], MBS_LOW, a[2]);
+  b[1] = _mm512_permutex2var_pd(a[1], MBS_LOW, a[3]);
+  b[2] = _mm512_permutex2var_pd(a[0], MBS_HIGH, a[2]);
+  b[3] = _mm512_permutex2var_pd(a[1], MBS_HIGH, a[3]);
 }
-
-MBS_ALWAYS void mbs_store_part(double *to, int count, mbs_lanes x) {
-#if MBS_LANES == 8
-  _mm512_mask_storeu_pd(to, (__mmask8)((1 << count) - 1), (__m512d)x);
-#else
-  memcpy(to, &x, (size_t)count * sizeof(double));
-#endif
+MBS_ALWAYS void mbs_unpack(const __m512d *a, __m512d *b) {
+  b[0] = _mm512_unpacklo_pd(a[0], a[1]), b[1] = _mm512_unpackhi_pd(a[0], a[1]);
+  b[2] = _mm512_unpacklo_pd(a[2], a[3]), b[3] = _mm512_unpackhi_pd(a[2], a[3]);
 }
+MBS_ALWAYS void mbs_take_four(const double *from, long long row, mbs_lanes *lanes) {
+  __m512d a[4], b[4];
+  MBS_UNROLLED for (int l = 0; l < 4; ++l) a[l] =
+      _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(from + l * row)),
+                         _mm256_loadu_pd(from + (l + 4) * row), 1);
+  mbs_unpack(a, b);
+  mbs_exchange(b, (__m512d *)lanes);
+}
+MBS_ALWAYS void mbs_give_four(double *to, long long row, const mbs_lanes *lanes) {
+  __m512d a[4], b[4];
+  mbs_unpack((const __m512d *)lanes, a);
+  mbs_exchange(a, b);
+  MBS_UNROLLED for (int l = 0; l < 4; ++l) {
+    _mm256_storeu_pd(to + l * row, _mm512_castpd512_pd256(b[l]));
+    _mm256_storeu_pd(to + (l + 4) * row, _mm512_extractf64x4_pd(b[l], 1));
+  }
+}
+#elif MBS_LANES == 4 && defined(MBS_PAIR)
+#define MBS_FOUR 4
+MBS_ALWAYS void mbs_take_four(const double *from, long long row, mbs_lanes *lanes) {
+  MBS_UNROLLED for (int l = 0; l < 4; ++l) lanes[l] = *(const mbs_unaligned *)(from + l * row);
+  mbs_transpose(lanes);
+}
+MBS_ALWAYS void mbs_give_four(double *to, long long row, const mbs_lanes *lanes) {
+  mbs_lanes square[4] = {lanes[0], lanes[1], lanes[2], lanes[3]};
+  mbs_transpose(square);
+  MBS_UNROLLED for (int l = 0; l < 4; ++l) *(mbs_unaligned *)(to + l * row) = square[l];
+}
+#endif
 
 /* One state in all lanes. */
 MBS_ALWAYS void mbs_take_same(const mbs_port *port, int size, mbs_lanes *lanes) {
@@ -66,22 +94,18 @@ MBS_ALWAYS void mbs_take_each(const mbs_port *port, long long first, int many, i
 /* States first .. first + many - 1 into lanes; lanes beyond them repeat the last one. */
 MBS_ALWAYS void mbs_take(const mbs_port *port, long long first, int many, int size,
                          mbs_lanes *lanes) {
-#if defined(MBS_PAIR)
+#if defined(MBS_FOUR)
   if (many == MBS_LANES && port->row == 1) {
     const double *from = port->at + first;
     for (int k = 0; k < size; ++k) lanes[k] = *(const mbs_unaligned *)(from + k * port->column);
     return;
   }
-  if (many == MBS_LANES && port->column == 1) {
+  if (many == MBS_LANES && port->column == 1 && size >= MBS_FOUR) {
     const double *from = port->at + first * port->row;
-    for (int k = 0; k < size; k += MBS_LANES) {
-      mbs_lanes square[MBS_LANES];
-      const int left = size - k, count = left < MBS_LANES ? left : MBS_LANES;
-      MBS_UNROLLED for (int l = 0; l < MBS_LANES; ++l) square[l] =
-          count == MBS_LANES ? *(const mbs_unaligned *)(from + l * port->row + k)
-                             : mbs_load_part(from + l * port->row + k, count);
-      mbs_transpose(square);
-      MBS_UNROLLED for (int j = 0; j < MBS_LANES; ++j) if (j < count) lanes[k + j] = square[j];
+    for (int k = 0; k < size * MBS_LANES; k += 8) __builtin_prefetch(from + MBS_AHEAD * port->row + k);
+    for (int k = 0; k < size; k += MBS_FOUR) {
+      const int at = k + MBS_FOUR <= size ? k : size - MBS_FOUR;
+      mbs_take_four(from + at, port->row, lanes + at);
     }
     return;
   }
@@ -97,20 +121,12 @@ MBS_ALWAYS void mbs_give_each(const mbs_port *port, long long first, int many, i
   }
 }
 
-#if defined(MBS_PAIR)
-/* Full lanes to rows of a matrix. */
+#if defined(MBS_FOUR)
+/* At least four elements of full lanes to rows; the last four overlap those before them. */
 MBS_ALWAYS void mbs_give_rows(double *to, long long row, int size, const mbs_lanes *lanes) {
-  for (int k = 0; k < size; k += MBS_LANES) {
-    mbs_lanes square[MBS_LANES];
-    const int left = size - k, count = left < MBS_LANES ? left : MBS_LANES;
-    MBS_UNROLLED for (int j = 0; j < MBS_LANES; ++j) square[j] = j < count ? lanes[k + j] : mbs_all(0);
-    mbs_transpose(square);
-    MBS_UNROLLED for (int l = 0; l < MBS_LANES; ++l) {
-      if (count == MBS_LANES)
-        *(mbs_unaligned *)(to + l * row + k) = square[l];
-      else
-        mbs_store_part(to + l * row + k, count, square[l]);
-    }
+  for (int k = 0; k < size; k += MBS_FOUR) {
+    const int at = k + MBS_FOUR <= size ? k : size - MBS_FOUR;
+    mbs_give_four(to + at, row, lanes + at);
   }
 }
 #endif
@@ -118,7 +134,7 @@ MBS_ALWAYS void mbs_give_rows(double *to, long long row, int size, const mbs_lan
 /* Lanes to states first .. first + many - 1. */
 MBS_ALWAYS void mbs_give(const mbs_port *port, long long first, int many, int size,
                          const mbs_lanes *lanes) {
-#if defined(MBS_PAIR)
+#if defined(MBS_FOUR)
   if (many == MBS_LANES && port->row == 1) {
     double *to = port->at + first;
     if (port->stream)
@@ -127,7 +143,7 @@ MBS_ALWAYS void mbs_give(const mbs_port *port, long long first, int many, int si
       for (int k = 0; k < size; ++k) *(mbs_unaligned *)(to + k * port->column) = lanes[k];
     return;
   }
-  if (many == MBS_LANES && port->column == 1) {
+  if (many == MBS_LANES && port->column == 1 && size >= MBS_FOUR) {
     double *to = port->at + first * port->row;
     if (port->stream) {
       mbs_lanes rows[size];

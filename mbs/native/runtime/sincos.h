@@ -17,6 +17,10 @@
 #define MBS_LANES 2
 #endif
 
+#if MBS_LANES > 2
+#include <immintrin.h>
+#endif
+
 #define MBS_LARGE 1e5
 
 typedef double mbs_lanes __attribute__((vector_size(8 * MBS_LANES), may_alias));
@@ -30,20 +34,26 @@ static inline __attribute__((always_inline)) void mbs_sincos_lanes(mbs_lanes x, 
   const mbs_bits quadrant = (mbs_bits)shifted;
   const mbs_lanes r = ((x - k * 1.57079632673412561417e+00) - k * 6.07710050630396597660e-11) -
                       k * 2.02226624879595063154e-21; /* the first two products are exact */
-  const mbs_lanes z = r * r, z2 = z * z, z4 = z2 * z2;
+  const mbs_lanes z = r * r, z2 = z * z;
   const mbs_lanes ps = (-1.66666666666666324348e-01 + z * 8.33333333332248946124e-03) +
-                       z2 * (-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06) +
-                       z4 * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10);
+                       z2 * ((-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06) +
+                             z2 * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10));
   const mbs_lanes pc = (4.16666666666666019037e-02 - z * 1.38888888888741095749e-03) +
-                       z2 * (2.48015872894767294178e-05 - z * 2.75573143513906633035e-07) +
-                       z4 * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11);
+                       z2 * ((2.48015872894767294178e-05 - z * 2.75573143513906633035e-07) +
+                             z2 * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11));
   const mbs_lanes s = r + (r * z) * ps;
   const mbs_lanes c = (1.0 - 0.5 * z) + z2 * pc;
+  const mbs_bits next = quadrant + 1, sb = (mbs_bits)s, cb = (mbs_bits)c;
+#if MBS_LANES == 8
+  const __mmask8 swap = _mm512_test_epi64_mask((__m512i)quadrant, _mm512_set1_epi64(1));
+  const mbs_bits sine_bits = (mbs_bits)_mm512_mask_blend_epi64(swap, (__m512i)sb, (__m512i)cb);
+  const mbs_bits cosine_bits = (mbs_bits)_mm512_mask_blend_epi64(swap, (__m512i)cb, (__m512i)sb);
+#else
   const mbs_bits swap = -(quadrant & 1);
-  const mbs_bits sine_sign = (quadrant & 2) << 62, cosine_sign = ((quadrant + 1) & 2) << 62;
-  const mbs_bits sb = (mbs_bits)s, cb = (mbs_bits)c;
-  *sine = (mbs_lanes)(((sb & ~swap) | (cb & swap)) ^ sine_sign);
-  *cosine = (mbs_lanes)(((cb & ~swap) | (sb & swap)) ^ cosine_sign);
+  const mbs_bits sine_bits = (sb & ~swap) | (cb & swap), cosine_bits = (cb & ~swap) | (sb & swap);
+#endif
+  *sine = (mbs_lanes)(sine_bits ^ ((quadrant & 2) << 62));
+  *cosine = (mbs_lanes)(cosine_bits ^ ((next & 2) << 62));
 }
 
 static __attribute__((noinline, cold)) void mbs_sincos_libm(const double *x, double *sc) {

@@ -1,0 +1,260 @@
+"""Functions evaluated on many states at once: arrays in, arrays out, several cores."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from threading import Thread
+from typing import Any, NamedTuple
+
+import casadi
+import numpy as np
+from casadi import Function
+
+from mbs.errors import ModelError
+from mbs.messages import quoted
+from mbs.native.array_calls import default_of_last
+from mbs.native.batch_arrays import Array, ArrayPort, CPort
+from mbs.native.batch_function import joined
+from mbs.native.batch_source import batch_source
+from mbs.native.cache import cached_library
+from mbs.native.compiled import require_function
+from mbs.native.compiler import compiler_found
+from mbs.native.kernel import FAST_FLAGS, processor
+
+_SHARE = 8192
+"""States that a thread takes at a time; a multiple of the lanes of every processor."""
+
+_PAST_CACHES = 4_000_000  # bytes of outputs from which they are stored past the caches
+
+
+class _Code(NamedTuple):
+    """A library, the doubles of work space it needs, and the states it computes at once."""
+
+    library: ctypes.CDLL
+    work: int
+    lanes: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """Functions of the same states as one call on arrays; made by `batch`.
+
+    Attributes:
+        function: all of them in one, its inputs and outputs dense columns (matrices row by row).
+        inputs: names and shapes of one state.
+        outputs: the same, Function after Function.
+        defaults: of inputs that may be left out, their values.
+        note: what kind of code answers.
+    """
+
+    function: Function
+    inputs: tuple[ArrayPort, ...]
+    outputs: tuple[ArrayPort, ...]
+    defaults: dict[str, Array]
+    note: str
+    _code: _Code | None
+
+    @property
+    def lanes(self) -> int:
+        """States computed side by side by one core; 0 when CasADi interprets the Functions."""
+        return self._code.lanes if self._code else 0
+
+    def __repr__(self) -> str:
+        """What goes in and out, and what computes it."""
+        ins, outs = (", ".join(map(str, ports)) for ports in (self.inputs, self.outputs))
+        return f"Batch({ins}) -> ({outs}): {self.note}"
+
+    def __call__(
+        self, *args: Array, out: Any = None, threads: int | None = None, **named: Array
+    ) -> Any:
+        """Evaluate every state.
+
+        An input of n elements is an array (N, n) of N states, of r x c elements (N, r, c); one
+        that is the same for all states is (n,) or (r, c). Rows may follow each other in memory
+        (order "C"), or states (order "F"), or be parts of a larger array: nothing is copied.
+        States do not depend on each other: neither N nor `threads` changes a bit of a result.
+
+        Args:
+            *args: the inputs in their order, arrays of doubles.
+            out: arrays that take the outputs, one or a tuple, which share no memory with inputs
+                of other states.
+            threads: how many work at once; as many as this process may use when left out.
+            **named: inputs by name.
+
+        Returns:
+            an array (N, n) or (N, r, c) for each output, a tuple of them for several, or `out`;
+            of one state, (n,) or (r, c), when all inputs are.
+
+        Raises:
+            ModelError: an array does not fit; says which, and how it should be.
+        """
+        given = self._given(args, named)
+        states = self._states(given)
+        results = self._results(out, states)
+        count = 1 if states is None else states
+        if self._code is None:
+            self._interpret(given, results, count)
+        else:
+            self._run(self._code, [*given, *results], count, self._threads(threads, count))
+        if out is not None:
+            return out
+        return results[0] if len(results) == 1 else tuple(results)
+
+    @property
+    def _name(self) -> str:
+        return self.function.name()
+
+    def _given(self, args: Sequence[Array], named: dict[str, Array]) -> list[Array]:
+        """Every input, checked."""
+        names = [port.name for port in self.inputs]
+        unknown = [name for name in named if name not in names[len(args) :]]
+        if len(args) > len(names) or unknown:
+            what = quoted(unknown[0]) if unknown else f"{len(args)} inputs"
+            raise ModelError(f"{self._name} does not take {what}; it takes {', '.join(names)}")
+        values = {**self.defaults, **dict(zip(names, args, strict=False)), **named}
+        missing = [name for name in names if name not in values]
+        if missing:
+            raise ModelError(f"{self._name}: input {missing[0]} is missing; give it as an array")
+        for port in self.inputs:
+            port.require(values[port.name], self._name, "input")
+        return [values[name] for name in names]
+
+    def _states(self, given: Sequence[Array]) -> int | None:
+        """How many there are; None when every input is of one."""
+        rows = [
+            (port.name, len(array))
+            for port, array in zip(self.inputs, given, strict=True)
+            if port.is_many(array)
+        ]
+        if len({length for _, length in rows}) > 1:
+            found = ", ".join(f"{name} has {length} states" for name, length in rows)
+            raise ModelError(f"{self._name}: {found}; give them one length")
+        return rows[0][1] if rows else None
+
+    def _results(self, out: Any, states: int | None) -> list[Array]:
+        """The arrays of the outputs, new ones or those given."""
+        if out is None:
+            return [port.empty(states) for port in self.outputs]
+        arrays = list(out) if isinstance(out, tuple) else [out]
+        if len(arrays) != len(self.outputs):
+            raise ModelError(
+                f"{self._name}: out has {len(arrays)} arrays, there are {len(self.outputs)} outputs"
+            )
+        for port, array in zip(self.outputs, arrays, strict=True):
+            port.require(array, self._name, "out for")
+            shape = port.shape if states is None else (states, *port.shape)
+            if array.shape != shape or not array.flags.writeable or not _spread(array):
+                raise ModelError(
+                    f"{self._name}: out for {port.name} must be a writable array of shape {shape}"
+                )
+        return arrays
+
+    def _threads(self, wanted: int | None, states: int) -> int:
+        if wanted is None:
+            wanted = _cores()
+        elif isinstance(wanted, bool) or not isinstance(wanted, int) or wanted < 1:
+            raise ModelError(f"{self._name}: threads is {quoted(wanted)}; give 1 or more, or None")
+        return max(1, min(wanted, -(-states // _SHARE)))
+
+    def _run(self, code: _Code, arrays: Sequence[Array], states: int, threads: int) -> None:
+        given = len(self.inputs)
+        past = sum(array.nbytes for array in arrays[given:]) > _PAST_CACHES
+        ports = enumerate(zip((*self.inputs, *self.outputs), arrays, strict=True))
+        table = (CPort * len(arrays))(
+            *(port.c_port(array, past and k >= given) for k, (port, array) in ports)
+        )
+        size = _SHARE if threads > 1 else max(states, 1)
+        shares = iter(range(0, states, size))
+
+        def work(space: Array) -> None:
+            for first in shares:
+                last = min(first + size, states)
+                code.library.mbs_batch(table, space.ctypes.data, first, last)
+
+        spaces = [np.empty(code.work) for _ in range(threads)]
+        others = [Thread(target=work, args=(space,)) for space in spaces[1:]]
+        for thread in others:
+            thread.start()
+        work(spaces[0])
+        for thread in others:
+            thread.join()
+
+    def _interpret(self, given: Sequence[Array], results: Sequence[Array], states: int) -> None:
+        """The map of CasADi."""
+        columns = []
+        for x, port in zip(given, self.inputs, strict=True):
+            every = x.reshape(-1, port.size) if x.size or port.size else np.zeros((1, 0))
+            columns.append(np.broadcast_to(every, (states, port.size)).T)
+        if states == 0:
+            return
+        answers = self.function.map(states).call([casadi.DM(c) for c in columns])
+        for answer, result in zip(answers, results, strict=True):
+            result[...] = np.array(answer.full().T).reshape(result.shape)
+
+
+def batch(functions: Function | Iterable[Function]) -> Batch:
+    """Functions of the same states as machine code for many of them: several in vector lanes.
+
+    Sines, cosines and most elementary functions are computed in lanes too; what lanes do not know
+    goes through libm, lane by lane. Values differ from those of the interpreter by about 1e-15 of
+    the largest element. The library is kept in the cache. Without a compiler, or for what is not
+    made of scalar operations, CasADi interprets a map; `Batch.note` says so.
+
+    Args:
+        functions: one or several, such as an inverse and a direct dynamics model: inputs of one
+            name are one input, and operations that they have in common are done once.
+
+    Raises:
+        ModelError: one is no Function, or their inputs do not fit together.
+        CompilerError: CC names no compiler, or the compiler refused the code.
+    """
+    parts = [functions] if isinstance(functions, Function) else list(functions)
+    if not parts:
+        raise ModelError("there is no Function to evaluate; give one or several")
+    for part in parts:
+        require_function(part)
+    function, inputs, outputs = joined(parts)
+    code, note = _code(function)
+    return Batch(function, tuple(inputs), tuple(outputs), _defaults(parts), note, code)
+
+
+def _code(function: Function) -> tuple[_Code | None, str]:
+    """The machine code, None where there can be none, and what to say about it."""
+    if not compiler_found():
+        return None, "interpreted by CasADi, for there is no C compiler"
+    try:
+        source = batch_source(function)
+    except ModelError as error:
+        return None, f"interpreted by CasADi ({error})"
+    files = {**source.files, "processor.h": f"/* {processor()} */\n"}
+    library = ctypes.CDLL(str(cached_library(files, FAST_FLAGS)))
+    number = ctypes.c_longlong
+    library.mbs_batch.argtypes = (ctypes.POINTER(CPort), ctypes.c_void_p, number, number)
+    library.mbs_batch.restype = None
+    lanes = library.mbs_batch_lanes()
+    return _Code(library, source.work, lanes), f"machine code, {lanes} states side by side"
+
+
+def _defaults(functions: Sequence[Function]) -> dict[str, Array]:
+    """Values of the parameters of models, when they may be left out."""
+    for function in functions:
+        like: Any = getattr(function, "like", None)
+        value = None if like is None else default_of_last(Function(function), like)
+        if value is not None:
+            return {"p": value}
+    return {}
+
+
+def _cores() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _spread(array: Array) -> bool:
+    """Whether every element has a place of its own."""
+    return all(step or length < 2 for length, step in zip(array.shape, array.strides, strict=True))

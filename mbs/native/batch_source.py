@@ -1,0 +1,114 @@
+"""C text of a Function of many states: several states at a time in vector lanes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from itertools import accumulate
+
+import casadi
+from casadi import Function
+
+from mbs.native.block_code import BlockCode
+from mbs.native.kernel_source import BLOCK, HEADERS
+from mbs.native.lane_code import LaneCode
+from mbs.native.schedule import Batch, blocks, schedule
+from mbs.native.slots import slots
+from mbs.operations.graph import Graph, graph_of
+
+_HEAD = """\
+#include "elementary.h"
+#include "rows.h"
+#define NOINLINE __attribute__((noinline))
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+EXPORT int mbs_batch_lanes(void) { return MBS_LANES; }
+"""
+_INLINE = 16  # angles whose code stands in the function; more are called
+_WIDEST = 8  # lanes for which work space is counted
+
+
+@dataclass(frozen=True, slots=True)
+class BatchSource:
+    """C text.
+
+    Attributes:
+        files: file name to text, one of which defines `mbs_batch(ports, work, first, last)`.
+        work: doubles of work space that a call of it needs.
+    """
+
+    files: dict[str, str]
+    work: int
+
+
+class _States(LaneCode):
+    """Blocks whose inputs are vectors one after the other."""
+
+    __slots__ = ()
+
+    def _written(self, graph: Graph, number: int) -> str:
+        node = graph.nodes[number]
+        if node.op == casadi.OP_INPUT:
+            return f"i{node.args[0]}[{node.args[1]}]"
+        return LaneCode._written(self, graph, number)
+
+
+def batch_source(function: Function, block: int = BLOCK) -> BatchSource:
+    """The C files of a Function whose inputs and outputs are dense columns.
+
+    Args:
+        function: made of scalar operations.
+        block: assignments in one C function.
+
+    Raises:
+        ModelError: it has no scalar operations, or one that C does not have.
+    """
+    graph = graph_of(function)
+    pieces = blocks(graph, schedule(graph), block)
+    where = slots(graph, pieces)
+    angles = sum(len(step.angles) for steps in pieces for step in steps if isinstance(step, Batch))
+    sincos = "mbs_sincos_wide" if angles <= _INLINE else "mbs_sincos_wide_call"
+    code: BlockCode = _States(graph, where, sincos, [False] * len(graph.inputs))
+    taken = [port.sparsity.nnz() for port in graph.inputs]
+    given = [port.sparsity.nnz() for port in graph.outputs]
+    starts = list(accumulate([*taken, *given], initial=where.count))
+    places = [f"w + {start}" for start in starts]
+    count = len(taken)
+    lines = [
+        _HEAD,
+        *(code.block(f"part{k}", k, steps) for k, steps in enumerate(pieces)),
+        "EXPORT void mbs_batch(const mbs_port *ports, double *work, long long first,"
+        " long long last)",
+        "{",
+        "  mbs_lanes *const w = (mbs_lanes *)mbs_aligned(work);",
+        f"  const double *const in[] = {{{_pointers('const double', places[:count])}}};",
+        f"  mbs_lanes *const out[] = {{{', '.join(places[count:-1]) or '0'}}};",
+        *(
+            f"  if (!ports[{k}].row) mbs_take_same(ports + {k}, {size}, {places[k]});"
+            for k, size in enumerate(taken)
+        ),
+        "  for (long long k = first; k < last; k += MBS_LANES) {",
+        "    const int many = last - k < MBS_LANES ? (int)(last - k) : MBS_LANES;",
+        *(
+            f"    if (ports[{k}].row) mbs_take(ports + {k}, k, many, {size}, {places[k]});"
+            for k, size in enumerate(taken)
+        ),
+        *(f"    part{k}(in, out, w);" for k in range(len(pieces))),
+        *(
+            f"    mbs_give(ports + {count + k}, k, many, {size}, out[{k}]);"
+            for k, size in enumerate(given)
+        ),
+        "  }",
+        "  mbs_store_end();",
+        "}",
+    ]
+    runtime = resources.files("mbs.native").joinpath("runtime")
+    headers = {name: runtime.joinpath(name).read_text("utf-8") for name in (*HEADERS, "rows.h")}
+    return BatchSource({"batch.c": "\n".join(lines), **headers}, _WIDEST * (starts[-1] + 1))
+
+
+def _pointers(kind: str, places: list[str]) -> str:
+    return ", ".join(f"({kind} *)({place})" for place in places) or "0"

@@ -1,6 +1,8 @@
 """Model builders: a System in, a casadi.Function with named inputs and outputs out."""
 
 from mbs.models import inverse_geometry
+from mbs.models.contact_phases import ContactPhases, contact_phases
+from mbs.models.contact_points import ContactPoint
 from mbs.models.dae import Dae, dae
 from mbs.models.derivatives import (
     direct_dynamics_derivatives,
@@ -17,15 +19,20 @@ from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, ja
 from mbs.models.joint_wrenches import joint_wrenches
 from mbs.models.kinematics import jacobian
 from mbs.models.lagrange import lagrange
+from mbs.models.limits import Limits, limits
 from mbs.models.link_motion import jacobian_dot_velocity, link_accelerations, link_velocities
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
 from mbs.models.measurements import measurements
 from mbs.models.singularities import singularities
 
 __all__ = [
+    "ContactPhases",
+    "ContactPoint",
     "Dae",
+    "Limits",
     "acceleration_closure",
     "bias",
+    "contact_phases",
     "dae",
     "devices",
     "direct_dynamics",
@@ -45,6 +52,7 @@ __all__ = [
     "jacobian_dot_velocity",
     "joint_wrenches",
     "lagrange",
+    "limits",
     "link_accelerations",
     "link_velocities",
     "measurements",

@@ -1,3 +1,7 @@
+import os
+import subprocess
+import sys
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -163,3 +167,24 @@ def test_machine_code_is_not_compiled_again():
         compiled(g)
     with pytest.raises(ModelError, match="example is machine code already"):
         mbs.export.code(g, "c")
+
+
+def test_two_processes_may_build_at_once(tmp_path):
+    program = (
+        "import casadi as ca\n"
+        "from mbs.native import compiled\n"
+        "x = ca.SX.sym('x')\n"
+        "f = ca.Function('f', [x], [ca.sin(x) * x])\n"
+        "print(float(compiled(f, derivatives=2)(0.5)) == float(f(0.5)))\n"
+    )
+    environment = {**os.environ, "MBS_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", program]
+    running = [
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    assert [process.communicate()[0].strip() for process in running] == ["True", "True"]
+    libraries = set(tmp_path.iterdir())
+    assert not list(tmp_path.glob("build-*"))
+    assert subprocess.run(command, env=environment, capture_output=True).returncode == 0
+    assert set(tmp_path.iterdir()) == libraries

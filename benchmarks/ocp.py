@@ -1,0 +1,145 @@
+"""Optimal control: instructions of a seven-joint arm, and problems beside other generators.
+
+python benchmarks/ocp.py [--peer PYTHON] [--repeat N]
+
+PYTHON has adam-robotics; without it the columns of adam are left out. Times of one run compare
+with each other alone. The cache of compiled libraries is a new folder, so that the first build is
+really the first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import casadi
+from casadi import SX, Function
+
+sys.path.insert(0, str(Path(__file__).parent))
+from ocp_peer import adam_inverse_dynamics
+from ocp_problems import (
+    Solved,
+    StageDerivatives,
+    acrobot_swing_up,
+    panda_by_stages,
+    panda_point_to_point,
+)
+from robots import panda_like, urdf
+
+import mbs
+from mbs.components import Body, Mechanism, Revolute
+from mbs.native import compiled
+
+
+def instructions(idm: Function) -> tuple[int, int, int, int]:
+    """Of tau, its Jacobian (n, 3n), the Hessian of y'tau (3n, 3n), and a product with it."""
+    n = idm.size1_in(0)
+    x, y, w = SX.sym("x", 3 * n), SX.sym("y", n), SX.sym("w", 3 * n)
+    tau = idm(x[:n], x[n : 2 * n], x[2 * n :])
+    H, gradient = casadi.hessian(casadi.dot(y, tau), x)
+    product = casadi.jtimes(gradient, x, w)
+    counts = []
+    for inputs, output in (
+        ([x], tau),
+        ([x], casadi.jacobian(tau, x)),
+        ([x, y], H),
+        ([x, y, w], product),
+    ):
+        counts.append(Function("f", inputs, [output]).n_instructions())
+    return tuple(counts)
+
+
+def acrobot() -> Function:
+    """(x, u) -> dx/dt of two rods, the motor at the elbow."""
+    m = Mechanism("acrobot", gravity=(0, -9.81, 0))
+    before = m.world
+    for name in ("shoulder", "elbow"):
+        rod = m.add(Body(f"{name}_rod", mass=1, com=(0.5, 0, 0), inertia=(1e-9, 1 / 12, 1 / 12)))
+        m.connect(before, Revolute(name, actuated=name == "elbow"), rod)
+        before = rod.at(1.0)
+    d = mbs.models.dae(m.assemble())
+    return Function("rates", [d.x, d.u], [d.ode])
+
+
+def arm(folder: Path) -> tuple[Function, Path, list[str]]:
+    """The inverse dynamic model of the arm, its URDF file and the names of its joints."""
+    file = folder / "panda_like.urdf"
+    file.write_text(urdf("panda_like", panda_like()), encoding="utf-8")
+    system = mbs.load(str(file)).assemble()
+    return mbs.models.inverse_dynamics(system), file, [row.joint for row in system.speeds]
+
+
+def print_counts(contenders: dict[str, Function]) -> None:
+    """The table of instructions."""
+    found = {name: instructions(idm) for name, idm in contenders.items()}
+    print("| instructions | tau | Jacobian | Hessian of y'tau | product with it |")
+    print("|---|---|---|---|---|")
+    for name, row in found.items():
+        print(f"| {name} | " + " | ".join(f"{value:,}" for value in row) + " |")
+    if "adam" in found:
+        ratios = (b / a for a, b in zip(found["mbs"], found["adam"], strict=True))
+        print("| adam / mbs | " + " | ".join(f"{ratio:.1f}" for ratio in ratios) + " |")
+
+
+def print_problem(name: str, stage: float, solved: Solved) -> None:
+    """A row of the table of problems."""
+    cells = [f"{stage:.2f}", f"{solved.build:.2f}", f"{solved.optimum:.4f}", solved.iterations]
+    cells += [f"{solved.solve:.3f}", f"{solved.functions:.3f}"]
+    print(f"| {name} | " + " | ".join(map(str, cells)) + " |", flush=True)
+
+
+def timed(make: Any, *arguments: Any, **options: Any) -> tuple[Any, float]:
+    """What is made, and the seconds that it took."""
+    begin = time.perf_counter()
+    made = make(*arguments, **options)
+    return made, time.perf_counter() - begin
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--peer", help="a Python that has adam-robotics")
+    parser.add_argument("--repeat", type=int, default=1)
+    parser.add_argument("--longest", type=int, default=1000, help="iterations of the arm")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        os.environ["MBS_CACHE_DIR"] = name
+        (idm, file, joints), seconds = timed(arm, Path(name))
+        print(f"description to inverse dynamic model: {seconds:.2f} s\n")
+        contenders = {"mbs": idm}
+        if given.peer:
+            contenders["adam"] = adam_inverse_dynamics(given.peer, file, joints)
+        print_counts(contenders)
+        code, first = timed(compiled, idm, derivatives=2)
+        _, later = timed(compiled, idm, derivatives=2)
+        stages = {"interpreted": (idm, 0.0), "compiled": (code, first), "cached": (code, later)}
+        if given.peer:
+            stages["adam, interpreted"] = contenders["adam"], 0.0
+        print("\n| problem | stage s | solver s | optimum | iterations | solve s | functions s |")
+        print("|---|---|---|---|---|---|---|")
+        rates = acrobot()
+        for evaluation, evaluate in (
+            ("interpreted", Function),
+            ("compiled", lambda f: compiled(f, derivatives=2)),
+        ):
+            print_problem(f"acrobot, {evaluation}", 0.0, acrobot_swing_up(rates, evaluate))
+        for _ in range(given.repeat):
+            for evaluation, (model, stage) in stages.items():
+                solved = panda_point_to_point(model, given.longest)
+                print_problem(f"arm, {evaluation}", stage, solved)
+            for evaluation, evaluate in (
+                ("interpreted", lambda f: f),
+                ("compiled", lambda f: compiled(f, derivatives=0)),
+            ):
+                parts, stage = timed(StageDerivatives.of, idm, evaluate)
+                print_problem(
+                    f"arm by stages, {evaluation}", stage, panda_by_stages(parts, given.longest)
+                )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""Points of links that planes may hold: where they are, how they move, what efforts act there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi
+from casadi import DM, SX
+
+from mbs.assembly import System
+from mbs.components.forces import RelativeMotion
+from mbs.errors import ModelError
+from mbs.messages import quoted
+from mbs.models.symbols import ModelSymbols
+from mbs.recursions.accelerations import link_accelerations, resting_base
+from mbs.recursions.frame_motion import relative_acceleration, relative_motion
+from mbs.recursions.velocities import link_velocities
+from mbs.spatial import zeros
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPoint:
+    """The origin of a frame, which may touch the plane x, y of another frame from above.
+
+    Attributes:
+        name: of the contact.
+        frame: a body, a named frame, or the number of a link.
+        plane: likewise, 0 for the base; its z points from the ground to the point.
+        friction: coefficient of dry friction, None where the ground never lets the point slip.
+    """
+
+    name: str
+    frame: str | int
+    plane: str | int = 0
+    friction: float | None = None
+
+    def __post_init__(self) -> None:
+        mu = self.friction
+        if mu is not None and (isinstance(mu, bool) or not isinstance(mu, (int, float)) or mu < 0):
+            raise ModelError(
+                f"{quoted(self.name)}: friction is {quoted(mu)}; give a coefficient of zero or"
+                " more, or None"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointRows:
+    """How n points move, seen from their planes and in the axes of these, 3 n elements each.
+
+    Attributes:
+        r: positions [m]; the third of each point is its distance from the plane.
+        V: velocities [m/s].
+        J: (3 n, nv), V = J v; the force on a point acts along the lines of its rows.
+        bias: accelerations where those of the joints are zero [m/s^2].
+    """
+
+    r: SX
+    V: SX
+    J: SX
+    bias: SX
+
+
+def point_rows(system: System, s: ModelSymbols, points: Sequence[ContactPoint]) -> PointRows:
+    """The motion of contact points.
+
+    Args:
+        system: open or closed.
+        s: its symbols, in tree coordinates.
+        points: one or more.
+
+    Raises:
+        ModelError: there is no such frame.
+    """
+    tree = system.tree
+    moving = link_velocities(tree, s.poses, s.v)
+    rest = SX.zeros(system.nv)
+    drifting = link_accelerations(tree, s.poses, s.v, rest, resting_base(zeros()))
+    seen: list[RelativeMotion] = []
+    bias: list[SX] = []
+    for point in points:
+        plane, frame = system.frame(point.plane), system.frame(point.frame)
+        motion = relative_motion(tree, plane, frame, s.q, moving)
+        seen.append(motion)
+        bias.append(relative_acceleration(motion, plane, frame, drifting).A)
+    V = casadi.densify(casadi.vertcat(*(motion.V for motion in seen)))
+    r = casadi.densify(casadi.vertcat(*(motion.p for motion in seen)))
+    return PointRows(r, V, casadi.jacobian(V, s.v), casadi.densify(casadi.vertcat(*bias)))
+
+
+def held_elements(ways: Sequence[str]) -> DM:
+    """(3 n, 1) 1 for each element of the motion that the plane holds.
+
+    Args:
+        ways: of each point "fixed", "sliding" or "" where it is free.
+    """
+    held = {"fixed": (1, 1, 1), "sliding": (0, 0, 1), "": (0, 0, 0)}
+    return DM([element for way in ways for element in held[way]])

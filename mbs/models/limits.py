@@ -1,0 +1,106 @@
+"""Limits of positions, velocities and efforts as vectors, for bounds of optimal control."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.components.contacts_joint import RigidStop
+from mbs.components.forces_joint import JointStop
+from mbs.errors import ModelError
+from mbs.expressions import Scalar, to_float
+from mbs.messages import did_you_mean, quoted
+
+Array = NDArray[np.float64]
+Largest = Mapping[str, float] | None
+"""The largest magnitude by the name of a velocity."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limits:
+    """Limits in the order of q, v and tau; infinite where there are none.
+
+    Attributes:
+        q_lower, q_upper: (nq,) of positions [rad, m or 1].
+        v_lower, v_upper: (nv,) of velocities [rad/s or m/s].
+        tau_lower, tau_upper: (nv,) of efforts [N m or N]; zero where there is no motor.
+    """
+
+    q_lower: Array
+    q_upper: Array
+    v_lower: Array
+    v_upper: Array
+    tau_lower: Array
+    tau_upper: Array
+
+
+def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> Limits:
+    """What a system may do: limits of its joints, and of stops where they are narrower.
+
+    Elements of unit quaternions are between -1 and 1. The description of a joint has limits of
+    its position alone; those of its motor are given here.
+
+    Args:
+        system: open or closed.
+        speed: the largest velocities by name, in both directions [rad/s or m/s].
+        effort: the largest efforts of motors by name, in both directions [N m or N].
+
+    Raises:
+        ModelError: a name is unknown or has no motor, or a value is not a positive number.
+    """
+    require_system(system)
+    q_lower, q_upper = _positions(system)
+    v_upper, tau_upper = np.full(system.nv, np.inf), np.zeros(system.nv)
+    tau_upper[[k for k, row in enumerate(system.speeds) if row.actuated]] = np.inf
+    for number, value in _magnitudes(system, "speed", speed):
+        v_upper[number] = value
+    for number, value in _magnitudes(system, "effort", effort):
+        if not system.speeds[number].actuated:
+            raise ModelError(
+                f"{system.name}: effort has {system.speeds[number].name!r}, which has no motor;"
+                " leave it out, or make that joint actuated=True"
+            )
+        tau_upper[number] = value
+    return Limits(q_lower, q_upper, -v_upper, v_upper, -tau_upper, tau_upper)
+
+
+def _positions(system: System) -> tuple[Array, Array]:
+    lower, upper = np.full(system.nq, -np.inf), np.full(system.nq, np.inf)
+    for k, coordinate in enumerate(system.coordinates):
+        if coordinate.kind == "quaternion":
+            lower[k], upper[k] = -1.0, 1.0
+        if coordinate.limits is not None:
+            lower[k], upper[k] = coordinate.limits
+    for force in system.forces:
+        place = force.levers[0].position if force.levers else None
+        if isinstance(force.element, (JointStop, RigidStop)) and place is not None:
+            lower[place] = max(lower[place], _number(force.element.lower, -np.inf))
+            upper[place] = min(upper[place], _number(force.element.upper, np.inf))
+    return lower, upper
+
+
+def _number(limit: Scalar | None, otherwise: float) -> float:
+    """A limit that is a number; a symbol has none yet."""
+    value = None if limit is None else to_float(limit)
+    return otherwise if value is None else value
+
+
+def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, float]]:
+    names = [row.name for row in system.speeds]
+    found = []
+    for name, value in (given or {}).items():
+        if name not in names:
+            raise ModelError(
+                f"{system.name}: {what} has {quoted(name)}; {did_you_mean(str(name), names)}"
+            )
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
+            raise ModelError(
+                f"{system.name}: {what} of {name!r} is {quoted(value)}; give a number above zero"
+            )
+        found.append((names.index(name), float(value)))
+    return found

@@ -14,9 +14,9 @@ from mbs.identification.estimation.residuals import Residuals
 from mbs.identification.estimation.robust import robust
 from mbs.identification.estimation.simulated_motion import simulated_motion
 from mbs.identification.estimation.weighted import reweighted, weighted
-from mbs.identification.excitation.excitation import Series, excitation
-from mbs.identification.excitation.limits import Plane
-from mbs.identification.excitation.trajectory import Trajectory
+from mbs.identification.exciting.excitation import Series, excitation
+from mbs.identification.exciting.limits import Plane
+from mbs.identification.exciting.trajectory import Trajectory
 from mbs.identification.identify import Identification, identify
 from mbs.identification.observations.energy import observe_energy
 from mbs.identification.observations.momentum import observe_momentum

@@ -6,11 +6,14 @@ from mbs.identification.bodies.physical_set import consistent_links
 from mbs.identification.estimation.essential import Essential
 from mbs.identification.estimation.estimate import Estimate
 from mbs.identification.estimation.residuals import Residuals
-from mbs.identification.observations.quality import ExcitationQuality, excitation_quality
+from mbs.identification.observations.observations import Observations
+from mbs.identification.observations.quality import excitation_quality
 from mbs.identification.regressors.columns import INERTIAL
 
 _POOR = 30.0
 _SURE = 3.0
+_UNFIT = 20.0
+"""Error of all efforts that noise and friction laws do not explain [%]."""
 
 
 def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
@@ -36,20 +39,25 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
     ]
     for title, residuals in tests:
         lines += ["", *_residuals(f"Errors, {title}", residuals)]
-    quality = excitation_quality(observations)
-    remarks = [*_excitation(quality), *_consistency(estimate), *_signs(estimate)]
+    remarks = [
+        *_fit(estimate.residuals),
+        *_dropped(observations),
+        *_excitation(estimate),
+        *_consistency(estimate),
+        *_signs(estimate),
+    ]
     return "\n".join([*lines, "", *remarks])
 
 
 def identification_report(
-    estimate: Estimate, essential: Essential, bodies: Estimate, *tests: tuple[str, Residuals]
+    estimate: Estimate, essential: Essential, bodies: Estimate | str, *tests: tuple[str, Residuals]
 ) -> str:
     """The account of base parameters, the essential ones among them, and bodies.
 
     Args:
         estimate: of base parameters.
         essential: the same in the parameters that the record needs.
-        bodies: a full set.
+        bodies: a full set, or why there is none.
         *tests: further errors of the base parameters with a title each.
     """
     few = essential.estimate
@@ -58,7 +66,8 @@ def identification_report(
         f" {few.residuals.total_percent:.2f} %; {essential.reason}",
         f"Not needed: {', '.join(essential.dropped) or 'none'}",
     ]
-    return "\n".join([report(estimate, *tests), "", *lines, "", report(bodies)])
+    told = bodies if isinstance(bodies, str) else report(bodies)
+    return "\n".join([report(estimate, *tests), "", *lines, "", told])
 
 
 def _parameters(estimate: Estimate) -> list[str]:
@@ -94,7 +103,31 @@ def _residuals(title: str, residuals: Residuals) -> list[str]:
     ]
 
 
-def _excitation(quality: ExcitationQuality) -> list[str]:
+def _fit(residuals: Residuals) -> list[str]:
+    """Errors that no noise explains."""
+    if not residuals.total_percent > _UNFIT:
+        return []
+    return [
+        f"Fit: {residuals.total_percent:.0f} % of the efforts are not explained; check the order of"
+        " the columns, units (rad, N m), gear ratios (joint_side) and signs"
+    ]
+
+
+def _dropped(observations: Observations) -> list[str]:
+    if not observations.dropped:
+        return []
+    rows = len(observations.time)
+    return [
+        f"Loops: {observations.dropped} of {rows + observations.dropped} instants are left out,"
+        " where the motion is next to a singular posture or passes it"
+    ]
+
+
+def _excitation(estimate: Estimate) -> list[str]:
+    """What the record does not show; of a full set, some parameters never can be told apart."""
+    if _is_full(estimate):
+        return []
+    quality = excitation_quality(estimate.observations)
     if quality.sentence:
         return [f"Excitation: {quality.sentence}"]
     return [
@@ -105,15 +138,20 @@ def _excitation(quality: ExcitationQuality) -> list[str]:
 
 def _consistency(estimate: Estimate) -> list[str]:
     """Whether bodies can have the parameters, where all ten of every link are there."""
-    inertial = [c for c in estimate.columns if c.kind in INERTIAL]
-    links = {c.link for c in inertial}
-    if len(inertial) < len(INERTIAL) * len(links) or not links:
+    if not _is_full(estimate):
         return []
+    links = {c.link for c in estimate.columns if c.kind in INERTIAL}
     good = consistent_links(estimate.columns, estimate.values)
     bad = [str(link) for link in sorted(links) if link not in good]
     if not bad:
         return [f"Bodies: all {len(good)} pseudo-inertias are positive definite"]
     return [f"Bodies: no body has the parameters of link {', '.join(bad)}"]
+
+
+def _is_full(estimate: Estimate) -> bool:
+    """Whether all ten parameters of every link are there."""
+    inertial = [c for c in estimate.columns if c.kind in INERTIAL]
+    return len(inertial) == len(INERTIAL) * len({c.link for c in inertial}) > 0
 
 
 def _signs(estimate: Estimate) -> list[str]:

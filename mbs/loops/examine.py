@@ -81,7 +81,7 @@ def examine(
         raise ModelError(f"{system.name}: an open chain has no loops that could be examined")
     position = np.array(system.position(q))
     p = closure_parameters(system, parameters)
-    residual, leads = (float(x) for x in _health(system)(position, p))
+    residual, leads = (float(x) for x in posture_health(system)(position, p))
     found = scales(system)
     J = np.array(constraint_jacobian(system)(position, p)) * found.rows.reshape(-1, 1)
     J *= found.columns([speed.unit for speed in system.speeds])
@@ -100,7 +100,7 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
         Unclosable: the posture leaves the loops open.
         SingularPosture: the independent joints do not determine how the others move.
     """
-    residual, leads = (float(x) for x in _health(system)(q, p))
+    residual, leads = (float(x) for x in posture_health(system)(q, p))
     if residual > OPEN:
         raise Unclosable(
             f"{system.name}: q leaves the loops open by {residual:.3g}; take a posture of"
@@ -115,8 +115,8 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
         )
 
 
-def _health(system: System) -> Function:
-    """`health(q, p) -> residual, leads`."""
+def posture_health(system: System) -> Function:
+    """``health(q, p) -> residual, leads``; see `PostureState`."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)

@@ -4,11 +4,12 @@ import pytest
 from support.measured_arm import arm, motion, noisy_record, true_efforts
 
 import mbs
-from mbs.errors import ModelError
+from mbs.errors import ModelError, SolverError
 from mbs.identification.base.base_parameters import base_parameters
+from mbs.identification.bodies import physical_set
 from mbs.identification.estimation.least_squares import least_squares
 from mbs.identification.estimation.methods import METHODS
-from mbs.identification.excitation.excitation import Series, excitation
+from mbs.identification.exciting.excitation import Series, excitation
 from mbs.identification.identify import identify
 from mbs.identification.observations.observations import observe
 from mbs.identification.postures import active_places
@@ -34,6 +35,10 @@ def test_an_arm_identified_from_a_noisy_record_predicts_another_motion():
     assert "physically consistent" in text
     assert "Errors, last 25 %, found from the rest" in text
     assert "measured_arm: 22 base parameters of 39, bandwidth 8 Hz" in text
+    assert repr(found).startswith(
+        "<Identification measured_arm: 22 base parameters of 39, weighted"
+    )
+    assert len(repr(found.estimate)) < 100
     essential = found.essential()
     assert f"Essential: {len(essential.estimate.names)} of 22 parameters" in text
     assert len(found.cross_validated().time) == len(found.estimate.observations.time)
@@ -70,6 +75,66 @@ def test_instruments_take_out_the_bias_of_rough_positions():
     k = free.estimate.names.index("Ia3")
     assert plain.estimate.values[k] < truth[k] - 0.02
     assert abs(free.estimate.values[k] - truth[k]) < 0.5 * abs(plain.estimate.values[k] - truth[k])
+
+
+@pytest.mark.parametrize("method", ["weighted", "instrumental"])
+def test_a_search_of_bodies_that_fails_leaves_the_base_parameters(method, monkeypatch):
+    wanted = identify(arm(), noisy_record(), 8.0, method, quiet=True).estimate
+    monkeypatch.setattr(physical_set, "_ROUNDS", 2)
+    monkeypatch.setitem(physical_set._OPTIONS["ipopt"], "max_iter", 2)
+    found = identify(arm(), noisy_record(), 8.0, method, quiet=True)
+    assert found.bodies is None
+    assert "IPOPT ended with Maximum_Iterations_Exceeded" in found.bodies_reason
+    assert found.estimate.values == pytest.approx(wanted.values, rel=0.05, abs=0.05)
+    assert "Bodies: none were found; physical consistency: IPOPT ended" in found.text()
+    with pytest.raises(ModelError, match="measured_arm: no bodies were found"):
+        found.identified_system()
+    with pytest.raises(SolverError, match="IPOPT ended"):
+        identify(arm(), noisy_record(), 8.0, "consistent", quiet=True)
+
+
+@pytest.mark.parametrize(
+    ("method", "equations"), [("weighted", "filtered"), ("instrumental", "dynamic")]
+)
+def test_several_records_are_identified_together(method, equations):
+    records = [noisy_record(), noisy_record(seed=1).between(0, 6)]
+    found = identify(arm(), records, 8.0, method, equations=equations, quiet=True)
+    alone = [identify(arm(), r, 8.0, equations=equations, quiet=True).observations for r in records]
+    assert len(found.observations) == sum(len(one) for one in alone)
+    assert (np.diff(found.observations.time) > 0).all()
+    truth = found.base.matrix @ numbers_of(arm(), found.base.columns)
+    errors = (found.estimate.values - truth) / found.estimate.deviations
+    assert np.sqrt(np.mean(errors**2)) < 2
+
+
+def test_the_pieces_of_a_record_with_a_gap_are_identified():
+    record = noisy_record()
+    keep = (record.time < 4) | (record.time > 4.5)
+    with pytest.raises(ModelError, match=r"identify\(system, \[r1, r2\], ...\)"):
+        Record.of(arm(), record.time[keep], record.q[keep], record.tau[keep])
+    gapped = Record.of(arm(), record.time[keep], record.q[keep], record.tau[keep], longest_gap=1.0)
+    with pytest.raises(ModelError, match=r"give identify the list record.pieces\(0.0625\)"):
+        identify(arm(), gapped, 8.0, quiet=True)
+    pieces = gapped.pieces()
+    assert [len(piece.time) for piece in pieces] == [1600, 2199]
+    found = identify(arm(), pieces, 8.0, quiet=True)
+    assert found.estimate["Fv1"] == pytest.approx(0.8, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("record", "options", "message"),
+    [
+        (np.zeros((100, 3)), {}, "measured_arm: the record is array"),
+        (None, {}, "measured_arm: the record is None; give mbs.identification.Record"),
+        ([], {}, "the list of records is empty"),
+        (noisy_record(), {"bandwidth": "5"}, "the bandwidth is '5'; give a number in Hz"),
+        (noisy_record(), {"smoothing": "smoothed"}, "smoothing is 'smoothed'; give the function"),
+    ],
+)
+def test_what_cannot_be_identified_is_refused(record, options, message):
+    given = {"bandwidth": 5.0} | options
+    with pytest.raises(ModelError, match=message):
+        identify(arm(), record, given.pop("bandwidth"), quiet=True, **given)
 
 
 def test_methods_and_equations_have_names():

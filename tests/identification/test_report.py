@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.measured_arm import equations, noisy_samples
@@ -37,7 +39,19 @@ def test_the_report_says_values_deviations_errors_and_excitation():
 def test_the_report_of_a_full_set_speaks_of_bodies():
     text = report(consistent(full()))
     assert "Bodies: all 3 pseudo-inertias are positive definite" in text
-    assert "cannot be told apart" in text
+    assert "cannot be told apart" not in text
+
+
+def test_a_bad_fit_is_told():
+    samples = noisy_samples(np.array([0.3, 0.1, 0.5]))
+    swapped = replace(samples, tau=samples.tau[:, ::-1])
+    estimate = weighted(observe(equations()[0], swapped).grouped(equations()[1]))
+    share = estimate.residuals.total_percent
+    assert share > 25
+    assert f"Fit: {share:.0f} % of the efforts are not explained; check the order" in report(
+        estimate
+    )
+    assert "Fit:" not in report(weighted(full().grouped(equations()[1])))
 
 
 def test_residuals_are_drawn_for_each_joint(tmp_path):

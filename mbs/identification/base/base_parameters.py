@@ -15,6 +15,7 @@ from mbs.assembly.model_function import ModelFunction, require_system
 from mbs.errors import ModelError
 from mbs.identification.base.application import with_parameters
 from mbs.identification.base.check import Check
+from mbs.identification.base.elsewhere import checked_elsewhere, numbers_at
 from mbs.identification.base.grouping import Grouping, coefficients
 from mbs.identification.base.loops import Postures
 from mbs.identification.base.numeric import (
@@ -186,8 +187,11 @@ def _by_rules(
 ) -> tuple[Grouping, Check]:
     """The grouping that the rules find, checked and completed by random states."""
     grouping = grouped_by_rules(system, sample.columns, _postures(system, seed), structure)
-    beta = _numbers(system, sample.columns, grouping, default_parameters(system))
+    beta = numbers_at(system, sample.columns, grouping, default_parameters(system))
     check = checked(sample, grouping, beta, order)
+    if check.agrees and depends_on_symbols(system) and not system.is_closed:
+        doubt = checked_elsewhere(system, sample.columns, grouping, order, structure)
+        return grouping, doubt or check
     return _completed(system, sample, grouping, check, order)
 
 
@@ -222,17 +226,6 @@ def _postures(system: System, seed: int) -> list[Postures]:
     return [Postures(closed_positions(system, p, count, seed + 1), p) for p in values]
 
 
-def _numbers(
-    system: System, columns: Sequence[Column], grouping: Grouping, p: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(kept, columns) the coefficients of a grouping."""
-    rows = {k: row for row, k in enumerate(grouping.kept)}
-    B = SX(len(rows), len(columns))
-    for k, column, x in coefficients(grouping):
-        B[rows[k], column] = x
-    return np.array(Function("B", [system.p], [casadi.densify(B)])(p))
-
-
 def _result(
     system: System, method: str, columns: tuple[Column, ...], grouping: Grouping, check: Check
 ) -> BaseParameters:
@@ -256,7 +249,7 @@ def _result(
         eliminated=tuple(c for k, c in enumerate(columns) if k not in kept),
         symbols=K,
         grouping=base,
-        matrix=_numbers(system, columns, grouping, default_parameters(system)),
+        matrix=numbers_at(system, columns, grouping, default_parameters(system)),
         function=ModelFunction(function, system),
         check=check,
         _terms=tuple(terms[k] for k in kept),

@@ -42,6 +42,10 @@ class Estimate(NamedValues):
     observations: Observations
     rounds: int = 1
 
+    def __repr__(self) -> str:
+        error = self.residuals.total_percent
+        return f"<Estimate: {len(self.values)} parameters, {self.method}, error {error:.3g} %>"
+
     @property
     def residuals(self) -> Residuals:
         """What it leaves unexplained of the observations that it was found from."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from casadi import DM, MX, SX, Function
 
 from mbs.errors import ModelError, SolverError
-from mbs.identification.observations.observations import known_of, motion_of
+from mbs.identification.observations.evaluated import known_of, motion_of
 from mbs.identification.postures import active_places, is_explicit, posture_of
 from mbs.identification.records.filters import Samples
 

@@ -11,12 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import ModelError
-from mbs.identification.observations.observations import (
-    Observations,
-    evaluated,
-    known_of,
-    motion_of,
-)
+from mbs.identification.observations.evaluated import evaluated, known_of, motion_of
+from mbs.identification.observations.observations import Observations, clear_of_singular
 from mbs.identification.records.filters import Samples
 
 Array = npt.NDArray[np.float64]
@@ -50,7 +46,7 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
     work = _integral(np.sum(v * (samples.tau - known_of(energy, samples)), axis=1), samples.rate)
     taken = h[:, 0] + _integral(P[:, 0], samples.rate)
     ends = np.arange(0, len(samples.time), step)
-    return Observations(
+    found = Observations(
         samples.time[ends[1:]],
         np.diff(taken[ends], axis=0)[:, None, :],
         np.diff(work[ends])[:, None],
@@ -58,6 +54,7 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
         ("energy",),
         ("J",),
     )
+    return clear_of_singular(found, energy, samples, 0.0, step / samples.rate)
 
 
 def _integral(values: Array, rate: float) -> Array:

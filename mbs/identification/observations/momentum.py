@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import ModelError
-from mbs.identification.observations.observations import Observations, evaluated, known_of
+from mbs.identification.observations.evaluated import evaluated, known_of
+from mbs.identification.observations.observations import Observations, clear_of_singular
 from mbs.identification.records.filters import Samples
 from mbs.result import optional_module
 
@@ -49,7 +50,7 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
     plain, slope = ([0.0, 0.0, corner**2], [0.0, corner**2, 0.0])
     keep = slice(settled, None, max(round(_ROWS * rate / corner), 1))
     W = _filtered(D1, slope, corner, rate)[keep] + _filtered(D2, plain, corner, rate)[keep]
-    return Observations(
+    found = Observations(
         samples.time[keep],
         W,
         _filtered(tau, plain, corner, rate)[keep],
@@ -57,6 +58,7 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
         samples.efforts,
         samples.effort_units,
     )
+    return clear_of_singular(found, filtered, samples, 0.0, _SETTLED / corner)
 
 
 def _filtered(values: Array, numerator: list[float], corner: float, rate: float) -> Array:

@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from casadi import DM
 
-from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.identification.base.base_parameters import BaseParameters
-from mbs.identification.postures import positions
+from mbs.identification.observations.evaluated import evaluated, known_of, led_samples
+from mbs.identification.observations.singular import without
 from mbs.identification.records.filters import ORDER, Samples, zero_phase
 from mbs.identification.regressors.columns import Column
-from mbs.identification.regressors.dynamic import known_efforts
 from mbs.messages import did_you_mean
 
 Array = npt.NDArray[np.float64]
@@ -29,7 +27,9 @@ spectrum folds; with more rows their errors depend on each other, with less the 
 """
 
 _SETTLED = 1.0
-_BATCH = 500
+_SPREAD = 2.0
+"""Periods of the bandwidth in which the filter forgets what came before, and what comes after."""
+_PAUSE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +43,8 @@ class Observations:
         columns: the k parameters.
         efforts: names of the m efforts.
         effort_units: their units.
+        dropped: instants that were left out, the posture of a closed system being next to a
+            singular one.
     """
 
     time: Array
@@ -51,6 +53,7 @@ class Observations:
     columns: tuple[Column, ...]
     efforts: tuple[str, ...]
     effort_units: tuple[str, ...]
+    dropped: int = 0
 
     def __post_init__(self) -> None:
         if self.W.shape != (*self.y.shape, len(self.columns)):
@@ -70,6 +73,10 @@ class Observations:
     def rows(self) -> tuple[Array, Array]:
         """(n m, k) and (n m,) the equations one below the other."""
         return self.W.reshape(-1, self.W.shape[2]), self.y.reshape(-1)
+
+    def __repr__(self) -> str:
+        rows, m = self.y.shape
+        return f"<Observations: {rows} instants of {m} efforts, {len(self.columns)} parameters>"
 
     def __len__(self) -> int:
         return int(self.y.size)
@@ -127,17 +134,26 @@ class Observations:
 
 
 def observe(regressor: Any, samples: Samples) -> Observations:
-    """The equations of the samples, none filtered or dropped.
+    """The equations of the samples, none filtered.
 
-    What springs and force elements of the system take is subtracted from the efforts.
+    What springs and force elements of the system take is subtracted from the efforts. Instants of
+    a closed system next to singular postures are left out.
 
     Args:
         regressor: Function D(q, v, a) with `.columns` and `.system`, such as `regressor` gives.
         samples: positions, rates and efforts.
 
     Raises:
-        ModelError: the samples have not the coordinates of the regressor.
+        ModelError: the samples have not the coordinates of the regressor, or most are next to
+            singular postures.
     """
+    keep = led_samples(regressor, samples)
+    full = replace(_observed(regressor, samples), dropped=int(np.sum(~keep)))
+    return full if keep.all() else full.at(samples.time[keep])
+
+
+def _observed(regressor: Any, samples: Samples) -> Observations:
+    """Every instant; next to singular postures the regressor is on straight lines."""
     return Observations(
         samples.time,
         evaluated(regressor, samples)[0],
@@ -174,7 +190,7 @@ def observe_filtered(
     passed = [] if samples.bandwidth is None else [samples.bandwidth]
     if not passed + further:
         raise ModelError("observations: the samples were not filtered; give a bandwidth in Hz")
-    full, rate = observe(regressor, samples), samples.rate
+    full, rate = _observed(regressor, samples), samples.rate
     narrowest = min(passed + further)
     step = max(round(rate / (KEPT_RATE * narrowest)), 1)
     ends = int(np.ceil(_SETTLED * rate / narrowest))
@@ -189,78 +205,53 @@ def observe_filtered(
     W = np.empty((*y.shape, len(full.columns)))
     for k in range(len(full.columns)):
         W[:, :, k] = behind(full.W[:, :, k], passed + further)
-    return replace(full, time=full.time[keep], W=W, y=y)
+    found = replace(full, time=full.time[keep], W=W, y=y)
+    return clear_of_singular(found, regressor, samples, _SPREAD / narrowest)
 
 
-def known_of(regressor: Any, samples: Samples) -> Array:
-    """(n, m) efforts of springs and force elements, which have no column [N m or N]."""
-    system: System = regressor.system
-    if not _has_elements(system):
-        return np.zeros(samples.tau.shape)
-    q, v, _ = motion_of(regressor, samples)
-    known = known_efforts(system, "independent" if _is_reduced(regressor) else "tree")
-    pairs = zip(q, v, strict=True)
-    return np.array([DM(known(*state)).full()[:, 0] for state in pairs])
-
-
-def motion_of(model: Any, samples: Samples) -> tuple[Array, Array, Array]:
-    """Positions (n, nq), velocities and accelerations (n, m) that a model takes.
-
-    The other joints of a closed system follow from the independent ones where the samples are of
-    those alone.
+def clear_of_singular(
+    found: Observations, model: Any, samples: Samples, before: float, after: float | None = None
+) -> Observations:
+    """The equations without those that a filter or an interval mixes with singular postures.
 
     Args:
-        model: of the independent or tree coordinates of `model.system`.
-        samples: of all joints, or of the independent ones.
+        found: from the samples.
+        model: of the samples.
+        samples: whose time is that of `found`.
+        before: time that an equation looks ahead [s].
+        after: time that it looks back [s]; the same when left out.
+    """
+    bad = samples.time[~led_samples(model, samples)]
+    keep = without(found.time, bad, before, before if after is None else after)
+    return replace(found.at(found.time[keep]), dropped=int(np.sum(~keep)))
+
+
+def stacked(parts: Sequence[Observations]) -> Observations:
+    """The equations of several records one after the other.
+
+    Times of a record go on where the one before ended, half a second later.
+
+    Args:
+        parts: one or more, of the same columns and efforts.
 
     Raises:
-        ModelError: the samples have not the coordinates of the model.
+        ModelError: their efforts or columns differ.
     """
-    system: System = model.system
-    width, m = samples.q.shape[1], int(model.size1_in(1))
-    if samples.tau.shape[1] == m:
-        if width == system.nq == system.nv:
-            chosen = list(system.active) if _is_reduced(model) else list(range(m))
-            return samples.q, samples.v[:, chosen], samples.a[:, chosen]
-        if width == m and _is_reduced(model):
-            return positions(system, samples.q), samples.v, samples.a
-    also = f" or {m}" if _is_reduced(model) else ""
-    raise ModelError(
-        f"observations: the samples have {width} positions and {samples.tau.shape[1]} efforts, the"
-        f" model takes {system.nq}{also} and {m}; give every joint of the tree or the independent"
-        " ones, and the efforts of the independent ones"
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    times = [first.time]
+    for part in parts[1:]:
+        if (part.names, part.efforts) != (first.names, first.efforts):
+            raise ModelError(
+                f"observations: one record has the efforts {', '.join(first.efforts)}, another"
+                f" {', '.join(part.efforts)}; give records of the same joints"
+            )
+        times.append(part.time - part.time[0] + times[-1][-1] + _PAUSE)
+    return replace(
+        first,
+        time=np.concatenate(times),
+        W=np.concatenate([part.W for part in parts]),
+        y=np.concatenate([part.y for part in parts]),
+        dropped=sum(part.dropped for part in parts),
     )
-
-
-def _is_reduced(model: Any) -> bool:
-    """Whether a model is in the independent velocities of a closed system."""
-    return bool(model.system.is_closed and int(model.size1_in(1)) == len(model.system.active))
-
-
-def _has_elements(system: System) -> bool:
-    springs = any(not link.stiffness.is_zero() for link in system.tree.links)
-    return springs or bool(system.forces)
-
-
-def evaluated(model: Any, samples: Samples) -> list[Array]:
-    """(n, rows, columns) every output of a model of (q, v) or (q, v, a) at every sample.
-
-    Args:
-        model: of the independent or tree coordinates of `model.system`.
-        samples: of all joints, or of the independent ones.
-
-    Raises:
-        ModelError: the samples have not the coordinates of the model.
-    """
-    states = motion_of(model, samples)[: model.n_in()]
-    n = len(samples.time)
-    size = min(_BATCH, n)
-    many = model.map(size)
-    found = [np.empty((n, *model.size_out(k))) for k in range(model.n_out())]
-    for start in [*range(0, n - size, size), n - size]:
-        rows = slice(start, start + size)
-        values = many(*(DM(x[rows].T) for x in states))
-        for whole, part in zip(found, values if len(found) > 1 else [values], strict=True):
-            m, k = whole.shape[1:]
-            whole[rows] = np.asarray(part).reshape(m, size, k).transpose(1, 0, 2)
-    return found

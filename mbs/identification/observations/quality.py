@@ -85,9 +85,11 @@ def require_visible(observations: Observations) -> ExcitationQuality:
     """
     count, rows = len(observations.columns), len(observations)
     if rows < count:
+        dropped = observations.dropped
+        left_out = f", {dropped} next to singular postures being left out" if dropped else ""
         raise ModelError(
-            f"observations: {rows} equations are too few for {count} parameters; give a longer"
-            " record"
+            f"observations: {rows} equations are too few for {count} parameters{left_out}; give a"
+            " longer record"
         )
     quality = excitation_quality(observations)
     if quality.sentence:

@@ -19,6 +19,9 @@ ORDER = 4
 WORKING_RATE = 20.0
 """Samples in a period of the bandwidth that are kept for the regressor."""
 
+_SLOW = 10.0
+"""Records of less samples in a second may have time in another unit [Hz]."""
+
 DROPPED = 5.0
 """Periods of the bandwidth that are left out at both ends, where the filter settles."""
 
@@ -36,6 +39,8 @@ class Samples:
         efforts: names of the efforts.
         effort_units: their units.
         bandwidth: of what was left by the filter [Hz], or None where nothing was filtered.
+        led: (n,) whether a posture of a closed system keeps clear of singular ones; None where
+            that is still to be found.
     """
 
     time: Array
@@ -46,6 +51,7 @@ class Samples:
     efforts: tuple[str, ...]
     effort_units: tuple[str, ...]
     bandwidth: float | None = None
+    led: npt.NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time)
@@ -106,9 +112,10 @@ def zero_phase(values: Array, rate: float, bandwidth: float, order: int = ORDER)
             samples for the filter.
     """
     if not 0 < bandwidth < rate / 2:
+        hint = "; time is in s, is that of the record in ms?" if rate < _SLOW else ""
         raise ModelError(
             f"filter: the bandwidth is {bandwidth:g} Hz for {rate:g} samples in a second; give more"
-            f" than zero and less than {rate / 2:g} Hz"
+            f" than zero and less than {rate / 2:g} Hz{hint}"
         )
     padding = 3 * (2 * ((order + 1) // 2) + 1)
     if len(values) <= padding:
@@ -188,8 +195,8 @@ def _without_gaps(record: Record, bandwidth: float) -> Record:
         start = float(record.time[int(np.argmax(steps))])
         raise ModelError(
             f"record: nothing was measured for {longest:.3g} s from {start:.6g} s, which is more"
-            f" than half a period of the bandwidth of {bandwidth:g} Hz; take one side of it by"
-            " between(), or a bandwidth that is lower"
+            f" than half a period of the bandwidth of {bandwidth:g} Hz; give identify the"
+            f" list record.pieces({0.5 / bandwidth:.3g}), or a bandwidth that is lower"
         )
     return resampled(record)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError
 from mbs.identification.postures import active_places
-from mbs.identification.records.rules import check_record
+from mbs.identification.records.rules import GAP, SHORTEST, check_record
 from mbs.identification.records.table import column, columns, csv_table
 from mbs.messages import quoted
 
@@ -60,6 +61,12 @@ class Record:
         for name in ("time", "q", "tau", "v"):
             if getattr(self, name) is not None or name != "v":
                 object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+        for name in ("names", "units", "efforts", "effort_units"):
+            if isinstance(getattr(self, name), str):
+                raise ModelError(
+                    f"record: {name} is the text {quoted(getattr(self, name))}; give a list with"
+                    " one for each column"
+                )
         width, m = (x.shape[1] if x.ndim == 2 else 0 for x in (self.q, self.tau))
         names = self.names or tuple(f"q{k + 1}" for k in range(width))
         efforts = names if m == width else tuple(f"tau{k + 1}" for k in range(m))
@@ -179,20 +186,34 @@ class Record:
 
     def between(self, start: float, stop: float) -> Record:
         """The rows from one instant to another [s]."""
-        keep = (self.time >= start) & (self.time <= stop)
+        return self._rows((self.time >= start) & (self.time <= stop))
+
+    def pieces(self, longest: float | None = None) -> list[Record]:
+        """The records between the gaps, for `identify`; those of too few rows are left out.
+
+        Args:
+            longest: step of time that is no gap [s]; 20 times the usual step when left out.
+
+        Raises:
+            ModelError: no piece is long enough.
+        """
+        steps = np.diff(self.time)
+        most = GAP * float(np.median(steps)) if longest is None else longest
+        ends = [0, *(np.flatnonzero(steps > most) + 1), len(self.time)]
+        at, found = np.arange(len(self.time)), []
+        for first, last in pairwise(ends):
+            if last - first >= SHORTEST:
+                found.append(self._rows((at >= first) & (at < last)))
+        if not found:
+            raise ModelError(
+                f"record: every piece between steps of more than {most:.3g} s has less than"
+                f" {SHORTEST} rows; give a longer step, or a record with less gaps"
+            )
+        return found
+
+    def _rows(self, keep: npt.NDArray[np.bool_]) -> Record:
         v = None if self.v is None else self.v[keep]
-        return Record(
-            self.time[keep],
-            self.q[keep],
-            self.tau[keep],
-            v,
-            self.names,
-            self.units,
-            self.limits,
-            self.efforts,
-            self.effort_units,
-            self.longest_gap,
-        )
+        return replace(self, time=self.time[keep], q=self.q[keep], tau=self.tau[keep], v=v)
 
 
 def joint_side(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:

@@ -18,10 +18,12 @@ Array = npt.NDArray[np.float64]
 SHORTEST = 50
 """Rows that a record needs at least."""
 
+GAP = 20.0
+"""Usual steps of time that are bridged by default."""
+
 FARTHEST_TURN = 4 * np.pi
 """Positions beyond it are not taken for those of a revolute joint [rad]."""
 
-_GAP = 20.0
 _RANGES = 3.0
 _SAME_MOTION = 0.9
 _SAME_RATE = 0.3
@@ -121,13 +123,14 @@ def _check_time(record: Record) -> None:
             f" {row + 2}; sort the rows, and keep one for each instant"
         )
     usual = float(np.median(steps))
-    longest = _GAP * usual if record.longest_gap is None else record.longest_gap
+    longest = GAP * usual if record.longest_gap is None else record.longest_gap
     if steps.max() > longest:
         row = int(np.argmax(steps))
         raise ModelError(
             f"record: nothing was measured from {record.time[row]:.6g} to"
-            f" {record.time[row + 1]:.6g} s, the usual step being {usual:.3g} s; cut the record"
-            " there, or give longest_gap"
+            f" {record.time[row + 1]:.6g} s, the usual step being {usual:.3g} s; give the two"
+            " sides as two records, identify(system, [r1, r2], ...), or give longest_gap, and the"
+            " list record.pieces()"
         )
 
 

@@ -72,6 +72,7 @@ def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
     if len(rows) < 2:
         raise ModelError(f"record: {quoted(path)} has no rows; it needs names, then numbers")
     header = [name.strip() for name in rows[0]]
+    _check_header(path, header)
     values = np.empty((len(rows) - 1, len(header)))
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
@@ -86,3 +87,26 @@ def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
                 f"record: row {number} of {quoted(path)} holds {quoted(row)}; write numbers alone"
             ) from None
     return {name: values[:, k] for k, name in enumerate(header)}
+
+
+def _check_header(path: str | os.PathLike[str], header: Sequence[str]) -> None:
+    """Refuse other separators than commas, and numbers in the place of names."""
+    for mark in (";", "\t"):
+        if len(header) == 1 and mark in header[0]:
+            raise ModelError(
+                f"record: {quoted(path)} has {quoted(mark)} between its columns; write commas, and"
+                " points in the numbers"
+            )
+    if all(_is_number(name) for name in header):
+        raise ModelError(
+            f"record: the first row of {quoted(path)} is {quoted(list(header))}, which are"
+            " numbers; write the names of the columns above them"
+        )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

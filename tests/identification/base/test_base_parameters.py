@@ -8,7 +8,9 @@ from support.base_robots import table
 import mbs
 from mbs.errors import ModelError
 from mbs.formats import read_par, write_toml
+from mbs.identification.base import base_parameters as module
 from mbs.identification.base.base_parameters import base_parameters
+from mbs.identification.base.grouping import Grouping
 from mbs.identification.regressors.columns import columns_of, numbers_of
 from mbs.operations import count
 from mbs.spatial.inertia import TEN_PARAMETERS
@@ -143,3 +145,25 @@ def test_errors(puma, arguments, told):
     with pytest.raises(ModelError) as error:
         base_parameters(puma, **arguments)
     assert told in str(error.value)
+
+
+def test_a_grouping_that_holds_at_the_defaults_alone_is_told(symbolic, monkeypatch):
+    rules = module.grouped_by_rules
+
+    def bent(system, *arguments):
+        grouping = rules(system, *arguments)
+        default = next(q.default for q in system.parameters if q.default is not None)
+        place = next(k for k, q in enumerate(system.parameters) if q.default is not None)
+        wrong = 1 + system.p[place] - default
+        kept = set(grouping.kept)
+        return Grouping(
+            tuple(
+                terms if k in kept else {i: x * wrong for i, x in terms.items()}
+                for k, terms in enumerate(grouping.columns)
+            )
+        )
+
+    monkeypatch.setattr(module, "grouped_by_rules", bent)
+    base = base_parameters(symbolic)
+    assert not base.check.agrees
+    assert "At other values of the symbols than their defaults: The rules" in base.check.text

@@ -181,3 +181,38 @@ def test_unequal_steps_give_the_same_parameters():
             [np.interp(uneven.time[inside], even.time, x) for x in getattr(even, name).T]
         )
         assert getattr(uneven, name)[inside] == pytest.approx(expected, abs=0.1)
+
+
+@pytest.mark.parametrize("name", ["names", "units", "efforts", "effort_units"])
+def test_a_text_is_no_list_of_names(name):
+    with pytest.raises(ModelError, match=f"{name} is the text 'rad'; give a list with one for"):
+        Record(TIME, Q, TAU, **{name: "rad"})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time;q1;tau1\n0;1;2\n", "has ';' between its columns; write commas"),
+        ("0,1,2\n1,2,3\n", r"the first row of .* which are numbers; write the names"),
+    ],
+)
+def test_files_of_another_form_are_named_as_such(text, message, tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text(text)
+    with pytest.raises(ModelError, match=message):
+        Record.from_csv(path, q=["q1"], tau=["tau1"])
+
+
+def test_time_in_milliseconds_is_guessed():
+    slow = Record.of(arm(), 1000 * TIME, Q, TAU)
+    with pytest.raises(ModelError, match="time is in s, is that of the record in ms"):
+        smoothed(slow, 5.0)
+
+
+def test_pieces_of_too_few_rows_are_left_out():
+    time = np.where(TIME > 5, TIME + 1, TIME) + np.where(TIME > 5.05, 1, 0)
+    record = Record.of(arm(), time, Q, TAU, longest_gap=2.0)
+    assert [len(piece.time) for piece in record.pieces()] == [2001, 1979]
+    assert len(record.pieces(1.5)[0].time) == 4000
+    with pytest.raises(ModelError, match="has less than 50 rows"):
+        record.pieces(1e-3)

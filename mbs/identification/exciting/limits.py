@@ -12,11 +12,15 @@ import numpy.typing as npt
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
+from mbs.identification.leading import CLEAR, leads_of
 from mbs.identification.postures import active_places
 from mbs.identification.records.rules import FARTHEST_TURN
 from mbs.messages import did_you_mean, quoted
 
 Array = npt.NDArray[np.float64]
+
+_SHARE = 0.2
+"""Part of `leads` of the assembled posture that motions keep at least."""
 
 Range = float | tuple[float, float] | None
 """A number +-, (lower, upper), or None for no limit."""
@@ -69,7 +73,7 @@ class Limit:
     """The range of one quantity during the motion.
 
     Attributes:
-        quantity: position, velocity, acceleration, effort or plane.
+        quantity: position, velocity, acceleration, effort, plane or leading.
         name: of the coordinate, or of the point's frame.
         unit: of the quantity.
         lower: -inf where there is none.
@@ -125,6 +129,7 @@ class Limits:
         effort: of the same.
         passive: positions of the other joints of a closed system, by number of the coordinate.
         planes: of points.
+        leading: how well the independent joints of a closed system lead the others.
     """
 
     position: tuple[Limit, ...]
@@ -133,6 +138,7 @@ class Limits:
     effort: tuple[Limit, ...]
     passive: tuple[tuple[int, Limit], ...]
     planes: tuple[Plane, ...]
+    leading: tuple[Limit, ...] = ()
 
     @property
     def of_rates(self) -> tuple[Limit, ...]:
@@ -141,11 +147,11 @@ class Limits:
 
     @property
     def of_models(self) -> tuple[Limit, ...]:
-        """Of efforts, passive positions and planes, in this order."""
+        """Of efforts, passive positions, planes and leading, in this order."""
         planes = (
             Limit("plane", str(plane.frame), "m", plane.offset, np.inf) for plane in self.planes
         )
-        return (*self.effort, *(limit for _, limit in self.passive), *planes)
+        return (*self.effort, *(limit for _, limit in self.passive), *planes, *self.leading)
 
 
 def limits_of(
@@ -193,7 +199,16 @@ def limits_of(
         rows("effort", effort, [EFFORT_UNIT[unit] for unit in rates]),
         others,
         tuple(planes),
+        _leading(system),
     )
+
+
+def _leading(system: System) -> tuple[Limit, ...]:
+    """The distance from singular postures; a robot that is assembled near one may come as near."""
+    if not system.is_closed:
+        return ()
+    least = min(CLEAR, _SHARE * float(leads_of(system, np.array([system.posture]))[0]))
+    return (Limit("leading", system.name, "1", least, np.inf),)
 
 
 def _positions(
@@ -238,6 +253,11 @@ def _pairs(
     if isinstance(bound, Mapping):
         _check_names(system, quantity, bound, names)
         bound = [bound.get(name) for name in names]
+    if isinstance(bound, str):
+        raise ModelError(
+            f"{system.name}: {quantity} is {quoted(bound)}; give a number, a range for each joint,"
+            " or a dict by joint"
+        )
     values = bound if isinstance(bound, Sequence | np.ndarray) else [bound] * len(names)
     if len(values) != len(names):
         raise ModelError(

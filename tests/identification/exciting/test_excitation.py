@@ -1,5 +1,6 @@
 """Exciting motions within limits, of open and closed systems."""
 
+import importlib
 import re
 from functools import cache
 
@@ -11,8 +12,8 @@ from mbs.assembly import System
 from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
 from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.excitation.excitation import Plane, Series, Trajectory, excitation
-from mbs.identification.excitation.limits import Limit, Margin
+from mbs.identification.exciting.excitation import Plane, Series, Trajectory, excitation
+from mbs.identification.exciting.limits import Limit, Margin
 from mbs.identification.postures import active_places
 from mbs.loops.closing import Closing
 
@@ -313,3 +314,17 @@ def test_limits_of_unknown_joints_are_refused() -> None:
         excitation(system, position={"q9": 1.0})
     with pytest.raises(ModelError, match="velocity names 'q2', which is none"):
         excitation(system, position=1.0, velocity={"q2": 1.0})
+
+
+def test_what_is_no_series_or_no_number_is_refused() -> None:
+    system = system_of("planar_2r")
+    with pytest.raises(ModelError, match=r"the series is \(4, 2\); give mbs"):
+        excitation(system, series=(4, 2), position=1.0)  # type: ignore[arg-type]
+    with pytest.raises(ModelError, match="velocity is '2'; give a number, a range"):
+        excitation(system, series=FORM, position=1.0, velocity="2")
+
+
+def test_the_function_does_not_hide_a_package() -> None:
+    assert mbs.identification.excitation is excitation
+    with pytest.raises(ModuleNotFoundError):
+        importlib.import_module("mbs.identification.excitation")

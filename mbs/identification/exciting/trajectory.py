@@ -11,8 +11,8 @@ from casadi import MX, SX
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT
 from mbs.errors import ModelError
-from mbs.identification.excitation.fourier_series import FourierSeries
-from mbs.identification.excitation.limits import RATE_UNITS, Margin
+from mbs.identification.exciting.fourier_series import FourierSeries
+from mbs.identification.exciting.limits import RATE_UNITS, Margin
 from mbs.identification.postures import active_places, positions
 from mbs.identification.regressors.columns import Column
 from mbs.result import Result
@@ -109,7 +109,7 @@ class Trajectory:
         """The margin of a kind of limit that is smallest as part of its limit.
 
         Args:
-            quantity: position, velocity, acceleration, effort or plane.
+            quantity: position, velocity, acceleration, effort, plane or leading.
 
         Raises:
             ModelError: no such quantity is limited.

@@ -14,9 +14,9 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError, SolverError
 from mbs.identification.base.base_parameters import BaseParameters, base_parameters
-from mbs.identification.excitation.criterion import CRITERIA
-from mbs.identification.excitation.instant import instant
-from mbs.identification.excitation.limits import (
+from mbs.identification.exciting.criterion import CRITERIA
+from mbs.identification.exciting.instant import instant
+from mbs.identification.exciting.limits import (
     Bound,
     Limit,
     Limits,
@@ -24,9 +24,11 @@ from mbs.identification.excitation.limits import (
     Plane,
     limits_of,
 )
-from mbs.identification.excitation.programme import Programme
-from mbs.identification.excitation.trajectory import Trajectory
+from mbs.identification.exciting.programme import Programme
+from mbs.identification.exciting.trajectory import Trajectory
 from mbs.identification.follower import Watch
+from mbs.identification.leading import leads_of
+from mbs.identification.postures import positions
 from mbs.identification.regressors.columns import Column, require_columns
 from mbs.messages import did_you_mean, quoted
 from mbs.progress import progress
@@ -94,7 +96,8 @@ def excitation(
     The coefficients of Fourier series of the independent joints minimise a criterion of the
     regressor at all samples, by IPOPT with exact gradients. Efforts are those of the parameters
     that the system has. Ranges of positions, velocities and accelerations hold at every instant;
-    those of efforts and planes, at instants eight times as dense as the samples.
+    those of efforts and planes, at instants eight times as dense as the samples. Closed systems
+    keep clear of postures at which the independent joints do not lead the others.
 
     The sign of velocities is smoothed over a fiftieth of the largest velocity while the motion is
     sought; the condition numbers of the answer are of the regressor as it is.
@@ -134,7 +137,7 @@ def excitation(
         effort=effort,
         planes=planes,
     )
-    form = series or Series()
+    form = _form(series)
     chosen = _columns(system, columns)
     smooth = _smoothed(system, limits, form)
     function = instant(smooth, chosen, limits)
@@ -205,6 +208,8 @@ def _measured(
     t = np.arange(n) * programme.period / n
     rates = motion.q(t), motion.v(t), motion.a(t)
     values = [np.array(value) for value in exact.map(n)(*(DM(x.T) for x in rates))]
+    if limits.leading:
+        values[1][-1] = leads_of(system, positions(system, rates[0]))
     quantities = [*np.hstack(rates).T, *values[1]]
     names: list[Limit] = [*limits.of_rates, *limits.of_models]
     margins = tuple(
@@ -221,6 +226,17 @@ def _measured(
         scaled_condition=_condition(W / lengths[:, None]),
         margins=margins,
     )
+
+
+def _form(series: Series | None) -> Series:
+    if series is None:
+        return Series()
+    if not isinstance(series, Series):
+        raise ModelError(
+            f"excitation: the series is {quoted(series)}; give"
+            " mbs.identification.Series(period=, harmonics=, samples=)"
+        )
+    return series
 
 
 def _columns(

@@ -12,14 +12,14 @@ import numpy.typing as npt
 from casadi import DM, MX, Function
 
 from mbs.errors import SolverError
-from mbs.identification.excitation.criterion import Criterion, CriterionFunction
-from mbs.identification.excitation.fourier_series import (
+from mbs.identification.exciting.criterion import Criterion, CriterionFunction
+from mbs.identification.exciting.fourier_series import (
     FourierSeries,
     between_samples,
     harmonic_terms,
     resting_coefficients,
 )
-from mbs.identification.excitation.limits import Limit, Limits
+from mbs.identification.exciting.limits import Limit, Limits
 from mbs.identification.follower import Follower, Watch
 
 Array = npt.NDArray[np.float64]
@@ -58,7 +58,7 @@ class Programme:
         period: [s].
         harmonics: two or more.
         samples: instants in equal steps of one period.
-        instant: see `mbs.identification.excitation.instant.instant`.
+        instant: see `mbs.identification.exciting.instant.instant`.
         criterion: of the observations at all samples.
         limits: of the motion.
     """

@@ -8,7 +8,8 @@ import casadi
 from casadi import DM, MX, Function
 
 from mbs.assembly import System
-from mbs.identification.excitation.limits import Limits
+from mbs.identification.exciting.limits import Limits
+from mbs.identification.leading import signed_leads
 from mbs.identification.postures import is_explicit, posture_of
 from mbs.identification.regressors.columns import Column
 from mbs.identification.regressors.dynamic import regressor
@@ -42,6 +43,8 @@ def instant(system: System, columns: Sequence[Column], limits: Limits) -> Functi
     for plane in limits.planes:
         T = transform(system, plane.frame)(q)
         bounded.append(casadi.dot(DM(plane.unit_normal), (T @ DM([*plane.point, 1.0]))[:3]))
+    if limits.leading:
+        bounded.append(signed_leads(system)(q))
     outputs = [D.T, casadi.vertcat(MX(0, 1), *bounded)]
     names = ["q_a", "v_a", "a_a"], ["D", "bounded"]
     function = Function("instant", [q_a, v_a, a_a], outputs, *names)

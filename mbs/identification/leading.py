@@ -1,0 +1,101 @@
+"""How well the independent joints of a closed system lead the others, along a motion."""
+
+from __future__ import annotations
+
+import casadi
+import numpy as np
+import numpy.typing as npt
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.loops.examine import posture_health
+from mbs.loops.velocity import determining_rows
+
+Array = npt.NDArray[np.float64]
+
+LED = 2.5e-3
+"""Squared sine between rows of the passive joints, that of 3 degrees, below which postures are
+taken as next to a singular one: the joints that follow magnify errors by 20 and more."""
+
+CLEAR = 0.01
+"""The same that exciting motions keep."""
+
+_LARGEST = 8
+
+
+def leads_of(system: System, q: Array) -> Array:
+    """(n,) `leads` of `mbs.loops.examine` at postures q (n, nq), negative beyond a singular one.
+
+    The sign is that of the determinant of the passive joints' rows by that of the assembled
+    posture; it does not change where the rows are more than these joints.
+
+    Args:
+        system: with loops, at the defaults of its parameters.
+        q: (n, nq) positions [rad or m].
+    """
+    n, p = len(q), DM(system.parameter_values())
+    leads = np.asarray(posture_health(system).map(n)(DM(q.T), p)[1]).ravel()
+    assert system.closure is not None
+    if system.closure.varies:
+        return leads
+    size = len(system.closure.passive)
+    rows = np.asarray(_passive_rows(system).map(n)(DM(q.T), p)).T.reshape(n, size, size)
+    return np.asarray(leads * np.linalg.slogdet(rows)[0] * _usual_sign(system), dtype=float)
+
+
+def signed_leads(system: System) -> Function:
+    """``leads(q)``: the same as a graph for a search, unsigned where many joints follow."""
+
+    def build() -> Function:
+        q, p = SX.sym("q", system.nq), DM(system.parameter_values())
+        value = posture_health(system)(q, p)[1]
+        assert system.closure is not None
+        size = len(system.closure.passive)
+        if not system.closure.varies and size <= _LARGEST:
+            rows = casadi.reshape(_passive_rows(system)(q, p), size, size)
+            value = value * casadi.sign(_determinant(rows)) * _usual_sign(system)
+        return Function("leads", [q], [value], {"cse": True})
+
+    function: Function = system.cached("signed leads", build)
+    return function
+
+
+def led(system: System, q: Array) -> npt.NDArray[np.bool_]:
+    """(n,) whether a posture, and the step from and to it, keeps clear of singular ones."""
+    leads = leads_of(system, q)
+    good = np.abs(leads) > LED
+    crossed = np.sign(leads[1:]) != np.sign(leads[:-1])
+    good[1:] &= ~crossed
+    good[:-1] &= ~crossed
+    return good
+
+
+def _usual_sign(system: System) -> float:
+    """Of the determinant at the assembled posture."""
+    rows = np.asarray(_passive_rows(system)(DM(system.posture), DM(system.parameter_values())))
+    size = round(rows.size**0.5)
+    return float(np.linalg.slogdet(rows.reshape(size, size))[0]) or 1.0
+
+
+def _passive_rows(system: System) -> Function:
+    """(q, p) -> (r r, 1) the rows that determine the passive velocities, column by column."""
+
+    def build() -> Function:
+        q = SX.sym("q", system.nq)
+        assert system.closure is not None
+        J = determining_rows(system, q).J[:, list(system.closure.passive)]
+        return Function("passive_rows", [q, system.p], [casadi.densify(casadi.vec(J))])
+
+    function: Function = system.cached("passive rows", build)
+    return function
+
+
+def _determinant(A: SX) -> SX:
+    """By traces, without divisions by elements: the method of Faddeev and Le Verrier."""
+    n = A.shape[0]
+    M, c = SX.eye(n), SX(1)
+    for k in range(1, n + 1):
+        product = casadi.mtimes(A, M)
+        c = -casadi.trace(product) / k
+        M = product + c * SX.eye(n)
+    return SX((-1) ** n * c)

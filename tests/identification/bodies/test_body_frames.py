@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+from support.measured_arm import arm, noisy_record
+
+import mbs
+from mbs.components import Body, Revolute
+from mbs.identification.bodies.body_frames import bodies_table, body_values
+from mbs.identification.identify import identify
+from mbs.identification.regressors.columns import columns_of, numbers_of
+
+CENTRE = (0.1, -0.2, 0.3)
+INERTIA = (0.3, 0.4, 0.5)
+
+
+def turned_arm():
+    """Two bodies behind joints about x and y."""
+    m = mbs.Mechanism("turned")
+    first = m.add(Body("first", mass=2, com=CENTRE, inertia=INERTIA))
+    second = m.add(Body("second", mass=3, com=CENTRE, inertia=INERTIA))
+    m.connect(m.world, Revolute("j1", axis="x"), first)
+    m.connect(first.at(0.5, 0.1), Revolute("j2", axis="y"), second)
+    return m
+
+
+def test_bodies_are_told_in_their_own_frames():
+    system = turned_arm().assemble()
+    columns = columns_of(system)
+    rows = body_values(system, columns, numbers_of(system, columns))
+    assert [row.name for row in rows] == ["first", "second"]
+    for row, mass in zip(rows, (2, 3), strict=True):
+        assert row.mass == pytest.approx(mass)
+        assert row.centre == pytest.approx(np.array(CENTRE))
+        assert row.inertia == pytest.approx(np.diag(INERTIA))
+    lines = bodies_table(system, columns, numbers_of(system, columns)).splitlines()
+    assert lines[2].split()[:5] == ["first", "2", "0.1", "-0.2", "0.3"]
+
+
+def test_an_identification_has_the_table():
+    found = identify(arm(), noisy_record(), 8.0, quiet=True)
+    table = found.bodies_table()
+    assert [line.split()[0] for line in table.splitlines()[2:]] == ["link1", "link2", "link3"]
+    assert table in found.text()

@@ -20,14 +20,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import casadi
 import numpy as np
 from pinocchio_twin import twin
-from robots import CATALOGUE, LINKS, urdf
+from robots import frictionless
 from timing import Array, InLibrary, Peer, harness
 
 import mbs
@@ -62,7 +60,7 @@ def main() -> None:
     loops, rows = harness(), []
     with tempfile.TemporaryDirectory() as folder:
         for name in arguments.robots.split(","):
-            system = _system(name, Path(folder))
+            system = frictionless(name, Path(folder))
             for algorithm in arguments.algorithms.split(","):
                 rows.append(_row(name, algorithm, system, loops, Path(folder), arguments.turns))
                 print(rows[-1], file=sys.stderr, flush=True)
@@ -158,19 +156,6 @@ def _difference(outputs: Sequence[Array], other: Any) -> float:
 def _path(library: Path | None) -> Path:
     assert library is not None
     return library
-
-
-def _system(name: str, folder: Path) -> System:
-    """The robot without friction, which pinocchio's algorithms do not have."""
-    if name in CATALOGUE:
-        system = mbs.load(name).assemble()
-    else:
-        file = folder / f"{name}.urdf"
-        file.write_text(urdf(name, LINKS[name]()), encoding="utf-8")
-        system = mbs.load(file).assemble()
-    none = casadi.SX(0)
-    links = tuple(replace(link, Fv=none, Fs=none) for link in system.tree.links)
-    return replace(system, tree=replace(system.tree, links=links), _cache={})
 
 
 if __name__ == "__main__":

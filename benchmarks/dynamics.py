@@ -20,7 +20,7 @@ import tempfile
 import time
 import timeit
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ import casadi
 import numpy as np
 from other_generators import generated_by_others
 from pinocchio_twin import to_twin, twin
-from robots import CATALOGUE, LINKS, urdf
+from robots import CATALOGUE, LINKS, frictionless
 from timing import ALGORITHMS, STATES, Array, Contender, InLibrary, Peer, best_times, harness
 
 import mbs
@@ -93,7 +93,7 @@ def main() -> None:
 
 def measure(name: str, loops: Any, folder: Path, arguments: Any) -> list[Row]:
     """The rows of a robot: built, compiled, compared, then timed in turns."""
-    system = _system(name, folder)
+    system = frictionless(name, folder)
     model = twin(system)
     file = folder / f"{name}.txt"
     model.saveToText(str(file))
@@ -163,19 +163,6 @@ def _difference(a: Contender, b: Contender) -> float:
         x, y = a.value(state), b.value(state)
         worst = max(worst, float(np.max(np.abs(x - y)) / np.max(np.abs(y))))
     return worst
-
-
-def _system(name: str, folder: Path) -> System:
-    """The robot without friction, which pinocchio's algorithms do not have."""
-    if name in CATALOGUE:
-        system = mbs.load(name).assemble()
-    else:
-        file = folder / f"{name}.urdf"
-        file.write_text(urdf(name, LINKS[name]()), encoding="utf-8")
-        system = mbs.load(file).assemble()
-    none = casadi.SX(0)
-    links = tuple(replace(link, Fv=none, Fs=none) for link in system.tree.links)
-    return replace(system, tree=replace(system.tree, links=links), _cache={})
 
 
 def _states(system: System) -> dict[str, Array]:

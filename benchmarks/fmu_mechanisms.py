@@ -22,7 +22,7 @@ import numpy as np
 from fmpy.validation import validate_fmu
 
 import mbs
-from mbs.components import Body, Box, CoulombFriction, Free, Revolute, RigidStop
+from mbs.components import Body, Box, CoulombFriction, Free, Prismatic, Revolute, RigidStop
 from mbs.files import write_text
 
 TOLERANCE = 1e-10
@@ -62,6 +62,26 @@ def rubbing_pendulum() -> mbs.System:
     return m.assemble()
 
 
+def two_roots() -> mbs.System:
+    """A pendulum and a slide beside each other on the ground."""
+    m = mbs.Mechanism("two_roots", gravity=(0, -9.81, 0))
+    rod = m.add(Box("rod", length=0.5, width=0.05, density=2700))
+    bar = m.add(Box("bar", length=0.4, width=0.05, density=2700))
+    m.connect(m.world, Revolute("j1", axis="z", actuated=True), rod.left)
+    m.connect(m.world.at(1, 0, 0), Prismatic("j2", axis="x", actuated=True), bar.left)
+    return m.assemble()
+
+
+def massless_slide() -> mbs.System:
+    """A pendulum on a slide without mass."""
+    m = mbs.Mechanism("massless_slide", gravity=(0, -9.81, 0))
+    slide = m.add(Body("slide", mass=0, com=(0, 0, 0), inertia=(0, 0, 0)))
+    bob = m.add(Body("bob", mass=1, com=(0.4, 0, 0), inertia=(0.01, 0.02, 0.02)))
+    m.connect(m.world, Prismatic("j1", axis="x", actuated=True), slide)
+    m.connect(slide, Revolute("j2", axis="z"), bob)
+    return m.assemble()
+
+
 def _catalogue(name: str) -> Callable[[], mbs.System]:
     return lambda: mbs.load(name).assemble()
 
@@ -76,6 +96,9 @@ CASES = {
     "delta": Case(_catalogue("delta"), 0.4, 1.0),
     "stewart_platform": Case(_catalogue("stewart_platform"), 0.25, 60.0),
     "floating_body": Case(floating_body, 2.0, 0.0),
+    "two_roots": Case(two_roots, 1.0, 3.0),
+    "massless_slide": Case(massless_slide, 0.5, 3.0),
+    "bricard": Case(_catalogue("bricard"), 0.5, 0.3),
 }
 
 

@@ -14,10 +14,15 @@ Arms of the catalogue come from their tables. The others are URDF texts made her
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
+from pathlib import Path
 
+import casadi
 import numpy as np
+
+import mbs
+from mbs.assembly import System
 
 CATALOGUE = ("puma560", "rx90", "stanford")
 AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
@@ -204,3 +209,21 @@ LINKS: dict[str, Callable[[], list[Link]]] = {
     "chain30": lambda: chain(30),
     "chain100": lambda: chain(100),
 }
+
+
+def frictionless(name: str, folder: Path) -> System:
+    """A robot by its name, without friction, which pinocchio's algorithms do not have.
+
+    Args:
+        name: of the catalogue, or a key of `LINKS`.
+        folder: for its URDF.
+    """
+    if name in CATALOGUE:
+        system = mbs.load(name).assemble()
+    else:
+        file = folder / f"{name}.urdf"
+        file.write_text(urdf(name, LINKS[name]()), encoding="utf-8")
+        system = mbs.load(file).assemble()
+    none = casadi.SX(0)
+    links = tuple(replace(link, Fv=none, Fs=none) for link in system.tree.links)
+    return replace(system, tree=replace(system.tree, links=links), _cache={})

@@ -3,7 +3,7 @@
 import casadi
 import numpy as np
 import pytest
-from bridges.test_opti import acrobot, four_bar
+from support.rod_mechanisms import acrobot, four_bar
 
 from mbs.bridges import acados_fields
 from mbs.errors import ModelError

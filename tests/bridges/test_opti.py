@@ -3,9 +3,10 @@
 import casadi
 import numpy as np
 import pytest
+from support.rod_mechanisms import acrobot, four_bar
 
 from mbs.bridges import Grid, collocation, invariants, multiple_shooting, step
-from mbs.components import Body, Mechanism, Prismatic, Revolute
+from mbs.components import Body, Mechanism, Prismatic
 from mbs.errors import ModelError
 from mbs.models import dae
 from mbs.native import batch
@@ -18,30 +19,6 @@ def slider():
     m = Mechanism("slider", gravity=(0, 0, -9.81), parameters={"m": 2.0})
     m.connect(m.world, Prismatic("s", axis="x", actuated=True), m.add(Body("b", mass="m")))
     return m.assemble()
-
-
-def acrobot():
-    m = Mechanism("acrobot", gravity=(0, -9.81, 0))
-    a, b = (
-        m.add(Body(n, mass=1, com=(0.5, 0, 0), inertia=(0, 1 / 12, 1 / 12)))
-        for n in ("upper", "lower")
-    )
-    m.connect(m.world, Revolute("shoulder", actuated=False), a)
-    m.connect(a.at(1.0), Revolute("elbow", actuated=True), b)
-    return m.assemble()
-
-
-def four_bar():
-    m = Mechanism("four_bar", gravity=(0, -9.81, 0))
-    crank, coupler, rocker = (
-        m.add(Body(n, mass=w, com=(x / 2, 0, 0), inertia=(0, w * x**2 / 12, w * x**2 / 12)))
-        for n, x, w in (("crank", 0.25, 1.0), ("coupler", 0.8, 3.0), ("rocker", 0.7, 2.0))
-    )
-    m.connect(m.world, Revolute("j1", actuated=True), crank)
-    m.connect(crank.at(0.25), Revolute("j2"), coupler)
-    m.connect(coupler.at(0.8), Revolute("j3"), rocker.at(0.7))
-    m.connect(m.world.at(1.0), Revolute("j4"), rocker)
-    return m.assemble(guess={"j1": 0.3, "j2": 0.8, "j4": 1.5})
 
 
 def moved(way, goal):

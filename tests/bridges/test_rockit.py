@@ -3,7 +3,8 @@
 import casadi
 import numpy as np
 import pytest
-from bridges.test_opti import four_bar, slider
+from bridges.test_opti import slider
+from support.rod_mechanisms import four_bar
 
 from mbs.bridges import rockit_stage
 from mbs.errors import ModelError

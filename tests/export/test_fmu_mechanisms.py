@@ -10,7 +10,9 @@ from fmu_mechanisms import CASES, imported, simulated
 import mbs
 
 
-@pytest.mark.parametrize("name", ["four_bar", "five_bar", "floating_body"])
+@pytest.mark.parametrize(
+    "name", ["four_bar", "five_bar", "floating_body", "two_roots", "massless_slide", "bricard"]
+)
 def test_model_exchange_co_simulation_and_simulation_agree(name, tmp_path):
     case = CASES[name]
     system = case.system()

@@ -4,27 +4,13 @@ import casadi
 import numpy as np
 import pytest
 from casadi import MX
+from support.rod_mechanisms import four_bar
 
-from mbs.components import Body, Mechanism, Revolute
 from mbs.models import dae
 
 STAGES, POINTS = 40, 3
 OPTIMUM = 28.1827
 """Found with equations of Lagrange written by hand, for the same collocation."""
-
-
-def four_bar():
-    """Crank 0.25, coupler 0.8, rocker 0.7 and ground 1.0 m; thin rods of 1, 3 and 2 kg."""
-    m = Mechanism("four_bar", gravity=(0, -9.81, 0))
-    crank, coupler, rocker = (
-        m.add(Body(n, mass=w, com=(x / 2, 0, 0), inertia=(1e-9, w * x**2 / 12, w * x**2 / 12)))
-        for n, x, w in (("crank", 0.25, 1.0), ("coupler", 0.8, 3.0), ("rocker", 0.7, 2.0))
-    )
-    m.connect(m.world, Revolute("j1", actuated=True), crank)
-    m.connect(crank.at(0.25), Revolute("j2"), coupler)
-    m.connect(coupler.at(0.8), Revolute("j3"), rocker.at(0.7))
-    m.connect(m.world.at(1.0), Revolute("j4"), rocker)
-    return m.assemble(guess={"j1": 0.3, "j2": 0.8, "j4": 1.5})
 
 
 def stage(d, h):

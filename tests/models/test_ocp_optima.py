@@ -4,25 +4,14 @@ import casadi
 import numpy as np
 import pytest
 from casadi import MX, SX, Function
+from support.rod_mechanisms import acrobot
 
-from mbs.components import Body, Mechanism, Revolute
 from mbs.models import dae
 from mbs.native import compiled
 
 STAGES, DURATION, LARGEST = 60, 4.0, 30.0
 OPTIMUM = 53.527
 """Of equations of Lagrange written by hand, for the same steps."""
-
-
-def acrobot():
-    """Two thin rods of 1 m and 1 kg, the motor at the elbow."""
-    m = Mechanism("acrobot", gravity=(0, -9.81, 0))
-    before = m.world
-    for name in ("shoulder", "elbow"):
-        rod = m.add(Body(f"{name}_rod", mass=1, com=(0.5, 0, 0), inertia=(1e-9, 1 / 12, 1 / 12)))
-        m.connect(before, Revolute(name, actuated=name == "elbow"), rod)
-        before = rod.at(1.0)
-    return m.assemble()
 
 
 def runge_kutta(d, h):

@@ -2,45 +2,19 @@
 
 import numpy as np
 import pytest
+from support.contact_mechanisms import DENSITY, FOUR, FOUR_GUESS, WIDTH, bars
 
 import mbs
 from mbs.components import (
-    Box,
     CoulombFriction,
     JointFriction,
-    Revolute,
     RigidStop,
     WrenchSensor,
 )
 
-DENSITY, WIDTH = 2700.0, 0.05
-
 
 def run(system, duration, **options):
     return mbs.simulate.run(system, duration, quiet=True, tolerance=1e-10, **options)
-
-
-def bars(lengths, base, gravity, *elements, guess=None):
-    """A planar loop of two arms, the last bar of one pinned to the last one of the other.
-
-    The arms start at the origin and at (base, 0); their joints are a1, a2, .. and b1, b2, ..
-    """
-    m = mbs.Mechanism("bars", gravity=(0, gravity, 0))
-    ends = []
-    for arm, start in (("a", m.world), ("b", m.world.at(base, 0, 0))):
-        end = start
-        for k, length in enumerate(lengths[arm], start=1):
-            bar = m.add(Box(f"bar_{arm}{k}", length=length, width=WIDTH, density=DENSITY))
-            driven = k == 1 and (arm == "a" or len(lengths["b"]) == 2)
-            m.connect(end, Revolute(f"{arm}{k}", axis="z", actuated=driven), bar.left)
-            end = bar.right
-        ends.append(end)
-    pin = Revolute("pin", axis="z")
-    m.connect(ends[0], pin, ends[1])
-    m.cut(pin)
-    for element in elements:
-        m.add(element)
-    return m.assemble(guess=guess)
 
 
 def arm(q, lengths, x):
@@ -89,8 +63,6 @@ def after_impact(A, J, v, row, restitution):
     return v + np.linalg.solve(K, right)[:n]
 
 
-FOUR = {"a": (0.4, 1.0), "b": (0.9,)}
-FOUR_GUESS = {"a1": 1.0, "a2": -0.8, "b1": 1.4}
 FIVE = {"a": (0.5, 0.6), "b": (0.5, 0.6)}
 FIVE_GUESS = {"a1": 2.0, "a2": -1.2, "b1": 1.1, "b2": 1.2}
 

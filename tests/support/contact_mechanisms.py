@@ -6,6 +6,7 @@ import mbs
 from mbs.components import Box, CoulombFriction, PointMass, Prismatic, Revolute, RigidStop, Spring
 
 G = 9.81
+DENSITY, WIDTH = 2700.0, 0.05
 FIVE = {"a": (0.5, 0.6), "b": (0.5, 0.6)}
 FIVE_GUESS = {"a1": 2.0, "a2": -1.2, "b1": 1.1, "b2": 1.2}
 FOUR = {"a": (0.4, 1.0), "b": (0.9,)}
@@ -52,7 +53,7 @@ def bars(lengths, base, gravity, *elements, guess):
     for arm, start in (("a", m.world), ("b", m.world.at(base, 0, 0))):
         end = start
         for k, length in enumerate(lengths[arm], start=1):
-            bar = m.add(Box(f"bar_{arm}{k}", length=length, width=0.05, density=2700.0))
+            bar = m.add(Box(f"bar_{arm}{k}", length=length, width=WIDTH, density=DENSITY))
             driven = k == 1 and (arm == "a" or len(lengths["b"]) == 2)
             m.connect(end, Revolute(f"{arm}{k}", axis="z", actuated=driven), bar.left)
             end = bar.right

@@ -1,6 +1,6 @@
 """Model builders: a System in, a casadi.Function with named inputs and outputs out."""
 
-from mbs.models import inverse_geometry
+from mbs.models import catalogue, inverse_geometry
 from mbs.models.contact_phases import ContactPhases, contact_phases
 from mbs.models.contact_points import ContactPoint
 from mbs.models.dae import Dae, dae
@@ -32,6 +32,7 @@ __all__ = [
     "Limits",
     "acceleration_closure",
     "bias",
+    "catalogue",
     "contact_phases",
     "dae",
     "devices",

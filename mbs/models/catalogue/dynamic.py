@@ -1,0 +1,81 @@
+"""Dynamic models: efforts, accelerations, matrices, energy, wrenches and derivatives."""
+
+from __future__ import annotations
+
+from mbs.models.catalogue.entry import Entry
+from mbs.models.catalogue.options import COORDINATES, F_EXT, METHODS, MOVING_BASE, choice
+from mbs.models.derivatives import direct_dynamics_derivatives, inverse_dynamics_derivatives
+from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
+from mbs.models.energy import energy
+from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
+from mbs.models.joint_wrenches import joint_wrenches
+from mbs.models.lagrange import lagrange
+
+DYNAMIC: tuple[Entry, ...] = (
+    Entry(
+        "idm",
+        "Dynamic",
+        "Inverse dynamic model, Newton and Euler",
+        "tau(q, v, a)",
+        (COORDINATES, F_EXT, MOVING_BASE),
+        inverse_dynamics,
+    ),
+    Entry(
+        "lagrange",
+        "Dynamic",
+        "Inverse dynamic model, Lagrange",
+        "A(q) a + B(q, v) v + Q(q)",
+        (choice("method", "method", "auto", "renaud", "christoffel"), COORDINATES),
+        lagrange,
+    ),
+    Entry("inertia", "Dynamic", "Inertia matrix", "A(q)", (COORDINATES,), inertia_matrix),
+    Entry(
+        "bias",
+        "Dynamic",
+        "Centrifugal, Coriolis and gravity efforts",
+        "H(q, v)",
+        (COORDINATES, MOVING_BASE),
+        bias,
+    ),
+    Entry(
+        "gravity",
+        "Dynamic",
+        "Gravity efforts",
+        "Q(q)",
+        (COORDINATES, MOVING_BASE),
+        gravity_effort,
+    ),
+    Entry(
+        "ddm",
+        "Dynamic",
+        "Direct dynamic model",
+        "a(q, v, tau)",
+        (METHODS, COORDINATES, F_EXT, MOVING_BASE),
+        direct_dynamics,
+    ),
+    Entry(
+        "wrenches",
+        "Dynamic",
+        "Wrenches in the joints",
+        "jfj, jmj",
+        (COORDINATES, F_EXT, MOVING_BASE),
+        joint_wrenches,
+    ),
+    Entry("energy", "Dynamic", "Energy", "E(q, v), U(q)", (COORDINATES,), energy),
+    Entry(
+        "didm",
+        "Dynamic",
+        "Derivatives of the inverse dynamic model",
+        "d tau / d (q, v, a)",
+        (COORDINATES,),
+        inverse_dynamics_derivatives,
+    ),
+    Entry(
+        "dddm",
+        "Dynamic",
+        "Derivatives of the direct dynamic model",
+        "d a / d (q, v, tau)",
+        (COORDINATES,),
+        direct_dynamics_derivatives,
+    ),
+)

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mbs
-from mbs.bridges import Grid, multiple_shooting
+from mbs.bridges import Grid, collocation, multiple_shooting
 from mbs.components import Body, Prismatic, Revolute
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/chain")
@@ -38,15 +38,15 @@ def chain(count):
 
 
 # %% 3 m to the side in 2.5 s, all at rest at both ends
-STAGES, SUBSTEPS, DURATION, WAY = 40, 2, 2.5, 3.0
+STAGES, DURATION, WAY = 40, 2.5, 3.0
 
 
-def least_effort(system):
-    """The solution and what it took."""
+def least_effort(system, transcription, **options):
+    """States, efforts and cost."""
     clock = time.perf_counter()
     dae = mbs.models.dae(system)
     opti = casadi.Opti()
-    way = multiple_shooting(opti, dae, Grid(stages=STAGES, duration=DURATION), substeps=SUBSTEPS)
+    way = transcription(opti, dae, Grid(stages=STAGES, duration=DURATION), **options)
     there = np.zeros(dae.x.numel())
     there[0] = WAY
     opti.subject_to(way.x[:, 0] == 0)
@@ -58,15 +58,20 @@ def least_effort(system):
     found = opti.solve()
     seconds, count = time.perf_counter() - clock, found.stats()["iter_count"]
     cost = found.value(opti.f)
-    print(f"ready in {ready:.1f} s, {count} iterations in {seconds:.2f} s")
+    name = transcription.__name__
+    print(f"{name}: ready in {ready:.1f} s, {count} iterations in {seconds:.2f} s")
     return found.value(way.x), found.value(way.u), cost
 
 
 results = {}
-for count, known in ((1, 114.595), (2, 134.967), (4, 129.933)):
-    results[count] = least_effort(chain(count))
+for count in (1, 2, 4):
+    system = chain(count)
+    results[count] = least_effort(system, multiple_shooting, substeps=4)
+    cost = results[count][2]
     links = "1 link" if count == 1 else f"{count} links"
-    print(f"{links}: cost - {known}: {results[count][2] - known:.4f} N2 s")
+    print(f"{links}: cost {cost:.3f} N2 s")
+    *_, other = least_effort(system, collocation, points=3, scheme="legendre")
+    print(f"{links}: shooting - collocation: {cost - other:.5f} N2 s")
 largest, *_ = results[max(results)]
 
 # %% Draw it
@@ -84,7 +89,7 @@ drawing.plot([-0.3, WAY + 0.3], [0, 0], color="0.7", linewidth=4, zorder=0)
 drawing.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"{count} links, grey to black")
 times = np.linspace(0, DURATION, STAGES + 1)
 for number, (_, u, _) in results.items():
-    forces.stairs(u, times, baseline=None, label=f"{number} links")
+    forces.stairs(u, times, baseline=None, label="1 link" if number == 1 else f"{number} links")
 forces.set(xlabel="time [s]", title="force on the crab [N]")
 forces.legend()
 figure.savefig(folder / "chain.png", dpi=90)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import casadi
-from casadi import SX
+from casadi import SX, Function
 
+from mbs.bridges.explicit import require_dae
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.models.dae import Dae
@@ -23,14 +24,19 @@ def acados_fields(dae: Dae, name: str = "model") -> dict[str, Any]:
 
     Args:
         dae: "reduced" for the integrator ERK, or with "index1" for IRK and GNSF.
-        name: of the model; it becomes a part of names in C.
+        name: of the model: letters, digits and single underscores, for it becomes a part of names
+            in C.
 
     Returns:
         name, x, xdot, u, z, p, f_impl_expr and perhaps f_expl_expr.
 
     Raises:
-        ModelError: the form is of index 2 or 3, which acados does not integrate.
+        ModelError: the form is of index 2 or 3, which acados does not integrate; or the name does
+            not serve in C.
     """
+    require_dae(dae)
+    if not isinstance(name, str) or not Function.check_name(name):
+        raise ModelError(f"name is {quoted(name)}; use letters, digits and single underscores")
     closed = casadi.which_depends(dae.alg, dae.z, 1, True) if dae.z.numel() else []
     if dae.form in _HIGHER and not all(closed):
         raise ModelError(

@@ -8,8 +8,15 @@ import casadi
 import numpy as np
 from casadi import MX, Function, Opti
 
-from mbs.bridges.explicit import Model, explicit
-from mbs.bridges.opti import Grid, Transcription, parameter_values
+from mbs.bridges.explicit import Model, explicit, require_dae
+from mbs.bridges.opti import (
+    Grid,
+    Transcription,
+    elements_of,
+    parameter_values,
+    require_counts,
+    variable,
+)
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.models.dae import Dae
@@ -42,7 +49,8 @@ def collocation(
         grid: stages, their duration, how they are evaluated.
         points: K of each stage, 1 to 9.
         scheme: "radau", of order 2K - 1 and stiffly accurate, or "legendre", of order 2K.
-        p: parameters, numbers or an expression of `opti`; the defaults of a Dae when left out.
+        p: parameters, numbers or an expression of `opti`, such as variables; or numbers by name.
+            Of a Dae, what is left out has its default.
 
     Returns:
         the variables.
@@ -50,11 +58,12 @@ def collocation(
     Raises:
         ModelError: there is no such scheme, or parameters have no values.
     """
+    require_counts(opti, grid, points=points)
     nodes = _nodes(points, scheme)
     slopes, ends, weights = (np.array(c) for c in casadi.collocation_coeff(list(nodes)))
     residual, count = _residual(model), grid.stages
-    x, z, u = (opti.variable(residual.size1_in(n), w) for n, w in _widths(points, count, scheme))
-    inside = opti.variable(x.shape[0], points * count)
+    x, z, u = (variable(opti, residual.size1_in(n), w) for n, w in _widths(points, count, scheme))
+    inside = variable(opti, x.shape[0], points * count)
     last = inside[:, points - 1 :: points]
     knots = casadi.horzcat(x, last) if scheme == "radau" else x
     basis = [knots[:, :-1], *(inside[:, k::points] for k in range(points))]
@@ -80,17 +89,22 @@ def collocation(
         weights=weights.ravel(),
         nodes=nodes,
         variables={"x": x, "u": u, "z": z, "x_points": inside},
+        elements=elements_of(model),
     )
 
 
-def invariants(model: Dae, x: MX, p: MX) -> MX:
+def invariants(model: Dae, x: MX, p: Any = None) -> MX:
     """What is zero along every motion, at one knot; ask it there only, where x is not given.
 
     Args:
         model: whose states they are.
         x: (nx, 1) a knot.
-        p: (np, 1) parameters.
+        p: (np, 1) parameters, as the transcription has them; the defaults when left out.
+
+    Raises:
+        ModelError: the model is no Dae, or p does not fit.
     """
+    p = parameter_values(require_dae(model), model.p.numel(), p)
     function = Function("invariants", [model.x, model.p], [model.invariants], {"cse": True})
     rows: MX = function(x, p)
     return rows
@@ -99,7 +113,7 @@ def invariants(model: Dae, x: MX, p: MX) -> MX:
 def _nodes(points: int, scheme: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     if scheme not in SCHEMES:
         raise ModelError(f"scheme is {quoted(scheme)}; use one of {', '.join(SCHEMES)}")
-    if not isinstance(points, int) or not 1 <= points <= 9:
+    if points > 9:
         raise ModelError(f"points is {quoted(points)}; use 1 to 9")
     return np.array(casadi.collocation_points(points, scheme))
 

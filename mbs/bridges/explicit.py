@@ -14,6 +14,17 @@ Model = Dae | Function
 """Equations: a `Dae`, or a Function of (x, u) or (x, u, p) that gives dx/dt."""
 
 
+def require_dae(model: object) -> Dae:
+    """The model, refused where it is no Dae.
+
+    Raises:
+        ModelError: says what to give.
+    """
+    if not isinstance(model, Dae):
+        raise ModelError(f"{quoted(model)} is not a Dae; give mbs.models.dae(system)")
+    return model
+
+
 def explicit(model: Model) -> Function:
     """``ode(x, u, p) -> dx/dt`` of equations without algebraic states.
 
@@ -42,7 +53,10 @@ def explicit(model: Model) -> Function:
 
 def _check(model: Function) -> None:
     if not isinstance(model, Function):
-        raise ModelError(f"{quoted(model)} has no equations; give an mbs.models.dae or a Function")
+        raise ModelError(
+            f"{quoted(model)} has no equations; give mbs.models.dae(system), or a Function"
+            " of (x, u) or (x, u, p) that gives dx/dt"
+        )
     columns = [model.size2_in(k) for k in range(model.n_in())]
     if model.n_in() not in (2, 3) or columns != [1] * len(columns):
         raise ModelError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,35 +11,47 @@ from casadi import Function, densify
 from numpy.typing import NDArray
 
 from mbs.errors import ModelError
-from mbs.native import compiled
+from mbs.native import batch
+from mbs.native.batch import Batch
 from mbs.native.compiled import require_function
 
-_Array = NDArray[np.float64]
+_Outputs = Callable[..., tuple[Any, ...]]
 
 
 def jax_function(function: Function) -> Callable[..., Any]:
     """The Function for JAX: under `jit`, `vmap`, `grad`, `jacfwd`, `jacrev` and `hessian`.
 
-    JAX calls machine code on the host by `jax.pure_callback`. Derivatives are products with the
-    Function's own Jacobian, which is again such a callable, so they can be taken to any order and
-    in both directions; each order is compiled when JAX first asks for it. For use on the CPU;
-    an accelerator waits for the host at every call.
+    JAX calls machine code on the host by `jax.pure_callback`, once for all points of a `vmap`:
+    they are a batch, see `mbs.native.batch`. Derivatives are products with the Function's own
+    Jacobian, which is again such a callable, so they can be taken to any order and in both
+    directions; each order is compiled when JAX first asks for it. For use on the CPU; an
+    accelerator waits for the host at every call.
 
     Args:
         function: any Function of vectors without free symbols, such as a model.
 
     Returns:
-        a callable of arrays: an input of n rows is (n,), or () where n is 1 and a number is given;
-        an output of one column is (n,), of several a matrix (m, n); several outputs are a tuple.
+        a callable of arrays, in their order or by name; the parameters of a model may be left
+        out. An input of n rows is (n,), or () where n is 1; an output of one column is (n,), of
+        several a matrix (m, n); several outputs are a tuple.
 
     Raises:
-        ModelError: JAX is not installed or calculates with 32 bits; an input has several columns.
+        ModelError: JAX is not installed or calculates with 32 bits; it is no Function, or an
+            input has several columns.
     """
     jax = _jax()
     require_function(function)
     if any(function.size2_in(k) > 1 for k in range(function.n_in())):
         raise ModelError(f"{function.name()}: an input is a matrix; make it a vector")
-    return _differentiable(jax, Function(function))
+    machine = batch(function)
+    call = _differentiable(jax, Function(function), machine)
+
+    def answer(*args: Any, **named: Any) -> Any:
+        outputs = call(*_vectors(jax, machine, machine.ordered(args, named)))
+        return outputs[0] if len(outputs) == 1 else outputs
+
+    answer.__name__, answer.__doc__ = function.name(), str(function)
+    return answer
 
 
 def _jax() -> Any:
@@ -54,10 +66,10 @@ def _jax() -> Any:
     return jax
 
 
-def _differentiable(jax: Any, function: Function) -> Callable[..., Any]:
-    """The callable, and by the rule of its tangents all its derivatives."""
-    values = _on_host(jax, function)
-    slopes: list[Callable[..., Any]] = []
+def _differentiable(jax: Any, function: Function, machine: Batch) -> _Outputs:
+    """A callable of its outputs, and by the rule of its tangents all its derivatives."""
+    values = _on_host(jax, machine)
+    slopes: list[_Outputs] = []
 
     @jax.custom_jvp  # type: ignore[untyped-decorator]
     def call(*inputs: Any) -> tuple[Any, ...]:
@@ -66,24 +78,20 @@ def _differentiable(jax: Any, function: Function) -> Callable[..., Any]:
     @call.defjvp  # type: ignore[untyped-decorator]
     def tangents(points: Any, directions: Any) -> tuple[Any, Any]:
         if not slopes:
-            slopes.append(_differentiable_jacobian(jax, function))
+            slopes.append(_slopes(jax, function))
         return call(*points), slopes[0](points, directions)
 
-    def answer(*given: Any) -> Any:
-        outputs = call(*_inputs(jax, function, given))
-        return outputs[0] if len(outputs) == 1 else outputs
-
-    answer.outputs = call  # type: ignore[attr-defined]
-    return answer
+    outputs: _Outputs = call
+    return outputs
 
 
-def _differentiable_jacobian(jax: Any, function: Function) -> Callable[..., tuple[Any, ...]]:
+def _slopes(jax: Any, function: Function) -> _Outputs:
     """Sum over the inputs of d(output)/d(input) times a direction, for every output."""
     inputs, outputs = function.n_in(), function.n_out()
     point = function.mx_in()
     blocks = function.jacobian().call([*point, *function.call(point)])
     flat = Function(f"slopes_{function.name()}", point, [densify(block) for block in blocks])
-    slopes = _differentiable(jax, flat).outputs  # type: ignore[attr-defined]
+    slopes = _differentiable(jax, flat, batch(flat))
 
     def product(points: Any, directions: Any) -> tuple[Any, ...]:
         every = slopes(*points)
@@ -91,7 +99,7 @@ def _differentiable_jacobian(jax: Any, function: Function) -> Callable[..., tupl
         for k in range(outputs):
             row = every[k * inputs : (k + 1) * inputs]
             terms = [
-                jax.numpy.atleast_2d(J).reshape(function.numel_out(k), -1) @ d
+                J.reshape(function.numel_out(k), d.size) @ d
                 for J, d in zip(row, directions, strict=True)
             ]
             result.append(_shaped(sum(terms), function.size_out(k)))
@@ -106,49 +114,46 @@ def _shaped(column: Any, size: tuple[int, int]) -> Any:
     return column if columns == 1 else column.reshape(columns, rows).T
 
 
-def _inputs(jax: Any, function: Function, given: tuple[Any, ...]) -> list[Any]:
-    names = function.name_in()
-    if len(given) != len(names):
-        raise ModelError(
-            f"{function.name()}: {len(given)} arguments were given; the inputs are"
-            f" {', '.join(names)}"
-        )
+def _vectors(jax: Any, machine: Batch, given: Sequence[Any]) -> list[Any]:
+    """Every input as a vector.
+
+    Raises:
+        ModelError: one has another size.
+    """
     arrays = [jax.numpy.asarray(value, dtype=float).reshape(-1) for value in given]
-    for name, array in zip(names, arrays, strict=True):
-        if array.size != function.size1_in(name):
+    for port, array in zip(machine.inputs, arrays, strict=True):
+        if array.size != port.size:
             raise ModelError(
-                f"{function.name()}: {name} has {array.size} values, it needs"
-                f" {function.size1_in(name)}"
+                f"{machine.function.name()}: {port.name} has {array.size} values, it needs"
+                f" {port.size}"
             )
     return arrays
 
 
-def _on_host(jax: Any, function: Function) -> Callable[..., tuple[Any, ...]]:
-    """The machine code behind a callback; a batch of points is a loop on the host."""
-    machine = compiled(function, derivatives=0)
-    shapes = [_shape(function.size_out(k)) for k in range(function.n_out())]
+def _on_host(jax: Any, machine: Batch) -> _Outputs:
+    """The machine code behind a callback; the points of a `vmap` are rows of one batch."""
+    wanted = tuple(jax.ShapeDtypeStruct(port.shape, np.float64) for port in machine.outputs)
 
-    def evaluate(*points: Any) -> tuple[_Array, ...]:
+    def evaluate(*points: Any) -> tuple[NDArray[np.float64], ...]:
         arrays = [np.asarray(point, dtype=float) for point in points]
         lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
-        rows = [np.broadcast_to(a, (*lead, a.shape[-1])).reshape(-1, a.shape[-1]) for a in arrays]
-        outputs = [np.empty((int(np.prod(lead)), *shape)) for shape in shapes]
-        for number in range(len(outputs[0])):
-            found = machine.call([row[number] for row in rows])
-            for output, value, shape in zip(outputs, found, shapes, strict=True):
-                output[number] = np.array(value).reshape(shape)
-        return tuple(o.reshape(*lead, *s) for o, s in zip(outputs, shapes, strict=True))
-
-    wanted = tuple(jax.ShapeDtypeStruct(shape, np.float64) for shape in shapes)
+        found = machine(*(_rows(array, lead) for array in arrays))
+        outputs = found if isinstance(found, tuple) else (found,)
+        ports = zip(outputs, machine.outputs, strict=True)
+        return tuple(output.reshape(*lead, *port.shape) for output, port in ports)
 
     def values(*points: Any) -> tuple[Any, ...]:
         answer: tuple[Any, ...] = jax.pure_callback(
-            evaluate, wanted, *points, vmap_method="broadcast_all"
+            evaluate, wanted, *points, vmap_method="expand_dims"
         )
         return answer
 
     return values
 
 
-def _shape(size: tuple[int, int]) -> tuple[int, ...]:
-    return size[:1] if size[1] == 1 else size
+def _rows(array: NDArray[np.float64], lead: tuple[int, ...]) -> NDArray[np.float64]:
+    """Points as rows; a vector where all have the same."""
+    size = array.shape[-1]
+    if array.size == size:
+        return array.reshape(size)
+    return np.broadcast_to(array, (*lead, size)).reshape(-1, size)

@@ -9,7 +9,14 @@ import numpy as np
 from casadi import MX, Opti
 
 from mbs.bridges.explicit import Model, explicit
-from mbs.bridges.opti import Grid, Transcription, parameter_values
+from mbs.bridges.opti import (
+    Grid,
+    Transcription,
+    elements_of,
+    parameter_values,
+    require_counts,
+    variable,
+)
 from mbs.bridges.step import advanced
 
 
@@ -31,7 +38,8 @@ def multiple_shooting(
             dx/dt.
         grid: stages, their duration, how they are evaluated.
         substeps: steps of the classical method of order 4 within a stage.
-        p: parameters, numbers or an expression of `opti`; the defaults of a Dae when left out.
+        p: parameters, numbers or an expression of `opti`, such as variables; or numbers by name.
+            Of a Dae, what is left out has its default.
 
     Returns:
         the variables.
@@ -39,9 +47,10 @@ def multiple_shooting(
     Raises:
         ModelError: the model has algebraic states, or parameters without values.
     """
+    require_counts(opti, grid, substeps=substeps)
     ode, count = explicit(model), grid.stages
-    x = opti.variable(ode.size1_in("x"), count + 1)
-    u = opti.variable(ode.size1_in("u"), count)
+    x = variable(opti, ode.size1_in("x"), count + 1)
+    u = variable(opti, ode.size1_in("u"), count)
     p = parameter_values(model, ode.size1_in("p"), p)
     every = casadi.repmat(p, 1, count)
     rates = grid.mapped(ode, count)
@@ -59,4 +68,5 @@ def multiple_shooting(
         weights=np.ones(1),
         nodes=np.zeros(1),
         variables={"x": x, "u": u},
+        elements=elements_of(model),
     )

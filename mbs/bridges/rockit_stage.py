@@ -7,7 +7,8 @@ from typing import Any
 
 from casadi import DM, MX
 
-from mbs.bridges.opti import CODES
+from mbs.bridges.explicit import require_dae
+from mbs.bridges.opti import CODES, parameter_values
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.models.dae import Dae
@@ -21,7 +22,7 @@ class RockitStage:
         x: (nx, 1) differential states.
         z: (nz, 1) algebraic states.
         u: (nu, 1) efforts.
-        p: (np, 1) parameters, set to the values of the start.
+        p: (np, 1) parameters.
         q: (nq, 1) positions of the tree, for constraints on paths and poses.
         v: (nv, 1) velocities of the tree.
         invariants: ask `stage.at_t0(invariants) == 0` where x is not given at the start.
@@ -36,7 +37,7 @@ class RockitStage:
     invariants: MX
 
 
-def rockit_stage(stage: Any, dae: Dae, *, code: str = "interpreted") -> RockitStage:
+def rockit_stage(stage: Any, dae: Dae, *, code: str = "interpreted", p: Any = None) -> RockitStage:
     """States, controls and parameters on a stage, with `set_der` and `add_alg` of a Dae.
 
     rockit chooses the method afterwards: "reduced" goes with all of them, forms with algebraic
@@ -47,20 +48,23 @@ def rockit_stage(stage: Any, dae: Dae, *, code: str = "interpreted") -> RockitSt
         dae: equations, of any form that the method takes.
         code: "interpreted", or "compiled" for machine code of the equations with exact first and
             second derivatives.
+        p: parameters: an expression of the stage, such as `stage.variable(np)`, or numbers, by
+            name or all. When left out they are `stage.parameter`, set to the defaults.
 
     Returns:
         the signals.
 
     Raises:
-        ModelError: there is no such code.
+        ModelError: there is no such code, it is no Dae, or p does not fit.
     """
+    require_dae(dae)
     if code not in CODES:
         raise ModelError(f"code is {quoted(code)}; use one of {', '.join(CODES)}")
     function = CODES[code](dae.function())
     x = stage.state(dae.x.numel())
     z = stage.algebraic(dae.z.numel()) if dae.z.numel() else MX(0, 1)
     u = stage.control(dae.u.numel()) if dae.u.numel() else MX(0, 1)
-    p = stage.parameter(dae.p.numel()) if dae.p.numel() else MX(0, 1)
+    p = _parameters(stage, dae, p)
     ode, alg, invariants, q, v = function(x, z, u, p)
     stage.set_der(x, ode)
     stage.set_initial(x, DM(dae.x0))
@@ -69,6 +73,13 @@ def rockit_stage(stage: Any, dae: Dae, *, code: str = "interpreted") -> RockitSt
         stage.set_initial(z, DM(dae.z0))
     if dae.u.numel():
         stage.set_initial(u, DM(dae.u0))
-    if dae.p.numel():
-        stage.set_value(p, DM(dae.p0))
     return RockitStage(x, z, u, p, q, v, invariants)
+
+
+def _parameters(stage: Any, dae: Dae, given: Any) -> MX:
+    """Those given, else parameters of the stage."""
+    if given is not None or not dae.p.numel():
+        return parameter_values(dae, dae.p.numel(), given)
+    p: MX = stage.parameter(dae.p.numel())
+    stage.set_value(p, DM(dae.p0))
+    return p

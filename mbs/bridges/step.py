@@ -29,7 +29,8 @@ def step(model: Model, substeps: int = 1) -> Function:
 
     Returns:
         a Function of SX operations where the model is one, else of MX. x (nx, 1) state,
-        u (nu, 1) efforts, p (np, 1) parameters, dt [s].
+        u (nu, 1) efforts, p (np, 1) parameters, dt [s]. Give p: CasADi takes zeros for an input
+        that is left out.
 
     Raises:
         ModelError: the model has algebraic states or other inputs, or substeps is below 1.
@@ -55,7 +56,7 @@ def advanced(rate: Callable[[_T], _T], x: _T, duration: _T, substeps: int) -> _T
     Raises:
         ModelError: substeps is below 1.
     """
-    if not isinstance(substeps, int) or substeps < 1:
+    if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
         raise ModelError(f"substeps is {quoted(substeps)}; use 1 or more")
     h = duration / substeps
     for _ in range(substeps):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import operator
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from threading import Thread
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from casadi import Function
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.native.array_calls import default_of_last
-from mbs.native.batch_arrays import Array, ArrayPort, CPort
+from mbs.native.batch_arrays import Array, ArrayPort, CPort, overlap, same_place, spread
 from mbs.native.batch_function import joined
 from mbs.native.batch_source import batch_source
 from mbs.native.cache import cached_library
@@ -79,8 +80,8 @@ class Batch:
 
         Args:
             *args: the inputs in their order, arrays of doubles.
-            out: arrays that take the outputs, one or a tuple, which share no memory with inputs
-                of other states.
+            out: arrays that take the outputs, one or a tuple; an output may take the place of an
+                input of its shape.
             threads: how many work at once; as many as this process may use when left out.
             **named: inputs by name.
 
@@ -91,9 +92,13 @@ class Batch:
         Raises:
             ModelError: an array does not fit; says which, and how it should be.
         """
-        given = self._given(args, named)
+        given = self.ordered(args, named)
+        for port, array in zip(self.inputs, given, strict=True):
+            port.require(array, self._name, "input")
         states = self._states(given)
         results = self._results(out, states)
+        if out is not None:
+            self._require_apart(given, results)
         count = 1 if states is None else states
         if self._code is None:
             self._interpret(given, results, count)
@@ -107,8 +112,16 @@ class Batch:
     def _name(self) -> str:
         return self.function.name()
 
-    def _given(self, args: Sequence[Array], named: dict[str, Array]) -> list[Array]:
-        """Every input, checked."""
+    def ordered(self, args: Sequence[Any], named: Mapping[str, Any]) -> list[Any]:
+        """Every input in its order, what is left out by its default.
+
+        Args:
+            args: inputs in their order.
+            named: inputs by name.
+
+        Raises:
+            ModelError: one is missing, or is not taken.
+        """
         names = [port.name for port in self.inputs]
         unknown = [name for name in named if name not in names[len(args) :]]
         if len(args) > len(names) or unknown:
@@ -118,8 +131,6 @@ class Batch:
         missing = [name for name in names if name not in values]
         if missing:
             raise ModelError(f"{self._name}: input {missing[0]} is missing; give it as an array")
-        for port in self.inputs:
-            port.require(values[port.name], self._name, "input")
         return [values[name] for name in names]
 
     def _states(self, given: Sequence[Array]) -> int | None:
@@ -138,7 +149,7 @@ class Batch:
         """The arrays of the outputs, new ones or those given."""
         if out is None:
             return [port.empty(states) for port in self.outputs]
-        arrays = list(out) if isinstance(out, tuple) else [out]
+        arrays = list(out) if isinstance(out, (tuple, list)) else [out]
         if len(arrays) != len(self.outputs):
             raise ModelError(
                 f"{self._name}: out has {len(arrays)} arrays, there are {len(self.outputs)} outputs"
@@ -146,18 +157,29 @@ class Batch:
         for port, array in zip(self.outputs, arrays, strict=True):
             port.require(array, self._name, "out for")
             shape = port.shape if states is None else (states, *port.shape)
-            if array.shape != shape or not array.flags.writeable or not _spread(array):
+            if array.shape != shape or not array.flags.writeable or not spread(array):
                 raise ModelError(
                     f"{self._name}: out for {port.name} must be a writable array of shape {shape}"
                 )
         return arrays
 
+    def _require_apart(self, given: Sequence[Array], results: Sequence[Array]) -> None:
+        """Refuse outputs that would write over inputs that are still to be read."""
+        for port, result in zip(self.outputs, results, strict=True):
+            others = [array for array in results if array is not result]
+            inputs = [array for array in given if not same_place(array, result)]
+            if any(overlap(array, result) for array in (*inputs, *others)):
+                raise ModelError(
+                    f"{self._name}: out for {port.name} shares memory with another array; give an"
+                    " array of its own, or an input itself"
+                )
+
     def _threads(self, wanted: int | None, states: int) -> int:
         if wanted is None:
-            wanted = _cores()
-        elif isinstance(wanted, bool) or not isinstance(wanted, int) or wanted < 1:
+            wanted = cores()
+        elif isinstance(wanted, bool) or not hasattr(wanted, "__index__") or wanted < 1:
             raise ModelError(f"{self._name}: threads is {quoted(wanted)}; give 1 or more, or None")
-        return max(1, min(wanted, -(-states // _SHARE)))
+        return max(1, min(operator.index(wanted), -(-states // _SHARE)))
 
     def _run(self, code: _Code, arrays: Sequence[Array], states: int, threads: int) -> None:
         given = len(self.inputs)
@@ -211,7 +233,9 @@ def batch(functions: Function | Iterable[Function]) -> Batch:
         ModelError: one is no Function, or their inputs do not fit together.
         CompilerError: CC names no compiler, or the compiler refused the code.
     """
-    parts = [functions] if isinstance(functions, Function) else list(functions)
+    parts: list[Any] = [functions]
+    if isinstance(functions, Iterable) and not isinstance(functions, str):
+        parts = list(functions)
     if not parts:
         raise ModelError("there is no Function to evaluate; give one or several")
     for part in parts:
@@ -248,13 +272,8 @@ def _defaults(functions: Sequence[Function]) -> dict[str, Array]:
     return {}
 
 
-def _cores() -> int:
+def cores() -> int:
     """Processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def _spread(array: Array) -> bool:
-    """Whether every element has a place of its own."""
-    return all(step or length < 2 for length, step in zip(array.shape, array.strides, strict=True))

@@ -17,6 +17,7 @@ Array: TypeAlias = np.ndarray[Any, Any]
 _DOUBLE = 8  # bytes
 _MOST_PAST = 500  # elements of a row whose lanes fit on any stack
 _LINE = 64  # bytes of a cache line
+_SEARCH = 1000  # steps that looking for common memory may take
 
 
 class CPort(ctypes.Structure):
@@ -68,6 +69,8 @@ class ArrayPort:
         if not isinstance(array, np.ndarray) or array.dtype != np.float64:
             kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray) else quoted(array)
             return f"is {kind}; give a numpy array of float64"
+        if isinstance(array, np.ma.MaskedArray):
+            return "has a mask, which would be passed over; give array.filled(value)"
         lengths = len(self.shape)
         if array.shape[-lengths:] != self.shape or array.ndim > lengths + 1:
             many = f"(N, {', '.join(map(str, self.shape))})"
@@ -77,8 +80,8 @@ class ArrayPort:
             )
         if self._steps(array) is None:
             return (
-                "has elements that are not evenly spaced in memory; give numpy.ascontiguousarray"
-                " of it"
+                "has elements that are not evenly spaced in memory, in steps of 8 bytes; give"
+                " numpy.array(it)"
             )
         return ""
 
@@ -120,3 +123,22 @@ class ArrayPort:
         if len(own) == 2 and own[0][1] != own[1][0] * own[1][1]:
             return None
         return row, own[-1][1] if own else 1
+
+
+def same_place(one: Array, other: Array) -> bool:
+    """Whether two arrays have each element in the same place."""
+    first, second = ((x.ctypes.data, x.shape, x.strides) for x in (one, other))
+    return first == second
+
+
+def overlap(one: Array, other: Array) -> bool:
+    """Whether two arrays have some element in one place, as far as that is found out soon."""
+    try:
+        return np.shares_memory(one, other, max_work=_SEARCH)  # type: ignore[arg-type]
+    except np.exceptions.TooHardError:
+        return False
+
+
+def spread(array: Array) -> bool:
+    """Whether every element has a place of its own, of an array whose strides do not interlace."""
+    return all(step or length < 2 for length, step in zip(array.shape, array.strides, strict=True))

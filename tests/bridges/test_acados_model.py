@@ -34,3 +34,14 @@ def test_implicit_equations_are_zero_and_regular(make, form):
 def test_refuses_what_acados_does_not_integrate(form):
     with pytest.raises(ModelError, match=f"form '{form}' has .* takes 'reduced' and 'index1'"):
         acados_fields(dae(four_bar(), form))
+
+
+@pytest.mark.parametrize("name", ["two words", "", "a__b", 3])
+def test_refuses_names_that_do_not_serve_in_c(name):
+    with pytest.raises(ModelError, match=r"name is .*; use letters, digits"):
+        acados_fields(dae(acrobot()), name)
+
+
+def test_refuses_what_is_no_dae():
+    with pytest.raises(ModelError, match=r"is not a Dae; give mbs\.models\.dae\(system\)"):
+        acados_fields(acrobot())

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from support.rod_mechanisms import acrobot, four_bar
 
+import mbs
 from mbs.bridges import Grid, collocation, invariants, multiple_shooting, step
 from mbs.components import Body, Mechanism, Prismatic
 from mbs.errors import ModelError
@@ -58,6 +59,20 @@ def test_shooting_of_a_double_integrator_is_exact(form):
     model = dae(slider()) if form == "reduced" else ode
     way = multiple_shooting(opti, model, Grid(stages=8, duration=2.0, code="interpreted"))
     assert moved(way, 1.5) == pytest.approx(least(2.0, 1.5, 2.0, 8), rel=1e-7)
+
+
+@pytest.mark.parametrize("stages", [1, 7])
+def test_stages_in_threads_give_the_same(stages):
+    costs = []
+    for parallel in ("serial", "thread"):
+        way = multiple_shooting(
+            casadi.Opti(), dae(slider()), grid(stages=stages, parallel=parallel), substeps=2
+        )
+        way.opti.minimize(casadi.sumsqr(way.x[:, -1] - [1.0, 0.5]) + 0.1 * casadi.sumsqr(way.u))
+        way.opti.solver("ipopt", *QUIET)
+        found = way.opti.solve()
+        costs.append(found.value(way.opti.f))
+    assert costs[0] == costs[1]
 
 
 def test_the_duration_may_be_a_variable():
@@ -132,6 +147,55 @@ def test_step_in_a_batch_is_the_step():
     assert np.abs(found - wanted).max() < 1e-13
 
 
+@pytest.mark.parametrize("make", [lambda: mbs.load("puma560").assemble(), four_bar])
+def test_steps_in_a_batch_follow_the_simulation(make):
+    """A simulation with error control, through a quarter of a second with constant efforts."""
+    system = make()
+    model = dae(system)
+    motors = [name.removesuffix(".tau") for name, _ in model.elements["u"]]
+    efforts = np.random.default_rng(6).uniform(-2, 2, (9, len(motors)))
+    advance, x = batch(step(model, 4)), np.repeat(model.x0[None], 9, axis=0)
+    for _ in range(50):
+        x = advance(x, efforts, model.p0, np.array([0.005]))
+    for k in (0, 8):
+        tau = dict(zip(motors, efforts[k], strict=True))
+        result = mbs.simulate.run(system, 0.25, tau=tau, tolerance=1e-11, quiet=True)
+        ends = [result[name][-1] for name, _ in model.elements["x"]]
+        assert x[k] == pytest.approx(ends, abs=1e-9)
+
+
+def test_parameters_may_be_variables():
+    """The mass that needs the least effort is the smallest allowed."""
+    opti = casadi.Opti()
+    mass = opti.variable()
+    way = multiple_shooting(opti, dae(slider()), grid(stages=8, duration=2.0), p=mass)
+    opti.subject_to(opti.bounded(1.5, mass, 9))
+    opti.set_initial(mass, 3)
+    assert moved(way, 1.5) == pytest.approx(least(1.5, 1.5, 2.0, 8), rel=1e-5)
+
+
+def test_rows_have_names_and_parameters_too():
+    opti = casadi.Opti()
+    way = collocation(opti, dae(slider(), "index1"), grid(), points=2, p={"m": 5.0})
+    assert [way.row(n).shape for n in ("s.q", "s.v", "s.tau", "s.a", "m")] == [
+        *((1, 5), (1, 5), (1, 4), (1, 8), (1, 1)),
+    ]
+    assert opti.debug.value(way.row("m")) == 5.0
+    way.guess(np.arange(10.0).reshape(2, 5))
+    assert np.array_equal(opti.debug.value(way.row("s.v"), opti.initial()), np.arange(5.0, 10.0))
+    with pytest.raises(ModelError, match=r"there is no 's\.w'; did you mean"):
+        way.row("s.w")
+
+
+def test_integrals_of_stages_and_of_points():
+    opti = casadi.Opti()
+    way = collocation(opti, dae(slider()), grid(duration=2.0), points=2)
+    way.guess(np.zeros(2), u=[[1, 2, 3, 4]])
+    stages, points = way.integral(way.u**2), way.integral(way.u_points**2)
+    found = [opti.debug.value(value, opti.initial()) for value in (stages, points)]
+    assert found == pytest.approx([15.0, 15.0])
+
+
 def test_guess_reaches_every_variable():
     opti = casadi.Opti()
     grid = Grid(stages=3, duration=1.0, code="interpreted")
@@ -152,6 +216,26 @@ def grid(**changes):
     ("act", "words"),
     [
         (lambda o, d: grid(stages=0), "stages is 0; use 1 or more"),
+        (lambda o, d: grid(stages=4.0), "stages is 4.0; use 1 or more"),
+        (lambda o, d: grid(duration=0), "duration is 0 s; use a number above zero"),
+        (lambda o, d: grid(duration="2"), "duration is '2'; give seconds"),
+        (lambda o, d: grid(parallel="gpu"), "parallel is 'gpu'; use one of serial, thread"),
+        (
+            lambda o, d: multiple_shooting(None, d, grid()),
+            "None is not an Opti; give",
+        ),
+        (lambda o, d: multiple_shooting(o, d, 40), "40 is not a Grid; give Grid"),
+        (lambda o, d: multiple_shooting(o, d, grid(), p="m"), "p is 'm'; give numbers"),
+        (lambda o, d: multiple_shooting(o, d, grid(), p={"M": 1}), "p has no 'M'; .*m"),
+        (lambda o, d: invariants(3, casadi.MX(2, 1)), "3 is not a Dae; give mbs.models.dae"),
+        (
+            lambda o, d: multiple_shooting(o, d, grid()).integral(casadi.MX(2, 4)),
+            r"integral: the values have the shape \(2, 4\); give \(1, 4\)",
+        ),
+        (
+            lambda o, d: multiple_shooting(o, d, grid()).guess({"s.q": 0.0}),
+            "x: the guess is .*; give numbers",
+        ),
         (lambda o, d: grid(code="fast"), "code is 'fast'; use one of compiled, interpreted"),
         (
             lambda o, d: multiple_shooting(o, dae(slider(), "index1"), grid()),
@@ -164,7 +248,7 @@ def grid(**changes):
         (lambda o, d: collocation(o, d, grid(), points=10), "points is 10; use 1 to 9"),
         (
             lambda o, d: multiple_shooting(o, d, grid()).guess(np.zeros(3)),
-            r"x: the guess has the shape \(3, 5\), it needs \(2, 5\)",
+            r"x: the guess has the shape \(3,\); give \(2, 5\), or \(2,\)",
         ),
         (lambda o, d: step(casadi.Function("f", [casadi.SX.sym("x")], [])), "f: its inputs are i0"),
         (

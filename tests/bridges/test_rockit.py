@@ -61,6 +61,20 @@ def test_parameters_get_their_values():
     assert float(stage.values[0][1]) == 2.0
 
 
+def test_parameters_may_be_given():
+    """As an expression, such as variables of a design problem, or as numbers by name."""
+    stage, mass = Recorded(), casadi.MX.sym("mass")
+    signals = rockit_stage(stage, dae(slider()), p=mass)
+    (x, rate), u = stage.ders[0], signals.u
+    got = casadi.Function("got", [x, u, mass], [rate])
+    assert np.array(got([0.0, 0.5], 6.0, 4.0)).ravel() == pytest.approx([0.5, 1.5])
+    assert stage.values == []
+    named = rockit_stage(stage, dae(slider()), p={"m": 7.0})
+    assert float(casadi.Function("p", [], [named.p])()["o0"]) == 7.0
+    with pytest.raises(ModelError, match=r"p has no 'mass'; .*m"):
+        rockit_stage(stage, dae(slider()), p={"mass": 7.0})
+
+
 def test_refuses_a_code_that_is_not_there():
     with pytest.raises(ModelError, match="code is 'c'; use one of compiled, interpreted"):
         rockit_stage(Recorded(), dae(slider()), code="c")

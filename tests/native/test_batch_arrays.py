@@ -56,6 +56,24 @@ def test_inputs_that_are_the_same_for_all_states():
     np.testing.assert_array_equal(one[0], every[0][3])
 
 
+def test_outputs_and_inputs_in_one_memory():
+    """An output may take the place of an input; what would be read after it is not written."""
+    q = ca.SX.sym("q", 3)
+    f = batch(ca.Function("f", [q], [ca.sin(q) + q[0]], ["q"], ["y"]))
+    start = np.random.default_rng(2).uniform(-2, 2, (40, 3))
+    exact, place = f(start), start.copy()
+    assert f(place, out=place) is place
+    np.testing.assert_array_equal(place, exact)
+    wide = np.hstack([start, start])
+    f(wide[:, :3], out=wide[:, 3:])
+    np.testing.assert_array_equal(wide, np.hstack([start, exact]))
+    for out in (wide[8:, :3], wide[:32, 1:4]):
+        refused(lambda out=out: f(wide[:32, :3], out=out), "out for y shares memory")
+    g = batch(example())
+    y = np.zeros((4, 5))
+    refused(lambda: g(np.ones((4, 5)), np.ones((5, 3)), out=(y, y)), "out for z")
+
+
 def test_no_states_and_one():
     f = batch(example())
     y, z = f(np.zeros((0, 5)), np.zeros((5, 3)))
@@ -111,10 +129,16 @@ def test_what_does_not_fit_is_refused():
     refused(lambda: f(x, m, out=y), "1 arrays", "2 outputs")
     refused(lambda: f(x, m, out=(y, z[:3])), "out for z", r"\(4, 5, 3\)")
     refused(lambda: f(x, m, out=(np.broadcast_to(y[0], (4, 5)), z)), "out for y", "writable")
+    refused(lambda: f(np.ma.array(x, mask=x > 0), m), "input x has a mask", "filled")
     y.flags.writeable = False
     refused(lambda: f(x, m, out=(y, z)), "out for y", "writable")
     refused(lambda: f(x, m, threads=0), "threads is 0")
+    refused(lambda: f(x, m, threads=True), "threads is True")
+    given = [np.zeros((4, 5)), z]
+    np.testing.assert_array_equal(f(x, m, out=given, threads=np.int64(2))[0], f(x, m)[0])
     refused(lambda: batch([]), "no Function")
+    refused(lambda: batch("idm"), "'idm' is not a Function")
+    refused(lambda: batch(None), "None is not a Function")
     refused(lambda: batch([example(), 3]), "3 is not a Function")
     refused(lambda: batch([example(5), example(4)]), r"x\[4\]", r"x\[5\]")
 

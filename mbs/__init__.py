@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         robots,
         simulate,
         units,
+        view,
     )
     from mbs.assembly import System
     from mbs.components import Mechanism
@@ -55,6 +56,7 @@ _MODULES = (
     "robots",
     "simulate",
     "units",
+    "view",
 )
 
 __all__ = [
@@ -76,6 +78,7 @@ __all__ = [
     "robots",
     "simulate",
     "units",
+    "view",
 ]
 
 

@@ -48,6 +48,7 @@ class Result:
         name: what was simulated.
         info: facts worth keeping with the numbers, such as the tolerance.
         events: what happened at instants: time, s, the name of what it happened to, and words.
+        system: the mechanism whose motion it is, where that is known; not saved, not pickled.
     """
 
     time: Array
@@ -56,6 +57,7 @@ class Result:
     name: str = ""
     info: Mapping[str, object] = field(default_factory=dict)
     events: tuple[tuple[float, str, str], ...] = ()
+    system: object | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -76,6 +78,10 @@ class Result:
         rows, columns = self.values.shape
         span = f", {self.time[0]:g} to {self.time[-1]:g} s" if rows else ""
         return f"<Result {self.name}: {columns} signals, {rows} rows{span}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        plain = dict(self.units), self.name, dict(self.info), self.events
+        return type(self), (self.time, self.values, *plain)
 
     @classmethod
     def from_structured(
@@ -145,7 +151,7 @@ class Result:
             writer.writerows([repr(v) for v in row] for row in rows)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write everything but `info` to a NumPy archive, which `load` reads back bit for bit.
+        """Write all but `info` and `system` to a NumPy archive; `load` reads it back bit for bit.
 
         Args:
             path: file to write, such as run.npz; it is replaced as a whole, or left alone.

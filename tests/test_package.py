@@ -45,7 +45,19 @@ def test_public_names_resolve(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["components", "export", "formats", "loops", "models", "native", "robots", "simulate"]
+    "module",
+    [
+        "bridges",
+        "components",
+        "export",
+        "formats",
+        "loops",
+        "models",
+        "native",
+        "robots",
+        "simulate",
+        "view",
+    ],
 )
 def test_public_names_of_modules_resolve(module: str) -> None:
     inside = getattr(mbs, module)
@@ -64,6 +76,7 @@ def test_types_and_c_sources_are_shipped() -> None:
     assert (package / "py.typed").is_file()
     assert (package / "export" / "fmu" / "c" / "core.c").is_file()
     assert (package / "native" / "runtime" / "dopri5.c").is_file()
+    assert (package / "view" / "assets" / "viewer.js").is_file()
 
 
 def test_tree_of_errors_is_the_documented_one() -> None:

@@ -1,5 +1,6 @@
 import csv
 import dataclasses
+import pickle
 import sys
 
 import numpy as np
@@ -30,6 +31,20 @@ def test_the_data_cannot_be_changed(result):
         result["j1.q"][0] = 3.0
     with pytest.raises(TypeError):
         result.units["x"] = "m"
+
+
+def test_a_copy_through_pickle_is_equal_but_for_the_system(result):
+    whole = dataclasses.replace(result, system="four_bar", events=((0.5, "stop", "closes"),))
+    assert whole.system == "four_bar"
+    assert "four_bar" not in repr(whole)
+    copy = pickle.loads(pickle.dumps(whole))
+    assert copy.system is None
+    assert np.array_equal(copy.values, whole.values)
+    assert np.array_equal(copy.time, whole.time)
+    for name in ("units", "info", "events", "name"):
+        assert getattr(copy, name) == getattr(whole, name)
+    with pytest.raises(TypeError):
+        copy.units["x"] = "m"
 
 
 def test_the_callers_array_is_copied():

@@ -8,6 +8,7 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.attached import attached_forces, force_elements
+from mbs.assembly.coordinate_coupling import CoordinateCoupling
 from mbs.assembly.drive_line import drive_line
 from mbs.assembly.drive_tables import attached_devices, shaft_rows
 from mbs.assembly.graph import Graph, connection_graph
@@ -16,7 +17,7 @@ from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
 from mbs.assembly.rates import zero_position
 from mbs.assembly.sensors import attached_sensors
 from mbs.assembly.spanning_tree import spanning_tree
-from mbs.assembly.system import CoordinateCoupling, System
+from mbs.assembly.system import System
 from mbs.assembly.tables import (
     BodyRow,
     Coordinate,
@@ -25,7 +26,7 @@ from mbs.assembly.tables import (
     position_coordinates,
     velocity_coordinates,
 )
-from mbs.components import Component, Free, Joint, Mechanism
+from mbs.components import Box, Component, Cylinder, Free, Joint, Mechanism
 from mbs.components.rigid_body import Mount
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
@@ -211,7 +212,8 @@ def _bodies(mechanism: Mechanism, graph: Graph, framed: Framed) -> tuple[BodyRow
     for body in mechanism.bodies():
         if homes[body.name] >= 0 and not isinstance(body, Mount):
             mass = _mass(body, values)
-            rows.append(BodyRow(body.name, homes[body.name] + 1, mass))
+            solid = body if isinstance(body, (Box, Cylinder)) else None
+            rows.append(BodyRow(body.name, homes[body.name] + 1, mass, solid))
     return tuple(sorted(rows, key=lambda row: row.link))
 
 

@@ -6,13 +6,14 @@ import math
 import threading
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly.attached import AttachedForce
+from mbs.assembly.coordinate_coupling import CoordinateCoupling
 from mbs.assembly.drive_tables import AttachedDevice, ShaftRow
 from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.khalil_frames import Cut
@@ -23,31 +24,15 @@ from mbs.assembly.tables import BodyRow, Closure, Coordinate, LinkRow, LoopRow, 
 from mbs.assembly.tree import Tree
 from mbs.errors import ModelError
 from mbs.expressions import Parameter
+from mbs.files import PathLike
 from mbs.messages import did_you_mean, quoted
 from mbs.spatial import Pose
 
+if TYPE_CHECKING:
+    from mbs.view.diagram import Diagram
+
 _BUILDING = threading.RLock()
 """Two threads that ask for the same model get the same Function."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CoordinateCoupling:
-    """driven = sum of c_k driver^k between two elements of q.
-
-    Attributes:
-        name: of the coupling.
-        driven, driver: numbers in q.
-        coefficients: c_0, c_1, ...
-    """
-
-    name: str
-    driven: int
-    driver: int
-    coefficients: tuple[SX, ...]
-
-    def value(self, driver: SX) -> SX:
-        """The driven coordinate for a position of the driver."""
-        return sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,6 +134,19 @@ class System:
     def report(self) -> str:
         """What was assembled, in plain sentences."""
         return report(self)
+
+    def draw(self, path: PathLike | None = None) -> Diagram:
+        """The connection graph: bodies, the joints of the tree, and those cut to open loops.
+
+        Args:
+            path: .svg file to write as well.
+
+        Raises:
+            ExportError: the file cannot be written.
+        """
+        from mbs.view.diagram import drawn
+
+        return drawn(self, path)
 
     def qdot(self, q: Any, v: Any) -> Any:
         """(nq, 1) time derivative of q; it differs from v for quaternion joints only.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from casadi import SX
 
 from mbs.assembly.tree import Tree
-from mbs.components import Joint
+from mbs.components import Box, Cylinder, Joint
 from mbs.components.motion import Motion
 from mbs.spatial import Pose
 
@@ -55,6 +55,7 @@ class Coordinate:
         actuated: whether a motor drives it.
         cut: whether its joint is cut, so that it is not in q.
         limits: (lower, upper), or None.
+        effort: of an element of v, (lower, upper) of the effort of its motor, or None.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Coordinate:
     actuated: bool
     cut: bool = False
     limits: tuple[float, float] | None = None
+    effort: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +101,13 @@ class BodyRow:
         name: of the body.
         link: number of the link that carries it, from 1.
         mass: [kg], None when a symbol without value is in it.
+        solid: the body itself where it was described by its dimensions.
     """
 
     name: str
     link: int
     mass: float | None
+    solid: Box | Cylinder | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +181,12 @@ def velocity_coordinates(
     links: Sequence[tuple[Motion, str, Joint]], actuated: Sequence[bool]
 ) -> tuple[Coordinate, ...]:
     """The elements of v of motions given as (motion, name, joint)."""
-    return _coordinates(_VELOCITIES, links, actuated, False)
+    rows = _coordinates(_VELOCITIES, links, actuated, False)
+    described = {joint.name: joint for _, _, joint in links}
+    return tuple(
+        replace(row, limits=described[row.joint].velocity, effort=described[row.joint].effort)
+        for row in rows
+    )
 
 
 def _coordinates(

@@ -150,4 +150,5 @@ def _result(system: System, legs: Sequence[Leg], p: Sequence[float]) -> Result:
     for name, unit, values in contact_columns(system, contact, held):
         column(name, unit, values)
     values = np.column_stack(columns)
-    return Result(times, values, units, name=system.name, events=told(system, contact))
+    events = told(system, contact)
+    return Result(times, values, units, name=system.name, events=events, system=system)

@@ -6,7 +6,7 @@ from collections.abc import Container
 
 from casadi import SX
 
-from mbs.assembly.system import CoordinateCoupling
+from mbs.assembly.coordinate_coupling import CoordinateCoupling
 from mbs.loops.closed_form.root import Root
 
 

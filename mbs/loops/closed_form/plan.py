@@ -13,8 +13,8 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
+from mbs.assembly.coordinate_coupling import CoordinateCoupling
 from mbs.assembly.model_function import require_system
-from mbs.assembly.system import CoordinateCoupling
 from mbs.components import PointOnLine, Rod
 from mbs.components.constraints import Constraint
 from mbs.errors import NoClosedForm

@@ -1,0 +1,9 @@
+"""Pictures of mechanisms: scenes for any viewer, files and notebooks, graphs of connections."""
+
+from mbs.view.asset_files import SCRIPTS as SCRIPTS
+from mbs.view.asset_files import assets_folder
+from mbs.view.diagram import Diagram
+from mbs.view.picture import Picture, animate, show
+from mbs.view.scene import Scene, scene
+
+__all__ = ["Diagram", "Picture", "Scene", "animate", "assets_folder", "scene", "show"]

@@ -1,0 +1,174 @@
+"""Primitives as small flat faces, for pictures that are made without a browser."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbs.view.posed import Array
+from mbs.view.primitives import (
+    Axis,
+    Ball,
+    Bar,
+    Box,
+    Cylinder,
+    Frame,
+    Plate,
+    Primitive,
+    Ring,
+    Span,
+    Spring,
+)
+
+_SIDES = 14
+_PIECES = 8
+"""A long bar is cut into so many, since faces are sorted by their middles."""
+
+_TURNS = 8
+_BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+_BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Faces:
+    """Faces of one colour in one frame.
+
+    Attributes:
+        corners: (n, 4, 3) [m]; seen from outside they run anticlockwise. A line has its two ends
+            twice.
+        colour: name in the palette, or "axes.0" for the first colour of the axes.
+        kind: closed, seen from outside only; open, seen from both sides; line.
+        opacity: 1 hides what is behind.
+    """
+
+    corners: Array
+    colour: str
+    kind: str = "closed"
+    opacity: float = 1.0
+
+
+def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
+    """Faces of a primitive in the frame of its link.
+
+    Args:
+        item: any but a label, which has none, and what is stretched between two links.
+        size: of the mechanism [m], for the dashes of axes.
+    """
+    if isinstance(item, (Bar, Cylinder)):
+        yield Faces(_round(item), item.colour)
+    elif isinstance(item, Ball):
+        turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
+        profile = item.radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        yield Faces(revolved(profile) + np.array(item.at), item.colour)
+    elif isinstance(item, Ring):
+        turn = np.linspace(0, 2 * np.pi, 9)
+        profile = item.tube * np.column_stack([np.cos(turn), np.sin(turn)]) + [item.radius, 0]
+        R = turned_to(np.array(item.axis))
+        yield Faces(revolved(profile, 48) @ R.T + np.array(item.at), item.colour)
+    elif isinstance(item, Box):
+        yield Faces(_posed(_cuboid(np.array(item.size)), item.pose), item.colour)
+    elif isinstance(item, Plate):
+        yield Faces(_fan(np.array(item.points)), item.colour, "open", item.opacity)
+    elif isinstance(item, Frame):
+        for k in range(3):
+            arrow = _arrow(item.length) @ turned_to(np.eye(3)[k]).T
+            yield Faces(_posed(arrow, item.pose), f"axes.{k}")
+    elif isinstance(item, Axis):
+        yield Faces(_dashes(np.array(item.a), np.array(item.b), size), item.colour, "line")
+
+
+def stretched(item: Span | Spring, a: Array, b: Array) -> Faces:
+    """Faces of what lies between two points of the base frame."""
+    if isinstance(item, Span):
+        bar = _round(Cylinder(item.role, 0, item.colour, tuple(a), tuple(b), item.radius))
+        return Faces(bar, item.colour)
+    t = np.linspace(0, 1, 24 * _TURNS + 1)
+    grown = item.radius * np.minimum(1, 12 * np.minimum(t, 1 - t))
+    angle = 2 * np.pi * _TURNS * t
+    length = float(np.linalg.norm(b - a))
+    wire = np.column_stack([grown * np.cos(angle), grown * np.sin(angle), length * t])
+    path = wire @ turned_to(b - a).T + a
+    return Faces(np.stack([path[:-1], path[:-1], path[1:], path[1:]], axis=1), item.colour, "line")
+
+
+def revolved(profile: Array, sides: int = _SIDES) -> Array:
+    """(n, 4, 3) faces of a profile (k, 2) of radius and height, turned about z."""
+    turn = np.linspace(0, 2 * np.pi, sides + 1)
+    round_ = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    rings = np.concatenate(
+        [
+            profile[:, None, :1] * round_[None],
+            np.repeat(profile[:, None, 1:], sides + 1, axis=1),
+        ],
+        axis=2,
+    )
+    below, above = rings[:-1], rings[1:]
+    faces = np.stack([below[:, :-1], below[:, 1:], above[:, 1:], above[:, :-1]], axis=2)
+    return faces.reshape(-1, 4, 3)
+
+
+def turned_to(direction: Array) -> Array:
+    """A rotation whose z axis is a direction; none where that has no length."""
+    length = float(np.linalg.norm(direction))
+    if length == 0:
+        return np.eye(3)
+    z = direction / length
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x = x / np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _round(item: Bar | Cylinder) -> Array:
+    a, b = np.array(item.a), np.array(item.b)
+    length, r = float(np.linalg.norm(b - a)), item.radius
+    along = np.column_stack([np.full(_PIECES + 1, r), np.linspace(0, length, _PIECES + 1)])
+    if isinstance(item, Bar):
+        turn = np.linspace(0, np.pi / 2, 4)
+        foot = r * np.column_stack([np.sin(turn), -np.cos(turn)])
+        head = r * np.column_stack([np.cos(turn), np.sin(turn)]) + [0, length]
+        profile = np.vstack([foot, along[1:-1], head])
+    else:
+        profile = np.vstack([[item.bore, 0], along, [item.bore, length]])
+        if item.bore > 0:
+            profile = np.vstack([profile, [item.bore, 0]])
+    faces: Array = revolved(profile) @ turned_to(b - a).T + a
+    return faces
+
+
+def _cuboid(size: Array) -> Array:
+    """Faces about the origin, cut across the longest side."""
+    longest = int(np.argmax(size))
+    faces = []
+    for corners in _BOX_CORNERS[np.array(_BOX_FACES)]:
+        first, last = corners[:, longest].min(), corners[:, longest].max()
+        cuts = np.linspace(first, last, _PIECES + 1) if last > first else np.array([first, last])
+        for low, high in itertools.pairwise(cuts):
+            piece = corners.copy()
+            piece[:, longest] = np.where(corners[:, longest] == first, low, high)
+            faces.append(piece * size)
+    return np.array(faces)
+
+
+def _arrow(length: float) -> Array:
+    profile = [[0, 0], [0.03, 0], [0.03, 0.4], [0.03, 0.8], [0.08, 0.8], [0, 1]]
+    return revolved(length * np.array(profile), 8)
+
+
+def _posed(faces: Array, rows: tuple[float, ...]) -> Array:
+    pose = np.array(rows).reshape(3, 4)
+    return np.array(faces @ pose[:, :3].T + pose[:, 3])
+
+
+def _fan(points: Array) -> Array:
+    return np.array([[points[0], b, c, c] for b, c in itertools.pairwise(points[1:])])
+
+
+def _dashes(a: Array, b: Array, size: float) -> Array:
+    count = max(1, round(float(np.linalg.norm(b - a)) / (0.032 * size)))
+    starts = np.arange(count) / count
+    first = a + starts[:, None] * (b - a)
+    last = a + (starts + 0.62 / count)[:, None] * (b - a)
+    return np.stack([first, first, last, last], axis=1)

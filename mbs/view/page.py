@@ -1,0 +1,80 @@
+"""An HTML file that shows a scene: everything is in it, so that it works offline."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+
+import numpy as np
+
+from mbs.view.asset_files import SCRIPTS, STYLES, asset
+from mbs.view.look import Look
+from mbs.view.posed import Array
+from mbs.view.scene import HIDDEN, Scene
+
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+)
+_HEIGHT = 460
+
+
+def page(
+    scene: Scene,
+    look: Look,
+    speed: float = 1.0,
+    times: Array | None = None,
+    poses: Array | None = None,
+) -> str:
+    """The text of an HTML file.
+
+    Args:
+        scene: what it shows.
+        look: how it looks.
+        speed: seconds of the motion a second.
+        times: (n,) of a motion [s]; none for a picture that stands.
+        poses: (n, 12 links) as `Scene.motion` gives them.
+    """
+    scripts = [*(asset(name) for name in SCRIPTS), asset("bar.js")]
+    styles = [*(asset(name) for name in STYLES), asset("bar.css")]
+    motion = None
+    if times is not None and poses is not None:
+        motion = {**_packed(times, poses), "speed": speed}
+    drawn = scene.as_dict()
+    drawn["hidden"] = [role for role in HIDDEN if role not in look.shown]
+    options = {"view": look.view, "theme": look.theme, "motion": motion}
+    start = (
+        "mbs.page = mbs.bar(document.querySelector('.mbs-page'),"
+        f" {_data(drawn)}, {_data(options)});"
+    )
+    lines = [
+        "<!doctype html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{html.escape(scene.system.name)}</title>",
+        *(f"<style>\n{style}</style>" for style in styles),
+        '</head><body><div class="mbs-page"></div>',
+        *(f"<script>\n{script}</script>" for script in [*scripts, start]),
+        "</body></html>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def framed(text: str) -> str:
+    """An HTML file as a part of another page, such as a notebook."""
+    source = html.escape(text, quote=True)
+    look = f"width: 100%; height: {_HEIGHT}px; border: 0; border-radius: 6px"
+    allowed = "allow-scripts allow-downloads"
+    return f'<iframe sandbox="{allowed}" style="{look}" srcdoc="{source}"></iframe>'
+
+
+def _packed(times: Array, poses: Array) -> dict[str, object]:
+    """A motion as the script reads it: poses are 32-bit numbers in base 64."""
+    data = base64.b64encode(np.ascontiguousarray(poses, dtype="<f4").tobytes())
+    return {"times": [round(float(t), 6) for t in times], "packed": data.decode("ascii")}
+
+
+def _data(value: object) -> str:
+    """JSON that may stand in a script element."""
+    return json.dumps(value, allow_nan=False).replace("<", "\\u003c")

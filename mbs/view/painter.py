@@ -1,0 +1,200 @@
+"""A scene painted on a matplotlib figure: far faces first, each with the light it gets."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mbs.result import optional_module
+from mbs.view.camera import Camera, camera
+from mbs.view.mesh import Faces, faces_of, stretched
+from mbs.view.palette import PALETTE, Theme
+from mbs.view.posed import Array
+from mbs.view.primitives import Label, Span, Spring
+from mbs.view.scene import HIDDEN, Scene
+
+_REMEDY = 'pip install "mbs[plot]"'
+_LIGHT = np.array([0.35, 0.85, 0.55])
+"""Towards the light: right, up, towards the eye."""
+
+_INCHES = (8.0, 5.5)
+_LINE = 1.1
+_SEAM = 0.35
+"""Width of the edge that closes the seam between two faces [points]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Painter:
+    """A scene made ready, painted at any poses.
+
+    Attributes:
+        scene: what is painted.
+        eye: where it is seen from.
+        theme: light or dark.
+        shown: roles that are painted.
+        solid: faces on links, with the number of the link.
+        figure: the matplotlib Figure.
+        axes: its axes.
+    """
+
+    scene: Scene
+    eye: Camera
+    theme: Theme
+    shown: frozenset[str]
+    solid: Sequence[tuple[int, Faces]]
+    figure: Any
+    axes: Any
+
+    def paint(self, poses: Sequence[float] | Array) -> Any:
+        """Paint the scene at poses (12 links,), as `Scene.poses` gives them; the Figure."""
+        matplotlib = optional_module("matplotlib.collections", _REMEDY)
+        axes, places = self.axes, np.reshape(poses, (-1, 3, 4))
+        axes.clear()
+        axes.set_axis_off()
+        axes.set_aspect("equal")
+        width, height = _INCHES
+        axes.set_xlim(-width / height, width / height)
+        axes.set_ylim(-1, 1)
+        segments, tints = self._grid()
+        axes.add_collection(
+            matplotlib.LineCollection(segments, colors=tints, linewidths=0.6, zorder=0)
+        )
+        corners, colours, widths, shadow = self._faces(places)
+        dark = self._mixed(self._colour("background"), np.zeros(3), self._number("shadow"))
+        axes.add_collection(
+            matplotlib.PolyCollection(
+                shadow, facecolors=[dark], edgecolors=[dark], linewidths=0.2, zorder=1
+            )
+        )
+        axes.add_collection(
+            matplotlib.PolyCollection(
+                corners, facecolors=colours, edgecolors=colours, linewidths=widths, zorder=2
+            )
+        )
+        self._labels(places)
+        return self.figure
+
+    def _faces(self, places: Array) -> tuple[Array, Array, Array, Array]:
+        """Corners on the picture, colours, widths of edges: far ones first; and the shadow."""
+        every = [(self._moved(faces, places[link]), faces) for link, faces in self.solid]
+        for item in self.scene.primitives:
+            if isinstance(item, (Span, Spring)) and item.role in self.shown:
+                a, b = (
+                    places[k, :, :3] @ np.array(end) + places[k, :, 3]
+                    for k, end in zip(item.links, item.ends, strict=True)
+                )
+                faces = stretched(item, a, b)
+                every.append((faces.corners, faces))
+        parts = [self._lit(corners, faces) for corners, faces in every if len(corners)]
+        corners, colours, widths = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        flat, depth = self.eye.seen(corners)
+        order = np.argsort(depth.mean(axis=1), kind="stable")
+        return flat[order], colours[order], widths[order], self._shadow(corners)
+
+    def _moved(self, faces: Faces, pose: Array) -> Array:
+        return np.array(faces.corners @ pose[:, :3].T + pose[:, 3])
+
+    def _lit(self, corners: Array, faces: Faces) -> tuple[Array, Array, Array]:
+        """The faces that are seen, their colours under the light and the widths of their edges."""
+        colour = self._colour(faces.colour)
+        if faces.kind == "line":
+            rows = np.tile([*colour, 1.0], (len(corners), 1))
+            return corners, rows, np.full(len(corners), _LINE)
+        normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+        size = np.linalg.norm(normal, axis=1)
+        normal = normal / np.where(size > 0, size, 1)[:, None]
+        sight = self.eye.place - corners.mean(axis=1)
+        outside = (normal * sight).sum(axis=1)
+        if faces.kind == "closed":
+            kept = outside > 0
+            corners, normal = corners[kept], normal[kept]
+        else:
+            normal = normal * np.sign(outside)[:, None]
+        sun = _LIGHT / np.linalg.norm(_LIGHT) @ self.eye.axes
+        bright = (
+            0.58 + 0.5 * np.clip(normal @ sun, 0, 1) + 0.06 * (normal @ np.array(self.scene.up))
+        )
+        rows = np.clip(bright[:, None] * colour, 0, 1)
+        alpha = np.full((len(rows), 1), faces.opacity)
+        seam = _SEAM if faces.opacity == 1 else 0.0
+        return corners, np.hstack([rows, alpha]), np.full(len(corners), seam)
+
+    def _shadow(self, corners: Array) -> Array:
+        """Faces where the light throws them on the ground."""
+        up, center = np.array(self.scene.up), np.array(self.scene.floor.center)
+        sun = up + 0.25 * self.eye.axes[0] - 0.1 * self.eye.axes[2]
+        height = (corners - center) @ up / float(sun @ up)
+        flat: Array = self.eye.seen(corners - height[..., None] * sun)[0]
+        return flat
+
+    def _grid(self) -> tuple[Array, Array]:
+        floor, up = self.scene.floor, np.array(self.scene.up)
+        count = int(floor.reach / floor.step)
+        right = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+        right = right / np.linalg.norm(right)
+        steps = np.arange(-count, count + 1) * floor.step
+        near = steps[:-1], steps[1:]
+        lines = np.array([[(c, a), (c, b)] for c in steps for a, b in zip(*near, strict=True)])
+        lines = np.vstack([lines, lines[:, :, ::-1]])
+        middle = np.linalg.norm(lines.mean(axis=1), axis=1)
+        points = np.array(floor.center) + lines @ np.vstack([right, np.cross(up, right)])
+        flat, depth = self.eye.seen(points)
+        kept = (depth < -0.05 * self.eye.away).all(axis=1) & (middle < floor.reach)
+        part = np.clip(1 - middle[kept] / floor.reach, 0, 1) ** 1.4
+        far, near_colour = self._colour("background"), self._colour("grid")
+        return flat[kept], far + part[:, None] * (near_colour - far)
+
+    def _labels(self, places: Array) -> None:
+        effects = optional_module("matplotlib.patheffects", _REMEDY)
+        halo = [effects.withStroke(linewidth=2.5, foreground=self._colour("background"))]
+        for item in self.scene.primitives:
+            if isinstance(item, Label) and item.role in self.shown:
+                at = places[item.link, :, :3] @ np.array(item.at) + places[item.link, :, 3]
+                (x, y), _ = self.eye.seen(at)
+                look = {"color": self._colour("text"), "fontsize": 9, "path_effects": halo}
+                y += 0.02 + 0.05 * item.row
+                self.axes.text(x + 0.02, y, item.text, gid=item.text, **look)
+
+    def _colour(self, name: str) -> Array:
+        colours = PALETTE[self.theme]
+        first, _, number = name.partition(".")
+        value = colours[first]
+        text = value[int(number)] if isinstance(value, list) else str(value)
+        return np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])
+
+    def _number(self, name: str) -> float:
+        value = PALETTE[self.theme][name]
+        return float(value) if isinstance(value, (int, float)) else 0.0
+
+    def _mixed(self, first: Array, second: Array, part: float) -> Array:
+        return np.array(first + 0.6 * part * (second - first))
+
+
+def painter(scene: Scene, view: str, theme: Theme, shown: Collection[str] = ()) -> Painter:
+    """A painter for a scene.
+
+    Args:
+        scene: what is painted.
+        view: iso, front, side or top.
+        theme: light or dark.
+        shown: roles that are painted besides the usual ones, such as "label".
+
+    Raises:
+        ModelError: matplotlib is missing, or there is no such view.
+    """
+    optional_module("matplotlib", _REMEDY)
+    figures = optional_module("matplotlib.figure", _REMEDY)
+    roles = frozenset(item.role for item in scene.primitives) - set(HIDDEN) | set(shown)
+    solid = [
+        (item.link, faces)
+        for item in scene.primitives
+        if not isinstance(item, (Span, Spring)) and item.role in roles
+        for faces in faces_of(item, scene.size)
+    ]
+    figure = figures.Figure(figsize=_INCHES)
+    figure.set_facecolor(str(PALETTE[theme]["background"]))
+    axes = figure.add_axes((0, 0, 1, 1))
+    return Painter(scene, camera(scene, view), theme, roles, solid, figure, axes)

@@ -1,0 +1,219 @@
+"""Pictures and films of mechanisms: for a notebook, and for files of several kinds."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.errors import ExportError, ModelError
+from mbs.files import PathLike, path_of, write_text
+from mbs.loops.posture import solve
+from mbs.messages import quoted
+from mbs.result import Result
+from mbs.view.film import save_gif, save_mp4, save_still
+from mbs.view.look import Look, look_of
+from mbs.view.page import framed, page
+from mbs.view.painter import Painter, painter
+from mbs.view.palette import Theme
+from mbs.view.posed import Array, Values
+from mbs.view.scene import Scene, scene
+
+_ENDINGS = (".html", ".png", ".svg", ".gif", ".mp4")
+_MOST_FRAMES = 5000
+_GIF_FPS = 20.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A mechanism, standing or moving. A notebook shows it as it is.
+
+    Attributes:
+        scene: what is shown.
+        poses: (n, 12 links) of each picture, one if it stands.
+        times: (n,) of each picture [s].
+        look: how it looks.
+        speed: seconds of the motion a second.
+    """
+
+    scene: Scene
+    poses: Array
+    times: Array
+    look: Look
+    speed: float = 1.0
+
+    @property
+    def html(self) -> str:
+        """The text of an HTML file with everything in it, which works offline."""
+        motion = (self.times, self.poses) if len(self.times) > 1 else ()
+        return page(self.scene, self.look, self.speed, *motion)
+
+    def _repr_html_(self) -> str:
+        return framed(self.html)
+
+    def save(self, path: PathLike) -> None:
+        """Write a file in the format that its ending names.
+
+        Args:
+            path: .html; .png or .svg, the first picture of a motion; .gif or .mp4 of a motion, the
+                latter by ffmpeg. It is replaced as a whole, or left alone.
+
+        Raises:
+            ExportError: the ending is another one, ffmpeg is missing, or the file cannot be
+                written.
+            ModelError: matplotlib is missing, which makes all but .html.
+        """
+        ending = path_of(path).suffix.lower()
+        if ending not in _ENDINGS:
+            raise ExportError(f"{path_of(path)}: the ending is {ending!r}; use {_listed()}")
+        if ending == ".html":
+            write_text(self.html, path)
+        elif ending in (".png", ".svg"):
+            save_still(self._painter(), self.poses[0], path)
+        else:
+            self._film(path, ending)
+
+    def _film(self, path: PathLike, ending: str) -> None:
+        if len(self.times) < 2:
+            raise ExportError(
+                f"{path_of(path)}: the picture does not move; save a .png, .svg or .html file, or"
+                " make one with mbs.view.animate"
+            )
+        fps = self.speed * (len(self.times) - 1) / float(self.times[-1] - self.times[0])
+        every = max(1, round(fps / _GIF_FPS)) if ending == ".gif" else 1
+        save = save_gif if ending == ".gif" else save_mp4
+        save(self._painter(), self.poses[::every], path, fps / every)
+
+    def _painter(self) -> Painter:
+        theme: Theme = "dark" if self.look.theme == "dark" else "light"
+        return painter(self.scene, self.look.view, theme, self.look.shown)
+
+
+def _listed() -> str:
+    return f"{', '.join(_ENDINGS[:-1])} or {_ENDINGS[-1]}"
+
+
+def show(
+    system: System,
+    q: Values = None,
+    path: PathLike | None = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    view: str = "iso",
+    theme: str = "auto",
+    shown: Collection[str] = (),
+) -> Picture:
+    """A picture of a mechanism at one posture.
+
+    Args:
+        system: open or closed; every symbol in its geometry has a value.
+        q: positions [rad or m]: all of them, or some by name, the others as assembled; the loops
+            are closed at those named, as `mbs.loops.solve` does. The assembled posture when left
+            out.
+        path: file to write, see `Picture.save`.
+        parameters: values of symbols, the others at their defaults.
+        view: iso, front, side or top.
+        theme: light or dark, or auto: what the browser prefers, and light in other files.
+        shown: roles that are shown besides the usual ones: "label" for the names of joints, "link
+            frame" for the frame of every link.
+
+    Raises:
+        ModelError: a name is unknown, or a symbol has no value.
+        Unclosable: the loops cannot be closed at the given positions.
+        ExportError: the file cannot be written.
+    """
+    require_system(system)
+    place: Values = q
+    if isinstance(q, Mapping) and system.is_closed:
+        place = solve(system, q, parameters=parameters).tolist()
+    made = scene(system, place, parameters=parameters)
+    look = look_of(made, view, theme, shown)
+    picture = Picture(made, np.array([made.poses()]), np.zeros(1), look)
+    if path is not None:
+        picture.save(path)
+    return picture
+
+
+def animate(
+    result: Result,
+    system: System | None = None,
+    path: PathLike | None = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    fps: float = 30.0,
+    speed: float = 1.0,
+    view: str = "iso",
+    theme: str = "auto",
+    shown: Collection[str] = (),
+) -> Picture:
+    """A film of a simulated or measured motion.
+
+    Args:
+        result: with a signal `name.q` for every coordinate.
+        system: whose motion it is; what was simulated when left out.
+        path: file to write, see `Picture.save`.
+        parameters: values of symbols, the others at their defaults.
+        fps: pictures a second.
+        speed: seconds of the motion a second, below one for slow motion.
+        view: as for `show`.
+        theme: as for `show`.
+        shown: as for `show`.
+
+    Raises:
+        ModelError: the result has no system or not the positions of this one, a name is unknown,
+            or there would be too many pictures.
+        ExportError: the file cannot be written.
+    """
+    whose = _owner(result, system)
+    times = _times(result, fps, speed)
+    q = _positions(result, whose, times)
+    made = scene(whose, q[0].tolist(), parameters=parameters).spanning(q)
+    look = look_of(made, view, theme, shown)
+    picture = Picture(made, made.motion(q), times, look, speed)
+    if path is not None:
+        picture.save(path)
+    return picture
+
+
+def _owner(result: Result, system: System | None) -> System:
+    if not isinstance(result, Result):
+        raise ModelError(f"{quoted(result)} is no Result; give what mbs.simulate.run returns")
+    whose = result.system if system is None else system
+    if whose is None:
+        raise ModelError(
+            f"result {result.name!r} does not know whose motion it is; give the System with system="
+        )
+    require_system(whose)
+    return cast(System, whose)
+
+
+def _times(result: Result, fps: float, speed: float) -> Array:
+    """(n,) instants of the pictures [s]."""
+    for name, value in (("fps", fps), ("speed", speed)):
+        if not (isinstance(value, (int, float)) and 0 < value < np.inf):
+            raise ModelError(f"{name} is {quoted(value)}; give a number above zero")
+    if len(result.time) < 2 or result.time[-1] <= result.time[0]:
+        raise ModelError(f"result {result.name!r} covers no time; give a motion")
+    count = float(result.time[-1] - result.time[0]) * fps / speed
+    if count > _MOST_FRAMES:
+        raise ModelError(
+            f"result {result.name!r}: {count:.0f} pictures are more than {_MOST_FRAMES}; give a"
+            " larger speed or fewer fps"
+        )
+    return np.linspace(result.time[0], result.time[-1], max(2, round(count) + 1))
+
+
+def _positions(result: Result, system: System, times: Array) -> Array:
+    """(n, nq) positions at these instants, on straight lines between the rows of the result."""
+    names = [f"{coordinate.name}.q" for coordinate in system.coordinates]
+    for name in names:
+        if name not in result:
+            raise ModelError(
+                f"result {result.name!r} has no signal {name!r}, which a motion of {system.name}"
+                " has; give the System it belongs to with system="
+            )
+    return np.column_stack([np.interp(times, result.time, result[name]) for name in names])

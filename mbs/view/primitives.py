@@ -1,0 +1,146 @@
+"""What a scene is made of: simple shapes in the frames of links, free of any way to draw them.
+
+Every primitive has a role, by which a viewer shows and hides it, and the name of a colour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Vector = tuple[float, float, float]
+Rows = tuple[float, ...]
+"""A pose: the rows of R|p, 12 numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A round bar with rounded ends from a to b [m], in the frame of the link."""
+
+    role: str
+    link: int
+    colour: str
+    a: Vector
+    b: Vector
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """A cylinder from a to b [m], with a bore where that is above zero [m]."""
+
+    role: str
+    link: int
+    colour: str
+    a: Vector
+    b: Vector
+    radius: float
+    bore: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Ball:
+    """A ball at a point [m]."""
+
+    role: str
+    link: int
+    colour: str
+    at: Vector
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A cuboid with these sides [m] about the origin of a pose."""
+
+    role: str
+    link: int
+    colour: str
+    pose: Rows
+    size: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """A ring about an axis through a point: radius of its middle line and of the tube [m]."""
+
+    role: str
+    link: int
+    colour: str
+    at: Vector
+    axis: Vector
+    radius: float
+    tube: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plate:
+    """A thin polygon with these corners [m]."""
+
+    role: str
+    link: int
+    colour: str
+    points: tuple[Vector, ...]
+    opacity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Three arrows along the axes of a frame: pose, and their length [m]."""
+
+    role: str
+    link: int
+    pose: Rows
+    length: float
+    colour: str = "axes"
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A dashed line from a to b [m]."""
+
+    role: str
+    link: int
+    a: Vector
+    b: Vector
+    colour: str = "axis"
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A text beside a point [m], above as many others that are there as `row` says."""
+
+    role: str
+    link: int
+    at: Vector
+    text: str
+    row: int = 0
+    colour: str = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A round bar between points on two links, however far apart they are.
+
+    `ends` are in the frames of the two links [m].
+    """
+
+    role: str
+    links: tuple[int, int]
+    colour: str
+    ends: tuple[Vector, Vector]
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """A coil between points on two links; `length` is the one at which its wire is round [m]."""
+
+    role: str
+    links: tuple[int, int]
+    colour: str
+    ends: tuple[Vector, Vector]
+    radius: float
+    length: float
+
+
+Primitive = Bar | Cylinder | Ball | Box | Ring | Plate | Frame | Axis | Label | Span | Spring

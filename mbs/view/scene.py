@@ -1,0 +1,179 @@
+"""A mechanism as simple shapes on its links, for any viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.errors import ModelError
+from mbs.view.joint_shapes import force_shapes, joint_shapes
+from mbs.view.link_shapes import base_shapes, corners, frame_shapes, link_shapes, solid_shapes
+from mbs.view.measures import Bounds, Floor, bounds_of, floor_of, measures, views
+from mbs.view.palette import PALETTE
+from mbs.view.posed import Array, Values, pose_rows, posed, position_of
+from mbs.view.primitives import Ball, Bar, Box, Cylinder, Frame, Primitive, Ring, Vector
+
+HIDDEN = ("link frame", "label")
+"""Roles that are not shown until asked for."""
+
+_MARGIN = 0.6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Shapes on links, and where they are seen from; lengths in m, in the frames of the links.
+
+    Attributes:
+        system: the mechanism.
+        primitives: the shapes, each with its link (0 the base) and its role: link, joint, axis,
+            frame, loop, force, base, label, link frame.
+        links: names of the base and the links.
+        up: unit vector against gravity.
+        size: of the mechanism [m].
+        bounds: a ball that holds it at the posture q.
+        floor: the ground grid.
+        views: unit vectors towards who looks: iso, front, side, top.
+        q: (nq,) posture that it was made at.
+        parameters: value of every symbol.
+    """
+
+    system: System
+    primitives: tuple[Primitive, ...]
+    links: tuple[str, ...]
+    up: Vector
+    size: float
+    bounds: Bounds
+    floor: Floor
+    views: Mapping[str, Vector]
+    q: tuple[float, ...]
+    parameters: Mapping[str, float]
+
+    def poses(self, q: Values = None, parameters: Mapping[str, float] | None = None) -> list[float]:
+        """Where the base and the links are: 12 numbers each, the rows of R|p in the base frame.
+
+        Args:
+            q: (nq,) positions [rad or m], or by name, the others as in the assembled posture; that
+                of the scene when left out. Loops are not closed here.
+            parameters: values of symbols, the others as in the scene.
+
+        Raises:
+            ModelError: a name is unknown, or the numbers do not fit.
+        """
+        place = self.q if q is None else position_of(self.system, q)
+        p = self.system.parameter_values({**self.parameters, **(parameters or {})})
+        flat: list[float] = pose_rows(self.system, np.reshape(place, (-1, 1)), p).ravel().tolist()
+        return flat
+
+    def motion(self, q: Array) -> Array:
+        """(n, 12 links) poses, as `poses` gives them, at each of n postures q (n, nq)."""
+        p = self.system.parameter_values(self.parameters)
+        return pose_rows(self.system, np.transpose(q), p).T
+
+    def spanning(self, q: Array) -> Scene:
+        """The same scene with bounds and ground for all of n postures q (n, nq)."""
+        marks = _marks(self.primitives)
+        poses = self.motion(q).reshape(len(q), -1, 3, 4)
+        points = np.vstack([poses[:, k, :, :3] @ at + poses[:, k, :, 3] for k, at in marks])
+        up, radius = np.array(self.up), self.bounds.radius
+        bounds = bounds_of(points, 0.08 * radius)
+        ground = float(np.array(self.floor.center) @ up) * up
+        return replace(self, bounds=bounds, floor=floor_of(np.vstack([points, ground]), up, bounds))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers, texts, lists and dicts, as JSON has them."""
+        return {
+            "name": self.system.name,
+            "links": list(self.links),
+            "primitives": [_plain(item) for item in self.primitives],
+            "poses": self.poses(),
+            "up": list(self.up),
+            "size": self.size,
+            "bounds": asdict(self.bounds),
+            "floor": asdict(self.floor),
+            "views": {name: list(view) for name, view in self.views.items()},
+            "hidden": list(HIDDEN),
+            "palette": {theme: dict(colours) for theme, colours in PALETTE.items()},
+        }
+
+
+def scene(
+    system: System, q: Values = None, *, parameters: Mapping[str, float] | None = None
+) -> Scene:
+    """The shapes that stand for a mechanism.
+
+    Bodies that were described by their dimensions are drawn as they are, the other links as bars
+    between their joints. Sizes of joints and frames follow from the size of the mechanism.
+
+    Args:
+        system: open or closed; every symbol in its geometry has a value.
+        q: posture that bounds and ground are for, and the poses unless others are asked for: (nq,)
+            [rad or m], or by name; the assembled one when left out. Loops are not closed here.
+        parameters: values of symbols, the others at their defaults.
+
+    Raises:
+        ModelError: `system` is not a System, a name is unknown, or a symbol has no value.
+    """
+    require_system(system)
+    place = position_of(system, q)
+    at = posed(system, place, parameters)
+    solids = list(solid_shapes(at))
+    spread = np.vstack([np.zeros((0, 3)), *(corners(at, solid) for solid in solids)])
+    sizes = measures(at, spread)
+    points = np.vstack([np.zeros((1, 3)), at.points, spread])
+    if not np.isfinite(points).all():
+        raise ModelError(
+            f"{system.name}: a point of the picture is not finite; check the values of the symbols"
+        )
+    bounds = bounds_of(points, _MARGIN * sizes.frame)
+    floor = floor_of(points, at.up, bounds, _gap(at.system) * sizes.joint)
+    level = float(np.array(floor.center) @ at.up)
+    primitives = (
+        *base_shapes(at, sizes, level),
+        *solids,
+        *link_shapes(at, sizes, solids),
+        *joint_shapes(at, sizes),
+        *force_shapes(at, sizes),
+        *frame_shapes(at, sizes),
+    )
+    up = (float(at.up[0]), float(at.up[1]), float(at.up[2]))
+    names = ("base", *(row.name for row in system.links))
+    return Scene(
+        system,
+        primitives,
+        names,
+        up,
+        sizes.size,
+        bounds,
+        floor,
+        views(at),
+        tuple(place),
+        at.parameters,
+    )
+
+
+def _gap(system: System) -> float:
+    """How far the ground is below, in radii of joints: wheels touch it, arms stand above it."""
+    kinds = {joint.kind for joint in system.joints}
+    return 0.0 if kinds & {"rollingdisc", "free"} else 4.0
+
+
+def _plain(item: Primitive) -> dict[str, Any]:
+    return {"kind": type(item).__name__.lower(), **asdict(item)}
+
+
+def _marks(primitives: tuple[Primitive, ...]) -> list[tuple[int, Array]]:
+    """Points of shapes on their links, which bound a motion."""
+    found: list[tuple[int, Array]] = []
+    for item in primitives:
+        if isinstance(item, (Bar, Cylinder)):
+            found += [(item.link, np.array(item.a)), (item.link, np.array(item.b))]
+        elif isinstance(item, (Ball, Ring)):
+            found.append((item.link, np.array(item.at)))
+        elif isinstance(item, (Box, Frame)):
+            found.append((item.link, np.array(item.pose).reshape(3, 4)[:, 3]))
+    return found

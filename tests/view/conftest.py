@@ -1,0 +1,22 @@
+"""Mechanisms of the catalogue, each assembled once for all pictures."""
+
+import functools
+
+import pytest
+
+import mbs
+
+
+@pytest.fixture(scope="session")
+def assembled():
+    @functools.cache
+    def assemble(name):
+        return mbs.load(name).assemble()
+
+    return assemble
+
+
+@pytest.fixture(scope="session")
+def swing(assembled):
+    """A second of the four-bar linkage, falling from its posture."""
+    return mbs.simulate.run(assembled("four_bar"), 1.0, q0={"j1": 0.4}, step=0.05, quiet=True)

@@ -1,0 +1,197 @@
+"""Scenes: shapes on links, of every mechanism of the catalogue."""
+
+import json
+
+import numpy as np
+import pytest
+
+import mbs
+from mbs.components import Body, Box, Cylinder, Free, PointMass, Prismatic, Revolute, Spring
+from mbs.errors import ModelError
+from mbs.models.skeleton import skeleton
+from mbs.view.primitives import Ball, Bar, Label, Ring
+from mbs.view.primitives import Box as BoxShape
+from mbs.view.primitives import Cylinder as CylinderShape
+from mbs.view.primitives import Spring as SpringShape
+
+SEED = 20261122
+CATALOGUE = mbs.robots.catalogue()
+
+
+def posture(system):
+    """Random positions, quaternions of unit length."""
+    rng = np.random.default_rng(SEED)
+    q = np.array(system.posture) + rng.uniform(-0.7, 0.7, system.nq)
+    turned = [k for k, c in enumerate(system.coordinates) if c.kind == "quaternion"]
+    for four in np.array(turned, int).reshape(-1, 4):
+        q[four] /= np.linalg.norm(q[four])
+    return q
+
+
+def numbers(value):
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, (list, tuple)):
+        return [number for inner in value for number in numbers(inner)]
+    return [value] if isinstance(value, (int, float)) else []
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_mechanism_has_a_scene(name, assembled):
+    system = assembled(name)
+    scene = mbs.view.scene(system)
+    plain = scene.as_dict()
+    assert json.loads(json.dumps(plain, allow_nan=False)) == json.loads(json.dumps(plain))
+    assert np.isfinite(numbers(plain)).all()
+    links = len(system.links) + 1
+    assert len(plain["links"]) == links
+    assert len(plain["poses"]) == 12 * links
+    for item in plain["primitives"]:
+        ends = item["links"] if "links" in item else [item["link"]]
+        assert all(0 <= link < links for link in ends)
+    roles = {item["role"] for item in plain["primitives"]}
+    known = {"link", "joint", "axis", "frame", "loop", "force", "base", "label", "link frame"}
+    assert {"link", "frame", "link frame"} <= roles <= known
+    assert ("loop" in roles) == bool(system.cuts)
+    named = {item["text"] for item in plain["primitives"] if item["kind"] == "label"}
+    assert named == {joint.name for joint in system.joints if joint.kind not in ("free", "fixed")}
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_links_stand_where_the_models_say(name, assembled):
+    system = assembled(name)
+    scene = mbs.view.scene(system)
+    q = posture(system)
+    poses = np.array(scene.poses(q.tolist())).reshape(-1, 3, 4)
+    assert np.array_equal(poses[0], np.eye(3, 4))
+    for number in range(1, len(poses)):
+        expected = np.array(mbs.models.transform(system, number)(q))[:3]
+        assert np.abs(poses[number] - expected).max() < 1e-12
+    rows = scene.motion(np.vstack([system.posture, q]))
+    assert np.array_equal(rows[1], poses.ravel())
+    assert np.array_equal(rows[0], scene.poses())
+
+
+@pytest.mark.parametrize("name", ["puma560", "four_bar", "stewart_platform"])
+def test_shapes_stay_on_the_skeleton(name, assembled):
+    system = assembled(name)
+    scene = mbs.view.scene(system)
+    q = posture(system)
+    poses = np.array(scene.poses(q.tolist())).reshape(-1, 3, 4)
+    parts = skeleton(system)
+    points = np.array(parts.function(q)[0]).T
+    wanted = [points[[a, b]] for link in parts.links for a, b in link.segments]
+    bars = [bar for bar in scene.primitives if isinstance(bar, Bar) and bar.role == "link"]
+    placed = [
+        np.array([bar.a, bar.b]) @ poses[bar.link, :, :3].T + poses[bar.link, :, 3] for bar in bars
+    ]
+    held = [any(np.abs(ends - line).max() < 1e-12 for ends in placed) for line in wanted]
+    solids = sum(body.solid is not None for body in system.bodies)
+    assert held.count(False) == (3 if name == "four_bar" else 0) == solids
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 100.0])
+def test_sizes_follow_from_the_mechanism(scale):
+    m = mbs.Mechanism("arm")
+    upper, lower = (
+        m.add(Body("upper", mass=1)),
+        m.add(Body("lower", mass=1, com=(0.5 * scale, 0, 0))),
+    )
+    m.connect(m.world, Revolute("j1"), upper)
+    m.connect(upper.at(scale), Revolute("j2"), lower)
+    m.add_frame("tool", lower.at(scale))
+    scene = mbs.view.scene(m.assemble())
+    assert scene.size == pytest.approx(2 * scale, rel=1e-12)
+    assert 1.0 * scale < scene.bounds.radius < 1.3 * scale
+    cell = scene.floor.step / 10.0 ** np.floor(np.log10(scene.floor.step))
+    assert min(abs(cell - nice) for nice in (1, 2, 5, 10)) < 1e-9
+    radii = {item.radius / scale for item in scene.primitives if isinstance(item, Bar)}
+    assert max(radii) == pytest.approx(0.62 * 0.028 * 2, rel=1e-9)
+
+
+def test_bodies_with_dimensions_are_drawn_as_they_are():
+    m = mbs.Mechanism("pair", parameters={"L": 0.4})
+    box = m.add(Box("box", length="L", width=0.05, height=0.02, density=1000))
+    tube = m.add(Cylinder("tube", length=0.3, radius=0.04, inner_radius=0.03, density=1000))
+    m.connect(m.world, Revolute("j1"), box.left)
+    m.connect(box.right, Revolute("j2"), tube.left)
+    system = m.assemble()
+    (shape,) = (
+        item
+        for item in mbs.view.scene(system, parameters={"L": 0.7}).primitives
+        if isinstance(item, BoxShape)
+    )
+    assert shape.size == (0.7, 0.05, 0.02)
+    scene = mbs.view.scene(system)
+    (round_,) = (i for i in scene.primitives if isinstance(i, CylinderShape) and i.role == "link")
+    assert (round_.radius, round_.bore) == (0.04, 0.03)
+    assert np.linalg.norm(np.subtract(round_.b, round_.a)) == pytest.approx(0.3, abs=1e-15)
+    assert not [i for i in scene.primitives if isinstance(i, Bar) and i.role == "link"]
+    centre = np.array(scene.poses({"j1": 0.0})).reshape(-1, 3, 4)[1]
+    pose = np.array(next(i for i in scene.primitives if isinstance(i, BoxShape)).pose)
+    middle = centre[:, :3] @ pose.reshape(3, 4)[:, 3] + centre[:, 3]
+    expected = np.array(mbs.models.transform(system, "box")(system.posture, [0.4]))
+    assert np.abs(middle - (expected @ [0.2, 0, 0, 1])[:3]).max() < 1e-12
+
+
+@pytest.mark.parametrize("gravity", [(0, 0, -9.81), (0, -9.81, 0), (0, 0, 9.81), (0, 0, 0)])
+def test_up_is_against_gravity_and_the_ground_below(gravity):
+    m = mbs.Mechanism("pendulum", gravity=gravity)
+    rod = m.add(Body("rod", mass=1, com=(0, 0, -1)))
+    m.connect(m.world, Revolute("j1", axis="x"), rod)
+    scene = mbs.view.scene(m.assemble())
+    up = np.array(scene.up)
+    expected = -np.array(gravity) / 9.81 if any(gravity) else np.array([0, 0, 1])
+    assert np.array_equal(up, expected)
+    lowest = min(0.0, float(up @ [0, 0, -1]))
+    assert float(np.array(scene.floor.center) @ up) < lowest
+    for view in scene.views.values():
+        assert np.linalg.norm(view) == pytest.approx(1, abs=1e-12)
+    assert np.array(scene.views["top"]) @ up > 0.99
+    assert abs(np.array(scene.views["side"]) @ up) < 1e-12
+
+
+def test_a_planar_mechanism_is_seen_from_the_front(assembled):
+    views = mbs.view.scene(assembled("four_bar")).views
+    assert np.allclose(views["front"], (0, 0, 1), atol=1e-12)
+    assert np.array(views["iso"]) @ np.array(views["front"]) > 0.8
+
+
+def test_wheels_springs_and_motors_are_told_apart(assembled):
+    rings = [
+        i for i in mbs.view.scene(assembled("whipple_bicycle")).primitives if isinstance(i, Ring)
+    ]
+    assert sorted(round(ring.radius + ring.tube, 12) for ring in rings) == [0.3, 0.35]
+    m = mbs.Mechanism("cart")
+    cart, mass = m.add(Body("cart", mass=1)), m.add(PointMass("mass", mass=1))
+    m.connect(m.world, Prismatic("x", axis="x"), cart)
+    m.connect(cart, Prismatic("z", axis="z", actuated=False), mass)
+    m.add(Spring("k", cart.frame, mass.at(0, 0, 1), stiffness=1.0))
+    items = mbs.view.scene(m.assemble()).primitives
+    (spring,) = (item for item in items if isinstance(item, SpringShape))
+    assert (spring.role, spring.links) == ("force", (1, 2))
+    boxes = {item.colour for item in items if isinstance(item, BoxShape)}
+    assert boxes == {"active", "joint"}
+    labels = [(item.text, item.row) for item in items if isinstance(item, Label)]
+    assert labels == [("x", 0), ("z", 1)]
+
+
+def test_a_body_that_floats_has_a_size_from_its_inertia():
+    m = mbs.Mechanism("stone")
+    stone = m.add(Body("stone", mass=2, inertia=(0.02, 0.02, 0.02)))
+    m.connect(m.world, Free("root"), stone)
+    scene = mbs.view.scene(m.assemble())
+    assert scene.size == pytest.approx(4 * np.sqrt(0.06 / 4), rel=1e-12)
+    assert any(isinstance(item, Ball) and item.role == "link" for item in scene.primitives)
+
+
+def test_mistakes_are_told_in_a_sentence(assembled):
+    with pytest.raises(ModelError, match="call assemble"):
+        mbs.view.scene("four_bar")
+    with pytest.raises(ModelError, match="there is no coordinate 'j9'"):
+        mbs.view.scene(assembled("four_bar"), {"j9": 1.0})
+    m = mbs.Mechanism("open")
+    rod = m.add(Body("rod", mass=1, com=(0, 0, -1)))
+    m.connect(m.world.at("L"), Revolute("j1", axis="x"), rod)
+    with pytest.raises(ModelError, match="parameter 'L' has no value"):
+        mbs.view.scene(m.assemble())

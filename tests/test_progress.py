@@ -36,3 +36,28 @@ def test_nothing_heavy_is_imported_early():
     loaded = set(answer.stdout.split())
     assert "casadi" in loaded
     assert not loaded & {"fmpy", "rich", "matplotlib", "pandas", "sympy"}
+
+
+def test_a_listener_hears_label_and_part_of_quiet_runs_and_only_within_its_block():
+    heard = []
+    with module.listen(lambda label, part: heard.append((label, part))):
+        with module.progress("swinging", 2.0, 12.0, quiet=True) as reach:
+            for time in (2.0, 7.0, 13.0):
+                reach(time)
+        with module.progress("nothing", 1.0, 1.0, quiet=True) as reach:
+            reach(1.0)
+    with module.progress("later", 0.0, 1.0, quiet=True) as reach:
+        reach(0.5)
+    assert heard == [("swinging", 0.0), ("swinging", 0.5), ("swinging", 1.0), ("nothing", 1.0)]
+
+
+def test_an_error_in_a_listened_block_ends_the_listening():
+    heard = []
+    try:
+        with module.listen(lambda *told: heard.append(told)):
+            raise RuntimeError("stop")
+    except RuntimeError:
+        pass
+    with module.progress("later", 0.0, 1.0, quiet=True) as reach:
+        reach(0.5)
+    assert heard == []

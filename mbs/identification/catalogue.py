@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from casadi import Function
+
 from mbs.assembly import System
-from mbs.identification.base.base_parameters import base_parameters
+from mbs.identification.base.base_parameters import METHODS, base_parameters
 from mbs.identification.regressors.dynamic import regressor
 from mbs.identification.regressors.energy import energy_regressor
 from mbs.identification.regressors.filtered import filtered_regressor
 from mbs.models.catalogue import Entry
+from mbs.models.catalogue.options import MOVING_BASE, choice
 
 
 def entries() -> tuple[Entry, ...]:
@@ -15,8 +18,12 @@ def entries() -> tuple[Entry, ...]:
     return _ENTRIES
 
 
-def _base(system: System) -> str:
-    return base_parameters(system).text()
+def _grouping(system: System, method: str, moving_base: bool) -> Function:
+    return base_parameters(system, method, moving_base=moving_base).function
+
+
+def _set(system: System, method: str, moving_base: bool) -> str:
+    return base_parameters(system, method, moving_base=moving_base).text() + "\n"
 
 
 _ENTRIES = (
@@ -25,7 +32,9 @@ _ENTRIES = (
         "Identification",
         "Base inertial parameters",
         "K_b = beta(K)",
-        text=_base,
+        (choice("method", "method", *METHODS), MOVING_BASE),
+        _grouping,
+        _set,
     ),
     Entry(
         "dynamic-identification",

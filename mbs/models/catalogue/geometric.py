@@ -2,27 +2,11 @@
 
 from __future__ import annotations
 
-from casadi import Function
-
 from mbs import loops
-from mbs.assembly import System
-from mbs.models import inverse_geometry
 from mbs.models.catalogue.entry import Entry
-from mbs.models.catalogue.options import TARGET, one_frame
+from mbs.models.catalogue.options import BASE, TARGET, one_frame
+from mbs.models.catalogue.postures import INVERSE_GEOMETRY
 from mbs.models.geometry import direct_geometry, transform
-
-
-def _postures(key: str, title: str, method: str) -> Entry:
-    def function(system: System, frame: str | int) -> Function:
-        return inverse_geometry.function(system, method, frame)
-
-    def text(system: System, frame: str | int) -> str:
-        return inverse_geometry.text(system, method, frame)
-
-    return Entry(
-        key, "Geometric", title, "q = igm(T)", (TARGET,), function, text, method, structures="open"
-    )
-
 
 GEOMETRIC: tuple[Entry, ...] = (
     Entry(
@@ -30,20 +14,11 @@ GEOMETRIC: tuple[Entry, ...] = (
         "Geometric",
         "Transformation matrix",
         "iTj(q)",
-        (TARGET, one_frame("relative_to", "seen from frame", lambda _: 0)),
+        (TARGET, one_frame("relative_to", "seen from frame", BASE)),
         transform,
     ),
     Entry("dgm", "Geometric", "Fast geometric model", "0Tn(q)", (TARGET,), direct_geometry),
-    _postures("igm-pieper", "Inverse geometric model, Pieper's method", "pieper"),
-    _postures("igm-paul", "Inverse geometric model, Paul's method", "paul"),
-    Entry(
-        "igm-general",
-        "Geometric",
-        "Inverse geometric model, general method",
-        "q = igm(T)",
-        (TARGET,),
-        solver="general",
-    ),
+    *INVERSE_GEOMETRY,
     Entry(
         "closure",
         "Geometric",

@@ -147,4 +147,6 @@ def _representative(question: Question, family: Family) -> Array:
 def _whole(question: Question, found: Nearest) -> Nearest:
     """The nearest pose with the posture of the whole robot; NaN where its loops stay open."""
     whole = question.whole(found.q)
+    if not np.all(np.isfinite(whole)):
+        return replace(found, q=whole)
     return replace(found, q=question.wishes.bounds.wound(whole, question.wishes.near))

@@ -1,0 +1,36 @@
+"""The command `mbs`: what the package does, from a terminal.
+
+Exit codes: 0 where all went well; 1 with one sentence on the standard error where mbs refused or
+could not go on, and silently where the reader of its output went away; 2 for words that the
+command line does not know; 130 when interrupted.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+
+__all__ = ["main"]
+
+
+def main() -> None:
+    """Run the command line on the words that the shell gave, then leave with an exit code."""
+    from mbs.app.cli.application import application
+
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+    try:
+        try:
+            application(prog_name="mbs")
+        finally:
+            sys.stdout.flush()
+    except OSError as error:
+        _close_output()
+        reader_gone = error.errno == errno.EPIPE
+        sys.exit(1 if reader_gone else f"mbs: the output cannot be written ({error.strerror})")
+
+
+def _close_output() -> None:
+    """Let what is still to be written vanish, so that leaving complains no more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

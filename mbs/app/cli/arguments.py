@@ -1,0 +1,57 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mbs.app.cli import completion
+
+Robot = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="Name in the catalogue, or a .toml, .par, .urdf or .xml (MJCF) file.",
+        autocompletion=completion.robots,
+        show_default=False,
+    ),
+]
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameter",
+        "-p",
+        metavar="NAME=VALUE",
+        help="Value of a symbol of the robot; may be repeated.",
+        show_default=False,
+    ),
+]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print JSON on the standard output, and nothing else there.")
+]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="File to write; it is replaced as a whole, or left alone.",
+        show_default=False,
+    ),
+]
+
+
+def examples(*lines: str) -> str:
+    """The end of a help page: commands that work as they stand."""
+    escaped = (line.replace("[", r"\[") for line in lines)
+    return "\n".join(["[bold]Examples[/bold]", *(f"[dim]$[/dim] {line}" for line in escaped)])
+
+
+def help_of(command: Callable[..., None]) -> str:
+    """The docstring of a command, each paragraph on one line so that terminals wrap it."""
+    paragraphs = (inspect.getdoc(command) or "").split("\n\n")
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)

@@ -1,0 +1,65 @@
+"""What the shell offers after a tab: names of robots, robot files, keys of models, languages."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import typer
+
+SUFFIXES = (".toml", ".par", ".urdf", ".xml")
+"""Endings of robot files."""
+
+
+def robot_names() -> list[str]:
+    """The names of the catalogue, read from the text of `mbs.robots` without loading CasADi."""
+    found = importlib.util.find_spec("mbs.robots")
+    if found is None or found.origin is None:
+        return []
+    text = Path(found.origin).read_text(encoding="utf-8")
+    return re.findall(r"^from mbs\.robots\.(\w+) import \1$", text, re.MULTILINE)
+
+
+def robots(incomplete: str) -> list[str]:
+    """Names of the catalogue, folders and robot files that begin so."""
+    names = [name for name in robot_names() if name.startswith(incomplete)]
+    return [*names, *_files(incomplete, SUFFIXES)]
+
+
+def keys(incomplete: str) -> list[tuple[str, str]]:
+    """Keys of models that begin so, with their titles."""
+    from mbs.app.tasks.equations import entries
+
+    return [(e.key, e.title) for e in entries() if e.key.startswith(incomplete)]
+
+
+def options(ctx: typer.Context, incomplete: str) -> list[str]:
+    """NAME= of the options of the model that the line names."""
+    from mbs.app.tasks.equations import entries
+
+    words = {ctx.params.get("key"), *ctx.args}  # the latter while the option has no value yet
+    named = [entry for entry in entries() if entry.key in words]
+    names = [option.name for entry in named for option in entry.options]
+    return [f"{name}=" for name in names if name.startswith(incomplete)]
+
+
+def languages(incomplete: str) -> list[str]:
+    """Languages of generated text that begin so."""
+    from mbs.export.languages import LANGUAGES
+
+    return [name for name in LANGUAGES if name.startswith(incomplete)]
+
+
+def _files(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
+    folder, _, start = incomplete.rpartition("/")
+    place = Path(f"{folder}/" if folder or incomplete.startswith("/") else ".")
+    if not place.is_dir():
+        return []
+    before = incomplete[: len(incomplete) - len(start)]
+    shown = [path for path in sorted(place.iterdir()) if path.name.startswith(start)]
+    return [
+        f"{before}{path.name}{'/' if path.is_dir() else ''}"
+        for path in shown
+        if (path.is_dir() or path.suffix.lower() in suffixes) and not path.name.startswith(".")
+    ]

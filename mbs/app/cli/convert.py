@@ -1,0 +1,77 @@
+"""`mbs convert`: a robot file in another format."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mbs.app.cli.arguments import Parameters, Robot, examples
+from mbs.app.cli.loading import mechanism, numbers
+from mbs.app.cli.printing import note
+from mbs.errors import DescriptionError, ExportError
+from mbs.messages import did_you_mean
+
+if TYPE_CHECKING:
+    from mbs.formats import RobotTable
+
+EXAMPLES = examples(
+    "mbs convert robot.urdf robot.par",
+    "mbs convert robot.par robot.toml",
+    "mbs convert sr400 sr400.toml",
+)
+_WRITTEN = (".par", ".toml")
+
+
+def convert(
+    source: Robot,
+    target: Annotated[
+        Path,
+        typer.Argument(
+            metavar="TARGET", help="File to write, .par (SYMORO) or .toml.", show_default=False
+        ),
+    ],
+    *,
+    parameter: Parameters = None,
+) -> None:
+    """Convert a robot to a .par or .toml file.
+
+    From .par and .toml the table of frames is written as it was read, symbols and all. From URDF,
+    MJCF and the catalogue, link j of the assembled robot is frame j.
+    """
+    suffix = target.suffix.lower()
+    if suffix not in _WRITTEN:
+        raise ExportError(
+            f"{target}: files of this kind are not written; {did_you_mean(suffix, _WRITTEN)}"
+        )
+    table = _table(source, parameter)
+    if table is not None:
+        from mbs.formats import write_par, write_toml
+
+        (write_par if suffix == ".par" else write_toml)(table, target)
+    else:
+        from mbs.app.tasks import exporting
+        from mbs.files import write_bytes
+
+        assembled = mechanism(source, parameter).assemble()
+        content = (exporting.par if suffix == ".par" else exporting.toml)(assembled)
+        write_bytes(content, target)
+    note(f"wrote {target}")
+
+
+def _table(source: str, parameters: list[str] | None) -> RobotTable | None:
+    """The table of frames that a file holds; None where it holds none."""
+    from mbs.formats import read_par, read_toml
+    from mbs.robots import catalogue
+
+    suffix = Path(source).suffix.lower()
+    if source in catalogue() or suffix not in _WRITTEN:
+        return None
+    table = read_par(source) if suffix == ".par" else read_toml(source)
+    given = numbers(parameters, "--parameter")
+    try:
+        return replace(table, parameters={**table.parameters, **given})
+    except DescriptionError as error:
+        raise DescriptionError(f"--parameter: {error}") from error

@@ -1,0 +1,119 @@
+"""An assembled robot as plain data: frames, inertial parameters, loops, symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from casadi import SX
+
+    from mbs.assembly import System
+
+GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
+TEN = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+DRIVE = ("Ia", "Fv", "Fs", "stiffness")
+
+Scalar = float | str
+"""A number, or the text of an expression of symbols."""
+
+
+def described(system: System) -> dict[str, Any]:
+    """A system in numbers, texts, lists and dicts, in SI units and radians.
+
+    Args:
+        system: open or closed.
+    """
+    scalar = _scalars(system)
+    closure = system.closure
+    return {
+        "name": system.name,
+        "source": system.source,
+        "closed": system.is_closed,
+        "nq": system.nq,
+        "nv": system.nv,
+        "gravity": [scalar(system.tree.gravity[k]) for k in range(3)],
+        "links": _links(system, scalar),
+        "inertia": _inertia(system, scalar),
+        "coordinates": _coordinates(system),
+        "independent": [system.speeds[k].name for k in system.active],
+        "frames": {name: link + 1 for name, (link, _) in system.frames.items()},
+        "loops": _loops(system),
+        "closure_residual": None if closure is None else closure.residual,
+        "symbols": [
+            {"name": p.name, "value": p.default, "unit": p.unit, "description": p.description}
+            for p in system.parameters
+        ],
+        "report": system.report(),
+    }
+
+
+def _coordinates(system: System) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": c.name,
+            "kind": c.kind,
+            "unit": c.unit,
+            "actuated": c.actuated,
+            "limits": c.limits,
+            "posture": value,
+        }
+        for c, value in zip(system.coordinates, system.posture, strict=True)
+    ]
+
+
+def _loops(system: System) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": loop.name,
+            "closing": loop.closing,
+            "joints": loop.joints,
+            "rows": len(loop.rows),
+            "dropped": loop.dropped,
+        }
+        for loop in system.loops
+    ]
+
+
+def _links(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, Any]]:
+    rows = []
+    for link, row in zip(system.tree.links, system.links, strict=True):
+        placed = zip(GEOMETRY, map(scalar, link.placement.parameters), strict=True)
+        bodies = [body.name for body in system.bodies if body.link == row.number]
+        rows.append(
+            {
+                "number": row.number,
+                "name": row.name,
+                "antecedent": row.antecedent,
+                "motion": row.motion,
+                **dict(placed),
+                "bodies": bodies,
+            }
+        )
+    return rows
+
+
+def _inertia(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, Any]]:
+    rows = []
+    for number, link in enumerate(system.tree.links, start=1):
+        ten = link.inertia.parameters
+        values = {name: scalar(ten[k]) for k, name in enumerate(TEN)}
+        values |= {name: scalar(getattr(link, name)) for name in DRIVE}
+        rows.append({"link": number, **values})
+    return rows
+
+
+def _scalars(system: System) -> Callable[[SX], Scalar]:
+    names = [parameter.name for parameter in system.parameters]
+
+    def scalar(value: SX) -> Scalar:
+        if value.is_constant():
+            return float(value)
+        from casadi import Function
+
+        from mbs.export.languages.one_line import one_line  # with sympy, which is slow to load
+        from mbs.operations.graph import graph_of
+
+        return one_line(graph_of(Function("value", [system.p], [value])), names)
+
+    return scalar

@@ -1,0 +1,42 @@
+"""`mbs app`: the desk in the browser."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from mbs.app.cli import completion
+from mbs.app.cli.arguments import examples
+
+EXAMPLES = examples("mbs app", "mbs app rx90", "mbs app my_robot.toml --port 8080 --no-browser")
+
+
+def app(
+    robot: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="ROBOT",
+            help="Name in the catalogue or a robot file to begin with.",
+            autocompletion=completion.robots,
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    port: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PORT", min=1, max=65535, help="A free one when left out.", show_default=False
+        ),
+    ] = None,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Whether to open the page.")
+    ] = True,
+) -> None:
+    """Open the desk: robots, equations, simulation and identification on a page.
+
+    It listens on the loopback address only. It needs the extra app: pip install "mbs[app]".
+    """
+    from mbs.app.desk.server import serve
+
+    serve(port=port, robot=robot, open_browser=browser)

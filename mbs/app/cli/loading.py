@@ -1,0 +1,88 @@
+"""The robot that a command line names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from mbs.errors import DescriptionError
+
+if TYPE_CHECKING:
+    from mbs.assembly import System
+    from mbs.components import Mechanism
+
+
+def mechanism(robot: str, parameters: Sequence[str] | None = None) -> Mechanism:
+    """The description of a robot.
+
+    Args:
+        robot: name in the catalogue, or a file.
+        parameters: NAME=VALUE for some of its symbols.
+
+    Raises:
+        DescriptionError: there is no such robot or symbol, or the file is malformed.
+    """
+    from mbs.robots import load
+
+    return load(robot, numbers(parameters, "--parameter"))
+
+
+def system(robot: str, parameters: Sequence[str] | None = None) -> System:
+    """The assembled robot; arguments and errors as for `mechanism`.
+
+    Raises:
+        AssemblyError: its components do not form a mechanism.
+        Unclosable: its loops cannot be closed.
+    """
+    return mechanism(robot, parameters).assemble()
+
+
+def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
+    """Numbers by name, of texts such as "L2=0.3" and "j1=pi/2".
+
+    Args:
+        texts: as they were typed.
+        option: that they were given to, for messages.
+
+    Raises:
+        DescriptionError: a text is no assignment of a number.
+    """
+    from mbs.app.tasks.simulation_laws import assignments
+
+    given = assignments(texts or (), option)
+    return {name: value(text, f"{option} {name}") for name, text in given.items()}
+
+
+def posture(system: System, texts: Sequence[str] | None, option: str = "--q") -> list[float]:
+    """Positions q of a robot, its loops closed, the others as in the assembled posture.
+
+    Args:
+        system: the robot.
+        texts: NAME=VALUE for some of its positions.
+        option: that they were given to, for messages.
+
+    Raises:
+        ModelError: a name is unknown.
+        Unclosable: the loops cannot be closed there.
+    """
+    given = numbers(texts, option)
+    q = system.position(given)
+    if not given or not system.is_closed:
+        return q
+    from mbs import loops
+
+    return [float(x) for x in loops.solve(system, given)]
+
+
+def value(text: str, what: str) -> float:
+    """The number of a text such as "pi/2".
+
+    Raises:
+        DescriptionError: it is not a number, or has a symbol in it.
+    """
+    from mbs.expressions import expression, to_float
+
+    found = to_float(expression(text, what))
+    if found is None:
+        raise DescriptionError(f"{what}: {text!r} is no number; write one, such as 0.3 or pi/2")
+    return found

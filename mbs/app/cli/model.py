@@ -1,0 +1,177 @@
+"""`mbs model`: the text of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mbs.app.cli import completion
+from mbs.app.cli.arguments import Json, Output, Parameters, Robot, examples
+from mbs.app.cli.loading import system
+from mbs.app.cli.printing import note, print_json
+
+if TYPE_CHECKING:
+    from mbs.app.tasks.equations import Equations
+    from mbs.assembly import System
+    from mbs.operations import Count
+
+EXAMPLES = examples(
+    "mbs model puma560 idm --language c",
+    "mbs model rx90 jacobian --option frame=6 --option expressed_in=3 --language fortran",
+    "mbs model sr400 base-parameters --language words",
+    "mbs model two_branch_tree idm --no-optimise --output idm.c",
+)
+
+_ALWAYS = ("multiplication", "addition")
+Key = Annotated[
+    str,
+    typer.Argument(
+        metavar="KEY",
+        help="Model, as `mbs models` lists them.",
+        autocompletion=completion.keys,
+        show_default=False,
+    ),
+]
+Options = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--option",
+        metavar="NAME=VALUE",
+        help="Option of the model, as `mbs models ROBOT` lists them; may be repeated.",
+        autocompletion=completion.options,
+        show_default=False,
+    ),
+]
+Optimise = Annotated[
+    bool,
+    typer.Option(
+        "--optimise/--no-optimise", help="Whether the optimizer takes operations out of it."
+    ),
+]
+
+
+def model(
+    robot: Robot,
+    key: Key,
+    *,
+    language: Annotated[
+        str | None,
+        typer.Option(
+            "--language",
+            "-l",
+            metavar="LANGUAGE",
+            help="c, fortran, matlab, octave, maple, mathematica, python, julia, rust, latex,"
+            " symoro, or words where the model has some; c when left out, words where there is no"
+            " function.",
+            autocompletion=completion.languages,
+            show_default=False,
+        ),
+    ] = None,
+    option: Options = None,
+    optimise: Optimise = True,
+    parameter: Parameters = None,
+    output: Output = None,
+    json: Json = False,
+) -> None:
+    """Write a model as source text, its operations counted on the standard error."""
+    written = equations_of(system(robot, parameter), key, option, language, optimise)
+    if output is not None:
+        from mbs.files import write_text
+
+        write_text(written.text, output)
+        note(f"wrote {output}")
+    if json:
+        print_json(_data(written))
+        return
+    if output is None:
+        typer.echo(written.text, nl=not written.text.endswith("\n"))
+    note(_counted(written))
+
+
+def equations_of(
+    assembled: System,
+    key: str,
+    options: Sequence[str] | None = None,
+    language: str | None = None,
+    optimise: bool = True,
+) -> Equations:
+    """The equations that the words of a command line ask for.
+
+    Args:
+        assembled: the robot.
+        key: of the model.
+        options: NAME=VALUE for some of the options of the model.
+        language: of the text.
+        optimise: whether the optimizer works on them.
+
+    Raises:
+        MbsError: there is no such model, option or language, or the robot does not have it.
+    """
+    from mbs.app.tasks import equations as task
+    from mbs.app.tasks.simulation_laws import assignments
+
+    texts = assignments(options or (), "--option")
+    values = task.parsed_options(assembled, task.entry(key), texts)
+    passes = task.EVERY_PASS if optimise else ()
+    return task.equations(assembled, key, values, language, passes)
+
+
+def _counted(written: Equations) -> str:
+    if written.before is None or written.after is None:
+        return f"{written.system} {written.key}: {written.title}"
+    told = f"{written.system} {written.key}: {_said(written.after)}"
+    if written.steps:
+        told += f"; before the optimizer {_said(written.before)}"
+    return told
+
+
+def _said(count: Count) -> str:
+    amounts = {
+        "multiplication": count.mul,
+        "addition": count.add,
+        "division": count.div,
+        "root": count.sqrt,
+        "function of angles": count.trig,
+        "other": count.other,
+    }
+    shown = [_many(n, name) for name, n in amounts.items() if n or name in _ALWAYS]
+    once = count.parameter_only
+    if once is not None and once.total:
+        shown.append(f"{_many(once.total, 'operation')} on parameters alone")
+    return ", ".join(shown)
+
+
+def _many(amount: int, name: str) -> str:
+    if amount == 1:
+        return f"1 {name}"
+    return f"{amount} {name.replace('function', 'functions') if ' ' in name else f'{name}s'}"
+
+
+def _data(written: Equations) -> dict[str, Any]:
+    return {
+        "robot": written.system,
+        "key": written.key,
+        "title": written.title,
+        "language": written.language,
+        "options": dict(written.choices),
+        "inputs": written.inputs,
+        "outputs": written.outputs,
+        "before": count_data(written.before),
+        "after": count_data(written.after),
+        "text": written.text,
+    }
+
+
+def count_data(count: Count | None) -> dict[str, Any] | None:
+    """The numbers of operations by name, their sum as "total"; None where there are none."""
+    if count is None:
+        return None
+    numbers: dict[str, Any] = {**asdict(count), "total": count.total}
+    if count.parameter_only is None:
+        del numbers["parameter_only"]
+    else:
+        numbers["parameter_only"] = count_data(count.parameter_only)
+    return numbers

@@ -1,0 +1,112 @@
+"""What commands print: tables for people, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import typer
+
+_WIDEST = 10_000
+"""Columns of a terminal that is none: nothing wraps in a pipe or a file."""
+_GAP = 3
+_NARROWEST = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows under a heading.
+
+    Attributes:
+        title: above the table, or "".
+        columns: names of the columns.
+        rows: a text for each column.
+        right: names of the columns of numbers, which stand to the right.
+        soft: names of the columns that wrap where a terminal is too narrow; the others are whole.
+        cut: whether the last column ends with dots there.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    right: Sequence[str] = ()
+    soft: Sequence[str] = ()
+    cut: bool = False
+
+
+def print_tables(tables: Iterable[Table]) -> None:
+    """Print tables, with an empty line between them; those without rows are left out."""
+    from rich.console import Console
+    from rich.text import Text
+
+    for number_of, table in enumerate(table for table in tables if table.rows):
+        narrow = sys.stdout.isatty() and table.soft
+        console = Console(file=sys.stdout, highlight=False, width=None if narrow else _WIDEST)
+        if number_of:
+            console.print()
+        if table.title:
+            console.print(Text(table.title, style="bold"))
+        console.print(_drawn(table, _widths(table)))
+
+
+def _widths(table: Table) -> list[int]:
+    """Columns that each column of a table takes."""
+    widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
+    if table.cut and sys.stdout.isatty():
+        left = shutil.get_terminal_size().columns - sum(widths[:-1]) - _GAP * len(widths[:-1])
+        widths[-1] = max(_NARROWEST, min(widths[-1], left))
+    return widths
+
+
+def _drawn(table: Table, widths: Sequence[int]) -> Any:
+    from rich import box
+    from rich.table import Table as Rich
+    from rich.text import Text
+
+    drawn = Rich(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for name, width in zip(table.columns, widths, strict=True):
+        drawn.add_column(
+            name,
+            justify="right" if name in table.right else "left",
+            min_width=None if name in table.soft else width,
+            max_width=width,
+            no_wrap=name not in table.soft,
+        )
+    for row in table.rows:
+        drawn.add_row(*(Text(cell) for cell in row))
+    return drawn
+
+
+def print_json(data: Any) -> None:
+    """Print JSON; what is no number, as infinity, is null."""
+    typer.echo(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def note(text: str) -> None:
+    """Say something beside the output, on the standard error."""
+    typer.echo(text, err=True)
+
+
+def plain(data: Any) -> Any:
+    """The same of dicts, lists, texts, finite numbers, truth values and None alone."""
+    if isinstance(data, Mapping):
+        return {str(key): plain(value) for key, value in data.items()}
+    if isinstance(data, str | bool | int | None):
+        return data
+    if hasattr(data, "tolist"):
+        return plain(data.tolist())
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    if isinstance(data, Iterable):
+        return [plain(value) for value in data]
+    return str(data)
+
+
+def number(value: float | None) -> str:
+    """A number in at most six digits; a dash where there is none."""
+    return "-" if value is None or math.isnan(value) else f"{value:.6g}"

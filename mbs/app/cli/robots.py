@@ -1,0 +1,78 @@
+"""`mbs robots`: the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mbs.app.cli.arguments import Json, examples
+from mbs.app.cli.printing import Table, print_json, print_tables
+from mbs.app.cli.structure import structure
+
+if TYPE_CHECKING:
+    from mbs.components import Mechanism
+
+EXAMPLES = examples(
+    "mbs robots",
+    "mbs robots --mobility",
+    "mbs robots --json | jq -r '.[] | select(.kind == \"closed\").name'",
+)
+
+
+def robots(
+    *,
+    mobility: Annotated[
+        bool,
+        typer.Option(
+            "--mobility", help="Count independent motions too: assembles all, which takes seconds."
+        ),
+    ] = False,
+    json: Json = False,
+) -> None:
+    """List the robots of the catalogue.
+
+    Joints are those that move, with their degrees of freedom together; loops are the closed ones
+    and the couplings of coordinates.
+    """
+    from mbs.robots import catalogue
+
+    rows = list(described(catalogue()))
+    if mobility:
+        rows = _with_mobility(rows, catalogue())
+    if json:
+        print_json(rows)
+        return
+    columns = [name for name in rows[0] if name != "source"]
+    cells = [[str(row[name]) for name in columns] + [row["source"]] for row in rows]
+    counts = ("joints", "dofs", "loops", "mobility")
+    print_tables([Table("", (*columns, "source"), cells, counts, cut=True)])
+
+
+def described(robots: Mapping[str, Callable[[], Mechanism]]) -> list[dict[str, Any]]:
+    """What descriptions say of themselves, without assembling them.
+
+    Args:
+        robots: name to the function that builds it.
+    """
+    return [{"name": name, **_row(build())} for name, build in robots.items()]
+
+
+def _row(mechanism: Mechanism) -> dict[str, Any]:
+    return {**asdict(structure(mechanism)), "source": mechanism.source}
+
+
+def _with_mobility(
+    rows: list[dict[str, Any]], robots: Mapping[str, Callable[[], Mechanism]]
+) -> list[dict[str, Any]]:
+    from mbs.progress import progress
+
+    counted = []
+    with progress("assembling the catalogue", 0.0, len(rows)) as reached:
+        for done, row in enumerate(rows, start=1):
+            system = robots[row["name"]]().assemble()
+            counted.append({**row, "mobility": len(system.active)})
+            reached(float(done))
+    return counted

@@ -1,0 +1,73 @@
+"""`mbs show`: a robot as tables, and what its assembly says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+
+from mbs.app.cli.arguments import Json, Parameters, Robot, examples
+from mbs.app.cli.description import DRIVE, GEOMETRY, TEN, described
+from mbs.app.cli.loading import system
+from mbs.app.cli.printing import Table, number, print_json, print_tables
+
+EXAMPLES = examples(
+    "mbs show puma560",
+    "mbs show my_robot.toml --parameter L2=0.3",
+    "mbs show four_bar --json | jq .loops",
+)
+
+
+def show(robot: Robot, *, parameter: Parameters = None, json: Json = False) -> None:
+    """Show a robot: frames, inertial parameters, coordinates, loops, symbols and the report.
+
+    Frames have Khalil's parameters and inertial parameters are about the origins of these frames,
+    in SI units and radians.
+    """
+    data = described(system(robot, parameter))
+    if json:
+        print_json(data)
+        return
+    gravity = ", ".join(_cell(value) for value in data["gravity"])
+    typer.echo(f"{data['name']}: gravity ({gravity}) m/s2")
+    if data["source"]:
+        typer.echo(f"Source: {data['source']}")
+    typer.echo()
+    print_tables(_tables(data))
+    typer.echo(f"\n{data['report']}")
+
+
+def _tables(data: dict[str, Any]) -> list[Table]:
+    links = {row["number"]: row["name"] for row in data["links"]}
+    inertia = [{**row, "name": links[row["link"]]} for row in data["inertia"]]
+    drive = [name for name in DRIVE if any(row[name] != 0 for row in inertia)]
+    return [
+        _table("Frames", data["links"], ("number", "name", "antecedent", "motion", *GEOMETRY)),
+        _table("Inertial parameters", inertia, ("link", "name", *TEN, *drive)),
+        _table("Coordinates", data["coordinates"]),
+        _table("Loops and couplings", data["loops"]),
+        _table("Symbols", data["symbols"]),
+    ]
+
+
+def _table(title: str, rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> Table:
+    names = names or list(rows[0] if rows else ())
+    right = [name for name in names if any(_is_number(row[name]) for row in rows)]
+    return Table(title, names, [[_cell(row[name]) for name in names] for row in rows], right)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return number(value)
+    if isinstance(value, tuple | list):
+        return ", ".join(map(_cell, value)) or "-"
+    return str(value)

@@ -1,0 +1,213 @@
+"""`mbs simulate`: the motion of a robot from given positions under given efforts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mbs.app.cli.arguments import Json, Parameters, Robot, examples
+from mbs.app.cli.loading import system
+from mbs.app.cli.places import require_places
+from mbs.app.cli.printing import Table, note, number, print_json, print_tables
+
+if TYPE_CHECKING:
+    from mbs.assembly import System
+    from mbs.result import Result
+
+EXAMPLES = examples(
+    "mbs simulate four_bar --duration 2 --q0 j1=0.3",
+    "mbs simulate four_bar --tau 'j1=5*sin(2*t)' --output motion.csv --plot motion.png",
+    "mbs simulate stewart_platform --duration 1 --film motion.html",
+    "mbs simulate planar_2r --tau 'q1=20*(1 - q1.q) - 5*q1.v' --output - | head -3",
+    "mbs simulate my_robot.toml --parameter L2=0.3 --duration 10 --step 0.001 --json",
+)
+
+Names = list[str] | None
+Duration = Annotated[
+    str, typer.Option("--duration", "-t", metavar="SECONDS", help="Simulated time.")
+]
+Step = Annotated[str, typer.Option(metavar="SECONDS", help="Time between rows of the result.")]
+Q0 = Annotated[
+    Names,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="Position at the start in rad or m; may be repeated. Loops are closed with it.",
+        show_default=False,
+    ),
+]
+V0 = Annotated[
+    Names,
+    typer.Option(
+        metavar="NAME=VALUE", help="Velocity at the start; may be repeated.", show_default=False
+    ),
+]
+Tau = Annotated[
+    Names,
+    typer.Option(
+        metavar="NAME=LAW",
+        help="Effort of a motor in N m or N: a number, or a law of t, NAME.q and NAME.v.",
+        show_default=False,
+    ),
+]
+Input = Annotated[
+    Names,
+    typer.Option(
+        "--input",
+        metavar="NAME=LAW",
+        help="Input of a device of a drive line, such as a voltage.",
+        show_default=False,
+    ),
+]
+Motion = Annotated[
+    Names,
+    typer.Option(
+        metavar="NAME=LAW",
+        help="Prescribed motion: NAME.q, NAME.v or NAME.a as a law of t.",
+        show_default=False,
+    ),
+]
+Tolerance = Annotated[
+    str, typer.Option(metavar="NUMBER", help="What the error of the motion should stay near.")
+]
+Method = Annotated[str, typer.Option(metavar="METHOD", help="dopri5, or rodas for stiff systems.")]
+
+
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        help="CSV file to write, - for the standard output.",
+        show_default=False,
+    ),
+]
+Plot = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Picture to write: .png, .svg or .pdf.", show_default=False),
+]
+Film = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Moving picture to write: .html, .gif, or .mp4 where ffmpeg is.",
+        show_default=False,
+    ),
+]
+Signal = Annotated[
+    Names,
+    typer.Option(
+        metavar="NAME",
+        help="Signal to draw, such as j1.q; may be repeated; all when left out.",
+        show_default=False,
+    ),
+]
+
+
+def simulate(
+    robot: Robot,
+    *,
+    duration: Duration = "2",
+    step: Step = "0.01",
+    q0: Q0 = None,
+    v0: V0 = None,
+    tau: Tau = None,
+    input_: Input = None,
+    motion: Motion = None,
+    tolerance: Tolerance = "1e-8",
+    method: Method = "dopri5",
+    parameter: Parameters = None,
+    output: Output = None,
+    plot: Plot = None,
+    film: Film = None,
+    signal: Signal = None,
+    json: Json = False,
+) -> None:
+    """Simulate a robot; loops stay closed.
+
+    The columns are NAME.q, NAME.v, NAME.a and NAME.tau of every coordinate, the energies and the
+    residual of the loops, devices and sensors.
+    """
+    from mbs.app.tasks import simulation as task
+
+    to_screen = output is not None and str(output) == "-"
+    file = None if to_screen else output
+    require_places(file, plot, film)
+    laws = assigned(q0=q0, v0=v0, tau=tau, input=input_, motion=motion)
+    assembled = system(robot, parameter)
+    settings = task.SimulationSettings(
+        duration=duration, step=step, tolerance=tolerance, method=method, **laws
+    )
+    result = task.simulate(assembled, settings)
+    _write(result, file)
+    _draw(result, assembled, plot, film, signal)
+    if json:
+        print_json(data_of(result))
+    elif to_screen:
+        typer.echo(task.csv_bytes(result).decode("utf-8").replace("\r\n", "\n"), nl=False)
+    else:
+        _show(result)
+
+
+def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
+    """Values by name for the fields of `SimulationSettings`.
+
+    Args:
+        **texts: what was given to an option, by its name.
+
+    Raises:
+        DescriptionError: a text is no NAME=VALUE.
+    """
+    from mbs.app.tasks.simulation_laws import assignments
+
+    fields = {"input": "inputs"}
+    return {
+        fields.get(name, name): assignments(given or (), f"--{name}")
+        for name, given in texts.items()
+    }
+
+
+def _write(result: Result, file: Path | None) -> None:
+    if file is not None:
+        result.to_csv(file)
+        note(f"wrote {file}")
+
+
+def _draw(
+    result: Result, assembled: System, plot: Path | None, film: Path | None, signals: Names
+) -> None:
+    if plot is not None:
+        result.plot(signals or None, plot)
+        note(f"wrote {plot}")
+    if film is not None:
+        from mbs.view import animate
+
+        animate(result, assembled, film)
+        note(f"wrote {film}")
+
+
+def data_of(result: Result) -> dict[str, Any]:
+    """A result as JSON has it: columns by name."""
+    return {
+        "name": result.name,
+        "time": result.time,
+        "units": dict(result.units),
+        "columns": {name: result[name] for name in result.names},
+        "events": [{"time": t, "name": name, "what": what} for t, name, what in result.events],
+    }
+
+
+def _show(result: Result) -> None:
+    rows = [
+        (name, unit, *map(number, (x[0], x.min(), x.max(), x[-1])))
+        for name, unit in result.units.items()
+        for x in (result[name],)
+    ]
+    title = f"{result.name}: {len(result)} rows, {result.time[0]:g} to {result.time[-1]:g} s"
+    columns = ("signal", "unit", "start", "least", "greatest", "end")
+    print_tables([Table(title, columns, rows, columns[2:])])
+    for time, name, what in result.events:
+        typer.echo(f"{time:.6g} s  {name}  {what}")

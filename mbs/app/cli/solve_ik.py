@@ -1,0 +1,202 @@
+"""`mbs solve-ik`: every posture that takes a frame to a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mbs.app.cli.arguments import Json, Parameters, Robot, examples
+from mbs.app.cli.loading import numbers, posture, system, value
+from mbs.app.cli.printing import note, print_json
+from mbs.errors import ModelError
+
+if TYPE_CHECKING:
+    from mbs.app.tasks.postures import Postures
+    from mbs.assembly import System
+
+EXAMPLES = examples(
+    "mbs solve-ik puma560 --xyz 0.4 0.1 0.3 --rpy 0 pi/2 0",
+    "mbs solve-ik rx90 --q q1=0.3 --q q2=0.5 --q q5=1",
+    'mbs solve-ik scara --pose "1 0 0 0.4  0 1 0 0.2  0 0 1 0.1"',
+    "mbs solve-ik panda --q q2=0.4 --locked q3=0 --json",
+)
+
+Triple = tuple[str, str, str]
+
+
+Pose = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TEXT",
+        help="Pose of the frame in the base: 12 or 16 numbers, row by row, or x y z roll"
+        " pitch yaw in m and rad.",
+        show_default=False,
+    ),
+]
+Xyz = Annotated[
+    Triple | None,
+    typer.Option(metavar="X Y Z", help="Position of the frame in m.", show_default=False),
+]
+Rpy = Annotated[
+    Triple | None,
+    typer.Option(
+        metavar="R P Y",
+        help="Roll, pitch and yaw about the fixed axes x, y, z in rad; zero when left out.",
+        show_default=False,
+    ),
+]
+Q = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="The pose that the frame has in this posture in rad or m; may be repeated.",
+        show_default=False,
+    ),
+]
+Frame = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FRAME",
+        help="Number of a link or name of a frame; the terminal one when left out.",
+        show_default=False,
+    ),
+]
+Method = Annotated[
+    str, typer.Option(metavar="METHOD", help="auto, pieper, paul, general or search.")
+]
+Seed = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="Posture that solutions are sorted by their distance from; may be repeated.",
+        show_default=False,
+    ),
+]
+Locked = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=VALUE",
+        help="Joint that stays where it is; may be repeated.",
+        show_default=False,
+    ),
+]
+
+
+def solve_ik(
+    robot: Robot,
+    *,
+    pose: Pose = None,
+    xyz: Xyz = None,
+    rpy: Rpy = None,
+    q: Q = None,
+    frame: Frame = None,
+    method: Method = "auto",
+    seed: Seed = None,
+    locked: Locked = None,
+    parameter: Parameters = None,
+    json: Json = False,
+) -> None:
+    """Solve the inverse geometry: every posture that takes a frame to a pose.
+
+    Say the pose in one way: --pose, --xyz with or without --rpy, or --q. Where no posture is
+    found the exit code is 1 and the reason stands on the standard error.
+    """
+    from mbs.app.tasks.postures import postures
+
+    assembled = system(robot, parameter)
+    place = _frame(frame)
+    wanted = _pose(assembled, place, pose=pose, xyz=xyz, rpy=rpy, q=q)
+    found = postures(
+        assembled,
+        wanted,
+        place,
+        method,
+        seed=numbers(seed, "--seed") or None,
+        locked=numbers(locked, "--locked") or None,
+    )
+    if json:
+        print_json({**_data(found), "pose": wanted})
+    elif found.rows:
+        typer.echo(found.text)
+    if not found.rows:
+        note(f"mbs: {_reason(found)}")
+        raise typer.Exit(1)
+
+
+def _frame(text: str | None) -> str | int | None:
+    return int(text) if text is not None and text.isdecimal() else text
+
+
+def _pose(
+    system: System,
+    frame: str | int | None,
+    *,
+    pose: str | None,
+    xyz: Triple | None,
+    rpy: Triple | None,
+    q: list[str] | None,
+) -> Any:
+    """The pose, said in one of the ways.
+
+    Raises:
+        ModelError: it is said in no way, or in several.
+    """
+    from mbs.app.tasks.postures import pose_from, pose_from_text, pose_of
+
+    ways = [pose is not None, xyz is not None, bool(q)]
+    if sum(ways) != 1 or (rpy is not None and xyz is None):
+        raise ModelError(
+            "solve-ik: say the pose in one way: --pose, --xyz with or without --rpy, or --q"
+        )
+    if pose is not None:
+        return pose_from_text(pose)
+    if xyz is not None:
+        return pose_from(_three(xyz, "--xyz"), _three(rpy or ("0", "0", "0"), "--rpy"))
+    return pose_of(system, posture(system, q), frame)
+
+
+def _three(texts: Sequence[str], option: str) -> list[float]:
+    return [value(text, option) for text in texts]
+
+
+def _reason(found: Postures) -> str:
+    reason = f"{found.system}: no solution, {found.reason}"
+    near = found.nearest
+    if near is None:
+        return reason
+    nearest = ", ".join(
+        f"{name}={round(x, 6) + 0.0:g}" for name, x in zip(found.names, near.q, strict=True)
+    )
+    return f"{reason}; the nearest posture is {nearest}"
+
+
+def _data(found: Postures) -> dict[str, Any]:
+    near = found.nearest
+    return {
+        "robot": found.system,
+        "frame": found.frame,
+        "method": found.method,
+        "names": found.names,
+        "units": found.units,
+        "solutions": [
+            {
+                "q": dict(zip(found.names, row.q, strict=True)),
+                "branch": row.label,
+                "residual": row.residual,
+                "sigma_min": row.sigma,
+                "multiplicity": row.multiplicity,
+                "within_limits": row.within_limits,
+                "family": row.family or None,
+            }
+            for row in found.rows
+        ],
+        "reason": found.reason,
+        "nearest": near
+        and {
+            "q": dict(zip(found.names, near.q, strict=True)),
+            "distance": near.distance,
+            "angle": near.angle,
+        },
+    }

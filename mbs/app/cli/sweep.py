@@ -1,0 +1,96 @@
+"""`mbs sweep`: one simulation for each case of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mbs.app.cli.arguments import Json, Output, Parameters, Robot, examples
+from mbs.app.cli.loading import system
+from mbs.app.cli.places import require_places
+from mbs.app.cli.printing import note, print_json
+from mbs.app.cli.simulate import Q0, V0, Duration, Method, Step, Tau, Tolerance, assigned
+
+if TYPE_CHECKING:
+    from mbs.app.tasks.sweeping import SweepTable
+
+EXAMPLES = examples(
+    "mbs sweep planar_2r --over q1.q=0:1:0.25 --duration 1",
+    "mbs sweep four_bar --over 'j1.tau=0, 2, 4' --over j1.v=0:1:0.5 --output study.csv",
+    "mbs sweep my_robot.toml --over L2=0.2:0.4:0.1 --folder study --json",
+)
+
+
+Over = Annotated[
+    list[str],
+    typer.Option(
+        metavar="NAME=VALUES",
+        help="What varies: a symbol, NAME.q or NAME.v at the start or a constant NAME.tau;"
+        " FROM:TO:STEP or values with commas between. Repeated, every combination is taken.",
+        show_default=False,
+    ),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Where the results of all cases are kept; a study that was interrupted goes on.",
+        show_default=False,
+    ),
+]
+
+
+def sweep(
+    robot: Robot,
+    *,
+    over: Over,
+    duration: Duration = "2",
+    step: Step = "0.01",
+    q0: Q0 = None,
+    v0: V0 = None,
+    tau: Tau = None,
+    tolerance: Tolerance = "1e-8",
+    method: Method = "dopri5",
+    folder: Folder = None,
+    parameter: Parameters = None,
+    output: Output = None,
+    json: Json = False,
+) -> None:
+    """Simulate a robot for every case of a study, and write one line a case as CSV.
+
+    A line has what varied, then the last value of every signal, as NAME.q.end. Cases that failed
+    have empty fields, are told on the standard error, and make the exit code 1.
+    """
+    from mbs.app.tasks import simulation, sweeping
+    from mbs.app.tasks.simulation_laws import assignments
+
+    require_places(output)
+    grid = sweeping.grid_of(assignments(over, "--over"))
+    laws = assigned(q0=q0, v0=v0, tau=tau)
+    settings = simulation.SimulationSettings(
+        duration=duration, step=step, tolerance=tolerance, method=method, **laws
+    )
+    table = sweeping.sweep(system(robot, parameter), grid, settings, folder=folder)
+    if output is not None:
+        from mbs.files import write_text
+
+        write_text(table.csv(), output)
+        note(f"wrote {output}")
+    if json:
+        print_json(_data(table))
+    elif output is None:
+        typer.echo(table.csv(), nl=False)
+    for case, sentence in table.failures.items():
+        note(f"mbs: case {case} failed: {sentence}")
+    if table.failures:
+        raise typer.Exit(1)
+
+
+def _data(table: SweepTable) -> dict[str, Any]:
+    return {
+        "units": dict(zip(table.columns, table.units, strict=True)),
+        "cases": [dict(zip(table.columns, row, strict=True)) for row in table.rows.tolist()],
+        "failures": table.failures,
+    }

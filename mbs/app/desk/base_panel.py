@@ -1,0 +1,99 @@
+"""The panel of base inertial parameters: a table, to copy and to download."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import cast
+
+from nicegui import ui
+
+from mbs.app.desk.count_table import column, plain_table
+from mbs.app.desk.desk import Desk
+from mbs.app.desk.equations_panel import open_equations
+from mbs.app.desk.form import Given, OptionForm
+from mbs.app.desk.panel_layout import (
+    in_a_row,
+    main_button,
+    side_button,
+    tell_of_changes,
+    two_sides,
+    waiting_note,
+)
+from mbs.app.desk.text_view import text_buttons
+from mbs.app.tasks.base import BaseTable, base
+from mbs.app.tasks.equations import entry
+from mbs.errors import MbsError
+
+KEY = "base-parameters"
+
+_COLUMNS = (
+    ("name", "parameter", "left"),
+    ("unit", "unit", "left"),
+    ("value", "value", "right"),
+    ("expression", "what is in it", "left"),
+)
+
+
+async def open_base(desk: Desk) -> None:
+    """Open the panel and find the base parameters of the present robot.
+
+    Args:
+        desk: of the page.
+    """
+    one = entry(KEY)
+    given = cast(Given, desk.session.notes.setdefault(f"options {KEY}", {}))
+    try:
+        desk.system()
+    except MbsError as error:
+        desk.complain(error)
+        return
+    with desk.open(one.title, key=KEY):
+        left, shown = two_sides("240px")
+    with left:
+        form = OptionForm(desk, one, given)
+        with in_a_row():
+            button = main_button("Find")
+            side_button("As text", partial(open_equations, desk, KEY), "In words, or in a language")
+    with shown:
+        waiting_note("The table appears here.")
+
+    tell_of_changes(desk, shown)
+
+    async def find() -> None:
+        options = form.given
+        method = options.pop("method", "symbolic")
+        button.disable()
+        made = await desk.run("Finding base parameters", base, method, options)
+        if shown.is_deleted:
+            return
+        button.enable()
+        if made is not None:
+            shown.clear()
+            with shown:
+                _show(desk, made)
+
+    button.on_click(find)
+    await form.fill()
+    await find()
+
+
+def _show(desk: Desk, made: BaseTable) -> None:
+    ui.label(
+        f"{made.system}: {len(made.rows)} base parameters of {made.total}, {made.method}"
+    ).style("font-weight: 600").mark("found")
+    ui.label(made.check + ".").classes("desk-note")
+    text_buttons(desk, made.csv(), f"{made.system}_base_parameters.csv")
+    columns = [column(*one) for one in _COLUMNS]
+    rows = [
+        {
+            "name": row.name,
+            "unit": row.unit,
+            "value": "" if row.value is None else f"{row.value:.6g}",
+            "expression": row.expression,
+        }
+        for row in made.rows
+    ]
+    table = plain_table(columns, rows, "name")
+    table.props("wrap-cells").mark("base")
+    ui.label(f"Grouped with others: {', '.join(made.grouped) or 'none'}.").classes("desk-note")
+    ui.label(f"Without effect: {', '.join(made.without_effect) or 'none'}.").classes("desk-note")

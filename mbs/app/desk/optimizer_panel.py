@@ -1,0 +1,99 @@
+"""The panel of the optimizer: its passes, and what they save in every model."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from mbs.app.desk.count_table import BEFORE, column, plain_table
+from mbs.app.desk.desk import Desk
+from mbs.app.desk.optimizer_settings import optimizer_settings, optimizer_switch, passes_of
+from mbs.app.desk.panel_layout import (
+    in_a_row,
+    main_button,
+    tell_of_changes,
+    two_sides,
+    waiting_note,
+)
+from mbs.app.tasks.counts import CountRow, counts
+from mbs.operations import PASSES, Count
+
+
+def open_optimizer(desk: Desk) -> None:
+    """Open the panel.
+
+    Args:
+        desk: of the page.
+    """
+    settings = optimizer_settings(desk.session)
+    with desk.open("Optimizer", key="optimizer"):
+        left, shown = two_sides("430px")
+    with left:
+        with in_a_row():
+            button = main_button("Count every model").mark("count")
+            optimizer_switch(desk.session, "optimize the equations").mark("on")
+        for one in PASSES:
+            _pass(settings["passes"], one.name, one.meaning)
+    with shown:
+        waiting_note("What the passes save in every model appears here.")
+
+    tell_of_changes(desk, shown)
+
+    async def count_all() -> None:
+        button.disable()
+        made = await desk.run("Counting operations", counts, (), passes_of(desk.session))
+        if shown.is_deleted:
+            return
+        button.enable()
+        if made is not None:
+            shown.clear()
+            with shown:
+                _show(made)
+
+    button.on_click(count_all)
+
+
+def _pass(chosen: list[str], name: str, meaning: str) -> None:
+    def changed() -> None:
+        if name in chosen:
+            chosen.remove(name)
+        if box.value:
+            chosen.append(name)
+
+    with ui.element("div").style("display: flex; gap: 10px; align-items: center"):
+        box = ui.checkbox(name, value=name in chosen, on_change=changed).props("dense")
+        box.style("flex: 0 0 106px").mark(f"pass {name}")
+        ui.label(meaning).classes("desk-note")
+
+
+def _show(made: tuple[CountRow, ...]) -> None:
+    heads = (
+        ("title", "model", "left"),
+        ("before", "before: mul/add", "right"),
+        ("all_before", "together", "right"),
+        ("after", "after: mul/add", "right"),
+        ("all_after", "together", "right"),
+        ("saved", "saved", "right"),
+    )
+    columns = [column(*head) for head in heads]
+    rows = [
+        _row(row, row.before, row.after)
+        for row in made
+        if row.before is not None and row.after is not None
+    ]
+    plain_table(columns, rows, "title").style("width: auto").mark("counts")
+    ui.label(BEFORE).classes("desk-note")
+    for row in made:
+        if row.reason:
+            ui.label(row.reason).classes("desk-note")
+
+
+def _row(row: CountRow, before: Count, after: Count) -> dict[str, object]:
+    saved = 100 * (1 - after.total / before.total) if before.total else 0
+    return {
+        "title": row.title,
+        "before": str(before),
+        "all_before": before.total,
+        "after": str(after),
+        "all_after": after.total,
+        "saved": f"{saved:.0f} %",
+    }

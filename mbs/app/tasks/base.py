@@ -1,0 +1,115 @@
+"""Base inertial parameters as rows of a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from casadi import Function
+
+from mbs.assembly import System
+from mbs.identification.base.base_parameters import METHODS, BaseParameters, base_parameters
+from mbs.identification.regressors.columns import values_of
+
+__all__ = ["METHODS", "BaseRow", "BaseTable", "base"]
+
+_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class BaseRow:
+    """A base inertial parameter.
+
+    Attributes:
+        name: of the parameter; R says that others were added to it, as in "XX2R".
+        unit: of the parameter.
+        expression: what it is in the parameters of the links.
+        value: at the values of the description, None where one of them has no value.
+    """
+
+    name: str
+    unit: str
+    expression: str
+    value: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class BaseTable:
+    """The base inertial parameters of a mechanism.
+
+    Attributes:
+        system: name of the mechanism.
+        method: that found them, "symbolic" or "numeric".
+        total: number of all parameters.
+        rows: the base parameters.
+        without_effect: parameters that no joint effort depends on.
+        grouped: parameters that left, since they act with others alone.
+        check: what random states say about the set.
+        text: the same as plain lines.
+    """
+
+    system: str
+    method: str
+    total: int
+    rows: tuple[BaseRow, ...]
+    without_effect: tuple[str, ...]
+    grouped: tuple[str, ...]
+    check: str
+    text: str
+
+    def csv(self) -> str:
+        """Lines of name, unit, expression and value, a header first."""
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(("name", "unit", "expression", "value"))
+        for row in self.rows:
+            value = "" if row.value is None else repr(row.value)
+            writer.writerow((row.name, row.unit, row.expression, value))
+        return stream.getvalue()
+
+
+def base(
+    system: System, method: str = "symbolic", options: Mapping[str, Any] = _NO_OPTIONS
+) -> BaseTable:
+    """The base inertial parameters of a mechanism.
+
+    Args:
+        system: open or closed.
+        method: "symbolic" or "numeric".
+        options: further arguments of `mbs.identification.base_parameters`, such as moving_base.
+
+    Raises:
+        ModelError: the method is unknown, or the loops cannot be closed.
+    """
+    found = base_parameters(system, method, **options)
+    without = tuple(column.name for column in found.without_effect)
+    pairs = zip(found.kept, found.names, found.equations, _values(found), strict=True)
+    return BaseTable(
+        system=system.name,
+        method=found.method,
+        total=len(found.columns),
+        rows=tuple(
+            BaseRow(name, column.unit, equation.split(" = ", 1)[1], value)
+            for column, name, equation, value in pairs
+        ),
+        without_effect=without,
+        grouped=tuple(c.name for c in found.eliminated if c.name not in without),
+        check=found.check.text,
+        text=found.text() + "\n",
+    )
+
+
+def _values(found: BaseParameters) -> list[float | None]:
+    """What the base parameters are worth at the values of the description."""
+    system = found.system
+    p = [system.p] if system.parameters else []
+    symbolic = found.function(values_of(system, found.columns), *p)
+    at = Function("values", [system.p], [symbolic])
+    numbers = np.array(at(system.p_default), dtype=float).ravel()
+    return [float(x) if math.isfinite(x) else None for x in numbers]

@@ -1,0 +1,224 @@
+"""Equations of a model as text, with the operations they take before and after the optimizer."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from casadi import Function
+
+from mbs.app.tasks.equations_options import OptionRow, option_values, parsed_options
+from mbs.assembly import System
+from mbs.errors import ModelError
+from mbs.export import code
+from mbs.export.languages import LANGUAGES
+from mbs.identification.catalogue import entries as identification_entries
+from mbs.messages import did_you_mean
+from mbs.models import catalogue
+from mbs.models.catalogue import Entry
+from mbs.operations import PASSES, Count, Step, count, simplification
+
+__all__ = [
+    "EVERY_PASS",
+    "MENUS",
+    "WORDS",
+    "Equations",
+    "OptionRow",
+    "entries",
+    "entry",
+    "equations",
+    "languages",
+    "option_values",
+    "parsed_options",
+]
+
+WORDS = "words"
+"""The language of entries that have a text of their own."""
+
+EVERY_PASS = tuple(one.name for one in PASSES)
+"""Names of the passes of the optimizer, in the order in which they are made."""
+
+MENUS = ("Geometric", "Kinematic", "Dynamic", "Identification")
+
+_SUFFIXES: Mapping[str, str] = MappingProxyType(
+    {
+        WORDS: ".txt",
+        "symoro": ".txt",
+        "c": ".c",
+        "fortran": ".f90",
+        "matlab": ".m",
+        "octave": ".m",
+        "maple": ".mpl",
+        "mathematica": ".wl",
+        "python": ".py",
+        "julia": ".jl",
+        "rust": ".rs",
+        "latex": ".tex",
+    }
+)
+_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """A model written down.
+
+    Attributes:
+        key: of the entry.
+        title: of the entry.
+        system: name of the mechanism.
+        symbol: what the formula is.
+        language: of the text.
+        text: the equations.
+        choices: every option and its value.
+        before: operations of the model as its recursion made it: constants are folded and equal
+            parts computed once, no pass of the optimizer was made; None of words.
+        after: operations of the Function whose text it is; None of words.
+        steps: passes of the optimizer.
+        inputs, outputs: of the Function, such as "q (6, 1)".
+        seconds: that it took.
+    """
+
+    key: str
+    title: str
+    system: str
+    symbol: str
+    language: str
+    text: str
+    choices: tuple[tuple[str, Any], ...]
+    before: Count | None
+    after: Count | None
+    steps: tuple[Step, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    seconds: float
+
+    @property
+    def suffix(self) -> str:
+        """The end of the name of a file for the text."""
+        return _SUFFIXES[self.language]
+
+    @property
+    def file_name(self) -> str:
+        """A name of a file for the text."""
+        return re.sub(r"\W+", "_", f"{self.system}_{self.key}") + self.suffix
+
+
+def entries() -> tuple[Entry, ...]:
+    """Every model, in the order of the menus."""
+    return (*catalogue.entries(), *identification_entries())
+
+
+def entry(key: str) -> Entry:
+    """The model of this short name.
+
+    Raises:
+        ModelError: there is none.
+    """
+    known = {one.key: one for one in entries()}
+    if key not in known:
+        raise ModelError(f"there is no model {key!r}; {did_you_mean(key, known)}")
+    return known[key]
+
+
+def languages(one: Entry, system: System) -> tuple[str, ...]:
+    """What `equations` can write the model in, what it takes by default first."""
+    words = (WORDS,) if one.text is not None else ()
+    return (*(LANGUAGES if one.has_function(system) else ()), *words)
+
+
+def equations(
+    system: System,
+    key: str,
+    options: Mapping[str, Any] = _NO_OPTIONS,
+    language: str | None = None,
+    passes: Sequence[str] = EVERY_PASS,
+    *,
+    name: str | None = None,
+) -> Equations:
+    """The equations of a model as text.
+
+    Args:
+        system: the mechanism.
+        key: of the model.
+        options: values of its options, the others at their defaults.
+        language: one of `languages`; the first of them when left out.
+        passes: names of the passes of the optimizer; none for the model as it was built.
+        name: of the function in the text, the model's own when left out.
+
+    Raises:
+        ModelError: no such model, option, language or pass, or the mechanism does not have it.
+        NoClosedForm: a closed form was asked for and there is none.
+    """
+    one = entry(key)
+    refusal = one.refusal(system)
+    if refusal:
+        raise ModelError(refusal)
+    chosen = one.choices(system, **options)
+    spoken = _language(one, system, language)
+    started = time.perf_counter()
+    if spoken == WORDS:
+        assert one.text is not None
+        return _written(system, one, chosen, one.text(system, **chosen), started)
+    model = one.build(system, **chosen)
+    final, steps = _optimised(model, passes)
+    return Equations(
+        **_about(system, one, chosen),
+        language=spoken,
+        text=code(final, spoken, name=name),
+        before=count(model),
+        after=count(final),
+        steps=steps,
+        inputs=tuple(f"{port} {final.size_in(port)}" for port in final.name_in()),
+        outputs=tuple(f"{port} {final.size_out(port)}" for port in final.name_out()),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _optimised(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[Step, ...]]:
+    """The model after the passes, and what each did; itself where there are none."""
+    if not passes:
+        return model, ()
+    made = simplification(model, passes)
+    return made.function, made.steps
+
+
+def _written(
+    system: System, one: Entry, chosen: Mapping[str, Any], text: str, started: float
+) -> Equations:
+    return Equations(
+        **_about(system, one, chosen),
+        language=WORDS,
+        text=text,
+        before=None,
+        after=None,
+        steps=(),
+        inputs=(),
+        outputs=(),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _about(system: System, one: Entry, chosen: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "key": one.key,
+        "title": one.title,
+        "system": system.name,
+        "symbol": one.symbol,
+        "choices": tuple(chosen.items()),
+    }
+
+
+def _language(one: Entry, system: System, language: str | None) -> str:
+    offered = languages(one, system)
+    spoken = offered[0] if language is None else str(language).lower()
+    if spoken not in offered:
+        raise ModelError(
+            f"{one.key} of {system.name} is not written in {language!r};"
+            f" {did_you_mean(spoken, offered)}"
+        )
+    return spoken

@@ -1,0 +1,177 @@
+"""Singular postures of a frame: the determinant of its Jacobian in factors, each in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.app.tasks.equations import entry
+from mbs.app.tasks.singular_words import condition
+from mbs.assembly import System
+from mbs.loops.alike import difference
+from mbs.loops.closing import Closing
+from mbs.models import singularities
+from mbs.models.singularities import SingularFactor
+from mbs.solvers.gauss_newton import gauss_newton
+
+Array = NDArray[np.float64]
+
+_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
+_TRIES, _SEED = 12, 20260111
+_REACH = 1.0
+"""Largest difference of a position between a start and the posture at hand [rad or m]."""
+_NUDGE = 1e-3
+_OPEN = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Factor:
+    """A factor of the determinant.
+
+    Attributes:
+        text: as one reads it, with its power.
+        power: how often it is a factor.
+        condition: when it is zero, in words.
+        posture: (nq) a posture near the one at hand where it is zero, loops closed [rad or m];
+            None where none was found from there.
+        determinant: at that posture.
+    """
+
+    text: str
+    power: int
+    condition: str
+    posture: tuple[float, ...] | None
+    determinant: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Singular:
+    """Where a frame loses a direction of motion.
+
+    Attributes:
+        system: name of the mechanism.
+        frame: whose Jacobian.
+        rows, columns: names of the square part of it.
+        determinant: constant and factors in one line.
+        constant: the factor that no position is in.
+        factors: the others.
+        verdict: one sentence: when the Jacobian is singular.
+    """
+
+    system: str
+    frame: str | int
+    rows: tuple[str, ...]
+    columns: tuple[str, ...]
+    determinant: str
+    constant: str
+    factors: tuple[Factor, ...]
+    verdict: str
+
+
+def singular(
+    system: System,
+    options: Mapping[str, Any] = _NO_OPTIONS,
+    near: Sequence[float] | None = None,
+) -> Singular:
+    """The determinant of a square part of a Jacobian in factors, and where each is zero.
+
+    Args:
+        system: open or closed.
+        options: of the model "determinant": frame, expressed_in, coordinates, rows, columns.
+        near: (nq,) a posture from which singular ones are looked for, the assembled one when left
+            out.
+
+    Raises:
+        ModelError: no such frame, row or column, or not as many rows as columns.
+    """
+    chosen = entry("determinant").choices(system, **options)
+    found = singularities(system, **chosen)
+    start = np.array(system.position(near))
+    factors = tuple(_factor(system, one, found.determinant, start) for one in found.factors)
+    return Singular(
+        system=system.name,
+        frame=chosen["frame"],
+        rows=tuple(chosen["rows"]),
+        columns=tuple(chosen["columns"]),
+        determinant=f"det J = {found}",
+        constant=found.constant,
+        factors=factors,
+        verdict=_verdict(found.constant, factors),
+    )
+
+
+def _verdict(constant: str, factors: Sequence[Factor]) -> str:
+    if constant == "0":
+        return "The determinant is zero in every posture; name other rows or columns."
+    if not factors:
+        return f"The determinant is {constant} in every posture; none is singular."
+    return "Singular where " + ", or where ".join(one.condition for one in factors) + "."
+
+
+def _factor(system: System, one: SingularFactor, determinant: Function, start: Array) -> Factor:
+    names = [(c.name, c.kind == "revolute") for c in system.coordinates]
+    posture = _zero(system, one.function, start)
+    value: float | None = None
+    if posture is not None:
+        p = [system.p_default] if system.parameters else []
+        value = float(Function.__call__(determinant, posture, *p))
+    return Factor(
+        text=str(one),
+        power=one.power,
+        condition=condition(one.text, names),
+        posture=posture,
+        determinant=value,
+    )
+
+
+def _zero(system: System, function: Function, start: Array) -> tuple[float, ...] | None:
+    """The nearest posture found where a function of it is zero and the loops are closed."""
+    residual = _residual(system, function)
+    rng = np.random.default_rng(_SEED)
+    found = list[Array]()
+    matter = np.abs(residual(start + _NUDGE)[1]).max(axis=0) > 0
+    for reach in (0.0, _NUDGE, *[_REACH] * _TRIES):
+        root = gauss_newton(residual, start + matter * rng.uniform(-reach, reach, start.size))
+        if root.converged:
+            near = start + difference(system, root.x, start)
+            found.append(near if _largest(residual(near)[0]) < _OPEN else root.x)
+    closing = Closing(system, np.array(system.p_default)) if system.is_closed else None
+    fitting = [q for q in found if closing is None or closing.faces(q)]
+    if not fitting:
+        return None
+    nearest = min(fitting, key=lambda q: float(np.linalg.norm(q - start)))
+    return tuple(float(x) for x in nearest)
+
+
+def _residual(system: System, function: Function) -> Callable[[Array], tuple[Array, Array]]:
+    """The function and the rows of the loops, (m,), and their slope by q, (m, nq)."""
+    p = np.array(system.p_default)
+    slope = _value_and_slope(system, function)
+    closing = Closing(system, p) if system.is_closed else None
+
+    def residual(q: Array) -> tuple[Array, Array]:
+        value, gradient = (np.array(m) for m in slope(q, p))
+        if closing is None:
+            return value.ravel(), gradient
+        r, J = closing.rows(q)
+        return np.concatenate([r, value.ravel()]), np.vstack([J, gradient])
+
+    return residual
+
+
+def _largest(rows: Array) -> float:
+    return float(np.max(np.abs(rows), initial=0.0))
+
+
+def _value_and_slope(system: System, function: Function) -> Function:
+    q = SX.sym("q", system.nq)
+    inputs = [q, system.p] if system.parameters else [q]
+    value = Function.__call__(function, *inputs)
+    return Function("zero", [q, system.p], [value, casadi.densify(casadi.jacobian(value, q))])

@@ -1,0 +1,138 @@
+"""A parameter study from the texts and numbers of a form or a command, as one table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.app.tasks.simulation import SimulationSettings, run_arguments
+from mbs.app.tasks.simulation_laws import number
+from mbs.assembly import System
+from mbs.assembly.tables import EFFORT_UNIT
+from mbs.errors import ModelError
+from mbs.messages import quoted
+from mbs.result import Result
+from mbs.simulate import Sweep
+from mbs.simulate import sweep as simulated_cases
+
+_MOST_VALUES = 10_000
+_END = ".end"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SweepTable:
+    """A row for each case of a study: what was varied, then the last value of every signal.
+
+    Attributes:
+        columns: names; those of last values end with ".end".
+        units: of the columns.
+        rows: (cases, columns) numbers, NaN where a case failed.
+        failures: number of a case that failed, counted from 0, to what it said.
+    """
+
+    columns: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: NDArray[np.float64]
+    failures: Mapping[int, str]
+
+    def csv(self) -> str:
+        """A line of names, then one for each case; fields of failed cases are empty."""
+        stream = io.StringIO()
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(self.columns)
+        for row in self.rows.tolist():
+            writer.writerow(["" if x != x else repr(x) for x in row])
+        return stream.getvalue()
+
+
+def grid_of(texts: Mapping[str, str]) -> dict[str, list[float]]:
+    """Values of every name of a grid.
+
+    Args:
+        texts: name to "FROM:TO:STEP", both ends included, or to values with commas between them,
+            such as "0, 0.5, pi/2".
+
+    Raises:
+        ExpressionError: a value is no number.
+        ModelError: a range has no end, or a name has too many values.
+    """
+    return {name: _values(text, name) for name, text in texts.items()}
+
+
+def sweep(
+    system: System,
+    grid: Mapping[str, Sequence[float]],
+    settings: SimulationSettings | None = None,
+    *,
+    folder: str | os.PathLike[str] | None = None,
+    quiet: bool = False,
+) -> SweepTable:
+    """Simulate a system for every combination of some values.
+
+    Args:
+        system: open or closed.
+        grid: name to its values: parameters, starts such as "j1.q" and "j1.v", and constant
+            efforts such as "j1.tau".
+        settings: of every simulation.
+        folder: where results are kept, so that an interrupted study goes on; nowhere when left
+            out.
+        quiet: no progress bar.
+
+    Raises:
+        ModelError: a name is unknown, or as for `mbs.simulate.sweep`.
+    """
+    arguments = run_arguments(system, settings or SimulationSettings())
+    given = {name: value for name, value in arguments.items() if value is not None}
+    study = simulated_cases(system, grid, folder=folder, quiet=quiet, **given)
+    summary = study.summary()
+    varied = list(grid)
+    values = [[case[name] for name in varied] for case in study.cases]
+    units = _units(system) | _signal_units(study)
+    columns = (*varied, *summary)
+    return SweepTable(
+        columns=columns,
+        units=tuple(units.get(name.removesuffix(_END), "1") for name in columns),
+        rows=np.column_stack([np.array(values, dtype=float), *summary.values()]),
+        failures=dict(study.failures),
+    )
+
+
+def _values(text: str, name: str) -> list[float]:
+    parts = text.split(":")
+    if len(parts) == 1:
+        return [number(part.strip(), f"grid of {name}") for part in text.split(",")]
+    if len(parts) != 3:
+        raise ModelError(
+            f"grid of {name}: {quoted(text)} is no range; write FROM:TO:STEP, such as 0:1:0.25, or"
+            " values with commas between them"
+        )
+    start, stop, step = (number(part.strip(), f"grid of {name}") for part in parts)
+    count = (stop - start) / step if step else -1.0
+    if not 0 <= count <= _MOST_VALUES:
+        raise ModelError(
+            f"grid of {name}: {quoted(text)} has no end or more than {_MOST_VALUES} values; give a"
+            " step that leads from the first to the last value"
+        )
+    whole = round(count) if abs(count - round(count)) < 1e-9 * max(1.0, count) else int(count)
+    return [start + k * step for k in range(whole + 1)]
+
+
+def _signal_units(study: Sweep) -> dict[str, str]:
+    first: Result | None = next((result for _, result in study), None)
+    return {} if first is None else dict(first.units)
+
+
+def _units(system: System) -> dict[str, str]:
+    """Units of what can be varied."""
+    positions = ((f"{c.name}.q", c.unit) for c in system.coordinates)
+    rates = ((f"{s.name}.v", s.unit) for s in system.speeds)
+    efforts = ((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.speeds)
+    parameters = ((p.name, p.unit) for p in system.parameters)
+    return dict(itertools.chain(positions, rates, efforts, parameters))

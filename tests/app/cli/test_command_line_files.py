@@ -1,0 +1,108 @@
+"""`mbs export` and `mbs convert`: files that are read and run again."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mbs
+
+TABLE = """
+name = "arm"
+parameters = { L2 = 0.4 }
+[[frame]]
+antecedent = 0
+[[frame]]
+antecedent = 1
+alpha = "pi/2"
+d = "L2"
+[[body]]
+frame = 1
+XX = 0.5
+YY = 0.5
+ZZ = 0.5
+[[body]]
+frame = 2
+M = 2
+MX = 0.3
+XX = 0.1
+YY = 0.2
+ZZ = 0.2
+"""
+URDF = """
+<robot name="two"><link name="base"/>
+<link name="a"><inertial><mass value="2"/><origin xyz="0.2 0 0"/>
+<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.2"/></inertial></link>
+<link name="b"><inertial><mass value="1"/><origin xyz="0.1 0 0.1"/>
+<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+<joint name="j1" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint>
+<joint name="j2" type="continuous"><origin xyz="0.5 0 0" rpy="0.3 0 0"/><parent link="a"/>
+<child link="b"/><axis xyz="0 1 0"/></joint></robot>
+"""
+
+
+def efforts(robot: str) -> np.ndarray:
+    """tau of the inverse dynamic model at an irregular state, (n,)."""
+    system = mbs.load(robot).assemble()
+    n, m = system.nq, len(system.active)
+    q = mbs.loops.solve(system, {}) if system.is_closed else np.linspace(0.3, 0.9, n)
+    state = (q, np.linspace(1, 2, m), np.linspace(-1, 1, m))
+    return np.array(mbs.models.inverse_dynamics(system)(*state)).ravel()
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("arm.toml", TABLE), ("two.urdf", URDF)], ids=["table", "urdf"]
+)
+def test_a_round_trip_keeps_the_inverse_dynamics(command, tmp_path, name, text) -> None:
+    (tmp_path / name).write_text(text)
+    for source, target in ((name, "x.par"), ("x.par", "y.toml"), ("y.toml", "z.par")):
+        answer = command("convert", source, target)
+        assert (answer.code, answer.err) == (0, f"wrote {target}\n")
+    for made in ("x.par", "y.toml", "z.par"):
+        np.testing.assert_allclose(efforts(made), efforts(name), rtol=1e-12, atol=1e-12)
+
+
+def test_symbols_of_a_table_stay_symbols_and_take_values(command, tmp_path) -> None:
+    (tmp_path / "arm.toml").write_text(TABLE)
+    command("convert", "arm.toml", "arm.par", "--parameter", "L2=0.7")
+    [parameter] = mbs.load("arm.par").parameters()
+    assert (parameter.name, parameter.default) == ("L2", 0.7)
+
+
+def test_a_closed_robot_of_the_catalogue_is_converted(command) -> None:
+    command("convert", "four_bar", "four_bar.toml")
+    command("export", "par", "four_bar", "four_bar.par")
+    np.testing.assert_allclose(efforts("four_bar.toml"), efforts("four_bar"), rtol=1e-9)
+    np.testing.assert_allclose(efforts("four_bar.par"), efforts("four_bar"), rtol=1e-9)
+
+
+def test_an_exported_fmu_runs_as_the_system_does(command) -> None:
+    words = ("planar_2r", "planar_2r.fmu", "--output", "energy", "--stop-time", "0.2")
+    answer = command("export", "fmu", *words)
+    assert (answer.code, answer.err) == (0, "wrote planar_2r.fmu\n")
+    result = mbs.simulate.fmu("planar_2r.fmu", 0.2, step=0.01)
+    expected = mbs.simulate.run(mbs.load("planar_2r").assemble(), 0.2)
+    for name in ("q1.q", "q2.q", "q1.v"):
+        np.testing.assert_allclose(result[name], expected[name], atol=1e-6)
+    assert "energy.kinetic" in result
+
+
+def test_c_source_is_a_folder_or_a_zip(command, tmp_path: Path) -> None:
+    command("export", "c", "planar_2r", "arm", "--model", "idm", "--model", "inertia")
+    header = (tmp_path / "arm" / "arm.h").read_text()
+    assert "idm_eval(" in header
+    assert "inertia_eval(" in header
+    assert "ddm" not in header
+    command("export", "c", "planar_2r", "arm.zip")
+    names = zipfile.ZipFile(tmp_path / "arm.zip").namelist()
+    assert "planar_2r/planar_2r.c" in names
+
+
+def test_a_picture_stands_alone(command, tmp_path: Path) -> None:
+    command("export", "html", "four_bar", "p.html", "--q", "j1=0.5")
+    text = (tmp_path / "p.html").read_text()
+    assert "<html" in text
+    assert 'src="http' not in text
+    assert command("export", "html", "four_bar", "q.html").code == 0
+    assert (tmp_path / "q.html").read_text() != text

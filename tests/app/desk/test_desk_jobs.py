@@ -1,0 +1,85 @@
+import asyncio
+import os
+import time
+from pathlib import Path
+
+import pytest
+from support import desk_tasks
+
+from mbs.app.desk import jobs
+from mbs.app.desk.document import Document
+from mbs.app.desk.document_cells import Cell
+from mbs.errors import DescriptionError, Unclosable
+
+ARM = Document.of_name("planar_2r")
+
+
+def run(task, *args, document=ARM, progress=None):
+    return asyncio.run(jobs.run(task, document, *args, progress=progress))
+
+
+def is_alive(pid):
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+def test_a_task_runs_in_another_process_and_tells_how_far_it_is():
+    heard = []
+    name, nq, pid = run(desk_tasks.counted, 1000, progress=lambda *told: heard.append(told))
+    assert (name, nq) == ("planar_2r", 2)
+    assert pid != os.getpid()
+    assert {label for label, _ in heard} == {"counting"}
+    parts = [part for _, part in heard]
+    assert parts == sorted(parts)
+    assert parts[-1] == 1.0
+    assert 50 < len(parts) < 150
+
+
+def test_the_error_of_a_task_comes_back_as_it_is():
+    with pytest.raises(Unclosable, match=r"^arm: no posture; change it$"):
+        run(desk_tasks.refused, "arm: no posture; change it")
+
+
+def test_a_wrong_document_is_refused_with_its_sentence():
+    wrong = ARM.changed(Cell("geometry", 1, "d"), "*")
+    with pytest.raises(DescriptionError, match="frame 2, d: cannot read"):
+        run(desk_tasks.counted, 1, document=wrong)
+
+
+def test_any_other_end_is_one_sentence_and_the_details_are_logged(caplog):
+    with pytest.raises(jobs.Broken, match=r"ZeroDivisionError.*please report it") as caught:
+        run(desk_tasks.broken)
+    assert "\n" not in str(caught.value)
+    assert "Traceback" in caplog.text
+    with pytest.raises(jobs.Broken, match="ended without an answer"):
+        run(desk_tasks.vanished)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks at processes through /proc")
+def test_cancel_ends_the_child_what_it_started_and_its_temporary_files(tmp_path):
+    told = tmp_path / "told"
+
+    async def cancelled():
+        work = asyncio.ensure_future(jobs.run(desk_tasks.endless, ARM, str(told)))
+        for _ in range(3000):
+            if told.exists():
+                break
+            await asyncio.sleep(0.02)
+        scratch, *pids = told.read_text().split()
+        assert Path(scratch).exists()
+        assert all(is_alive(pid) for pid in pids)
+        work.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await work
+        return scratch, pids
+
+    scratch, pids = asyncio.run(cancelled())
+    assert not Path(scratch).exists()
+    for _ in range(500):
+        if not any(is_alive(pid) for pid in pids):
+            break
+        time.sleep(0.02)
+    assert not any(is_alive(pid) for pid in pids)

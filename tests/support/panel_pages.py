@@ -1,0 +1,52 @@
+"""A page with one panel of the desk, visited without a browser; its work is done at once."""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import asynccontextmanager
+
+from nicegui import ui
+from nicegui.testing.user_simulation import user_simulation
+
+from mbs.app.desk import jobs
+from mbs.app.desk.desk import Desk
+from mbs.app.desk.document import Document
+from mbs.app.desk.session import Session
+
+PATIENT = 100
+"""Attempts to see what takes a moment."""
+
+
+def visited(panel, robot, visit, monkeypatch):
+    """Open a panel on a robot of the catalogue, and let `visit(user, desk)` use it."""
+    monkeypatch.setattr(jobs, "run", _at_once)
+
+    async def whole():
+        async with _page(panel, robot) as (user, desk):
+            await visit(user, desk)
+
+    asyncio.run(whole())
+
+
+@asynccontextmanager
+async def _page(panel, robot):
+    desks = []
+
+    async def page():
+        await ui.context.client.connected(timeout=30)
+        desk = Desk(Session(Document.of_name(robot)))
+        desk.drawer.build(lambda filled: None)
+        desk.build_cards()
+        await desk.start()
+        panel(desk)
+        desks.append(desk)
+        ui.label("the panel stands")
+
+    async with user_simulation(root=page) as user:
+        await user.open("/")
+        await user.should_see("the panel stands", retries=PATIENT)
+        yield user, desks[0]
+
+
+async def _at_once(task, document, *args, progress=None):
+    return task(document.system(), *args)

@@ -16,7 +16,7 @@ endif
 
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --editable
 
-.PHONY: help demo test lint types layers clean
+.PHONY: help demo test lint types layers docs clean
 
 help:
 	@echo "make demo     install mbs into $(VENV) and run examples/01_four_bar.py; files go to build/four_bar"
@@ -24,6 +24,7 @@ help:
 	@echo "make lint     ruff: style and format"
 	@echo "make types    mypy, strict"
 	@echo "make layers   import-linter: no module imports a higher layer"
+	@echo "make docs     build the documentation into build/docs; a warning is an error"
 	@echo "make clean    remove build/, caches and $(VENV)"
 	@echo "PYTHON=...    the Python to make $(VENV) of, 3.11 or newer (now: $(PYTHON))"
 
@@ -42,6 +43,10 @@ types: $(VENV)/.dev
 
 layers: $(VENV)/.dev
 	@$(RUN)/lint-imports
+
+docs: $(VENV)/.dev
+	@$(RUN)/sphinx-build -q -W --keep-going -b html -d build/doctrees docs build/docs
+	@echo "Documentation in build/docs/index.html"
 
 clean:
 	rm -rf build dist $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -60,3 +60,52 @@ def test_version_is_the_same_everywhere() -> None:
     assert f"## {mbs.__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert f"version: {mbs.__version__}" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f'version = "{mbs.__version__}"' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+
+def test_comparison_quotes_what_the_measured_pages_say() -> None:
+    measured = {
+        row
+        for page in ("operations", "speed", "inverse_geometry", "derivatives")
+        for row in (DOCS / f"{page}.md").read_text(encoding="utf-8").splitlines()
+    }
+    text = (DOCS / "comparison.md").read_text(encoding="utf-8").split("## Agreement")[0]
+    quoted = [row for row in text.splitlines() if re.match(r"\| .*\d", row)]
+    assert len(quoted) > 15
+    assert [row for row in quoted if row not in measured] == []
+
+
+@pytest.mark.parametrize("robot", ["planar_2r", "four_bar"])
+def test_notation_names_inputs_and_outputs_of_models(robot: str) -> None:
+    text = (DOCS / "notation.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"`(\w+)`", text))
+    system = mbs.load(robot).assemble()
+    used: set[str] = set()
+    for entry in mbs.models.catalogue.entries():
+        if not entry.key.startswith("igm") and entry.applies(system) and entry.has_function(system):
+            function = entry.build(system)
+            used.update(function.name_in(), function.name_out())
+    assert len(used) > 20
+    assert {name.replace("_a_", "_").removesuffix("_a") for name in used} - listed == set()
+
+
+def test_every_work_that_a_page_names_is_in_the_bibliography() -> None:
+    text = (DOCS / "references.bib").read_text(encoding="utf-8")
+    known = {(_plain(author), year) for _, author, year in _ENTRY.findall(text)}
+    known |= {
+        (_plain(author.split(",")[0]), year)
+        for people, year in re.findall(r"author = \{(.+?)\},\n.*?year = \{(\d+)\}", text, re.DOTALL)
+        for author in people.split(" and ")
+    }
+    unknown = {}
+    for page in DOCS.glob("*.md"):
+        flat = " ".join(page.read_text(encoding="utf-8").split())
+        found = re.findall(r"\b([A-Z][a-z]+)(?: et al\.)? ((?:19|20)\d\d)\b", flat)
+        unknown.update({pair: page.name for pair in found if pair not in known})
+    assert unknown == {}
+
+
+def test_every_public_package_has_a_page_in_the_reference() -> None:
+    pages = [path.read_text(encoding="utf-8") for path in (DOCS / "api").glob("*.md")]
+    shown = {name for page in pages for name in re.findall(r"automodule:: (\S+)", page)}
+    packages = {f"mbs.{name}" for name in mbs.__all__ if name.islower() and name != "load"}
+    assert packages - shown == set()

@@ -9,6 +9,7 @@ from casadi import Function
 
 from mbs.errors import ModelError
 from mbs.export.languages import language_of
+from mbs.export.languages.language import Language
 from mbs.files import write_text
 from mbs.messages import quoted
 from mbs.native.compiled import require_function
@@ -16,7 +17,7 @@ from mbs.native.compiled import require_function
 
 def code(
     function: Function,
-    language: str,
+    language: str | Language,
     path: str | os.PathLike[str] | None = None,
     name: str | None = None,
 ) -> str:
@@ -30,7 +31,8 @@ def code(
     Args:
         function: made of scalar operations, or a Function that can be expanded to them.
         language: "c", "fortran", "matlab" or "octave", "maple", "mathematica", "python", "julia",
-            "rust", "latex", or "symoro" for the classic text of equations.
+            "rust", "latex", or "symoro" for the classic text of equations; or a `Language` of your
+            own.
         path: a file to write the text to as well.
         name: of the function in the text, its own when left out.
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING
 
 from mbs.errors import ModelError
+from mbs.export.languages.language import Language
 from mbs.messages import did_you_mean, quoted
-
-if TYPE_CHECKING:
-    from mbs.export.languages.language import Language
 
 _CLASSES = {
     "c": "C",
@@ -30,11 +27,13 @@ LANGUAGES = (*_CLASSES, *_ALIASES)
 
 
 def language_of(name: object) -> Language:
-    """The language of a name, in lower or upper case.
+    """The language of a name, in lower or upper case; a language of the user's own as it is.
 
     Raises:
         ModelError: there is no such language.
     """
+    if isinstance(name, Language):
+        return name
     key = name.lower() if isinstance(name, str) else ""
     key = _ALIASES.get(key, key)
     if key not in _CLASSES:

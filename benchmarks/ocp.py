@@ -1,10 +1,10 @@
 """Optimal control: instructions of a seven-joint arm, and problems beside other generators.
 
-python benchmarks/ocp.py [--peer PYTHON] [--repeat N]
+python benchmarks/ocp.py [--peer PYTHON] [--kin-dyn PYTHON] [--repeat N]
 
-PYTHON has adam-robotics; without it the columns of adam are left out. Times of one run compare
-with each other alone. The cache of compiled libraries is a new folder, so that the first build is
-really the first.
+The first PYTHON has adam-robotics, the second cmeel-casadi-kin-dyn; without them their rows are
+left out. Efforts of all are compared with ours first. Times of one run compare with each other
+alone. The cache of compiled libraries is a new folder, so that the first build is really the first.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import casadi
+import numpy as np
 from casadi import SX, Function
 
 sys.path.insert(0, str(Path(__file__).parent))
-from ocp_peer import adam_inverse_dynamics
+from ocp_peer import adam_inverse_dynamics, kin_dyn_inverse_dynamics
 from ocp_problems import (
     Solved,
     StageDerivatives,
@@ -81,9 +82,19 @@ def print_counts(contenders: dict[str, Function]) -> None:
     print("|---|---|---|---|---|")
     for name, row in found.items():
         print(f"| {name} | " + " | ".join(f"{value:,}" for value in row) + " |")
-    if "adam" in found:
-        ratios = (b / a for a, b in zip(found["mbs"], found["adam"], strict=True))
-        print("| adam / mbs | " + " | ".join(f"{ratio:.1f}" for ratio in ratios) + " |")
+    for peer in [name for name in found if name != "mbs"]:
+        ratios = (b / a for a, b in zip(found["mbs"], found[peer], strict=True))
+        print(f"| {peer} / mbs | " + " | ".join(f"{ratio:.1f}" for ratio in ratios) + " |")
+
+
+def require_same(contenders: dict[str, Function]) -> None:
+    """Refuse contenders whose efforts are not those of mbs, at three random states."""
+    rng, ours = np.random.default_rng(0), contenders["mbs"]
+    for state in rng.uniform(-1, 1, (3, 3, ours.size1_in(0))):
+        expected = np.array(ours(*state))
+        for name, idm in contenders.items():
+            if not np.allclose(np.array(idm(*state)), expected, rtol=1e-9, atol=1e-9):
+                raise ValueError(f"{name} gives other efforts")
 
 
 def print_problem(name: str, stage: float, solved: Solved) -> None:
@@ -100,9 +111,38 @@ def timed(make: Any, *arguments: Any, **options: Any) -> tuple[Any, float]:
     return made, time.perf_counter() - begin
 
 
+def print_problems(contenders: dict[str, Function], repeat: int, longest: int) -> None:
+    """The table of problems; longest is the number of iterations of the arm."""
+    idm = contenders["mbs"]
+    code, first = timed(compiled, idm, derivatives=2)
+    _, later = timed(compiled, idm, derivatives=2)
+    stages = {"interpreted": (idm, 0.0), "compiled": (code, first), "cached": (code, later)}
+    for peer in [name for name in contenders if name != "mbs"]:
+        stages[f"{peer}, interpreted"] = contenders[peer], 0.0
+    print("\n| problem | stage s | solver s | optimum | iterations | solve s | functions s |")
+    print("|---|---|---|---|---|---|---|")
+    rates = acrobot()
+    for evaluation, evaluate in (
+        ("interpreted", Function),
+        ("compiled", lambda f: compiled(f, derivatives=2)),
+    ):
+        print_problem(f"acrobot, {evaluation}", 0.0, acrobot_swing_up(rates, evaluate))
+    for _ in range(repeat):
+        for evaluation, (model, stage) in stages.items():
+            print_problem(f"arm, {evaluation}", stage, panda_point_to_point(model, longest))
+        for evaluation, evaluate in (
+            ("interpreted", lambda f: f),
+            ("compiled", lambda f: compiled(f, derivatives=0)),
+        ):
+            parts, stage = timed(StageDerivatives.of, idm, evaluate)
+            print_problem(f"arm by stages, {evaluation}", stage, panda_by_stages(parts, longest))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--peer", help="a Python that has adam-robotics")
+    parser.add_argument("--kin-dyn", help="a Python that has cmeel-casadi-kin-dyn")
+    parser.add_argument("--counts", action="store_true", help="no problems, instructions alone")
     parser.add_argument("--repeat", type=int, default=1)
     parser.add_argument("--longest", type=int, default=1000, help="iterations of the arm")
     given = parser.parse_args()
@@ -113,32 +153,12 @@ def main() -> None:
         contenders = {"mbs": idm}
         if given.peer:
             contenders["adam"] = adam_inverse_dynamics(given.peer, file, joints)
+        if given.kin_dyn:
+            contenders["casadi-kin-dyn"] = kin_dyn_inverse_dynamics(given.kin_dyn, file, joints)
+        require_same(contenders)
         print_counts(contenders)
-        code, first = timed(compiled, idm, derivatives=2)
-        _, later = timed(compiled, idm, derivatives=2)
-        stages = {"interpreted": (idm, 0.0), "compiled": (code, first), "cached": (code, later)}
-        if given.peer:
-            stages["adam, interpreted"] = contenders["adam"], 0.0
-        print("\n| problem | stage s | solver s | optimum | iterations | solve s | functions s |")
-        print("|---|---|---|---|---|---|---|")
-        rates = acrobot()
-        for evaluation, evaluate in (
-            ("interpreted", Function),
-            ("compiled", lambda f: compiled(f, derivatives=2)),
-        ):
-            print_problem(f"acrobot, {evaluation}", 0.0, acrobot_swing_up(rates, evaluate))
-        for _ in range(given.repeat):
-            for evaluation, (model, stage) in stages.items():
-                solved = panda_point_to_point(model, given.longest)
-                print_problem(f"arm, {evaluation}", stage, solved)
-            for evaluation, evaluate in (
-                ("interpreted", lambda f: f),
-                ("compiled", lambda f: compiled(f, derivatives=0)),
-            ):
-                parts, stage = timed(StageDerivatives.of, idm, evaluate)
-                print_problem(
-                    f"arm by stages, {evaluation}", stage, panda_by_stages(parts, given.longest)
-                )
+        if not given.counts:
+            print_problems(contenders, given.repeat, given.longest)
 
 
 if __name__ == "__main__":

@@ -22,15 +22,39 @@ def adam_inverse_dynamics(python: str, file: Path, joints: list[str]) -> Any:
         file: URDF text of an arm on a fixed base.
         joints: names, in the order of q.
     """
+    return _made(python, "adam", file, joints)
+
+
+def kin_dyn_inverse_dynamics(python: str, file: Path, joints: list[str]) -> Any:
+    """``idm(q, v, a) -> tau`` of casadi-kin-dyn: pinocchio's recursion on CasADi's scalars.
+
+    Args:
+        python: has cmeel-casadi-kin-dyn; its own casadi may be an older one.
+        file: URDF text of an arm on a fixed base.
+        joints: names, in the order of q.
+    """
+    return _made(python, "kin_dyn", file, joints)
+
+
+def _made(python: str, peer: str, file: Path, joints: list[str]) -> Any:
     import casadi
 
-    target = file.with_suffix(".adam")
-    command = [python, __file__, str(file), str(target), *joints]
+    target = file.with_suffix(f".{peer}")
+    command = [python, __file__, peer, str(file), str(target), *joints]
     subprocess.run(command, check=True, timeout=SECONDS, capture_output=True)
     return casadi.Function.load(str(target))
 
 
-def _save(file: str, target: str, joints: list[str]) -> None:
+def _save_kin_dyn(file: str, target: str, joints: list[str]) -> None:
+    from casadi_kin_dyn import casadi_kin_dyn
+
+    model = casadi_kin_dyn.CasadiKinDyn(Path(file).read_text(encoding="utf-8"))
+    if list(model.joint_names())[1:] != joints:
+        raise ValueError(f"casadi-kin-dyn orders the joints {model.joint_names()}")
+    model.rnea().save(target)
+
+
+def _save_adam(file: str, target: str, joints: list[str]) -> None:
     import casadi as ca
     import numpy as np
 
@@ -52,4 +76,5 @@ def _save(file: str, target: str, joints: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    _save(sys.argv[1], sys.argv[2], sys.argv[3:])
+    save = {"adam": _save_adam, "kin_dyn": _save_kin_dyn}[sys.argv[1]]
+    save(sys.argv[2], sys.argv[3], sys.argv[4:])

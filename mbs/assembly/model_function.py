@@ -9,6 +9,7 @@ import casadi
 import numpy as np
 from casadi import DM, MX, SX, Function
 
+from mbs.assembly.function_table import function_table
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
@@ -101,6 +102,14 @@ class ModelFunction(Function):
     def elements(self, name: str) -> list[tuple[str, str]]:
         """Name and unit of every element of an input or output; empty where they have none."""
         return _elements(self._system).get(name, [])
+
+    def describe(self) -> str:
+        """A table of index, name, quantity and unit of every input and output; `print` shows it."""
+        return function_table(self)
+
+    def __str__(self) -> str:
+        """The table of `describe`; `repr` is the one line of CasADi."""
+        return self.describe()
 
     @property
     def _title(self) -> str:

@@ -9,6 +9,7 @@ from casadi import SX
 
 from mbs.components.forces import JointForce
 from mbs.components.placement import SymbolTable
+from mbs.components.smooth_sign import smooth_sign
 from mbs.expressions import Number, Scalar, to_sx
 
 
@@ -120,7 +121,7 @@ class JointFriction(JointForce):
             falling = casadi.exp(-((v / to_sx(self.velocity, symbols)) ** 2))
             dry = dry + to_sx(self.stribeck, symbols) * falling
         total = to_sx(self.viscous, symbols) * v
-        return total + dry * casadi.tanh(v / to_sx(self.width, symbols))
+        return total + dry * smooth_sign(v, to_sx(self.width, symbols))
 
     def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
         """Friction stores nothing."""

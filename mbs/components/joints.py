@@ -7,8 +7,7 @@ frame_b. The rows that close a loop through a cut joint follow from the same des
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from mbs.components.axes import in_plane, unit_axis
 from mbs.components.component import Component, Point
 from mbs.components.drive_flange import Flange
+from mbs.components.joint_limits import limits_by_suffix, motor_range
 from mbs.components.motion import Freedom, Motion
 from mbs.components.rotor import Rotor
 from mbs.errors import DescriptionError
@@ -32,6 +32,9 @@ class Joint(Component):
         actuated: whether a motor drives it; None leaves the choice to the assembly: every joint
             of an open chain is active, a joint of a loop and a Free joint are passive.
         limits: (lower, upper) of its position, or a mapping from the suffix of a coordinate.
+        velocity: the largest velocity in both directions, or (lower, upper), of a joint of one
+            degree of freedom [rad/s or m/s]; kept as the pair.
+        effort: likewise of its motor [N m or N].
         Fv: viscous friction [N m s/rad or N s/m].
         Fs: dry friction [N m or N], which acts as Fs tanh(v / Fs_width).
         Fs_width: velocity over which dry friction changes sign [rad/s or m/s]; zero for the
@@ -47,6 +50,8 @@ class Joint(Component):
 
     actuated: bool | None = None
     limits: Any = None
+    velocity: Any = None
+    effort: Any = None
     Fv: Scalar = 0.0
     Fs: Scalar = 0.0
     Fs_width: Scalar = 1e-3
@@ -72,7 +77,11 @@ class Joint(Component):
                 raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
         if self.nv != 1 or len(self.freedoms) != 1:
             self._refuse_drive()
-        object.__setattr__(self, "limits", self._limits_by_suffix(self.limits))
+        known = [f.suffix for f in self.freedoms if f.motion.nq == 1]
+        object.__setattr__(self, "limits", limits_by_suffix(self.name, known, self.limits))
+        for name in ("velocity", "effort"):
+            pair = motor_range(self.name, name, getattr(self, name))
+            object.__setattr__(self, name, pair)
 
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
@@ -124,45 +133,14 @@ class Joint(Component):
             yield "inertia of the rotor", self.rotor.inertia
 
     def _refuse_drive(self) -> None:
-        """Springs and rotors belong to joints of one position."""
+        """Springs, rotors and limits of a motor belong to joints of one position."""
         given = [name for name in ("stiffness", "rest") if getattr(self, name) != Number(0.0)]
-        for name in [*given, *(["rotor"] if self.rotor is not None else [])]:
+        given += [n for n in ("rotor", "velocity", "effort") if getattr(self, n) is not None]
+        for name in given:
             raise DescriptionError(
                 f"{self.name}: {name} is given, but a {type(self).__name__} joint has not one"
                 " position that it could act on; give it to Revolute or Prismatic joints"
             )
-
-    def _limits_by_suffix(self, limits: Any) -> tuple[tuple[str, tuple[float, float]], ...]:
-        if limits is None:
-            return ()
-        known = {f.suffix for f in self.freedoms if f.motion.nq == 1}
-        items: list[tuple[Any, Any]] = [("" if known == {""} else None, limits)]
-        if isinstance(limits, Mapping):
-            items = list(limits.items())
-        elif isinstance(limits, tuple) and all(_is_named_interval(item) for item in limits):
-            items = list(limits)
-        return tuple((suffix, self._interval(suffix, pair, known)) for suffix, pair in items)
-
-    def _interval(self, suffix: Any, pair: Any, known: set[str]) -> tuple[float, float]:
-        if suffix not in known:
-            raise DescriptionError(
-                f"{self.name}: limits {quoted(pair)} name no coordinate of one number; "
-                + (f"give a mapping from {sorted(known)}" if known else "leave them out")
-            )
-        try:
-            low, high = (float(value) for value in pair)
-        except (TypeError, ValueError):
-            low, high = math.nan, math.nan
-        if not low < high:
-            raise DescriptionError(
-                f"{self.name}: limits {quoted(pair)} are not (lower, upper); give two numbers in"
-                " order"
-            )
-        return low, high
-
-
-def _is_named_interval(item: Any) -> bool:
-    return isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], str)
 
 
 @dataclass(frozen=True, slots=True)

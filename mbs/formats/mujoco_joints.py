@@ -18,6 +18,7 @@ from mbs.components import (
     RigidBody,
     Spherical,
 )
+from mbs.formats.mujoco_efforts import effort_range
 from mbs.formats.mujoco_model import MjcfModel, matrix_of, placed
 
 
@@ -66,6 +67,7 @@ def _joint(mjcf: MjcfModel, j: int) -> Joint:
         return Spherical(**common)
     if model.jnt_limited[j]:
         common["limits"] = tuple(float(value) for value in model.jnt_range[j])
+    common["effort"] = effort_range(mjcf, j)
     if model.jnt_stiffness[j]:
         common["stiffness"] = float(model.jnt_stiffness[j])
         common["rest"] = float(model.qpos_spring[model.jnt_qposadr[j]])

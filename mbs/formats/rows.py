@@ -36,6 +36,8 @@ class FrameRow:
             theta of a revolute joint and to r of a prismatic one.
         limits: (lower, upper) of the joint variable [rad or m].
         name: of the joint, q<j> when empty.
+        velocity: (lower, upper) of its rate, or the largest in both directions [rad/s or m/s].
+        effort: likewise of its motor [N m or N].
     """
 
     antecedent: int
@@ -49,6 +51,8 @@ class FrameRow:
     r: Scalar = 0.0
     limits: tuple[float, float] | None = None
     name: str = ""
+    velocity: tuple[float, float] | float | None = None
+    effort: tuple[float, float] | float | None = None
 
     @property
     def geometry(self) -> dict[str, Scalar]:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mbs.components import Rotor
+from mbs.components.joint_limits import motor_range
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, parameters_of, to_float
 from mbs.formats.rows import (
@@ -138,7 +139,8 @@ def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
         raise DescriptionError(
             f"{where}: antecedent {row.antecedent!r} must be 0 (base) or an earlier frame"
         )
-    if row.sigma == 2 and (row.actuated or row.limits is not None):
+    limited = any(given is not None for given in (row.limits, row.velocity, row.effort))
+    if row.sigma == 2 and (row.actuated or limited):
         raise DescriptionError(
             f"{where}: a fixed frame has a motor or limits; remove them or give it a joint"
         )
@@ -149,6 +151,8 @@ def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
         sigma=int(row.sigma),
         actuated=None if row.sigma == 2 else row.actuated,
         limits=None if row.limits is None else _limits(where, row.limits),
+        velocity=motor_range(where, "velocity", row.velocity),
+        effort=motor_range(where, "effort", row.effort),
     )
 
 

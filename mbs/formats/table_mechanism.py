@@ -101,7 +101,7 @@ def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) ->
     return {
         "name": table.joint_name(j),
         "actuated": actuated,
-        "limits": table.frames[j - 1].limits,
+        **{name: getattr(table.frames[j - 1], name) for name in ("limits", "velocity", "effort")},
         **{name: getattr(row, name) for name in (*DRIVE, "Fs_width", "rest", "rotor")},
     }
 

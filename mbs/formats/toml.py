@@ -20,7 +20,8 @@ from mbs.formats.table import RobotTable, require_table
 from mbs.messages import did_you_mean
 
 _TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "guess", "extras")
-_FRAME = ("antecedent", "joint", "sigma", "actuated", "mu", *GEOMETRY, "limits", "name")
+_MOTOR = ("velocity", "effort")
+_FRAME = ("antecedent", "joint", "sigma", "actuated", "mu", *GEOMETRY, "limits", "name", *_MOTOR)
 _BODY = ("frame", *BODY_SCALARS, "rotor", "name", "grouped")
 _ROTOR = ("inertia", "ratio", "axis")
 _LOOP = ("cut", "joint")
@@ -35,7 +36,7 @@ def read_toml(path: str | Path) -> RobotTable:
     """
     try:
         data = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also of brackets and digits without end
         raise DescriptionError(f"{path}: the file is not TOML: {error}; correct it") from None
     return from_dict(data)
 
@@ -109,7 +110,7 @@ def _frame(row: Mapping[str, Any], where: str) -> FrameRow:
         actuated=_actuated(row, where),
         limits=row.get("limits"),
         name=_text(row, "name", where),
-        **{key: row[key] for key in GEOMETRY if key in row},
+        **{key: row[key] for key in (*GEOMETRY, *_MOTOR) if key in row},
     )
 
 
@@ -216,7 +217,14 @@ def _frame_dict(row: FrameRow) -> dict[str, Any]:
         data["limits"] = list(row.limits)
     if row.name:
         data["name"] = row.name
+    data.update({key: _range(getattr(row, key)) for key in _MOTOR if getattr(row, key) is not None})
     return data
+
+
+def _range(pair: tuple[float, float]) -> float | list[float]:
+    """The largest value alone where it is the same in both directions."""
+    lower, upper = pair
+    return upper if lower == -upper else [lower, upper]
 
 
 def _body_dict(row: InertiaRow) -> dict[str, Any]:

@@ -123,6 +123,8 @@ def _joint(reader: Reader, joint: JointElement, kind: str) -> Joint:
         axis=axis,
         actuated=joint.element.find("mimic") is None,
         limits=None if kind == "continuous" else _limits(reader, joint.element),
+        velocity=_largest(reader, joint.element, "velocity"),
+        effort=_largest(reader, joint.element, "effort"),
         Fv=Fv,
         Fs=Fs,
     )
@@ -132,6 +134,11 @@ def _limits(reader: Reader, element: Element) -> tuple[float, float] | None:
     limit = element.find("limit")
     low, high = (reader.number(limit, key, 0.0) for key in ("lower", "upper"))
     return None if low == high == 0 else (low, high)
+
+
+def _largest(reader: Reader, element: Element, key: str) -> float | None:
+    """The largest velocity or effort; files write zero where it is not known."""
+    return reader.number(element.find("limit"), key, 0.0) or None
 
 
 def _add_mimic(mechanism: Mechanism, tree: UrdfTree, joint: JointElement) -> None:

@@ -53,17 +53,32 @@ def _tree_velocity(
         ModelError: no motion of the loops has these velocities.
     """
     p = [system.parameter_values(parameters)] if system.parameters else []
-    J = np.array(closure_jacobian(system)(q, *p))
+    v, missed = smallest_velocity(system, np.array(closure_jacobian(system)(q, *p)), v0)
+    if missed:
+        raise ModelError(
+            f"{system.name}: the loops allow no motion with the velocities {missed};"
+            " give those of independent joints: "
+            + ", ".join(system.speeds[k].name for k in system.active)
+        )
+    return v
+
+
+def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, str]:
+    """The smallest velocities with J v = 0 that give the joints named in v0 theirs.
+
+    Args:
+        system: any.
+        J: (m, nv) rows, dependent ones included.
+        v0: velocities by name [rad/s or m/s], or all of them.
+
+    Returns:
+        v (nv,); the velocities of v0 as text where no v has them, else an empty one.
+    """
     free = null_space(J)
     wanted = np.array(system.velocity(v0))
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
     v: Vector = free @ np.linalg.lstsq(free[rows], wanted[rows], rcond=None)[0]
-    if not np.allclose(v[rows], wanted[rows], rtol=1e-6, atol=1e-9):
-        told = ", ".join(f"{names[k]} = {wanted[k]:g}" for k in rows)
-        raise ModelError(
-            f"{system.name}: the loops allow no motion with the velocities {told};"
-            " give those of independent joints: " + ", ".join(names[k] for k in system.active)
-        )
-    return v
+    fits = np.allclose(v[rows], wanted[rows], rtol=1e-6, atol=1e-9)
+    return v, "" if fits else ", ".join(f"{names[k]} = {wanted[k]:g}" for k in rows)

@@ -17,20 +17,25 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.messages import did_you_mean, quoted
+from mbs.loops.start import Values
 from mbs.models.constrained_accelerations import inertia_size, loop_rows
-from mbs.models.contact_points import ContactPoint, PointRows, held_elements, point_rows
+from mbs.models.contact_points import (
+    ContactPoint,
+    PointRows,
+    Touching,
+    friction_cone,
+    held_elements,
+    point_rows,
+    ways_of,
+)
 from mbs.models.contacts import require_no_contacts
+from mbs.models.dae_phases import PhaseDae, phase_dae
+from mbs.models.dae_standing import PhaseStart, Standing
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.surroundings import surroundings
 from mbs.models.symbols import ModelSymbols, symbols_of
 from mbs.recursions.composite_body import inertia_matrix
 from mbs.solvers.saddle import solve_saddle
-
-Touching = Iterable[str] | Mapping[str, str]
-"""Names of the points that stand; or for each name "fixed" or "sliding"."""
-
-WAYS = ("fixed", "sliding")
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,18 +187,43 @@ class ContactPhases:
         Raises:
             ModelError: a pyramid has fewer than three sides.
         """
-        if sides is not None and (isinstance(sides, bool) or sides not in range(3, 1000)):
-            raise ModelError(
-                f"{self.system.name}: sides is {quoted(sides)}; give a number of sides from 3, or"
-                " None for the cone"
-            )
+        return friction_cone(self.system.name, self.points, sides)
 
-        f = SX.sym("f", 3, len(self.points))
-        margins = [
-            casadi.vertcat(f[2, k], _slip(f[:, k], point.friction, sides))
-            for k, point in enumerate(self.points)
-        ]
-        return Function("cone", [f], [casadi.densify(casadi.vertcat(*margins))], ["f"], ["margin"])
+    def dae(
+        self,
+        touching: Touching = (),
+        form: str = "reduced",
+        *,
+        q0: Values = None,
+        v0: Values = None,
+        tau0: Values = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> PhaseDae:
+        """The phase as differential-algebraic equations; points that touch are rows like loops.
+
+        x = [q; v] in every form. "reduced" is `accelerations`, without z; the others are those of
+        `mbs.models.dae`: lam has the forces of the rows. A point that touches binds its distance
+        from the plane, one that is "fixed" its velocity along the plane too, as a rolling disc
+        does: where it stands is not asked for, so that the equations are those of every place.
+        Rows that depend on others are left out, and have no force.
+
+        Args:
+            touching: the points that do.
+            form: one of the five words of `mbs.models.dae`.
+            q0: positions at the start by name, which are kept; the others move from the assembled
+                posture as little as the points and the loops need.
+            v0: velocities at the start by name, or all of them; the others are the smallest.
+            tau0: efforts of motors at the start by name, the others zero.
+            parameters: values of symbols at the start, the others at their defaults.
+
+        Raises:
+            ModelError: as of `accelerations` and `mbs.models.dae`; or the points allow no motion
+                with the velocities v0.
+            Unclosable: no posture with the positions q0 lets all of them touch.
+        """
+        ways, begin = self._ways(touching), PhaseStart(q0, v0, tau0, parameters)
+        explicit = self.accelerations(touching)
+        return phase_dae(Standing(self.system, self.points, ways), explicit, form, begin)
 
     def _loops(self, name: str, value: SX) -> Named:
         """An input or output that only closed systems have."""
@@ -201,19 +231,7 @@ class ContactPhases:
 
     def _ways(self, touching: Touching) -> tuple[str, ...]:
         """Of each point how it touches."""
-        given = dict(touching) if isinstance(touching, Mapping) else _standing(touching)
-        for name, way in given.items():
-            if name not in self.names:
-                raise ModelError(
-                    f"{self.system.name}: there is no contact point {quoted(name)}; "
-                    + did_you_mean(str(name), self.names)
-                )
-            if way not in WAYS:
-                raise ModelError(
-                    f"{self.system.name}: point {name!r} touches {quoted(way)}; use 'fixed' or"
-                    " 'sliding', or leave it out"
-                )
-        return tuple(given.get(name, "") for name in self.names)
+        return ways_of(self.system.name, self.points, touching)
 
     def _held(
         self, s: ModelSymbols, rows: PointRows, ways: tuple[str, ...], right: tuple[SX, SX, SX]
@@ -278,21 +296,5 @@ def contact_phases(system: System, points: Iterable[ContactPoint]) -> ContactPha
     return ContactPhases(system, every)
 
 
-def _standing(names: Iterable[str]) -> dict[str, str]:
-    given = [names] if isinstance(names, str) else list(names)
-    return dict.fromkeys(given, "fixed")
-
-
 def _efforts(system: System, s: ModelSymbols, a: SX) -> SX:
     return tree_efforts(system, s, a, surroundings(system))
-
-
-def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
-    """How far a force is from the border of its cone."""
-    if friction is None:
-        return SX(0, 1)
-    if sides is None:
-        return (friction * f[2]) ** 2 - f[0] ** 2 - f[1] ** 2
-    turns = 2 * casadi.pi / sides * casadi.DM(range(sides))
-    reach = casadi.cos(casadi.pi / sides) * friction * f[2]
-    return reach - casadi.cos(turns) * f[0] - casadi.sin(turns) * f[1]

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi
-from casadi import DM, SX
+from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.components.forces import RelativeMotion
 from mbs.errors import ModelError
-from mbs.messages import quoted
+from mbs.messages import did_you_mean, quoted
 from mbs.models.symbols import ModelSymbols
 from mbs.recursions.accelerations import link_accelerations, resting_base
 from mbs.recursions.frame_motion import relative_acceleration, relative_motion
 from mbs.recursions.velocities import link_velocities
 from mbs.spatial import zeros
+
+Touching = Iterable[str] | Mapping[str, str]
+"""Names of the points that stand; or for each name "fixed" or "sliding"."""
+
+WAYS = ("fixed", "sliding")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,3 +101,65 @@ def held_elements(ways: Sequence[str]) -> DM:
     """
     held = {"fixed": (1, 1, 1), "sliding": (0, 0, 1), "": (0, 0, 0)}
     return DM([element for way in ways for element in held[way]])
+
+
+def ways_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tuple[str, ...]:
+    """Of each point "fixed", "sliding" or "" where it is free.
+
+    Args:
+        name: of the mechanism, for errors.
+        points: that may touch.
+        touching: those that do.
+
+    Raises:
+        ModelError: there is no such point, or a point touches in no known way.
+    """
+    names = [point.name for point in points]
+    standing = [touching] if isinstance(touching, str) else touching
+    given = dict(touching) if isinstance(touching, Mapping) else dict.fromkeys(standing, "fixed")
+    for point, way in given.items():
+        if point not in names:
+            raise ModelError(
+                f"{name}: there is no contact point {quoted(point)}; "
+                + did_you_mean(str(point), names)
+            )
+        if way not in WAYS:
+            raise ModelError(
+                f"{name}: point {point!r} touches {quoted(way)}; use 'fixed' or 'sliding', or"
+                " leave it out"
+            )
+    return tuple(given.get(point, "") for point in names)
+
+
+def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) -> Function:
+    """``cone(f) -> margin``; see `ContactPhases.friction`.
+
+    Args:
+        name: of the mechanism, for errors.
+        points: a column of f (3, n) each.
+        sides: of a pyramid, None for the cone.
+
+    Raises:
+        ModelError: a pyramid has fewer than three sides.
+    """
+    if sides is not None and (isinstance(sides, bool) or sides not in range(3, 1000)):
+        raise ModelError(
+            f"{name}: sides is {quoted(sides)}; give a number of sides from 3, or None for the cone"
+        )
+    f = SX.sym("f", 3, len(points))
+    margins = [
+        casadi.vertcat(f[2, k], _slip(f[:, k], point.friction, sides))
+        for k, point in enumerate(points)
+    ]
+    return Function("cone", [f], [casadi.densify(casadi.vertcat(*margins))], ["f"], ["margin"])
+
+
+def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
+    """How far a force is from the border of its cone."""
+    if friction is None:
+        return SX(0, 1)
+    if sides is None:
+        return (friction * f[2]) ** 2 - f[0] ** 2 - f[1] ** 2
+    turns = 2 * casadi.pi / sides * casadi.DM(range(sides))
+    reach = casadi.cos(casadi.pi / sides) * friction * f[2]
+    return reach - casadi.cos(turns) * f[0] - casadi.sin(turns) * f[1]

@@ -109,7 +109,7 @@ def dae(
         raise ModelError(f"{system.name}: form is {quoted(form)}; use one of {', '.join(FORMS)}")
     p = np.array(system.parameter_values(parameters), dtype=float)
     q, v = start(system, q0, v0, parameters)
-    tau = _start_efforts(system, tau0)
+    tau = start_efforts(system, tau0)
     kind = _kind(system, form, q, p)
     equations, elements = _built(system, kind)
     parts = {field.name: getattr(equations, field.name) for field in fields(equations)}
@@ -186,7 +186,7 @@ def _built(system: System, kind: _Kind) -> tuple[Equations, Mapping[str, Element
     return built
 
 
-def _start_efforts(system: System, tau0: Values) -> Array:
+def start_efforts(system: System, tau0: Values) -> Array:
     """(nv,) efforts, of motors only."""
     tau = np.array(system.effort(tau0))
     driven = motors(system)

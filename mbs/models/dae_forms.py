@@ -10,6 +10,7 @@ the index of the others.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi
@@ -24,6 +25,10 @@ from mbs.models.composition import outputs_of
 from mbs.models.dae_rows import Rows, rows_of
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics
+from mbs.models.symbols import ModelSymbols, symbols_of
+
+Held = Callable[[ModelSymbols, SX], Rows]
+"""Rows at the symbols of the tree and its accelerations a (nv, 1)."""
 
 FORMS = ("reduced", "index1", "index2", "index3", "ggl")
 
@@ -60,22 +65,30 @@ def motors(system: System) -> list[int]:
     return [k for k, speed in enumerate(system.speeds) if speed.actuated]
 
 
-def implicit(system: System, form: str) -> Equations:
+def implicit(system: System, form: str, held: Held | None = None) -> Equations:
     """The forms with x = [q; v] and z = [a; lam], or [a; lam; mu]; the mass stays implicit.
 
     No inertia matrix is built or factorised: the rows of a are the inverse dynamic model, which
     also serves links without mass.
+
+    Args:
+        system: open or closed.
+        form: "index1", "index2", "index3" or "ggl".
+        held: rows besides those of the loops, such as points that stand.
     """
-    q, v, a = SX.sym("q", system.nq), SX.sym("v", system.nv), SX.sym("a", system.nv)
+    s = symbols_of(system, "tree")
+    q, v, a = s.q, s.v, SX.sym("a", system.nv)
     rows = rows_of(system, q, v, a)
+    if held is not None:
+        rows = rows.joined(held(s, a))
     lam, mu = SX.sym("lam", rows.J.shape[0]), SX(0, 1)
-    u, tau = _efforts(system)
+    u, tau = motor_efforts(system)
     (needed,) = outputs_of(system, inverse_dynamics(system, "tree"), q, v, a)
     speed = v
     if form == "ggl":
         mu = SX.sym("mu", rows.positions.numel())
         speed = v + casadi.mtimes(rows.J_positions.T, mu)
-    return _equations(
+    return equations(
         system,
         states=(casadi.vertcat(q, v), casadi.vertcat(a, lam, mu), u),
         ode=casadi.vertcat(position_rate(system.tree, q, speed), a),
@@ -100,9 +113,9 @@ def _kept(rows: Rows, form: str) -> SX:
 def open_chain(system: System) -> Equations:
     """Open chains, x = [q; v] and no z: the accelerations are those of the direct dynamic model."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    u, tau = _efforts(system)
+    u, tau = motor_efforts(system)
     (a,) = outputs_of(system, direct_dynamics(system), q, v, tau)
-    return _equations(
+    return equations(
         system,
         states=(casadi.vertcat(q, v), SX(0, 1), u),
         ode=casadi.vertcat(position_rate(system.tree, q, v), a),
@@ -122,7 +135,7 @@ def closed_form(system: System, branch: tuple[str, ...]) -> Equations:
     q_a, v_a = SX.sym("q_a", len(active)), SX.sym("v_a", len(active))
     (q,) = outputs_of(system, function(system, branch), q_a)
     u, v, a = _independent_motion(system, q, v_a)
-    return _equations(
+    return equations(
         system,
         states=(casadi.vertcat(q_a, v_a), SX(0, 1), u),
         ode=casadi.vertcat(v_a, a),
@@ -136,7 +149,7 @@ def carried_positions(system: System) -> Equations:
     """Other loops, x = [q; v_a] and no z: all positions are integrated, phi(q) is an invariant."""
     q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.active))
     u, v, a = _independent_motion(system, q, v_a)
-    return _equations(
+    return equations(
         system,
         states=(casadi.vertcat(q, v_a), SX(0, 1), u),
         ode=casadi.vertcat(position_rate(system.tree, q, v), a),
@@ -148,13 +161,13 @@ def carried_positions(system: System) -> Equations:
 
 def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX]:
     """Symbols u, velocities of the tree, and accelerations of the independent joints."""
-    u, tau = _efforts(system)
+    u, tau = motor_efforts(system)
     (G,) = outputs_of(system, reduction_matrix(system), q)
     (a,) = outputs_of(system, direct_dynamics(system), q, v_a, tau[list(system.active)])
     return u, casadi.mtimes(G, v_a), a
 
 
-def _efforts(system: System) -> tuple[SX, SX]:
+def motor_efforts(system: System) -> tuple[SX, SX]:
     """Symbols u, and the efforts tau (nv, 1) that they are."""
     driven = motors(system)
     u, tau = SX.sym("u", len(driven)), SX.zeros(system.nv)
@@ -162,7 +175,7 @@ def _efforts(system: System) -> tuple[SX, SX]:
     return u, tau
 
 
-def _equations(
+def equations(
     system: System,
     states: tuple[SX, SX, SX],
     ode: SX,

@@ -17,13 +17,17 @@ _RATE_OF_RATE = {"m": "m/s2", "rad": "rad/s2", "1": "1/s2"}
 _EFFORT = {"m": "N", "rad": "N.m", "1": "N.m"}
 
 
-def elements_of(system: System, form: str) -> Mapping[str, Elements]:
+def elements_of(
+    system: System, form: str, standing: tuple[Elements, Elements] = ((), ())
+) -> Mapping[str, Elements]:
     """For x, z, u, p, alg and invariants of a form, the name and unit of each element.
 
     Args:
         system: open or closed.
-        form: "open", "closed form" or "carried" for the three kinds of "reduced", else as in
-            `mbs.models.dae`.
+        form: "open", "closed form" or "carried" for the three kinds of "reduced", "phase" for that
+            of a contact phase, else as in `mbs.models.dae`.
+        standing: of points that touch, the rows that bind positions and those that bind velocities
+            alone.
     """
     q, v, a, tau = _coordinates(system)
     norms = tuple(
@@ -35,17 +39,18 @@ def elements_of(system: System, form: str) -> Mapping[str, Elements]:
         "p": tuple((parameter.name, parameter.unit) for parameter in system.parameters),
     }
     v_a = tuple(v[k] for k in system.active)
-    phi, slips = _rows(system)
+    phi, slips = (a + b for a, b in zip(_rows(system), standing, strict=True))
+    rows = phi + slips
+    speeds = _of("der", rows, RATE_UNIT)
     explicit = {
         "open": (q + v, norms),
         "closed form": (tuple(q[k] for k in system.active) + v_a, ()),
         "carried": (q + v_a, phi + norms),
+        "phase": (q + v, phi + speeds + norms),
     }
     if form in explicit:
         x, invariants = explicit[form]
         return {**fixed, "x": x, "z": (), "alg": (), "invariants": invariants}
-    rows = phi + slips
-    speeds = _of("der", rows, RATE_UNIT)
     kept = {
         "index1": _of("der(der", rows, _RATE_OF_RATE, "))"),
         "index2": speeds,

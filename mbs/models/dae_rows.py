@@ -42,6 +42,21 @@ class Rows:
         """(s, nv) the lines of J that belong to rows that bind positions."""
         return self.J[: self.positions.numel(), :]
 
+    def joined(self, other: Rows) -> Rows:
+        """These rows and others of the same system; of each kind these come first."""
+        s, t = self.positions.numel(), other.positions.numel()
+
+        def both(mine: SX, theirs: SX) -> SX:
+            return casadi.vertcat(mine[:s, :], theirs[:t, :], mine[s:, :], theirs[t:, :])
+
+        return Rows(
+            J=both(self.J, other.J),
+            positions=casadi.vertcat(self.positions, other.positions),
+            velocities=both(self.velocities, other.velocities),
+            accelerations=both(self.accelerations, other.accelerations),
+            norms=self.norms,
+        )
+
 
 def rows_of(system: System, q: SX, v: SX, a: SX) -> Rows:
     """The independent rows at the symbols q (nq, 1), v (nv, 1), a (nv, 1)."""

@@ -36,7 +36,8 @@ from mbs.models.symbols import (
 from mbs.operations.counts import cheapest
 
 _COMPARED = 6
-"""Velocities up to which both methods are built and their operations counted."""
+"""Velocities from the base to a leaf up to which both methods are built and their operations
+counted; in longer trees differentiation takes more."""
 
 _STAGED = 10
 """Velocities from which the columns of -A^-1 dtau are a map, not written out one by one."""
@@ -198,7 +199,11 @@ def _check_method(system: System, coordinates: str, method: str, known: tuple[st
 
 def _compared(system: System, recursive: str) -> tuple[str, ...]:
     """The recursive method, and the differentiated one while it may win."""
-    return (recursive,) if system.nv > _COMPARED else (recursive, "ad")
+    behind: list[int] = []
+    for link in system.tree.links:
+        before = behind[link.antecedent] if link.antecedent >= 0 else 0
+        behind.append(before + link.motion.nv)
+    return (recursive,) if max(behind) > _COMPARED else (recursive, "ad")
 
 
 def _chosen(

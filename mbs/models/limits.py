@@ -18,7 +18,7 @@ from mbs.messages import did_you_mean, quoted
 
 Array = NDArray[np.float64]
 Largest = Mapping[str, float] | None
-"""The largest magnitude by the name of a velocity."""
+"""The largest magnitude by the name of a velocity, which replaces that of the description."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +42,8 @@ class Limits:
 def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> Limits:
     """What a system may do: limits of its joints, and of stops where they are narrower.
 
-    Elements of unit quaternions are between -1 and 1. The description of a joint has limits of
-    its position alone; those of its motor are given here.
+    Elements of unit quaternions are between -1 and 1. Velocities and efforts are those of the
+    description, `velocity` and `effort` of a joint, where they are not given here.
 
     Args:
         system: open or closed.
@@ -55,18 +55,26 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
     """
     require_system(system)
     q_lower, q_upper = _positions(system)
-    v_upper, tau_upper = np.full(system.nv, np.inf), np.zeros(system.nv)
-    tau_upper[[k for k, row in enumerate(system.speeds) if row.actuated]] = np.inf
+    v_lower, v_upper = _ends([row.limits for row in system.speeds])
+    tau_lower, tau_upper = _ends([row.effort for row in system.speeds])
     for number, value in _magnitudes(system, "speed", speed):
-        v_upper[number] = value
+        v_lower[number], v_upper[number] = -value, value
     for number, value in _magnitudes(system, "effort", effort):
         if not system.speeds[number].actuated:
             raise ModelError(
                 f"{system.name}: effort has {system.speeds[number].name!r}, which has no motor;"
                 " leave it out, or make that joint actuated=True"
             )
-        tau_upper[number] = value
-    return Limits(q_lower, q_upper, -v_upper, v_upper, -tau_upper, tau_upper)
+        tau_lower[number], tau_upper[number] = -value, value
+    still = [k for k, row in enumerate(system.speeds) if not row.actuated]
+    tau_lower[still] = tau_upper[still] = 0
+    return Limits(q_lower, q_upper, v_lower, v_upper, tau_lower, tau_upper)
+
+
+def _ends(ranges: list[tuple[float, float] | None]) -> tuple[Array, Array]:
+    """Lower and upper ends, infinite where there is no range."""
+    lower, upper = zip(*(given or (-np.inf, np.inf) for given in ranges), strict=True)
+    return np.array(lower, dtype=float), np.array(upper, dtype=float)
 
 
 def _positions(system: System) -> tuple[Array, Array]:

@@ -40,6 +40,7 @@ def cached_library(
     """The shared library of these sources, built when nobody has built it yet.
 
     Two processes may ask at once: each builds in a folder of its own and the last to finish wins.
+    The name of a library holds a hash of its content; one that is damaged is built again.
 
     Args:
         files: file name to its text; names that end in .c are compiled, the others are headers.
@@ -54,9 +55,10 @@ def cached_library(
         CompilerError: there is no compiler, or it refused the code.
     """
     folder, chosen = cache_dir(), compiler or find_compiler()
-    target = folder / f"{_key(files, flags, chosen)}{suffix}"
-    if target.exists():
-        return target
+    key = _key(files, flags, chosen)
+    for known in sorted(folder.glob(f"{key}-*{suffix}")):
+        if is_whole(known):
+            return known
     with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as name:
         build = Path(name)
         for file, text in files.items():
@@ -64,8 +66,28 @@ def cached_library(
         sources = [build / file for file in files if file.endswith(".c")]
         output = build / f"library{suffix}"
         library = compile_library(sources, [build], flags, output, compiler=chosen)
+        target = folder / f"{key}-{_sum_of(library)}{suffix}"
         _install(library, target)
     return target
+
+
+def is_whole(library: Path) -> bool:
+    """Whether the content of a library of the cache is that which its name tells."""
+    try:
+        facts = library.stat()
+    except OSError:
+        return False
+    return _checked(library, facts.st_mtime_ns, facts.st_size)
+
+
+@functools.lru_cache(maxsize=1024)
+def _checked(library: Path, changed: int, size: int) -> bool:
+    return library.stem.rpartition("-")[2] == _sum_of(library)
+
+
+def _sum_of(library: Path) -> str:
+    with library.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
 def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> str:

@@ -12,6 +12,7 @@ from mbs.native.array_calls import with_array_calls
 from mbs.native.cache import cached_library
 from mbs.native.compiler import compiler_found, flags_for
 from mbs.native.kernel import kernel_library
+from mbs.native.library_index import indexed_library
 from mbs.native.patterns import patterns_source
 
 
@@ -59,6 +60,11 @@ def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | 
     """The library of a Function and its derivatives; None when they cannot be written as C."""
     if calls_machine_code([function]):
         return None
+    options = f"{'fast' if fast else 'exact'}, {derivatives} derivatives"
+    return indexed_library(function, options, lambda: _built(function, derivatives, fast))
+
+
+def _built(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
     functions = [function, *_all_derivatives(function, derivatives)]
     known = _products(function) if derivatives == 2 else []
     patterns = {"patterns.c": patterns_source(known)} if known else {}

@@ -10,6 +10,7 @@ from casadi import SX
 
 from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
+from mbs.components.smooth_sign import smooth_sign
 from mbs.spatial import cross, zeros
 
 
@@ -58,18 +59,8 @@ def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
     total = zeros(link.motion.nv)
     if link.motion is Motion.FREE:  # the velocity is in the turning frame
         a = a + casadi.vertcat(cross(v[3:6], v[0:3]), zeros())
-    step = _smooth_sign(v, link.Fs_width)
+    step = smooth_sign(v, link.Fs_width)
     for coefficient, rate in ((link.Ia, a), (link.Fv, v), (link.Fs, step)):
         if not coefficient.is_zero():
             total = total + coefficient * rate
     return total
-
-
-def _smooth_sign(v: SX, width: SX) -> SX:
-    """tanh(v / width), and sign(v) for a width of zero."""
-    if width.is_zero():
-        return casadi.sign(v)
-    if width.is_constant():
-        return casadi.tanh(v / width)
-    vanishes = width == 0
-    return casadi.if_else(vanishes, casadi.sign(v), casadi.tanh(v / (width + vanishes)))

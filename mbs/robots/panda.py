@@ -8,9 +8,11 @@ from mbs.components import Mechanism
 from mbs.robots.rows import cuboid, frame, robot
 
 _SOURCE = (
-    "Geometry and joint ranges: Franka Emika, Denavit-Hartenberg parameters in Craig's convention"
-    " and limits of the Panda; masses and inertias are illustrative: homogeneous cuboids"
+    "Geometry and limits: Franka Emika, Denavit-Hartenberg parameters in Craig's convention and"
+    " joint ranges, velocities and torques of the Panda; masses and inertias are illustrative:"
+    " homogeneous cuboids"
 )
+_LARGE, _SMALL = {"velocity": 2.175, "effort": 87}, {"velocity": 2.61, "effort": 12}
 _GUESS = {"q4": -pi / 2, "q6": pi / 2}
 
 
@@ -20,18 +22,18 @@ def panda() -> Mechanism:
     Frame 7 is on the flange, 107 mm beyond the joint. The posture of assembly lies within the joint
     ranges, which the zero posture does not.
 
-    Source: modified Denavit-Hartenberg parameters and joint ranges published by Franka Emika.
+    Source: modified Denavit-Hartenberg parameters and limits of joints published by Franka Emika.
     Masses, inertias and rotors are illustrative.
     """
     half = pi / 2
     frames = [
-        frame(0, r=0.333, limits=[-2.8973, 2.8973]),
-        frame(1, alpha=-half, limits=[-1.7628, 1.7628]),
-        frame(2, alpha=half, r=0.316, limits=[-2.8973, 2.8973]),
-        frame(3, alpha=half, d=0.0825, limits=[-3.0718, -0.0698]),
-        frame(4, alpha=-half, d=-0.0825, r=0.384, limits=[-2.8973, 2.8973]),
-        frame(5, alpha=half, limits=[-0.0175, 3.7525]),
-        frame(6, alpha=half, d=0.088, r=0.107, limits=[-2.8973, 2.8973]),
+        frame(0, r=0.333, limits=[-2.8973, 2.8973], **_LARGE),
+        frame(1, alpha=-half, limits=[-1.7628, 1.7628], **_LARGE),
+        frame(2, alpha=half, r=0.316, limits=[-2.8973, 2.8973], **_LARGE),
+        frame(3, alpha=half, d=0.0825, limits=[-3.0718, -0.0698], **_LARGE),
+        frame(4, alpha=-half, d=-0.0825, r=0.384, limits=[-2.8973, 2.8973], **_SMALL),
+        frame(5, alpha=half, limits=[-0.0175, 3.7525], **_SMALL),
+        frame(6, alpha=half, d=0.088, r=0.107, limits=[-2.8973, 2.8973], **_SMALL),
     ]
     bodies = [
         cuboid(1, 3, (0.12, 0.12, 0.2), (0, -0.02, -0.05), Ia=0.6),

@@ -4,14 +4,15 @@ import casadi
 import numpy as np
 import pytest
 from support.dae_mechanisms import four_bar
+from support.legged import FEET
+from support.legged import quadruped as walker
 from support.random_trees import random_state
 
 import mbs
-from mbs.components import Body, Free, Mechanism, Revolute, Universal
+from mbs.components import Body, Free, Mechanism
 from mbs.errors import ModelError
 from mbs.models import ContactPoint, contact_phases
 
-FEET = {"fl": (0.3, 0.15), "fr": (0.3, -0.15), "hl": (-0.3, 0.15), "hr": (-0.3, -0.15)}
 PHASES = [(), ("fl",), ("fl", "hr"), {"fl": "sliding", "hr": "fixed"}, tuple(FEET)]
 
 
@@ -21,20 +22,7 @@ def numbers(value):
 
 @pytest.fixture(scope="module")
 def quadruped():
-    m = Mechanism("quadruped", gravity=(0, 0, -9.81))
-    trunk = m.add(Body("trunk", mass=10, inertia=(0.1, 0.3, 0.4)))
-    m.connect(m.world, Free("base"), trunk)
-    m.add_frame("slope", m.world.at(0, 0, -0.4, rotation=("y", 0.2)))
-    for name, (x, y) in FEET.items():
-        upper, lower = (
-            m.add(Body(f"{name}_{part}", mass=w, com=(0, 0, -0.1), inertia=(0.01, 0.01, 0.002)))
-            for part, w in (("upper", 1.0), ("lower", 0.5))
-        )
-        hip = Universal(f"{name}_hip", axes=("x", "y"), actuated=True)
-        m.connect(trunk.at(x, y, 0), hip, upper)
-        m.connect(upper.at(0, 0, -0.25), Revolute(f"{name}_knee", axis="y", actuated=True), lower)
-        m.add_frame(name, lower.at(0, 0, -0.25))
-    return m.assemble()
+    return walker()
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 import mbs
 from mbs.components import Body, Free, JointStop, Mechanism, Prismatic, Revolute
-from mbs.errors import ModelError
+from mbs.errors import DescriptionError, ModelError
 from mbs.models import limits
 
 
@@ -32,10 +32,51 @@ def test_every_limit_is_in_its_place(system):
 
 
 def test_motors_without_limits_are_unlimited():
+    found = limits(mbs.load("rx90").assemble())
+    assert np.all(np.isinf(found.tau_upper))
+    assert np.all(np.isinf(found.v_lower))
+
+
+def test_velocities_and_efforts_are_those_of_the_description():
     panda = mbs.load("panda").assemble()
     found = limits(panda)
-    assert np.all(np.isinf(found.tau_upper))
     np.testing.assert_array_equal(found.q_upper[:3], [2.8973, 1.7628, 2.8973])
+    np.testing.assert_array_equal(found.v_upper, [2.175] * 4 + [2.61] * 3)
+    np.testing.assert_array_equal(found.tau_upper, [87] * 4 + [12] * 3)
+    given = limits(panda, speed={"q1": 1.0}, effort={"q7": 5.0})
+    np.testing.assert_array_equal(given.v_lower, [-1, *found.v_lower[1:]])
+    np.testing.assert_array_equal(given.tau_upper, [*found.tau_upper[:6], 5])
+
+
+def test_ranges_need_not_be_the_same_in_both_directions():
+    m = Mechanism("slide")
+    body = m.add(Body("body", mass=1))
+    m.connect(m.world, Prismatic("s", velocity=(-0.5, 2), effort=(0, 30)), body)
+    found = limits(m.assemble())
+    assert (found.v_lower[0], found.v_upper[0]) == (-0.5, 2)
+    assert (found.tau_lower[0], found.tau_upper[0]) == (0, 30)
+
+
+def test_a_joint_without_motor_has_no_effort():
+    m = Mechanism("slide")
+    m.connect(m.world, Prismatic("s", actuated=False, effort=5), m.add(Body("body", mass=1)))
+    assert limits(m.assemble()).tau_upper[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("joint", "message"),
+    [
+        (lambda: Revolute("j", velocity=0), "j: velocity is 0; give the largest one, above zero"),
+        (lambda: Revolute("j", effort=(1, 2)), r"j: effort is \(1, 2\); give the largest one"),
+        (lambda: Revolute("j", effort="much"), "j: effort is 'much'"),
+        (lambda: Revolute("j", effort=True), "j: effort is True"),
+        (lambda: Prismatic("j", velocity=float("nan")), "j: velocity is nan"),
+        (lambda: Free("j", velocity=1), "j: velocity is given, but a Free joint has not one"),
+    ],
+)
+def test_ranges_that_are_refused(joint, message):
+    with pytest.raises(DescriptionError, match=message):
+        joint()
 
 
 @pytest.mark.parametrize(

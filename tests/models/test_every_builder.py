@@ -3,83 +3,43 @@
 import casadi
 import numpy as np
 import pytest
-from support.dae_mechanisms import CLOSED, OPEN
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support.builders import (
+    AGAIN,
+    ALONE,
+    BUILDERS,
+    CLOSED_ALONE,
+    OPEN_ALONE,
+    PAIRS,
+    SYSTEMS,
+    built,
+    numbers,
+    point,
+    public_builders,
+    same,
+    system_of,
+)
+from support.dae_mechanisms import CLOSED
+from support.random_trees import ALL_KINDS, random_tree
 
 import mbs
 import mbs.models
 from mbs.native import compiled
 from mbs.native.compiled import generated, unwritten
+from mbs.native.compiler import compile_library, compiler_found
 
-SYSTEMS = {**{n: OPEN[n] for n in OPEN}, **{n: CLOSED[n] for n in ("four_bar", "rssr", "rolling")}}
-BUILT = {}
-
-BUILDERS = {
-    "inverse_dynamics": mbs.models.inverse_dynamics,
-    "inverse_dynamics, tree": lambda s: mbs.models.inverse_dynamics(s, "tree"),
-    "wrenches": lambda s: mbs.models.inverse_dynamics(s, f_ext=True, moving_base=True),
-    "bias": mbs.models.bias,
-    "gravity_effort": mbs.models.gravity_effort,
-    "inertia_matrix": mbs.models.inertia_matrix,
-    "direct_dynamics": mbs.models.direct_dynamics,
-    "direct_dynamics, tree": lambda s: mbs.models.direct_dynamics(s, coordinates="tree"),
-    "inverse_dynamics_derivatives": mbs.models.inverse_dynamics_derivatives,
-    "direct_dynamics_derivatives": mbs.models.direct_dynamics_derivatives,
-    "energy": mbs.models.energy,
-    "lagrange": mbs.models.lagrange,
-    "transform": lambda s: mbs.models.transform(s, len(s.links)),
-    "jacobian": lambda s: mbs.models.jacobian(s, len(s.links)),
-    "jacobian_dot_velocity": lambda s: mbs.models.jacobian_dot_velocity(s, len(s.links)),
-    "link_velocities": mbs.models.link_velocities,
-    "link_accelerations": mbs.models.link_accelerations,
-    "joint_wrenches": mbs.models.joint_wrenches,
-    "phase": lambda s: phases(s).accelerations("tip"),
-    "phase_residuals": lambda s: phases(s).residuals("tip"),
-    "touchdown": lambda s: phases(s).impact({"tip": "sliding"}),
-    "points": lambda s: phases(s).motion(),
-}
+COMPILER = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 
 
-def phases(system):
-    return mbs.models.contact_phases(system, [mbs.models.ContactPoint("tip", len(system.links))])
+def test_every_public_builder_is_here():
+    everywhere = (BUILDERS, CLOSED_ALONE, OPEN_ALONE, *ALONE.values())
+    known = {name.split(",")[0] for table in everywhere for name in table}
+    assert public_builders() <= known
 
 
-def built(name):
-    if name not in BUILT:
-        BUILT[name] = SYSTEMS[name]()
-    return BUILT[name]
-
-
-def point(system, f):
-    """Arguments at which the model is finite: a closed posture, small numbers elsewhere."""
-    rng = np.random.default_rng(7)
-    values = {name: rng.uniform(-1, 1, f.size_in(name)) for name in f.name_in()}
-    values["q"] = np.array(system.posture).reshape(-1, 1)
-    if "p" in values:
-        values["p"] = np.array(system.p_default).reshape(-1, 1)
-    if "R_0" in values:
-        values["R_0"] = np.eye(3)
-    return [values[name] for name in f.name_in()]
-
-
-def numbers(results):
-    every = results if isinstance(results, (tuple, list)) else (results,)
-    return [np.array(casadi.DM(result)) for result in every]
-
-
-def same(found, expected, tolerance=1e-12):
-    for a, b in zip(found, expected, strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(1, np.abs(b).max(initial=0)))
-
-
-@pytest.mark.parametrize("builder", BUILDERS)
-@pytest.mark.parametrize("name", SYSTEMS)
-def test_symbols_maps_expansion_and_c(name, builder):
-    system = built(name)
-    f = BUILDERS[builder](system)
-    assert BUILDERS[builder](system) is f
-    at = point(system, f)
-    expected = numbers(f(*at))
-    assert all(np.isfinite(value).all() for value in expected)
+def on_symbols(f, at, expected):
+    """The same values on SX and MX, expanded, and for two columns at once."""
     for kind in (casadi.SX, casadi.MX):
         symbols = [kind.sym(n, *f.size_in(n)) for n in f.name_in()]
         again = casadi.Function("again", symbols, f.call(symbols))
@@ -88,31 +48,111 @@ def test_symbols_maps_expansion_and_c(name, builder):
     twice = f.map(2).call([np.hstack([x, x]) for x in at])
     for value, one in zip(numbers(twice), expected, strict=True):
         same([value], [np.hstack([one, one])])
-    assert unwritten(generated([casadi.Function(f)])) == ""
 
 
-@pytest.mark.parametrize("name", ["floating", "four_bar"])
-def test_machine_code_with_two_derivatives(name):
+@pytest.mark.parametrize(("name", "builder"), PAIRS)
+def test_symbols_maps_and_expansion(name, builder):
+    f = built(name, builder)
+    assert builder in AGAIN or built(name, builder) is f
+    at = point(system_of(name), f)
+    expected = numbers(f(*at))
+    assert all(np.isfinite(value).all() for value in expected)
+    on_symbols(f, at, expected)
+
+
+@COMPILER
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_the_c_code_of_all_models(name, tmp_path):
+    """One file of C with every model of a system gives the same values."""
+    models = [built(name, builder) for where, builder in PAIRS if where == name]
+    written = [casadi.Function.expand(f, f"m{k}") for k, f in enumerate(models)]
+    source = generated(written)
+    assert unwritten(source) == ""
+    (tmp_path / "models.c").write_text(source)
+    flags = ("-O0", "-ffp-contract=off", "-fPIC", "-shared")
+    output = tmp_path / "models.so"
+    library = compile_library([tmp_path / "models.c"], [tmp_path], flags, output)
+    for k, f in enumerate(models):
+        at = point(system_of(name), f)
+        code = casadi.external(f"m{k}", str(library))
+        same(numbers(code.call(at)), numbers(f(*at)), 1e-13)
+
+
+@settings(max_examples=2, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(st.integers(0, 10**6), st.integers(1, 2), st.booleans())
+def test_models_of_any_tree(seed, size, aligned):
+    """What holds for the systems by name holds for trees that were not chosen."""
+    system = random_tree(seed, n=size, kinds=ALL_KINDS, aligned=aligned).mechanism.assemble()
+    for build in BUILDERS.values():
+        f = build(system)
+        at = point(system, f, seed)
+        expected = numbers(f(*at))
+        assert all(np.isfinite(value).all() for value in expected)
+        on_symbols(f, at, expected)
+
+
+def with_hessian(model, at, k):
+    """The sum of the outputs, its gradient and its Hessian by input k."""
+    x = casadi.MX.sym("x", model.size1_in(k))
+    every = model.call([*map(casadi.MX, map(casadi.DM, at[:k])), x, *at[k + 1 :]])
+    total = casadi.sum1(casadi.vertcat(*map(casadi.vec, every)))
+    return numbers(casadi.Function("d", [x], [total, *casadi.hessian(total, x)])(at[k]))
+
+
+@COMPILER
+@pytest.mark.parametrize(
+    ("name", "builder"),
+    [
+        ("floating", "energy"),
+        ("four_bar", "energy"),
+        ("loop", "inverse_dynamics"),
+        ("driven", "transform"),
+        ("rolling", "closure"),
+    ],
+)
+def test_machine_code_with_two_derivatives(name, builder):
     """First and second derivatives of a compiled model are those of the interpreted one."""
-    system = built(name)
-    f = mbs.models.energy(system)
-    at = point(system, f)
-    k = f.name_in().index("q")
-    x = casadi.MX.sym("q", f.size1_in(k))
-    values = []
-    for model in (f, compiled(f, derivatives=2)):
-        total = casadi.sum1(casadi.vertcat(*model(*at[:k], x, *at[k + 1 :])))
-        second = casadi.hessian(total, x)
-        values.append(numbers(casadi.Function("d", [x], [total, *second])(at[k])))
-    same(values[1], values[0], 1e-13)
+    f = built(name, builder)
+    at, k = point(system_of(name), f), f.name_in().index("q")
+    same(with_hessian(compiled(f, derivatives=2), at, k), with_hessian(f, at, k), 1e-12)
 
 
-def test_casadi_compiles_it_itself():
-    f = mbs.models.inverse_dynamics(mbs.load("planar_2r").assemble())
+@COMPILER
+@pytest.mark.parametrize(
+    ("name", "builder"),
+    [
+        ("loop", "direct_dynamics"),
+        ("rx90", "inverse_dynamics"),
+        ("loop", "phase"),
+        *[
+            ("four_bar", "function"),
+            ("floating", "dae, ggl"),
+        ],
+    ],
+)
+def test_machine_code_with_one_derivative(name, builder):
+    f = built(name, builder)
+    at = point(system_of(name), f)
+    code = compiled(f, derivatives=1)
+    results = []
+    for model in (f, code):
+        inputs = [casadi.MX.sym(n, *f.size_in(n)) for n in f.name_in()]
+        slope = casadi.jacobian(casadi.vertcat(*map(casadi.vec, model.call(inputs))), inputs[0])
+        results.append(numbers(casadi.Function("J", inputs, [casadi.densify(slope)])(*at)))
+    same(*results, 1e-12)
+
+
+@COMPILER
+@pytest.mark.parametrize(
+    ("name", "builder"),
+    [("loop", "inverse_dynamics"), ("four_bar", "energy"), ("floating", "link_velocities")],
+)
+def test_casadi_compiles_it_itself(name, builder):
+    f = built(name, builder)
     x = [casadi.MX.sym(n, *f.size_in(n)) for n in f.name_in()]
     options = {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
     g = casadi.Function("g", x, f.call(x), options)
-    at = [[0.3, -0.4], [1.0, 2.0], [0.5, 0.1]]
+    at = point(system_of(name), f)
     same(numbers(g(*at)), numbers(f(*at)))
 
 

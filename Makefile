@@ -32,7 +32,7 @@ demo: $(VENV)/.demo
 	@$(RUN)/python examples/01_four_bar.py build/four_bar
 
 test: lint types layers
-	@$(RUN)/python -m pytest -n 2
+	@$(RUN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(VENV)/.dev
 	@$(RUN)/ruff check .

@@ -18,7 +18,7 @@ _ACCENT = re.compile(r"\{?\\(?:[`'^\"~=]|o(?=\W))\{?(\w?)\}*")
 _NAME = r"[A-Z][\w’-]+"
 MENTION = re.compile(
     rf"(?P<first>{_NAME})(?P<others>(?:(?:,|\s+&|,?\s+and)\s+(?:Van )?{_NAME})*)(?: et al\.)?,?"
-    r"\s+\(?(?P<year>(?:19|20)\d\d)\b\)?"
+    r"\s+(?P<open>\()?(?P<year>(?:19|20)\d\d)\b(?(open)\)?)"
 )
 _PROTECTED = re.compile(
     r"^(`{3,})[\s\S]*?^\1$"  # blocks of code

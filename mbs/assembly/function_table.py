@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from mbs.assembly.model_function import ModelFunction
+    from mbs.assembly.system import System
 
 _QUANTITIES = {
     "q": "position",
@@ -27,7 +28,8 @@ def function_table(function: ModelFunction) -> str:
             those that end in _a are of the independent joints.
 
     Returns:
-        Lines of index, name, quantity and unit; parameters with their defaults.
+        Lines of index, name, quantity and unit; parameters with their defaults, and positions,
+        velocities and efforts with the limits that the joints describe.
     """
     lines = [f"{function.name()} of {function.system.name}"]
     for way, names, shape in (
@@ -44,10 +46,25 @@ def _elements(function: ModelFunction, name: str, size: int) -> list[str]:
     if len(rows) != size:
         return []
     quantity = _QUANTITIES.get(name.removesuffix("_a"), "")
-    defaults = function.system.parameter_values() if name == "p" else []
+    defaults = function.system.parameter_values(needed=()) if name == "p" else []
+    limits = _limits(function.system, name.removesuffix("_a"))
     width = max((len(element) for element, _ in rows), default=0)
     return [
-        f"  {k:>3}  {element:<{width}}  {quantity} [{unit or '-'}]"
-        + (f" = {float(defaults[k]):g}" if k < len(defaults) else "")
+        f"  {k:>3}  {element:<{width}}  {quantity} [{unit}]{limits.get(element, '')}"
+        + (f" = {defaults[k]:g}" if k < len(defaults) and defaults[k] == defaults[k] else "")
         for k, (element, unit) in enumerate(rows)
     ]
+
+
+def _limits(system: System, name: str) -> dict[str, str]:
+    """What to write of the limits of the elements of an input, by the name of the element."""
+    ranges = {
+        "q": [(row.name, row.limits) for row in system.coordinates],
+        "v": [(row.name, row.limits) for row in system.speeds],
+        "tau": [(row.name, row.effort) for row in system.speeds],
+    }
+    return {
+        element: f" {ends[0]:g} .. {ends[1]:g}"
+        for element, ends in ranges.get(name, [])
+        if ends is not None
+    }

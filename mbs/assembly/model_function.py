@@ -14,6 +14,7 @@ from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
 from mbs.messages import quoted
+from mbs.operations.naming import names_found
 
 Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""
@@ -90,6 +91,14 @@ class ModelFunction(Function):
     def like(self, function: Function) -> ModelFunction:
         """Another Function with the inputs of this one, checked and completed in the same way."""
         return ModelFunction(function, self._system)
+
+    def rewritten(self, function: Function) -> ModelFunction:
+        """An equal Function of other operations, its intermediate quantities named as here."""
+        made = self.like(function)
+        made._check_posture = self._check_posture
+        if self._annotate is not None:
+            made._annotate = lambda: names_found(Function(function), self.annotated())
+        return made
 
     def map(self, *args: Any) -> Function:
         """The Function over many columns, as `casadi.Function.map`."""
@@ -254,19 +263,19 @@ def require_system(system: object) -> None:
         ModelError: says what to call.
     """
     if not isinstance(system, System):
-        name = getattr(system, "name", system)
-        raise ModelError(
-            f"{name}: models are made of a System, not of a {type(system).__name__};"
-            " call assemble() first"
-        )
+        name = getattr(system, "name", None)
+        what = f"{name if isinstance(name, str) else quoted(system)} ({type(system).__name__})"
+        assembles = hasattr(system, "assemble")
+        remedy = "call assemble() first" if assembles else "give what assemble() returns"
+        raise ModelError(f"{what} is not a System, of which models are made; {remedy}")
 
 
 def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
     q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
-    free = [system.speeds[k].name for k in system.free]
+    free = [system.speeds[k] for k in system.free]
     units = {"v": _SAME_UNIT, "a": ACCELERATION_UNIT, "tau": EFFORT_UNIT}
     result = {"q": q, "p": [(parameter.name, parameter.unit) for parameter in system.parameters]}
-    result["q_a"] = [row for row in q if row[0] in free]
+    result["q_a"] = [(speed.name, speed.unit.removesuffix("/s")) for speed in free]
     for name, unit in units.items():
         every = [(speed.name, unit[speed.unit]) for speed in system.speeds]
         result[name] = every

@@ -105,8 +105,8 @@ def _check(system: System) -> None:
         freedoms = cut.edge.joint.freedoms
         if cut.welded or len(freedoms) != 1 or freedoms[0].motion not in _SIGMA:
             raise ModelError(
-                f"{system.name}/{cut.edge.joint.name}: a .par file cuts loops at revolute or"
-                " prismatic joints without friction, rotor and motor; cut the loop elsewhere"
+                f"{system.name}/{cut.edge.joint.name}: a table of frames cuts loops at revolute"
+                " or prismatic joints without friction, rotor and motor; cut the loop elsewhere"
             )
 
 

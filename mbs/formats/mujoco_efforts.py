@@ -28,8 +28,8 @@ def effort_range(mjcf: MjcfModel, j: int) -> _Range | None:
         and int(model.actuator_trnid[k, 0]) == j
     ]
     for k in acting:
-        low, high = _force(mjcf, k)
-        ends = sorted(float(model.actuator_gear[k, 0]) * end for end in (low, high))
+        gear = float(model.actuator_gear[k, 0])
+        ends = sorted(gear * end for end in _force(mjcf, k)) if gear else (0.0, 0.0)
         lower, upper = lower + ends[0], upper + ends[1]
     if not acting:
         lower, upper = -math.inf, math.inf

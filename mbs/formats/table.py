@@ -200,7 +200,7 @@ def _guess(table: RobotTable) -> dict[str, float]:
     known = [table.joint_name(j) for j in range(1, len(table.frames) + 1) if _has_joint(table, j)]
     values: dict[str, float] = {}
     for joint, value in table.guess.items():
-        if joint.partition(".")[0] not in known:
+        if joint not in known and joint.rpartition(".")[0] not in known:
             raise DescriptionError(
                 f"{where}: there is no joint {joint!r}; {did_you_mean(joint, known)}"
             )

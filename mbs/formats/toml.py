@@ -34,8 +34,9 @@ def read_toml(path: str | Path) -> RobotTable:
     Raises:
         DescriptionError: the file is missing or not TOML, or the table is impossible.
     """
+    text = read_text(path)
     try:
-        data = tomllib.loads(read_text(path))
+        data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also of brackets and digits without end
         raise DescriptionError(f"{path}: the file is not TOML: {error}; correct it") from None
     return from_dict(data)

@@ -23,6 +23,7 @@ from mbs.models.contact_points import (
     ContactPoint,
     PointRows,
     Touching,
+    checked_points,
     friction_cone,
     held_elements,
     point_rows,
@@ -275,18 +276,12 @@ def contact_phases(system: System, points: Iterable[ContactPoint]) -> ContactPha
         points: each with a name of its own.
 
     Raises:
-        ModelError: there is no such frame, two points have one name, or a point and its plane are
-            on the same link.
+        ModelError: there is no such frame, two points have one name, something is no point, or a
+            point and its plane are on the same link.
     """
     require_system(system)
     require_no_contacts(system, "contact_phases")
-    every = tuple(points)
-    names = [point.name for point in every]
-    if not every or len(set(names)) < len(names):
-        raise ModelError(
-            f"{system.name}: the contact points are {', '.join(names) or 'none'}; give one or more,"
-            " each a name of its own"
-        )
+    every = checked_points(system.name, points)
     for point in every:
         if system.frame(point.frame)[0] == system.frame(point.plane)[0]:
             raise ModelError(

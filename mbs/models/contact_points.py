@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import casadi
 from casadi import DM, SX, Function
@@ -41,12 +43,19 @@ class ContactPoint:
     friction: float | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise ModelError(
+                f"contact point {quoted(self.name)}: the name is not a text; give it a name"
+            )
         mu = self.friction
-        if mu is not None and (isinstance(mu, bool) or not isinstance(mu, (int, float)) or mu < 0):
+        if mu is None:
+            return
+        if isinstance(mu, bool) or not isinstance(mu, Real) or not 0 <= mu < math.inf:
             raise ModelError(
                 f"{quoted(self.name)}: friction is {quoted(mu)}; give a coefficient of zero or"
                 " more, or None"
             )
+        object.__setattr__(self, "friction", float(mu))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,6 +112,31 @@ def held_elements(ways: Sequence[str]) -> DM:
     return DM([element for way in ways for element in held[way]])
 
 
+def checked_points(name: str, points: Iterable[ContactPoint]) -> tuple[ContactPoint, ...]:
+    """One or more points, each with a name of its own.
+
+    Args:
+        name: of the mechanism, for errors.
+        points: that may touch.
+
+    Raises:
+        ModelError: there is none, two have one name, or something is no contact point.
+    """
+    every = tuple(points) if isinstance(points, Iterable) else (points,)
+    for point in every:
+        if not isinstance(point, ContactPoint):
+            raise ModelError(
+                f"{name}: {quoted(point)} is no contact point; give ContactPoint(name, frame)"
+            )
+    names = [point.name for point in every]
+    if not every or len(set(names)) < len(names):
+        raise ModelError(
+            f"{name}: the contact points are {', '.join(names) or 'none'}; give one or more, each a"
+            " name of its own"
+        )
+    return every
+
+
 def ways_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tuple[str, ...]:
     """Of each point "fixed", "sliding" or "" where it is free.
 
@@ -112,11 +146,10 @@ def ways_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tu
         touching: those that do.
 
     Raises:
-        ModelError: there is no such point, or a point touches in no known way.
+        ModelError: there is no such point, one is named twice, or it touches in no known way.
     """
     names = [point.name for point in points]
-    standing = [touching] if isinstance(touching, str) else touching
-    given = dict(touching) if isinstance(touching, Mapping) else dict.fromkeys(standing, "fixed")
+    given = _ways_by_name(name, touching)
     for point, way in given.items():
         if point not in names:
             raise ModelError(
@@ -129,6 +162,17 @@ def ways_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tu
                 " leave it out"
             )
     return tuple(given.get(point, "") for point in names)
+
+
+def _ways_by_name(name: str, touching: Touching) -> dict[str, str]:
+    """How each point touches that is named, each once."""
+    if isinstance(touching, Mapping):
+        return dict(touching)
+    alone = isinstance(touching, str) or not isinstance(touching, Iterable)
+    standing = [str(point) for point in ([touching] if alone else touching)]
+    if len(set(standing)) < len(standing):
+        raise ModelError(f"{name}: the points that touch are {', '.join(standing)}; name each once")
+    return dict.fromkeys(standing, "fixed")
 
 
 def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) -> Function:

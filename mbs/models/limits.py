@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,10 +52,17 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
         effort: the largest efforts of motors by name, in both directions [N m or N].
 
     Raises:
-        ModelError: a name is unknown or has no motor, or a value is not a positive number.
+        ModelError: a name is unknown or has no motor, a value is not a positive number, or limits
+            and stops of a joint do not overlap.
     """
     require_system(system)
     q_lower, q_upper = _positions(system)
+    for row, least, largest in zip(system.coordinates, q_lower, q_upper, strict=True):
+        if least > largest:
+            raise ModelError(
+                f"{system.name}: limits and stops of {row.name!r} leave it nothing between"
+                f" {least:g} and {largest:g}; let them overlap"
+            )
     v_lower, v_upper = _ends([row.limits for row in system.speeds])
     tau_lower, tau_upper = _ends([row.effort for row in system.speeds])
     for number, value in _magnitudes(system, "speed", speed):
@@ -99,14 +107,18 @@ def _number(limit: Scalar | None, otherwise: float) -> float:
 
 
 def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, float]]:
+    if given is not None and not isinstance(given, Mapping):
+        raise ModelError(
+            f"{system.name}: {what} is {quoted(given)}; give a mapping from names to numbers"
+        )
     names = [row.name for row in system.speeds]
-    found = []
+    found: list[tuple[int, float]] = []
     for name, value in (given or {}).items():
         if name not in names:
             raise ModelError(
                 f"{system.name}: {what} has {quoted(name)}; {did_you_mean(str(name), names)}"
             )
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
+        if isinstance(value, bool) or not isinstance(value, Real) or not value > 0:
             raise ModelError(
                 f"{system.name}: {what} of {name!r} is {quoted(value)}; give a number above zero"
             )

@@ -66,18 +66,16 @@ def cached_library(
         sources = [build / file for file in files if file.endswith(".c")]
         output = build / f"library{suffix}"
         library = compile_library(sources, [build], flags, output, compiler=chosen)
-        target = folder / f"{key}-{_sum_of(library)}{suffix}"
-        _install(library, target)
-    return target
+        return _installed(library, folder / f"{key}-{_sum_of(library)}{suffix}")
 
 
 def is_whole(library: Path) -> bool:
     """Whether the content of a library of the cache is that which its name tells."""
     try:
         facts = library.stat()
-    except OSError:
+        return _checked(library, facts.st_mtime_ns, facts.st_size)
+    except OSError:  # it has gone, or another user keeps it to himself
         return False
-    return _checked(library, facts.st_mtime_ns, facts.st_size)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -100,15 +98,19 @@ def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> 
     return digest.hexdigest()[:40]
 
 
-def _install(library: Path, target: Path) -> None:
+def _installed(library: Path, target: Path) -> Path:
+    """The target; where another user keeps one of its name to himself, a copy for this process."""
     try:
         os.replace(library, target)
     except OSError as error:
-        if not target.exists():  # another process may hold it open, which some systems protect
+        if not target.exists():
             raise CompilerError(
                 f"library {target} could not be stored ({error}); set MBS_CACHE_DIR to a folder "
                 "that you may write"
             ) from error
+        if not is_whole(target):  # else another process holds it open, which some systems protect
+            return Path(shutil.copy(library, _process_dir() / target.name))
+    return target
 
 
 def _wanted_dir() -> Path | None:

@@ -32,8 +32,9 @@ def compiled(
     Args:
         function: any Function without free symbols.
         derivatives: how often the answer can be differentiated: 0, 1 (Jacobians, forward and
-            reverse products) or 2 (Hessians too, for about five times the code). Beyond it
-            CasADi refuses to differentiate.
+            reverse products) or 2 (Hessians too, for about five times the code), which IPOPT
+            needs unless it approximates them. Beyond it CasADi refuses to differentiate:
+            "Derivatives cannot be calculated for adj1_..", the name of the Function after it.
         fast: code for the processor of this computer, with fused multiplications and all sines
             and cosines in vector lanes: two to three times faster, equal to the interpreted
             Function to about 1e-15 of the largest element instead of the last bit. A map

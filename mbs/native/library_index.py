@@ -64,13 +64,14 @@ def _entry(entry: Path) -> Path | None:
 
 
 def _write(entry: Path, name: str) -> None:
-    handle, temporary = tempfile.mkstemp(dir=entry.parent, prefix="build-")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(name)
+    """Keep the name; where that fails, the next call writes the text of the Function again."""
     try:
-        os.replace(temporary, entry)
-    except OSError:  # another process holds it open, which some systems protect
-        os.unlink(temporary)
+        with tempfile.TemporaryDirectory(dir=entry.parent, prefix="build-") as folder:
+            written = Path(folder) / entry.name
+            written.write_text(name, encoding="utf-8")
+            os.replace(written, entry)
+    except OSError:  # the disk is full, or another process holds the entry open
+        return
 
 
 def _key(text: str, options: str) -> str:

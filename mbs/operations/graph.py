@@ -145,7 +145,8 @@ def _scalar(function: Function) -> Function:
     if calls:
         raise ModelError(
             f"{function.name()}: it is not made of scalar operations; give a Function that"
-            " expand() can turn into SX without calls of other Functions, such as integrators"
+            " expand() can turn into SX without calls of other Functions, such as integrators or"
+            " the iterations that close loops of no known closed form"
         )
     return scalar
 

@@ -86,7 +86,8 @@ def simplify(
 
     Returns:
         a Function with the same name, inputs, outputs and default inputs; of a model, with its
-        checks and its parameter defaults too.
+        checks and its parameter defaults too, and with the names of those intermediate
+        quantities that it still computes.
 
     Raises:
         ModelError: the Function has no scalar operations, gives no numbers, or a pass has no
@@ -147,8 +148,8 @@ def _made(
 
 
 def _function_like(function: Function, graph: Graph) -> Function:
-    """The Function of a graph, with the defaults of another and, of a model, its checks."""
+    """The Function of a graph, with the defaults of another and, of a model, checks and names."""
     defaults = [function.default_in(k) for k in range(function.n_in())]
     made = function_of(graph, defaults)
-    like: Any = getattr(function, "like", None)
-    return made if like is None else like(made)
+    rewritten: Any = getattr(function, "rewritten", None)
+    return made if rewritten is None else rewritten(made)

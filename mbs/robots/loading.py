@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,80 +13,7 @@ from mbs.errors import DescriptionError
 from mbs.expressions import Parameter
 from mbs.formats import from_dict, read_mjcf, read_par, read_toml, read_urdf, to_mechanism
 from mbs.messages import did_you_mean
-from mbs.robots.akr3000 import akr3000
-from mbs.robots.andrews_squeezer import andrews_squeezer
-from mbs.robots.bricard import bricard
-from mbs.robots.cart_pole import cart_pole
-from mbs.robots.crx10 import crx10
-from mbs.robots.delta import delta
-from mbs.robots.differential_wrist import differential_wrist
-from mbs.robots.five_bar import five_bar
-from mbs.robots.flyball_governor import flyball_governor
-from mbs.robots.four_bar import four_bar
-from mbs.robots.gantry import gantry
-from mbs.robots.irb120 import irb120
-from mbs.robots.kr6 import kr6
-from mbs.robots.manseur_doty import manseur_doty
-from mbs.robots.modelica_four_bar import modelica_four_bar
-from mbs.robots.modelica_rod_four_bar import modelica_rod_four_bar
-from mbs.robots.n_four_bar import n_four_bar
-from mbs.robots.panda import panda
-from mbs.robots.planar_2r import planar_2r
-from mbs.robots.puma560 import puma560
-from mbs.robots.rx90 import rx90
-from mbs.robots.scara import scara
-from mbs.robots.simple_pendulum import simple_pendulum
-from mbs.robots.single_cylinder_engine import single_cylinder_engine
-from mbs.robots.slider_crank import slider_crank
-from mbs.robots.sr400 import sr400
-from mbs.robots.stanford import stanford
-from mbs.robots.stewart_platform import stewart_platform
-from mbs.robots.two_branch_tree import two_branch_tree
-from mbs.robots.tx90 import tx90
-from mbs.robots.ur5 import ur5
-from mbs.robots.whipple_bicycle import whipple_bicycle
-from mbs.robots.youbot import youbot
 
-_CATALOGUE: Mapping[str, Callable[[], Mechanism]] = MappingProxyType(
-    {
-        robot.__name__: robot
-        for robot in (
-            puma560,
-            stanford,
-            rx90,
-            tx90,
-            kr6,
-            irb120,
-            ur5,
-            crx10,
-            panda,
-            youbot,
-            manseur_doty,
-            gantry,
-            scara,
-            planar_2r,
-            cart_pole,
-            two_branch_tree,
-            sr400,
-            five_bar,
-            four_bar,
-            whipple_bicycle,
-            slider_crank,
-            single_cylinder_engine,
-            modelica_four_bar,
-            modelica_rod_four_bar,
-            simple_pendulum,
-            n_four_bar,
-            andrews_squeezer,
-            bricard,
-            flyball_governor,
-            akr3000,
-            delta,
-            stewart_platform,
-            differential_wrist,
-        )
-    }
-)
 _READERS: Mapping[str, Callable[[str | Path], Mechanism]] = MappingProxyType(
     {
         ".toml": lambda path: to_mechanism(read_toml(path)),
@@ -96,9 +24,13 @@ _READERS: Mapping[str, Callable[[str | Path], Mechanism]] = MappingProxyType(
 )
 
 
+@cache
 def catalogue() -> Mapping[str, Callable[[], Mechanism]]:
     """Every mechanism of the catalogue: name -> function that builds it."""
-    return _CATALOGUE
+    from mbs import robots  # the one list of them; it imports this module
+
+    names = (name for name in robots.__all__ if name not in (catalogue.__name__, load.__name__))
+    return MappingProxyType({name: getattr(robots, name) for name in names})
 
 
 def load(
@@ -129,8 +61,8 @@ def load(
 def _mechanism(source: str | Path | Mapping[str, Any]) -> Mechanism:
     if isinstance(source, Mapping):
         return to_mechanism(from_dict(source))
-    if isinstance(source, str) and source in _CATALOGUE:
-        return _CATALOGUE[source]()
+    if isinstance(source, str) and source in catalogue():
+        return catalogue()[source]()
     if not isinstance(source, (str, Path)):
         raise DescriptionError(
             f"robot {source!r}: it is neither a name, a dict nor a path; give one of them"
@@ -143,5 +75,5 @@ def _mechanism(source: str | Path | Mapping[str, Any]) -> Mechanism:
             f"{source}: files of this kind are not read; {did_you_mean(suffix, _READERS)}"
         )
     raise DescriptionError(
-        f"robot {str(source)!r} is not in the catalogue; {did_you_mean(str(source), _CATALOGUE)}"
+        f"robot {str(source)!r} is not in the catalogue; {did_you_mean(str(source), catalogue())}"
     )

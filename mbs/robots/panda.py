@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
 from mbs.components import Mechanism
 from mbs.robots.rows import cuboid, frame, robot
@@ -12,7 +13,8 @@ _SOURCE = (
     " joint ranges, velocities and torques of the Panda; masses and inertias are illustrative:"
     " homogeneous cuboids"
 )
-_LARGE, _SMALL = {"velocity": 2.175, "effort": 87}, {"velocity": 2.61, "effort": 12}
+_LARGE: dict[str, Any] = {"velocity": 2.175, "effort": 87}
+_SMALL: dict[str, Any] = {"velocity": 2.61, "effort": 12}
 _GUESS = {"q4": -pi / 2, "q6": pi / 2}
 
 

@@ -7,7 +7,6 @@ from casadi import SX
 
 _QUARTER = math.pi / 2
 _SNAP = 1e-9
-_EXACT = {0: (0.0, 1.0), 1: (1.0, 0.0), 2: (0.0, -1.0), 3: (-1.0, 0.0)}
 
 
 def sin_cos(angle: SX) -> tuple[SX, SX]:
@@ -22,8 +21,7 @@ def sin_cos(angle: SX) -> tuple[SX, SX]:
         total = SX(constant) + rest
         return casadi.sin(total), casadi.cos(total)
     s, c = (SX(0), SX(1)) if rest.is_zero() else (casadi.sin(rest), casadi.cos(rest))
-    s_k, c_k = _EXACT[quarters % 4]
-    return SX(s_k * c + c_k * s), SX(c_k * c - s_k * s)
+    return ((s, c), (c, -s), (-s, -c), (-c, s))[quarters % 4]
 
 
 def _split(angle: SX) -> tuple[float, SX]:

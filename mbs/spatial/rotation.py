@@ -76,7 +76,7 @@ class Turn:
 
     def _turned(self, vector: SX, s: SX) -> SX:
         k, h = self.across
-        turned = SX(vector)
+        turned = +vector
         turned[k] = self.c * vector[k] - s * vector[h]
         turned[h] = s * vector[k] + self.c * vector[h]
         return turned
@@ -97,7 +97,7 @@ class Turn:
         (k, h), m = self.across, self.along
         s, c = self.s, self.c
         a, b, d, e = square[k, k], square[k, h], square[h, k], square[h, h]
-        turned = SX(square)
+        turned = +square
         if c.is_zero():
             turned[k, k], turned[k, h], turned[h, k], turned[h, h] = e, -d, -b, a
         elif not s.is_zero():

@@ -1,6 +1,7 @@
 """3-vectors of SX scalars, and constants made exact."""
 
 from collections.abc import Iterable
+from typing import cast
 
 import casadi
 from casadi import SX
@@ -11,7 +12,8 @@ _ROUNDING = 2e-15
 
 def vector(elements: Iterable[SX | float]) -> SX:
     """The column of these scalars."""
-    return casadi.vertcat(*(SX(element) for element in elements))
+    scalars = (one if isinstance(one, SX) else SX(one) for one in elements)
+    return casadi.vertcat(*scalars)
 
 
 def zeros(rows: int = 3, columns: int = 1) -> SX:
@@ -29,20 +31,19 @@ def skew(a: SX) -> SX:
 
 def cross(a: SX, b: SX) -> SX:
     """Vector product of a and b, (3, 1), scalar by scalar so that zeros fold."""
-    return casadi.vertcat(
-        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    )
+    (a_x, a_y, a_z), (b_x, b_y, b_z) = elements(a), elements(b)
+    return casadi.vertcat(a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x)
 
 
 def is_zero(value: SX) -> bool:
     """Whether every element is the constant zero (a symbol is not)."""
-    return all(element.is_zero() for element in elements(value))
+    return value.is_zero()
 
 
 def elements(value: SX) -> list[SX]:
     """The scalars of a matrix, column by column, zeros included."""
-    dense = casadi.densify(value)
-    return [SX(dense[k]) for k in range(dense.numel())]
+    dense = value if value.is_dense() else casadi.densify(value)
+    return cast("list[SX]", dense.nonzeros())
 
 
 def exact_sum(a: SX, b: SX) -> SX:
@@ -50,27 +51,24 @@ def exact_sum(a: SX, b: SX) -> SX:
 
     Constants that ought to cancel fold only so; what is small by itself stays.
     """
-    total = SX(a + b)
     if not (a.is_constant() and b.is_constant()):
-        return total
-    return SX(0) if abs(float(total)) <= _ROUNDING * (abs(float(a)) + abs(float(b))) else total
+        return a + b
+    first, second = float(a), float(b)
+    total = first + second
+    return SX(0 if abs(total) <= _ROUNDING * (abs(first) + abs(second)) else total)
 
 
 def snapped(value: SX) -> SX:
-    """The same matrix with constants within 1e-12 of -1, 0 or 1 put exactly there.
+    """The same matrix, dense, with constants within 1e-12 of -1, 0 or 1 put exactly there.
 
     Rotations that come from files carry pi/2 with a dozen digits; without this their zeros
     never fold.
     """
-    return casadi.reshape(
-        casadi.vertcat(*(_snapped(element) for element in elements(value))),
-        *value.shape,
-    )
-
-
-def _snapped(element: SX) -> SX:
-    if not element.is_constant():
-        return element
-    number = float(element)
-    nearest = round(number)
-    return SX(nearest) if abs(nearest) <= 1 and abs(number - nearest) < _SNAP else SX(number)
+    exact = casadi.densify(value)
+    for place, element in enumerate(elements(exact)):
+        if element.is_constant():
+            number = float(element)
+            nearest = round(number)
+            if number != nearest and abs(nearest) <= 1 and abs(number - nearest) < _SNAP:
+                exact[place] = nearest
+    return exact

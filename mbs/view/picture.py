@@ -28,7 +28,7 @@ _MOST_FRAMES = 5000
 _GIF_FPS = 20.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Picture:
     """A mechanism, standing or moving. A notebook shows it as it is.
 
@@ -51,6 +51,11 @@ class Picture:
         """The text of an HTML file with everything in it, which works offline."""
         motion = (self.times, self.poses) if len(self.times) > 1 else ()
         return page(self.scene, self.look, self.speed, *motion)
+
+    def __repr__(self) -> str:
+        """One line; a notebook shows the picture."""
+        moving = f", {len(self.times)} pictures" if len(self.times) > 1 else ""
+        return f"<Picture of {self.scene.system.name}{moving}>"
 
     def _repr_html_(self) -> str:
         return framed(self.html)

@@ -87,6 +87,17 @@ def test_mjcf_gives_the_efforts_of_its_actuators(tmp_path):
     assert joints["a"].velocity is None
 
 
+def test_an_actuator_without_gear_gives_nothing(tmp_path):
+    pytest.importorskip("mujoco")
+    idle = '<motor joint="c" gear="0"/><motor joint="d" ctrlrange="-1 2"/>'
+    (tmp_path / "r.xml").write_text(
+        MJCF.replace('<motor joint="c"/>', idle + '<motor joint="d" gear="0"/>')
+    )
+    joints = {joint.name: joint for joint in mbs.load(str(tmp_path / "r.xml")).joints()}
+    assert joints["c"].effort is None
+    assert joints["d"].effort == (-1, 2)
+
+
 def test_a_joint_is_made_again_from_its_own_fields():
     for joint in (Revolute("j", velocity=2, effort=(-1, 3)), Prismatic("s", effort=7.0)):
         assert dataclasses.replace(joint, name="k") == type(joint)(

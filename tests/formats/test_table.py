@@ -1,5 +1,6 @@
 import copy
 import math
+from dataclasses import replace
 
 import casadi
 import numpy as np
@@ -248,6 +249,16 @@ def test_missing_and_broken_files(tmp_path):
         from_dict([])
 
 
+def test_a_folder_is_refused_in_one_sentence(tmp_path):
+    (tmp_path / "arm.toml").mkdir()
+    with pytest.raises(DescriptionError) as refused:
+        read_toml(tmp_path / "arm.toml")
+    said = str(refused.value)
+    assert said.startswith(f"{tmp_path / 'arm.toml'}: the file cannot be read (")
+    assert said.endswith("); give the path of a readable file")
+    assert said.count("arm.toml") == 1
+
+
 @pytest.mark.parametrize("read", [read_toml, read_par, read_urdf, read_mjcf])
 @pytest.mark.parametrize("path", [None, 3.5, "a\0b"])
 def test_what_is_no_path_is_said(read, path):
@@ -349,3 +360,11 @@ def test_bad_drive_is_refused(case):
     with pytest.raises(DescriptionError) as error:
         to_mechanism(from_dict(changed(ARM, **changes)))
     assert message in str(error.value)
+
+
+def test_a_guess_of_a_joint_with_a_dot_in_its_name_is_kept():
+    table = from_dict({**ARM, "frame": [{**ARM["frame"][0], "name": "arm.q1"}, *ARM["frame"][1:]]})
+    made = replace(table, guess={"arm.q1": 0.2})
+    assert made.guess == {"arm.q1": 0.2}
+    with pytest.raises(DescriptionError, match=r"there is no joint 'arm\.q2'"):
+        replace(table, guess={"arm.q2": 0.2})

@@ -164,6 +164,15 @@ def test_margins_of_friction(phases):
     ("given", "message"),
     [
         (lambda s: contact_phases(s, []), "the contact points are none"),
+        (lambda s: contact_phases(s, ["fl"]), "'fl' is no contact point; give ContactPoint"),
+        (
+            lambda s: contact_phases(s, [ContactPoint("a", "fl"), ContactPoint("a", "fr")]),
+            "the contact points are a, a; give one or more, each a name of its own",
+        ),
+        (
+            lambda s: contact_phases(s, [ContactPoint("a", "fl")]).accelerations(5),
+            "there is no contact point '5'",
+        ),
         (lambda s: contact_phases(s, [ContactPoint("a", "toe")]), "there is no frame 'toe'"),
         (lambda s: contact_phases(s, [ContactPoint("a", 0)]), "on the same link"),
         (
@@ -178,7 +187,14 @@ def test_margins_of_friction(phases):
             lambda s: contact_phases(s, [ContactPoint("a", "fl")]).friction(2),
             "sides is 2; give a number of sides from 3",
         ),
+        (
+            lambda s: contact_phases(s, [ContactPoint("a", "fl")]).accelerations(["a", "a"]),
+            "the points that touch are a, a; name each once",
+        ),
         (lambda s: ContactPoint("a", "fl", friction=-1), "friction is -1; give a coefficient"),
+        (lambda s: ContactPoint("a", "fl", friction=np.nan), "friction is nan; give a coefficient"),
+        (lambda s: ContactPoint("a", "fl", friction=np.inf), "friction is inf; give a coefficient"),
+        (lambda s: ContactPoint("", "fl"), "contact point '': the name is not a text"),
     ],
 )
 def test_what_is_refused(quadruped, given, message):

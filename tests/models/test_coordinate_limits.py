@@ -29,6 +29,7 @@ def test_every_limit_is_in_its_place(system):
     np.testing.assert_array_equal(found.v_lower, -found.v_upper)
     np.testing.assert_array_equal(found.tau_upper, [0] * 6 + [9, 0])
     np.testing.assert_array_equal(found.tau_lower, -found.tau_upper)
+    assert not np.signbit(found.tau_lower[found.tau_lower == 0]).any()
 
 
 def test_motors_without_limits_are_unlimited():
@@ -63,6 +64,19 @@ def test_a_joint_without_motor_has_no_effort():
     assert limits(m.assemble()).tau_upper[0] == 0
 
 
+def test_numbers_of_numpy_are_numbers(system):
+    assert limits(system, speed={"j1": np.float32(0.5)}).v_upper[6] == 0.5
+    assert limits(system, effort={"j1": np.int64(3)}).tau_lower[6] == -3
+
+
+def test_a_stop_beyond_the_limits_is_refused():
+    m = Mechanism("slide")
+    m.connect(m.world, Prismatic("s", limits=(0, 1)), m.add(Body("body", mass=1)))
+    m.add(JointStop("stop", "s", lower=2.0, stiffness=10.0, width=0.1))
+    with pytest.raises(ModelError, match="'s' leave it nothing between 2 and 1; let them overlap"):
+        limits(m.assemble())
+
+
 @pytest.mark.parametrize(
     ("joint", "message"),
     [
@@ -86,6 +100,9 @@ def test_ranges_that_are_refused(joint, message):
         (dict(effort={"j2": 1.0}), "effort has 'j2', which has no motor"),
         (dict(effort={"j1": 0.0}), "effort of 'j1' is 0.0; give a number above zero"),
         (dict(speed={"j1": "fast"}), "speed of 'j1' is 'fast'"),
+        (dict(speed=[1.0, 2.0]), "speed is .1.0, 2.0.; give a mapping from names"),
+        (dict(speed={"j1": np.nan}), "speed of 'j1' is nan"),
+        (dict(effort={"j1": True}), "effort of 'j1' is True"),
     ],
 )
 def test_what_is_refused(system, given, message):

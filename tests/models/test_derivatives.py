@@ -254,7 +254,7 @@ def test_tree_coordinates_of_a_closed_system():
         (lambda s: inverse_dynamics_derivatives(s, with_respect_to=("q", "q")), "once"),
         (lambda s: inverse_dynamics_derivatives(s, with_respect_to="p"), "has no parameters"),
         (lambda s: inverse_dynamics_derivatives(s, coordinates="all"), "coordinates"),
-        (lambda s: inverse_dynamics_derivatives("puma"), "models are made of a System"),
+        (lambda s: inverse_dynamics_derivatives("puma"), "is not a System, of which models are"),
     ],
 )
 def test_wrong_words_are_refused(call, says):

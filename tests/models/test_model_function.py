@@ -93,7 +93,16 @@ def test_a_mechanism_is_not_a_system():
         lambda s: mbs.models.jacobian(s, 1),
     )
     for builder in builders:
-        with pytest.raises(
-            ModelError, match=r"puma560: .* not of a Mechanism; call assemble\(\) first"
-        ):
+        with pytest.raises(ModelError) as refused:
             builder(m)
+        assert str(refused.value) == (
+            "puma560 (Mechanism) is not a System, of which models are made; call assemble() first"
+        )
+
+
+def test_what_cannot_be_assembled_is_told_apart():
+    with pytest.raises(ModelError) as refused:
+        mbs.models.inverse_dynamics(3)  # type: ignore[arg-type]
+    assert str(refused.value) == (
+        "3 (int) is not a System, of which models are made; give what assemble() returns"
+    )

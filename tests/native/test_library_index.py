@@ -120,6 +120,44 @@ def test_a_damaged_library_of_texts_is_built_again(cache):
     assert library.read_bytes() == whole
 
 
+def test_a_library_that_another_user_keeps_to_himself_is_built_elsewhere(cache, monkeypatch):
+    files = {"f.c": "int f(void) { return 43; }"}
+    library = cached_library(files)
+    module = sys.modules["mbs.native.cache"]
+    read = module._sum_of
+
+    def guarded(path):
+        if path == library:
+            raise PermissionError(path)
+        return read(path)
+
+    def held(source, target):
+        raise PermissionError(target)
+
+    module._checked.cache_clear()
+    monkeypatch.setattr(module, "_sum_of", guarded)
+    monkeypatch.setattr(module.os, "replace", held)
+    assert not is_whole(library)
+    own = cached_library(files)
+    assert own.parent != cache
+    assert own.read_bytes() == library.read_bytes()
+
+
+def test_an_index_that_cannot_be_written_is_done_without(cache, built, monkeypatch):
+    def full(source, target):
+        raise OSError("no space is left")
+
+    model_before = compiled(model(7.0))
+    for entry in parts(cache)[".library"]:
+        entry.unlink()
+    monkeypatch.setattr(library_index.os, "replace", full)
+    again = compiled(model(7.0))
+    np.testing.assert_array_equal(again(POINT), model_before(POINT))
+    assert len(built) == 2
+    assert not parts(cache)[".library"]
+    assert not list(cache.glob("build-*"))
+
+
 def test_a_callback_is_left_to_the_interpreter(cache, built):
     class Twice(casadi.Callback):
         def __init__(self):

@@ -3,6 +3,9 @@
 Exit codes: 0 where all went well; 1 with one sentence on the standard error where mbs refused or
 could not go on, and silently where the reader of its output went away; 2 for words that the
 command line does not know; 130 when interrupted.
+
+A fault of mbs itself is one sentence as well; with MBS_TRACEBACK=1 in the environment Python shows
+where it happened.
 """
 
 from __future__ import annotations
@@ -12,6 +15,8 @@ import os
 import sys
 
 __all__ = ["main"]
+
+_TRACEBACK = "MBS_TRACEBACK"
 
 
 def main() -> None:
@@ -25,7 +30,16 @@ def main() -> None:
             application(prog_name="mbs")
         finally:
             sys.stdout.flush()
-    except OSError as error:
+    except Exception as error:
+        if os.environ.get(_TRACEBACK):
+            raise
+        if not isinstance(error, OSError):
+            sys.exit(
+                f"mbs: this is a fault of mbs itself ({type(error).__name__}: {error}); please"
+                f" report it with what is shown when {_TRACEBACK}=1 is set"
+            )
+        if error.filename is not None:
+            sys.exit(f"mbs: {error.filename}: {error.strerror}")
         _close_output()
         reader_gone = error.errno == errno.EPIPE
         sys.exit(1 if reader_gone else f"mbs: the output cannot be written ({error.strerror})")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -14,12 +13,6 @@ from mbs.app.cli.group import Commands
 from mbs.app.cli.loading import posture, system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import note
-from mbs.errors import ModelError
-
-if TYPE_CHECKING:
-    from casadi import Function
-
-    from mbs.assembly import System
 
 C_EXAMPLES = examples(
     "mbs export c puma560 build/puma560",
@@ -91,25 +84,8 @@ def export_c(
     if target.suffix.lower() == ".zip":
         _write(target, exporting.c_library(assembled, keys))
         return
-    c_library(_functions(assembled, keys), target)
+    c_library(exporting.c_functions(assembled, keys), target)
     note(f"wrote {target}")
-
-
-def _functions(system: System, keys: Sequence[str]) -> dict[str, Function]:
-    """The models by their names in C.
-
-    Raises:
-        ModelError: there is no such model, or the robot does not have it.
-    """
-    from mbs.app.tasks.equations import entry
-
-    functions = {}
-    for key in keys:
-        chosen = entry(key)
-        if refusal := chosen.refusal(system):
-            raise ModelError(refusal)
-        functions[key.replace("-", "_")] = chosen.build(system)
-    return functions
 
 
 Fmi = Annotated[str, typer.Option(metavar="VERSION", help="2.0 or 3.0.")]

@@ -12,6 +12,7 @@ from mbs.app.desk.desk import Desk
 from mbs.app.desk.equations_panel import open_equations
 from mbs.app.desk.form import Given, OptionForm
 from mbs.app.desk.panel_layout import (
+    Asking,
     in_a_row,
     main_button,
     side_button,
@@ -62,15 +63,8 @@ async def open_base(desk: Desk) -> None:
     async def find() -> None:
         options = form.given
         method = options.pop("method", "symbolic")
-        button.disable()
-        made = await desk.run("Finding base parameters", base, method, options)
-        if shown.is_deleted:
-            return
-        button.enable()
-        if made is not None:
-            shown.clear()
-            with shown:
-                _show(desk, made)
+        asking = Asking(desk, button, shown, partial(_show, desk))
+        await asking.run("Finding base parameters", base, method, options)
 
     button.on_click(find)
     await form.fill()

@@ -173,6 +173,10 @@ async def warm_up() -> None:
 
 def _drawn(system: System, q: Vector) -> tuple[Scene | None, str]:
     """The picture, or None and a sentence."""
+    values = zip(system.parameters, system.parameter_values(needed=()), strict=True)
+    open_symbols = [parameter.name for parameter, value in values if value != value]
+    if open_symbols:
+        return None, f"{', '.join(open_symbols)}: no value yet; write one in the table Symbols"
     try:
         drawn = scene(system, q)
         drawn.poses(q)

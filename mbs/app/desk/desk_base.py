@@ -53,6 +53,11 @@ class DeskBase:
         """(nq,) present posture [rad or m]."""
         return self.session.q
 
+    @property
+    def is_left(self) -> bool:
+        """Whether the page was closed for good; nothing can be shown on it any more."""
+        return self._client.is_deleted
+
     def system(self) -> System:
         """The robot as typed, assembled already.
 
@@ -67,9 +72,12 @@ class DeskBase:
 
     def complain(self, error: Exception | str) -> None:
         """Show why something was refused."""
+        sentence = self._sentence(error)
+        if self.is_left:
+            return
         with self._client:
             ui.notify(
-                self._sentence(error),
+                sentence,
                 type="negative",
                 multi_line=True,
                 timeout=9000,
@@ -79,11 +87,15 @@ class DeskBase:
 
     def tell(self, sentence: str) -> None:
         """Show a short message."""
+        if self.is_left:
+            return
         with self._client:
             ui.notify(sentence, position="bottom", timeout=3500)
 
     def download(self, data: bytes, name: str) -> None:
         """Send a file to the browser."""
+        if self.is_left:
+            return
         with self._client:
             ui.download(data, name)
 
@@ -113,6 +125,8 @@ class DeskBase:
         ui.on("desk-time", lambda event: listener(float(event.args)))
 
     def _tell(self, listeners: Sequence[Listener]) -> None:
+        if self.is_left:
+            return
         with self._client:
             for listener in listeners:
                 answer = listener()

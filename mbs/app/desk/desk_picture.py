@@ -6,6 +6,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from mbs.app.desk.desk_base import DeskBase
 from mbs.app.desk.session import Session
 from mbs.app.desk.session_posture import Vector, moved
@@ -40,6 +42,10 @@ class DeskPicture(DeskBase):
         Args:
             q: (nq,) positions that close the loops [rad or m].
         """
+        system = self.session.system
+        if system is None or len(q) != system.nq:
+            self.complain("the posture is of a robot with other joints; make it anew for this one")
+            return
         self.session.q = tuple(float(x) for x in q)
         await self._pose(self.session.q)
         self._tell(self._on_posture)
@@ -96,10 +102,12 @@ class DeskPicture(DeskBase):
             speed: of the film; 1 is as in reality.
         """
         drawn = self._scene
-        if drawn is None:
+        film_of = np.asarray(postures, dtype=float)
+        if drawn is None or film_of.shape[1:] != (drawn.system.nq,):
+            self.complain("the motion is of a robot with other joints; simulate this one")
             return
-        poses = await self.aside(lambda: [drawn.poses(list(map(float, q))) for q in postures])
-        film = {"times": [float(t) for t in times], "poses": poses, "speed": speed}
+        poses = await self.aside(drawn.motion, film_of)
+        film = {"times": [float(t) for t in times], "poses": poses.tolist(), "speed": speed}
         self._send("play", film)
 
     def pause(self) -> None:
@@ -121,5 +129,7 @@ class DeskPicture(DeskBase):
 
     def _send(self, method: str, *args: Any) -> None:
         """Call a method of the picture in the browser."""
+        if self.is_left:
+            return
         values = ", ".join(json.dumps(value) for value in args)
         self._client.run_javascript(f"deskView.{method}({values})")

@@ -70,6 +70,7 @@ class Drawer:
             tab.panel.set_visibility(other == name)
             if other == name:
                 tab.head.classes(add="desk-tab-on")
+                _into_view(tab.head)
             else:
                 tab.head.classes(remove="desk-tab-on")
         self._on_tabs((*(other for other in self._tabs if other != name), name))
@@ -104,3 +105,10 @@ class Drawer:
         assert self._panels is not None
         with self._panels:
             return ui.element("div").classes("desk-panel")
+
+
+def _into_view(head: ui.element) -> None:
+    """Scroll the heads to this one, as soon as the page has drawn it."""
+    find = f"document.getElementById('{head.html_id}')"
+    scroll = f"{find}?.scrollIntoView({{block: 'nearest', inline: 'nearest'}})"
+    head.client.run_javascript(f"setTimeout(() => {scroll}, 100)")

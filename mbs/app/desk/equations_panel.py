@@ -10,7 +10,13 @@ from mbs.app.desk.count_table import BEFORE, count_table, steps_table
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.form import FIELD, Given, OptionForm
 from mbs.app.desk.optimizer_settings import passes_of
-from mbs.app.desk.panel_layout import in_a_row, main_button, tell_of_changes, two_sides
+from mbs.app.desk.panel_layout import (
+    in_a_row,
+    main_button,
+    new_answer,
+    tell_of_changes,
+    two_sides,
+)
 from mbs.app.desk.text_view import text_view
 from mbs.app.tasks.equations import EVERY_PASS, WORDS, Equations, entry, equations, languages
 from mbs.errors import MbsError
@@ -124,14 +130,14 @@ class _Panel:
         one, desk = self._entry, self._desk
         passes = (passes_of(desk.session) or EVERY_PASS) if self._optimizer.value else ()
         args = (one.key, self._form.given, self._language.value, passes)
+        document = desk.document
         made = await desk.run(f"Writing {one.title}", equations, *args)
         if made is None or self._shown.is_deleted:
             return
-        self._shown.clear()
         self._counts.clear()
         with self._counts:
             _show_counts(made)
-        with self._shown:
+        with new_answer(desk, self._shown, document):
             text_view(desk, made.text, made.file_name)
             ui.label(_about(made)).classes("desk-note")
 

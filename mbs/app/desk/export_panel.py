@@ -61,8 +61,7 @@ def _fmu_card(desk: Desk, system: System, asked: _Asked) -> None:
         fmu_form(system, asked.fmu)
 
         async def make() -> None:
-            made = await desk.run("Writing the FMU", exporting.fmu, asked.fmu.settings())
-            _hand_out(desk, made, ".fmu")
+            await _hand_out(desk, ".fmu", "Writing the FMU", exporting.fmu, asked.fmu.settings())
 
         _button("Download FMU", "fmu", make)
 
@@ -84,8 +83,8 @@ def _c_card(desk: Desk, system: System, asked: _Asked) -> None:
         )
 
         async def make() -> None:
-            made = await desk.run("Writing C", exporting.c_library, tuple(asked.models))
-            _hand_out(desk, made, ".zip")
+            keys = tuple(asked.models)
+            await _hand_out(desk, ".zip", "Writing C", exporting.c_library, keys)
 
         _button("Download C library", "c-library", make)
 
@@ -112,20 +111,24 @@ async def _robot_file(desk: Desk, suffix: str) -> None:
         except MbsError as error:
             desk.complain(error)
             return
-        made = cast(str, text).encode("utf-8")
+        desk.download(cast(str, text).encode("utf-8"), f"{document.file_name}{suffix}")
     else:
         task = exporting.toml if suffix == ".toml" else exporting.par
-        made = await desk.run(f"Writing {suffix}", task)
-    _hand_out(desk, made, suffix)
+        await _hand_out(desk, suffix, f"Writing {suffix}", task)
 
 
 async def _picture(desk: Desk) -> None:
-    _hand_out(desk, await desk.run("Drawing", exporting.html, tuple(desk.q)), ".html")
+    await _hand_out(desk, ".html", "Drawing", exporting.html, tuple(desk.q))
 
 
-def _hand_out(desk: Desk, made: bytes | None, suffix: str) -> None:
+async def _hand_out(
+    desk: Desk, suffix: str, label: str, task: Callable[..., bytes], *args: Any
+) -> None:
+    """Download what a task makes, under the name of the robot that it was asked for."""
+    name = f"{desk.document.file_name}{suffix}"
+    made = await desk.run(label, task, *args)
     if made is not None:
-        desk.download(made, f"{exporting.file_stem(desk.system())}{suffix}")
+        desk.download(made, name)
 
 
 def _models(system: System) -> dict[str, str]:

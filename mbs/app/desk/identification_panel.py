@@ -11,6 +11,7 @@ from nicegui import ui
 
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.identification_panel_results import show_results
+from mbs.app.desk.panel_layout import new_answer, tell_of_changes
 from mbs.app.desk.plots_fields import Look, choice_field, several_field, text_field
 from mbs.app.desk.plots_look import add_look, come_into_view
 from mbs.app.tasks.identification import (
@@ -91,6 +92,7 @@ def open_identification(desk: Desk) -> None:
         finally:
             button.enable()
 
+    tell_of_changes(desk, shown)
     button.on_click(run)
 
 
@@ -103,8 +105,7 @@ async def _run(desk: Desk, asked: _Asked, shown: ui.element) -> None:
     if found is None or shown.is_deleted:
         return
     desk.session.notes[_FOUND] = (document, found)
-    shown.clear()
-    with shown:
+    with new_answer(desk, shown, document):
         show_results(desk, found)
     come_into_view(shown)
 

@@ -56,4 +56,5 @@ class JobCards:
         try:
             yield card
         finally:
-            card.element.delete()
+            if not card.element.is_deleted:
+                card.element.delete()

@@ -128,6 +128,7 @@ def _child(
     tempfile.tempdir = folder
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # what it starts is stopped with it
+    threading.Thread(target=_end_with_server, args=(folder,), daemon=True).start()
     try:
         with listen(_Teller(theirs)):
             answer = task(document.system(), *args)
@@ -138,6 +139,18 @@ def _child(
         theirs.send(("broken", f"{type(error).__name__}: {error}", traceback.format_exc()))
     finally:
         theirs.close()
+
+
+def _end_with_server(folder: str) -> None:
+    """Stop the child, and what it started, when the process that asked for it is gone."""
+    server = multiprocessing.parent_process()
+    if server is None:
+        return
+    server.join()
+    shutil.rmtree(folder, ignore_errors=True)
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)
 
 
 class _Teller:

@@ -8,6 +8,7 @@ from mbs.app.desk.count_table import BEFORE, column, plain_table
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.optimizer_settings import optimizer_settings, optimizer_switch, passes_of
 from mbs.app.desk.panel_layout import (
+    Asking,
     in_a_row,
     main_button,
     tell_of_changes,
@@ -39,15 +40,8 @@ def open_optimizer(desk: Desk) -> None:
     tell_of_changes(desk, shown)
 
     async def count_all() -> None:
-        button.disable()
-        made = await desk.run("Counting operations", counts, (), passes_of(desk.session))
-        if shown.is_deleted:
-            return
-        button.enable()
-        if made is not None:
-            shown.clear()
-            with shown:
-                _show(made)
+        asking = Asking(desk, button, shown, _show)
+        await asking.run("Counting operations", counts, (), passes_of(desk.session))
 
     button.on_click(count_all)
 

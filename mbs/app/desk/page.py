@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 
 from nicegui import app, events, ui
 
@@ -56,10 +55,7 @@ def session_of(first: Document) -> Session:
     else:
         owner, session = kept
         if owner != tab:
-            lists = {"past": list(session.past), "future": list(session.future)}
-            session = replace(
-                session, **lists, shown=dict(session.shown), notes=dict(session.notes)
-            )
+            session = session.doubled()
     app.storage.tab[_KEY] = (tab, session)
     return session
 

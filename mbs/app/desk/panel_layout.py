@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
+from mbs.app.desk.document import Document
 
 
 def two_sides(width: str = "330px") -> tuple[ui.element, ui.element]:
@@ -50,6 +53,56 @@ def waiting_note(sentence: str) -> None:
     ui.label(sentence).classes("desk-note")
 
 
+_CHANGED = "The robot has changed since this was made."
+_ANSWER = 2
+"""Elements that an answer has at least; a note that waits for one is alone."""
+
+
+@contextmanager
+def new_answer(desk: Desk, shown: ui.element, document: Document) -> Iterator[None]:
+    """The place of an answer, the old one taken away.
+
+    Args:
+        desk: of the page.
+        shown: where the answer is.
+        document: the robot that it is of; where another one stands there by now, it says so.
+    """
+    shown.clear()
+    with shown:
+        if document != desk.document:
+            _note_of_change()
+        yield
+
+
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """A button that asks for an answer, where it is shown, and how.
+
+    Attributes:
+        desk: of the page.
+        button: it is off while the answer is made.
+        shown: where the answer is.
+        show: puts an answer where the slot is.
+    """
+
+    desk: Desk
+    button: ui.button
+    shown: ui.element
+    show: Callable[[Any], None]
+
+    async def run(self, label: str, task: Callable[..., Any], *args: Any) -> None:
+        """Show what `task(system, *args)` returns; see `Desk.run`."""
+        document = self.desk.document
+        self.button.disable()
+        made = await self.desk.run(label, task, *args)
+        if self.shown.is_deleted:
+            return
+        self.button.enable()
+        if made is not None:
+            with new_answer(self.desk, self.shown, document):
+                self.show(made)
+
+
 def tell_of_changes(desk: Desk, shown: ui.element) -> None:
     """Write above an answer that the robot has changed since, once it has.
 
@@ -57,16 +110,17 @@ def tell_of_changes(desk: Desk, shown: ui.element) -> None:
         desk: of the page.
         shown: where the answer is; it is cleared before a new one.
     """
-    notes = list[ui.label]()
 
     def changed() -> None:
-        if shown.is_deleted or not shown.default_slot.children:
+        if shown.is_deleted or len(shown.default_slot.children) < _ANSWER:
             return
-        if notes and not notes[-1].is_deleted:
-            return
-        with shown:
-            note = ui.label("The robot has changed since this was made.").classes("desk-bad")
-        note.move(target_index=0)
-        notes.append(note)
+        first = shown.default_slot.children[0]
+        if not (isinstance(first, ui.label) and first.text == _CHANGED):
+            with shown:
+                _note_of_change().move(target_index=0)
 
     desk.on_robot(changed)
+
+
+def _note_of_change() -> ui.label:
+    return ui.label(_CHANGED).classes("desk-bad")

@@ -11,6 +11,7 @@ from mbs.app.desk.desk import Desk
 from mbs.app.desk.equations_panel import open_equations
 from mbs.app.desk.form import FIELD, frame_label
 from mbs.app.desk.panel_layout import (
+    Asking,
     in_a_row,
     main_button,
     side_button,
@@ -115,15 +116,9 @@ class _Panel:
         task = partial(
             postures, frame=self._frame.value, method=self._method.value, seed=self._desk.q
         )
-        self._button.disable()
-        made = await self._desk.run("Solving the inverse geometry", task, T)
-        if self._shown.is_deleted:
-            return
-        self._button.enable()
-        if made is not None:
-            self._shown.clear()
-            with self._shown:
-                show_postures(self._desk, made)
+        show = partial(show_postures, self._desk)
+        asking = Asking(self._desk, self._button, self._shown, show)
+        await asking.run("Solving the inverse geometry", task, T)
 
     async def _framed(self) -> None:
         notes = cast(dict[str, Any], self._desk.session.notes[KEY])

@@ -26,6 +26,8 @@ def serve(port: int | None = None, robot: str | None = None, open_browser: bool 
     The server listens on the loopback address and answers requests that name it so; anything
     else is refused, so that pages of other sites cannot reach it under a name of their own.
 
+    Its address is printed as soon as it answers.
+
     Args:
         port: a free one when left out.
         robot: a name of the catalogue, or a file, that new visitors find; the RX90 when left out.
@@ -46,6 +48,8 @@ def serve(port: int | None = None, robot: str | None = None, open_browser: bool 
     serve_assets()
     app.add_middleware(Guard)
     app.on_startup(warm_up)
+    address = f"http://{HOST}:{number}/"
+    app.on_startup(lambda: print(f"The desk is at {address}; Ctrl+C ends it.", flush=True))
     ui.run(
         page_of(first),
         host=HOST,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 
 from mbs.app.desk.document import Document
 from mbs.app.desk.document_tables import Tables
@@ -40,6 +41,16 @@ class Session:
     future: list[Document] = field(default_factory=list)
     shown: dict[str, bool] = field(default_factory=dict)
     notes: dict[str, object] = field(default_factory=dict)
+
+    def doubled(self) -> Session:
+        """The same in another tab: what is changed there stays as it is here."""
+        return replace(
+            self,
+            past=list(self.past),
+            future=list(self.future),
+            shown=dict(self.shown),
+            notes=deepcopy(self.notes),
+        )
 
     def change(self, document: Document) -> None:
         """Put another document in the place of the present one, which can be had back."""

@@ -8,6 +8,7 @@ from typing import cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
+from mbs.app.desk.panel_layout import new_answer, tell_of_changes
 from mbs.app.desk.plots import line_chart
 from mbs.app.desk.plots_look import add_look, come_into_view
 from mbs.app.desk.simulation_panel_form import build_form
@@ -57,6 +58,7 @@ def open_simulation(desk: Desk) -> None:
         finally:
             button.enable()
 
+    tell_of_changes(desk, shown)
     button.on_click(run)
 
 
@@ -71,10 +73,10 @@ async def _run(desk: Desk, texts: Texts, shown: ui.element) -> None:
     if made is None or shown.is_deleted:
         return
     desk.session.notes[_FILM] = (document, made)
-    shown.clear()
-    with shown:
+    with new_answer(desk, shown, document):
         player = _show(desk, system, made)
-        await player.play()
+        if document == desk.document:
+            await player.play()
     come_into_view(shown)
 
 

@@ -11,6 +11,7 @@ from mbs.app.desk.desk import Desk
 from mbs.app.desk.equations_panel import open_equations
 from mbs.app.desk.form import Given, OptionForm
 from mbs.app.desk.panel_layout import (
+    Asking,
     in_a_row,
     main_button,
     side_button,
@@ -53,15 +54,8 @@ async def open_singular(desk: Desk) -> None:
     tell_of_changes(desk, shown)
 
     async def factor() -> None:
-        button.disable()
-        made = await desk.run("Factoring the determinant", singular, form.given, desk.q)
-        if shown.is_deleted:
-            return
-        button.enable()
-        if made is not None:
-            shown.clear()
-            with shown:
-                _show(desk, made)
+        asking = Asking(desk, button, shown, partial(_show, desk))
+        await asking.run("Factoring the determinant", singular, form.given, desk.q)
 
     button.on_click(factor)
     await form.fill()

@@ -15,7 +15,7 @@ from mbs.app.tasks.equations_options import OptionRow, option_values, parsed_opt
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.export import code
-from mbs.export.languages import LANGUAGES
+from mbs.export.languages import LANGUAGES, language_of
 from mbs.identification.catalogue import entries as identification_entries
 from mbs.messages import did_you_mean
 from mbs.models import catalogue
@@ -44,22 +44,6 @@ EVERY_PASS = tuple(one.name for one in PASSES)
 
 MENUS = ("Geometric", "Kinematic", "Dynamic", "Identification")
 
-_SUFFIXES: Mapping[str, str] = MappingProxyType(
-    {
-        WORDS: ".txt",
-        "symoro": ".txt",
-        "c": ".c",
-        "fortran": ".f90",
-        "matlab": ".m",
-        "octave": ".m",
-        "maple": ".mpl",
-        "mathematica": ".wl",
-        "python": ".py",
-        "julia": ".jl",
-        "rust": ".rs",
-        "latex": ".tex",
-    }
-)
 _NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -100,7 +84,7 @@ class Equations:
     @property
     def suffix(self) -> str:
         """The end of the name of a file for the text."""
-        return _SUFFIXES[self.language]
+        return ".txt" if self.language == WORDS else language_of(self.language).suffix
 
     @property
     def file_name(self) -> str:

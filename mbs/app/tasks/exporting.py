@@ -11,6 +11,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
+from casadi import Function
+
 from mbs import export
 from mbs.app.tasks.equations import entry
 from mbs.app.tasks.simulation_laws import number
@@ -77,6 +79,20 @@ def c_library(
     Raises:
         ModelError: a key is unknown, the system does not have the model, or no key is given.
     """
+    functions = c_functions(system, keys, options)
+    name = file_stem(system)
+    with tempfile.TemporaryDirectory(prefix="mbs-c-") as place:
+        folder = export.c_library(functions, Path(place) / name)
+        files = {f"{name}/{path.name}": path.read_bytes() for path in sorted(folder.iterdir())}
+    return _zipped(files)
+
+
+def c_functions(
+    system: System,
+    keys: Sequence[str] = MODELS,
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+) -> dict[str, Function]:
+    """Models by their names in a C library; arguments and errors as for `c_library`."""
     require_system(system)
     if not keys:
         raise ModelError(f"{system.name}: no model is chosen for the C library; choose one or more")
@@ -86,11 +102,7 @@ def c_library(
         if reason := chosen.refusal(system):
             raise ModelError(f"{key}: {reason}; leave it out of the C library")
         functions[key.replace("-", "_")] = chosen.build(system, **(options or {}).get(key, {}))
-    name = file_stem(system)
-    with tempfile.TemporaryDirectory(prefix="mbs-c-") as place:
-        folder = export.c_library(functions, Path(place) / name)
-        files = {f"{name}/{path.name}": path.read_bytes() for path in sorted(folder.iterdir())}
-    return _zipped(files)
+    return functions
 
 
 def fmu(system: System, settings: FmuSettings | None = None) -> bytes:
@@ -145,9 +157,10 @@ def toml(system: System) -> bytes:
 
 def _named(table: RobotTable, system: System) -> RobotTable:
     """The table with the names and ranges of the joints of the system, its name and posture."""
+    joints = zip(system.coordinates, system.speeds, strict=True)
     frames = [
-        replace(frame, name=c.name, limits=c.limits)
-        for frame, c in zip(table.frames, system.coordinates, strict=False)
+        replace(frame, name=c.name, limits=c.limits, velocity=s.limits, effort=s.effort)
+        for frame, (c, s) in zip(table.frames, joints, strict=False)
     ]
     return replace(
         table,

@@ -121,7 +121,7 @@ def _values(text: str, name: str) -> list[float]:
             " step that leads from the first to the last value"
         )
     whole = round(count) if abs(count - round(count)) < 1e-9 * max(1.0, count) else int(count)
-    return [start + k * step for k in range(whole + 1)]
+    return [float(f"{start + k * step:.14g}") for k in range(whole + 1)]
 
 
 def _signal_units(study: Sweep) -> dict[str, str]:

@@ -14,6 +14,7 @@ from mbs.export.languages.language import Language
 from mbs.export.languages.names import Names, spelled_names
 from mbs.export.languages.plan import LEAVES, Plan, arranged, plan_of
 from mbs.export.languages.quantities import angle_names, element_names, elements_of, places
+from mbs.export.languages.signs import TURNED, turned
 from mbs.export.languages.symbolic import Writer, number_of, symbol
 from mbs.export.languages.unit import Argument, Expr, Load, Store, Unit
 from mbs.operations.graph import Graph, Port, graph_of
@@ -71,12 +72,28 @@ def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str], set[st
         outputs=graph.outputs[:count],
         results=graph.results[:count],
     )
+    graph, given = _named(graph, pairs)
+    return graph, given, {name for _, name in pairs}
+
+
+def _named(graph: Graph, pairs: Sequence[tuple[int, str]]) -> tuple[Graph, dict[int, str]]:
+    """The graph and its nodes that have a name, those of opposite sign turned."""
     alive = graph.live()
     given: dict[int, str] = {}
+    opposite: dict[int, str] = {}
     for number, name in pairs:
-        if alive[number] and graph.nodes[number].op not in LEAVES:
+        node = graph.nodes[number]
+        if alive[number] and node.op not in LEAVES:
             given.setdefault(number, name)
-    return graph, given, {name for _, name in pairs}
+        elif node.op == casadi.OP_NEG and alive[node.args[0]]:
+            opposite.setdefault(node.args[0], name)
+    opposite = {
+        number: name
+        for number, name in opposite.items()
+        if number not in given and graph.nodes[number].op in TURNED
+    }
+    graph, new = turned(graph, opposite)
+    return graph, {new[number]: name for number, name in (given | opposite).items()}
 
 
 def _element_names(function: Function, port: Port, language: Language) -> list[str]:

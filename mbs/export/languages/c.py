@@ -25,6 +25,7 @@ class C(Language):
     """C99."""
 
     title = "C"
+    suffix = ".c"
     scalars_by_name = False
     squares_as_products = True
 

@@ -43,6 +43,7 @@ class Fortran(Language):
     """Fortran 90; hyperbolic inverses, erf and hypot are of 2008."""
 
     title = "Fortran"
+    suffix = ".f90"
     reserved = frozenset(_WORDS.split())
     folds_case = True
     longest_name = 31

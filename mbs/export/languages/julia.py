@@ -46,6 +46,7 @@ class Julia(Language):
     """Julia 1."""
 
     title = "Julia"
+    suffix = ".jl"
     reserved = frozenset(_WORDS.split())
     brackets = "[", "]"
 

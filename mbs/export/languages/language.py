@@ -21,6 +21,7 @@ class Language(ABC):
 
     Attributes:
         title: for messages and headers.
+        suffix: the end of the name of a file.
         reserved: names that mean something else.
         folds_case: whether names that differ in case only are the same.
         longest_name: in characters, or None.
@@ -33,6 +34,7 @@ class Language(ABC):
     """
 
     title: str
+    suffix = ".txt"
     reserved: frozenset[str] = frozenset()
     folds_case = False
     longest_name: int | None = None

@@ -53,6 +53,7 @@ class Latex(Language):
     """LaTeX with amsmath."""
 
     title = "LaTeX"
+    suffix = ".tex"
 
     def printer(self) -> Any:
         """A printer of sympy."""

@@ -50,6 +50,7 @@ class Maple(Language):
     """Maple."""
 
     title = "Maple"
+    suffix = ".mpl"
     reserved = frozenset(_WORDS.split())
     brackets = "[", "]"
 

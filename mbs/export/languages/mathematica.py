@@ -48,6 +48,7 @@ class Mathematica(Language):
     """Mathematica and the Wolfram language."""
 
     title = "Mathematica"
+    suffix = ".wl"
     reserved = frozenset(_SYSTEM.split())
     brackets = "[[", "]]"
     tail = "x"

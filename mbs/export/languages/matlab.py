@@ -46,6 +46,7 @@ class Matlab(Language):
     """Matlab and Octave."""
 
     title = "Matlab"
+    suffix = ".m"
     reserved = frozenset(_WORDS.split())
     longest_name = 63
 

@@ -36,6 +36,7 @@ class Python(Language):
     """Python 3 with numpy."""
 
     title = "Python"
+    suffix = ".py"
     reserved = frozenset(_WORDS)
     brackets = "[", "]"
     first = 0

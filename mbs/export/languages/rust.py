@@ -39,6 +39,7 @@ class Rust(Language):
     """Rust 2018 and later."""
 
     title = "Rust"
+    suffix = ".rs"
     reserved = frozenset(_WORDS.split())
     scalars_by_name = False
     squares_as_products = True

@@ -112,9 +112,10 @@ def excitation(
         position: limits of the m independent joints [rad or m]; the ranges of the joints when
             left out. A number is meant as +-; a sequence gives each joint its own; a dict names
             joints, those that follow the independent ones included.
-        velocity: likewise [rad/s or m/s], none when left out.
-        acceleration: likewise [rad/s2 or m/s2].
-        effort: likewise [N m or N].
+        velocity: likewise [rad/s or m/s], those that the joints describe when left out; None in
+            a sequence or dict is no limit.
+        acceleration: likewise [rad/s2 or m/s2], none when left out.
+        effort: likewise [N m or N], those that the joints describe when left out.
         planes: that points must not pass.
         objective: "log_det" (smallest volume of the parameters' uncertainty), "condition" (of the
             regressor in SI units) or "scaled_condition" (with columns of length one).

@@ -163,7 +163,7 @@ def limits_of(
     effort: Bound = None,
     planes: Sequence[Plane] = (),
 ) -> Limits:
-    """The limits of a motion of a system, ranges of positions those of the joints by default.
+    """The limits of a motion of a system, those that its joints describe by default.
 
     Raises:
         ModelError: a limit has not as many values as there are independent joints, it is empty or
@@ -172,11 +172,14 @@ def limits_of(
     places = active_places(system)
     joints = [system.coordinates[k] for k in places]
     rates = [RATE_UNITS[joint.unit] for joint in joints]
+    free: dict[str, Range] = dict.fromkeys((joint.name for joint in joints), None)
+    motors = {row.name: row for row in system.speeds}
 
-    def rows(quantity: str, bound: Bound, units: Sequence[str]) -> tuple[Limit, ...]:
-        names = [joint.name for joint in joints]
-        pairs = _pairs(system, quantity, bound, names)
-        return tuple(Limit(quantity, *row) for row in _joined(names, units, pairs))
+    def rows(
+        quantity: str, bound: Bound, units: Sequence[str], known: Mapping[str, Range] = free
+    ) -> tuple[Limit, ...]:
+        pairs = _pairs(system, quantity, bound, known)
+        return tuple(Limit(quantity, *row) for row in _joined(list(known), units, pairs))
 
     own, others = _positions(system, position, places)
     positions = rows("position", own, [joint.unit for joint in joints])
@@ -194,13 +197,23 @@ def limits_of(
             )
     return Limits(
         positions,
-        rows("velocity", velocity, rates),
+        rows("velocity", velocity, rates, {name: _known(motors[name].limits) for name in free}),
         rows("acceleration", acceleration, [ACCELERATION_UNIT[unit] for unit in rates]),
-        rows("effort", effort, [EFFORT_UNIT[unit] for unit in rates]),
+        rows(
+            "effort",
+            effort,
+            [EFFORT_UNIT[unit] for unit in rates],
+            {name: _known(motors[name].effort) for name in free},
+        ),
         others,
         tuple(planes),
         _leading(system),
     )
+
+
+def _known(described: tuple[float, float] | None) -> Range:
+    """A range of a description; None where it has no end."""
+    return None if described is None or np.isinf(described).all() else described
 
 
 def _leading(system: System) -> tuple[Limit, ...]:
@@ -247,12 +260,14 @@ def _joined(
 
 
 def _pairs(
-    system: System, quantity: str, bound: Bound, names: Sequence[str]
+    system: System, quantity: str, bound: Bound, described: Mapping[str, Range]
 ) -> list[tuple[float, float]]:
-    """(lower, upper) of each joint."""
-    if isinstance(bound, Mapping):
-        _check_names(system, quantity, bound, names)
-        bound = [bound.get(name) for name in names]
+    """(lower, upper) of each joint, as its description has it where it is not given."""
+    names = list(described)
+    if bound is None or isinstance(bound, Mapping):
+        given = bound or {}
+        _check_names(system, quantity, given, names)
+        bound = [given.get(name, described[name]) for name in names]
     if isinstance(bound, str):
         raise ModelError(
             f"{system.name}: {quantity} is {quoted(bound)}; give a number, a range for each joint,"

@@ -68,23 +68,24 @@ def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
         with open(path, newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream) if row]
     except (OSError, TypeError, UnicodeDecodeError, csv.Error) as error:
-        raise ModelError(f"record: {quoted(path)} cannot be read ({error})") from error
+        raise ModelError(f"record: {quoted(str(path))} cannot be read ({error})") from error
     if len(rows) < 2:
-        raise ModelError(f"record: {quoted(path)} has no rows; it needs names, then numbers")
+        raise ModelError(f"record: {quoted(str(path))} has no rows; it needs names, then numbers")
     header = [name.strip() for name in rows[0]]
     _check_header(path, header)
     values = np.empty((len(rows) - 1, len(header)))
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
             raise ModelError(
-                f"record: row {number} of {quoted(path)} has {len(row)} fields, the header has"
+                f"record: row {number} of {quoted(str(path))} has {len(row)} fields, the header has"
                 f" {len(header)}; write one number for each name"
             )
         try:
             values[number - 2] = [float(field) for field in row]
         except ValueError:
             raise ModelError(
-                f"record: row {number} of {quoted(path)} holds {quoted(row)}; write numbers alone"
+                f"record: row {number} of {quoted(str(path))} holds {quoted(row)};"
+                " write numbers alone"
             ) from None
     return {name: values[:, k] for k, name in enumerate(header)}
 
@@ -94,12 +95,12 @@ def _check_header(path: str | os.PathLike[str], header: Sequence[str]) -> None:
     for mark in (";", "\t"):
         if len(header) == 1 and mark in header[0]:
             raise ModelError(
-                f"record: {quoted(path)} has {quoted(mark)} between its columns; write commas, and"
-                " points in the numbers"
+                f"record: {quoted(str(path))} has {quoted(mark)} between its columns; write"
+                " commas, and points in the numbers"
             )
     if all(_is_number(name) for name in header):
         raise ModelError(
-            f"record: the first row of {quoted(path)} is {quoted(list(header))}, which are"
+            f"record: the first row of {quoted(str(path))} is {quoted(list(header))}, which are"
             " numbers; write the names of the columns above them"
         )
 

@@ -159,9 +159,13 @@ def regressor_function(
         inputs, outputs = build(s)
         return [("q", s.q), ("v" + s.suffix, s.v), *inputs], outputs
 
-    check = posture_check(system, coordinates)
-    model: Any = model_function(system, (*key, columns), both, check)
-    return Regressor(model, columns)
+    def make() -> Regressor:
+        check = posture_check(system, coordinates)
+        model: Any = model_function(system, (*key, columns), both, check)
+        return Regressor(model, columns)
+
+    made: Regressor = system.cached(("with columns", *key, columns), make)
+    return made
 
 
 def side_by_side(

@@ -103,7 +103,8 @@ def _mark(equation: Equation) -> object:
     keys = sorted(equation.parts)
     samples = max(len(part.values) for part in equation.parts.values())
     table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
-    table /= np.linalg.norm(table, axis=0) * np.sign(_leading(table))
+    size = np.linalg.norm(table, axis=0)
+    table /= np.where(size > 0, size, 1.0) * np.where(_leading(table) < 0, -1.0, 1.0)
     return equation.variables, tuple(keys), np.round(table, 6).tobytes()
 
 

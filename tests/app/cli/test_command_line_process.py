@@ -1,5 +1,6 @@
 """`python -m mbs` as a process: help, version, pipes, completion, what it loads."""
 
+import io
 import json
 import os
 import subprocess
@@ -8,7 +9,7 @@ import sys
 import pytest
 
 import mbs
-from mbs.app.cli import completion
+from mbs.app.cli import completion, main
 from mbs.app.cli.application import application
 
 HEAVY = ("casadi", "numpy", "sympy", "fmpy", "matplotlib", "nicegui", "mujoco", "scipy")
@@ -29,7 +30,7 @@ def test_version_and_one_command() -> None:
     assert mbs_process("--version").stdout == f"mbs {mbs.__version__}\n"
     answer = mbs_process("robots", "--json")
     assert (answer.returncode, answer.stderr) == (0, "")
-    assert json.loads(answer.stdout)[0]["name"] == "puma560"
+    assert "puma560" in [row["name"] for row in json.loads(answer.stdout)]
     answer = mbs_process("show", "nothing")
     assert (answer.returncode, answer.stdout) == (1, "")
     assert "Traceback" not in answer.stderr
@@ -60,6 +61,29 @@ def test_a_reader_that_goes_away_is_no_error_to_read() -> None:
     )
     os.close(writing)
     assert (answer.returncode, answer.stderr) == (1, b"")
+
+
+def _main_that_meets(error: Exception, monkeypatch) -> object:
+    def broken(**_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("mbs.app.cli.application.application", broken)
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO()))
+    monkeypatch.setattr(sys, "stderr", io.TextIOWrapper(io.BytesIO()))
+    with pytest.raises(SystemExit) as left:
+        main()
+    return left.value.code
+
+
+def test_a_fault_of_mbs_is_a_sentence_and_a_traceback_where_it_is_wanted(monkeypatch) -> None:
+    monkeypatch.delenv("MBS_TRACEBACK", raising=False)
+    told = str(_main_that_meets(KeyError("gamma"), monkeypatch))
+    assert told.startswith("mbs: this is a fault of mbs itself (KeyError: 'gamma'); please report")
+    gone = FileNotFoundError(2, "No such file or directory", "a.csv")
+    assert _main_that_meets(gone, monkeypatch) == "mbs: a.csv: No such file or directory"
+    monkeypatch.setenv("MBS_TRACEBACK", "1")
+    with pytest.raises(KeyError):
+        _main_that_meets(KeyError("gamma"), monkeypatch)
 
 
 @pytest.mark.parametrize(

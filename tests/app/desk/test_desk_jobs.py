@@ -1,10 +1,13 @@
 import asyncio
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
 from support import desk_tasks
+from support.processes import IN_PROC, is_alive
 
 from mbs.app.desk import jobs
 from mbs.app.desk.document import Document
@@ -16,14 +19,6 @@ ARM = Document.of_name("planar_2r")
 
 def run(task, *args, document=ARM, progress=None):
     return asyncio.run(jobs.run(task, document, *args, progress=progress))
-
-
-def is_alive(pid):
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except FileNotFoundError:
-        return False
-    return state != "Z"
 
 
 def test_a_task_runs_in_another_process_and_tells_how_far_it_is():
@@ -58,7 +53,46 @@ def test_any_other_end_is_one_sentence_and_the_details_are_logged(caplog):
         run(desk_tasks.vanished)
 
 
-@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks at processes through /proc")
+def ended(pids):
+    """Whether all of them end within some seconds."""
+    for _ in range(500):
+        if not any(is_alive(pid) for pid in pids):
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def told_in(path):
+    """The words that `endless` writes, once it has."""
+    for _ in range(3000):
+        if path.exists():
+            return path.read_text().split()
+        time.sleep(0.02)
+    raise AssertionError("the task does not begin")
+
+
+@IN_PROC
+def test_a_child_does_not_outlive_the_server(tmp_path):
+    told = tmp_path / "told"
+    code = (
+        "import asyncio, sys\n"
+        "from support import desk_tasks\n"
+        "from mbs.app.desk import jobs\n"
+        "from mbs.app.desk.document import Document\n"
+        "if __name__ == '__main__':\n"
+        "    arm = Document.of_name('planar_2r')\n"
+        "    asyncio.run(jobs.run(desk_tasks.endless, arm, sys.argv[1]))\n"
+    )
+    path = os.pathsep.join(filter(None, sys.path))
+    command = [sys.executable, "-c", code, str(told)]
+    with subprocess.Popen(command, env={**os.environ, "PYTHONPATH": path}) as server:
+        scratch, *pids = told_in(told)
+        server.kill()
+    assert ended(pids)
+    assert not Path(scratch).exists()
+
+
+@IN_PROC
 def test_cancel_ends_the_child_what_it_started_and_its_temporary_files(tmp_path):
     told = tmp_path / "told"
 
@@ -78,8 +112,4 @@ def test_cancel_ends_the_child_what_it_started_and_its_temporary_files(tmp_path)
 
     scratch, pids = asyncio.run(cancelled())
     assert not Path(scratch).exists()
-    for _ in range(500):
-        if not any(is_alive(pid) for pid in pids):
-            break
-        time.sleep(0.02)
-    assert not any(is_alive(pid) for pid in pids)
+    assert ended(pids)

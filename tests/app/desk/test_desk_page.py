@@ -14,6 +14,8 @@ from nicegui import app, core, ui
 from nicegui.testing.user import User
 from nicegui.testing.user_simulation import user_simulation
 from support import desk_tasks
+from support.panel_pages import run_visit
+from support.processes import IN_PROC, is_alive
 
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.document import Document
@@ -64,7 +66,7 @@ def visit(monkeypatch, name, story, count=1):
         async with visits(monkeypatch, name, count) as (user, desks, menus):
             await story(user, desks, menus)
 
-    asyncio.run(told())
+    run_visit(told)
 
 
 def spied(desk):
@@ -246,6 +248,42 @@ def test_long_work_can_be_stopped_and_refusals_are_sentences(monkeypatch, tmp_pa
         await desk.edit(Cell("geometry", 1, "d"), "*")
         assert await desk.run("Counting", desk_tasks.counted, 10) is None
         await until(lambda: "cannot read '*'" in str(user.notify.messages))
+
+    visit(monkeypatch, "planar_2r", story)
+
+
+@IN_PROC
+def test_work_for_a_page_that_was_closed_is_stopped_without_a_word(monkeypatch, tmp_path, caplog):
+    async def story(user, desks, menus):
+        (desk,) = desks
+        told = tmp_path / "told"
+        work = asyncio.ensure_future(desk.run("Waiting", desk_tasks.endless, str(told)))
+        await until(told.exists)
+        _, *pids = told.read_text().split()
+        user.client.delete()
+        assert await asyncio.wait_for(work, PATIENCE) is None
+        await until(lambda: not any(map(is_alive, pids)))
+        await desk.edit(Cell("geometry", 1, "d"), "0.9")
+        assert caplog.text == ""
+
+    visit(monkeypatch, "planar_2r", story)
+
+
+def test_a_posture_of_another_robot_is_refused(monkeypatch):
+    async def story(user, desks, menus):
+        (desk,) = desks
+        sent, before = spied(desk), desk.q
+        await desk.set_posture([0.1, 0.2, 0.3])
+        await desk.play([0.0, 1.0], [[0.1] * 3] * 2)
+        assert [m.partition(" is of")[0] for m in user.notify.messages] == [
+            "the posture",
+            "the motion",
+        ]
+        assert (desk.q, sent) == (before, [])
+        await desk.play([0.0, 1.0], [[0.1] * 2] * 2)
+        ((method, (film,)),) = sent
+        assert method == "play"
+        assert [len(flat) for flat in film["poses"]] == [36, 36]
 
     visit(monkeypatch, "planar_2r", story)
 

@@ -36,6 +36,20 @@ def test_undo_and_redo_walk_through_the_history():
     assert not session.redo()
 
 
+def test_a_doubled_session_goes_its_own_way():
+    first = Document.of_name("planar_2r")
+    session = Session(first, past=[edited(first, "0.7")], notes={"options idm": {"frame": 1}})
+    double = session.doubled()
+    assert double == session
+    double.undo()
+    double.shown["axis"] = False
+    double.notes["options idm"]["frame"] = 2
+    assert session.document == first
+    assert session.future == []
+    assert session.shown == {}
+    assert session.notes == {"options idm": {"frame": 1}}
+
+
 def test_the_history_has_an_end():
     session = Session(Document.of_name("planar_2r"))
     for k in range(250):

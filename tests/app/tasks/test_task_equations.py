@@ -17,7 +17,7 @@ from mbs.app.tasks.equations import (
 )
 from mbs.errors import ModelError, NoClosedForm
 from mbs.export import code
-from mbs.export.languages import LANGUAGES
+from mbs.export.languages import LANGUAGES, language_of
 from mbs.models import inverse_dynamics
 from mbs.operations import count, simplify
 
@@ -118,7 +118,15 @@ def test_every_language(systems, language):
     made = equations(systems["four_bar"], "gravity", language=language, passes=())
     assert made.text == code(entry("gravity").build(systems["four_bar"]), language)
     assert made.file_name == f"four_bar_gravity{made.suffix}"
-    assert made.suffix.startswith(".")
+    assert made.suffix == language_of(language).suffix
+
+
+def test_endings_of_files_are_those_of_the_languages(systems):
+    endings = {name: language_of(name).suffix for name in LANGUAGES}
+    assert endings["fortran"] == ".f90"
+    assert endings["octave"] == endings["matlab"] == ".m"
+    assert len(set(endings.values())) == len(endings) - 1
+    assert equations(systems["rx90"], "igm-pieper", language="words").suffix == ".txt"
 
 
 def test_the_words_of_a_closed_form_name_its_joints(systems):

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -44,15 +45,18 @@ def test_deviations_are_those_of_many_records():
     assert np.abs(errors).max() < 5
 
 
+@cache
 def filtered_records(count, deviations, bandwidth=8.0):
     """Equations of filtered records that differ in the white noise of their efforts alone."""
     D, base, _ = equations()
     record = noisy_record(position=0.0, effort=0.0)
     exact = observe_filtered(D, smoothed(record, bandwidth)).grouped(base)
     rows = np.searchsorted(record.time, exact.time - 1e-9)
+    records = []
     for seed in range(count):
         noise = np.random.default_rng((12, seed)).normal(size=record.tau.shape) * deviations
-        yield replace(exact, y=exact.y + zero_phase(noise, 400.0, bandwidth)[rows])
+        records.append(replace(exact, y=exact.y + zero_phase(noise, 400.0, bandwidth)[rows]))
+    return records
 
 
 def by_motion(observations):
@@ -62,7 +66,7 @@ def by_motion(observations):
 
 @pytest.mark.parametrize("method", [least_squares, weighted, reweighted, robust, by_motion])
 def test_deviations_are_those_of_200_filtered_records(method):
-    found = [method(record) for record in filtered_records(200, np.array([1.0, 0.3, 0.05]))]
+    found = [method(record) for record in filtered_records(200, (1.0, 0.3, 0.05))]
     values = np.array([estimate.values for estimate in found])
     predicted = np.sqrt(np.mean([estimate.deviations**2 for estimate in found], axis=0))
     ratio = values.std(axis=0, ddof=1) / predicted

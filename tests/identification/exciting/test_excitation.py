@@ -9,11 +9,12 @@ import pytest
 
 import mbs
 from mbs.assembly import System
+from mbs.components import Body, Revolute
 from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
 from mbs.identification.base.base_parameters import base_parameters
 from mbs.identification.exciting.excitation import Plane, Series, Trajectory, excitation
-from mbs.identification.exciting.limits import Limit, Margin
+from mbs.identification.exciting.limits import Limit, Margin, limits_of
 from mbs.identification.postures import active_places
 from mbs.loops.closing import Closing
 
@@ -314,6 +315,28 @@ def test_limits_of_unknown_joints_are_refused() -> None:
         excitation(system, position={"q9": 1.0})
     with pytest.raises(ModelError, match="velocity names 'q2', which is none"):
         excitation(system, position=1.0, velocity={"q2": 1.0})
+
+
+def test_limits_that_joints_describe_are_those_by_default() -> None:
+    m = mbs.Mechanism("arm")
+    bars = [m.add(Body(n, mass=1.0, com=(0.1, 0, 0), inertia=(1, 1, 1))) for n in "ab"]
+    described = {"limits": (-2.0, 2.0), "velocity": 3.0, "effort": (-4.0, 5.0)}
+    m.connect(m.world, Revolute("q1", axis="y", **described), bars[0])
+    m.connect(bars[0].at(0.3), Revolute("q2", axis="y", limits=(-1.0, 1.0), effort=np.inf), bars[1])
+    system = m.assemble()
+
+    def ends(limits: tuple[Limit, ...]) -> list[tuple[float, float]]:
+        return [(row.lower, row.upper) for row in limits]
+
+    free, taken = (-np.inf, np.inf), limits_of(system)
+    assert ends(taken.position) == [(-2.0, 2.0), (-1.0, 1.0)]
+    assert ends(taken.velocity) == [(-3.0, 3.0), free]
+    assert ends(taken.effort) == [(-4.0, 5.0), free]
+    assert ends(taken.acceleration) == [free, free]
+    given = limits_of(system, velocity={"q2": 1.5}, effort={"q1": None})
+    assert ends(given.velocity) == [(-3.0, 3.0), (-1.5, 1.5)]
+    assert ends(given.effort) == [free, free]
+    assert ends(limits_of(system, velocity=2.0).velocity) == [(-2.0, 2.0)] * 2
 
 
 def test_what_is_no_series_or_no_number_is_refused() -> None:

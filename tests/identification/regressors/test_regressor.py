@@ -23,8 +23,11 @@ from mbs.identification import (
     Column,
     base_parameters,
     columns_of,
+    energy_regressor,
+    filtered_regressor,
     known_efforts,
     numbers_of,
+    power_regressor,
     regressor,
 )
 from mbs.operations import count, simplify
@@ -236,3 +239,15 @@ def test_columns_in_any_order_and_number():
 def test_columns_must_be_those_of_the_system(columns, options, told):
     with pytest.raises(ModelError, match=told):
         regressor(system_of("puma560"), columns, **options)
+
+
+@pytest.mark.parametrize(
+    "build", [regressor, filtered_regressor, energy_regressor, power_regressor]
+)
+def test_the_same_call_gives_the_same_function(build):
+    system = system_of("planar_2r")
+    made = build(system)
+    assert build(system) is made
+    assert build(system, columns_of(system)) is made
+    assert build(system, friction=False) is not made
+    assert build(mbs.load("planar_2r").assemble()) is not made

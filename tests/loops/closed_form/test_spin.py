@@ -12,6 +12,7 @@ from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops import function, modes, solve
 from mbs.loops.closed_form.plan import plan
 from mbs.loops.closing import Closing
+from mbs.models import direct_geometry
 
 CASES = [("RSSR", None), ("RSSR", 1), ("RSSR", 3), ("RSSP", None), ("PSSR", 3), ("RWSR", 2)]
 
@@ -85,6 +86,15 @@ def test_a_spin_that_is_no_number():
     spin = next(system.speeds[k].name for k in system.free if system.speeds[k].name != "j0")
     with pytest.raises(ModelError, match="give a finite number"):
         modes(system, {spin: np.nan})
+
+
+def test_the_spin_is_named_among_the_inputs():
+    system = ring_loop(1, "RSSR").assemble()
+    names = [system.speeds[k].name for k in system.free]
+    pose = direct_geometry(system)
+    assert pose.elements("q_a") == [(name, "rad") for name in names]
+    with pytest.raises(ModelError, match=f"3 values, it needs 2: {', '.join(names)}$"):
+        pose([0.1, 0.2, 0.3])
 
 
 def test_a_ball_that_turns_freely_is_refused():

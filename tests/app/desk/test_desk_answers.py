@@ -1,0 +1,76 @@
+"""Answers that come after the robot has changed."""
+
+import asyncio
+import html
+
+from support.panel_pages import PATIENT, visited
+
+from mbs.app.desk import jobs
+from mbs.app.desk.document import Document
+from mbs.app.desk.document_cells import Cell
+from mbs.app.desk.export_panel import open_export
+from mbs.app.desk.menus import build_menus
+
+CHANGED = "The robot has changed since this was made."
+
+
+class Slow:
+    """Jobs that begin at once and are done when they are let go."""
+
+    def __init__(self, monkeypatch):
+        self.begun, self.go = asyncio.Event(), asyncio.Event()
+        monkeypatch.setattr(jobs, "run", self._run)
+
+    async def _run(self, task, document, *args, progress=None):
+        self.begun.set()
+        await self.go.wait()
+        return task(document.system(), *args)
+
+
+def test_an_answer_of_the_robot_before_says_so(monkeypatch):
+    async def visit(user, desk):
+        slow = Slow(monkeypatch)
+        user.find(marker="menu base-parameters").click()
+        await slow.begun.wait()
+        await desk.edit(Cell("inertia", 1, "Fv"), "0.3")
+        await user.should_not_see(CHANGED)
+        slow.go.set()
+        await user.should_see(marker="base", retries=PATIENT)
+        await user.should_see(CHANGED)
+        await desk.edit(Cell("inertia", 0, "Fv"), "0.2")
+        assert len(user.find(CHANGED).elements) == 1
+        user.find(marker="find").click()
+        await user.should_not_see(CHANGED, retries=PATIENT)
+
+    visited(build_menus, "planar_2r", visit, monkeypatch)
+
+
+def test_a_download_has_the_name_of_the_robot_that_was_asked_for(monkeypatch):
+    async def visit(user, desk):
+        slow, names = Slow(monkeypatch), []
+        monkeypatch.setattr(desk, "download", lambda data, name: names.append((name, data)))
+        user.find(marker="html").click()
+        await slow.begun.wait()
+        name = desk.document.name
+        await desk.edit(Cell("general", 0, "value"), "a/b <i>")
+        await desk.edit(Cell("geometry", 1, "d"), "*")
+        slow.go.set()
+        await asyncio.sleep(0)
+        await user.should_not_see("Drawing", retries=PATIENT)
+        ((file, data),) = names
+        assert (name, file) == ("planar_2r", "planar_2r.html")
+        assert f"<title>{html.escape(name)}</title>".encode() in data
+
+    visited(open_export, "planar_2r", visit, monkeypatch)
+
+
+def test_names_that_are_markup_stay_text():
+    evil = "<img/src=x/onerror=alert(1)>"
+    document = Document.of_name("planar_2r")
+    for cell in (Cell("general", 0, "value"), Cell("geometry", 0, "name")):
+        document = document.changed(cell, evil)
+    assert document.problems == ()
+    system = document.system()
+    assert evil not in system.draw().svg
+    assert html.escape(evil) in system.draw().svg
+    assert document.file_name == "img_src_x_onerror_alert_1"

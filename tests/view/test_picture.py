@@ -114,7 +114,7 @@ def test_results_know_their_system_until_they_are_pickled(swing, assembled, tmp_
         ({"fps": 0}, "fps is 0; give a number above zero"),
         ({"speed": float("nan")}, "speed is nan"),
         ({"fps": 1e6}, "1000000 pictures are more than 5000"),
-        ({"system": "four_bar"}, "call assemble"),
+        ({"system": "four_bar"}, "give what assemble() returns"),
     ],
 )
 def test_options_that_mean_nothing_are_refused(swing, options, words):

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any
 
-from mbs.app.desk import jobs
 from mbs.app.desk.desk_base import aside
 from mbs.app.desk.desk_picture import DeskPicture
-from mbs.app.desk.document import Document
-from mbs.app.desk.document_cells import Cell
+from mbs.app.desk.document.cells import Cell
+from mbs.app.desk.document.document import Document
 from mbs.app.desk.drawer import Drawer
-from mbs.app.desk.job_cards import JobCards
+from mbs.app.desk.jobs import jobs
+from mbs.app.desk.jobs.cards import JobCards
 from mbs.app.desk.session import Session
 from mbs.app.desk.session_posture import Vector, carried, handles, moved
 from mbs.assembly import System

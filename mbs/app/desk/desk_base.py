@@ -11,7 +11,7 @@ from typing import Any
 from nicegui import background_tasks, ui
 from nicegui.client import Client
 
-from mbs.app.desk.document import Document
+from mbs.app.desk.document.document import Document
 from mbs.app.desk.session import Session
 from mbs.app.desk.session_posture import Vector
 from mbs.assembly import System

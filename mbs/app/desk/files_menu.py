@@ -8,8 +8,8 @@ from typing import Any
 from nicegui import events, ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.document import Document
-from mbs.app.desk.document_reading import LARGEST_UPLOAD, READERS
+from mbs.app.desk.document.document import Document
+from mbs.app.desk.document.reading import LARGEST_UPLOAD, READERS
 from mbs.errors import MbsError
 from mbs.robots import catalogue
 

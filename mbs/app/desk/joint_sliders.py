@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import events, ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.document_cells import number
+from mbs.app.desk.document.cells import number
 from mbs.app.desk.session_posture import Handle, assembly_modes, handles, mode_of
 from mbs.errors import MbsError
 from mbs.loops import Mode

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, cast
 
-from mbs.app.desk import base_panel, postures_panel, singular_panel
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.equations_panel import open_equations
-from mbs.app.desk.export_panel import open_export
-from mbs.app.desk.identification_panel import open_identification
-from mbs.app.desk.optimizer_panel import open_optimizer
-from mbs.app.desk.simulation_panel import open_simulation
+from mbs.app.desk.panels import base as base_panel
+from mbs.app.desk.panels import postures as postures_panel
+from mbs.app.desk.panels import singular as singular_panel
+from mbs.app.desk.panels.equations import open_equations
+from mbs.app.desk.panels.export import open_export
+from mbs.app.desk.panels.identification import open_identification
+from mbs.app.desk.panels.optimizer import open_optimizer
+from mbs.app.desk.panels.simulation import open_simulation
 from mbs.app.tasks.equations import entries
 
 _NOTE = "tabs"

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from nicegui import app, events, ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.document import Document
+from mbs.app.desk.document.document import Document
 from mbs.app.desk.files_menu import FilesMenu
 from mbs.app.desk.menus import build_menus
 from mbs.app.desk.open_again import open_again

@@ -11,7 +11,7 @@ from mbs.errors import MbsError
 from mbs.messages import quoted
 
 if TYPE_CHECKING:
-    from mbs.app.desk.document import Document
+    from mbs.app.desk.document.document import Document
 
 HOST = "127.0.0.1"
 _PATIENCE = 60.0
@@ -104,7 +104,7 @@ def robot_document(robot: str) -> Document:
     Raises:
         MbsError: there is none, or it is malformed.
     """
-    from mbs.app.desk.document import Document
+    from mbs.app.desk.document.document import Document
     from mbs.robots import catalogue
 
     path = Path(robot)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 
-from mbs.app.desk.document import Document
-from mbs.app.desk.document_tables import Tables
+from mbs.app.desk.document.document import Document
+from mbs.app.desk.document.tables import Tables
 from mbs.app.desk.session_posture import Vector
 from mbs.assembly import System
 from mbs.errors import DescriptionError, MbsError

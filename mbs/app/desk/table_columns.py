@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from mbs.app.desk.document_cells import CHOICES, COLUMNS, GENERAL_ROWS, CellProblem
-from mbs.app.desk.document_tables import Tables
+from mbs.app.desk.document.cells import CHOICES, COLUMNS, GENERAL_ROWS, CellProblem
+from mbs.app.desk.document.tables import Tables
 
 SHEETS: Mapping[str, str] = MappingProxyType(
     {

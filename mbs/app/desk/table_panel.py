@@ -7,8 +7,8 @@ from typing import Any
 from nicegui import events, ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.document import Document
-from mbs.app.desk.document_cells import Cell, CellProblem
+from mbs.app.desk.document.cells import Cell, CellProblem
+from mbs.app.desk.document.document import Document
 from mbs.app.desk.table_columns import SHEETS, columns, rows
 from mbs.errors import MbsError
 

@@ -5,11 +5,11 @@ import html
 
 from support.panel_pages import PATIENT, visited
 
-from mbs.app.desk import jobs
-from mbs.app.desk.document import Document
-from mbs.app.desk.document_cells import Cell
-from mbs.app.desk.export_panel import open_export
+from mbs.app.desk.document.cells import Cell
+from mbs.app.desk.document.document import Document
+from mbs.app.desk.jobs import jobs
 from mbs.app.desk.menus import build_menus
+from mbs.app.desk.panels.export import open_export
 
 CHANGED = "The robot has changed since this was made."
 

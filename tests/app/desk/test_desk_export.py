@@ -8,8 +8,8 @@ import zipfile
 from support.panel_pages import PATIENT, visited
 
 import mbs
-from mbs.app.desk.export_panel import open_export
-from mbs.app.desk.export_panel_fmu import FmuAsked
+from mbs.app.desk.panels.export import open_export
+from mbs.app.desk.panels.export_fmu import FmuAsked
 
 
 async def _downloaded(user, marker):

@@ -8,7 +8,7 @@ from nicegui.elements.upload_files import SmallFileUpload
 from support.panel_pages import PATIENT, visited
 
 import mbs
-from mbs.app.desk.identification_panel import open_identification
+from mbs.app.desk.panels.identification import open_identification
 from mbs.app.tasks.simulation import SimulationSettings, csv_bytes, simulate
 
 

@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from mbs.app.desk.document import Document
-from mbs.app.desk.document_cells import Cell
+from mbs.app.desk.document.cells import Cell
+from mbs.app.desk.document.document import Document
 from mbs.app.desk.session import Session
 from mbs.app.desk.session_posture import assembly_modes, carried, handles, mode_of, moved
 from mbs.components import Free, Mechanism, PointMass

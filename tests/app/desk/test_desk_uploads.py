@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from mbs.app.desk.document import Document
+from mbs.app.desk.document.document import Document
 from mbs.errors import MbsError
 
 URDF = b"""<?xml version="1.0"?><robot name="arm"><link name="base"/><link name="a"><inertial>

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from nicegui import ui
 
-from mbs.app.desk.form import FIELD
+from mbs.app.desk.panels.form import FIELD
 from mbs.app.tasks.postures import pose_from, pose_from_text, rpy_of
 from mbs.app.tasks.postures_pose import Array
 

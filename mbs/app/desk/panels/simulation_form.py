@@ -7,8 +7,8 @@ from functools import partial
 
 from nicegui import ui
 
-from mbs.app.desk.plots_fields import Look, choice_field, text_field
-from mbs.app.desk.simulation_panel_settings import KINDS, PICTURE, TYPED, Row, Texts, chosen_rows
+from mbs.app.desk.panels.plots_fields import Look, choice_field, text_field
+from mbs.app.desk.panels.simulation_settings import KINDS, PICTURE, TYPED, Row, Texts, chosen_rows
 from mbs.assembly import System
 
 _METHODS = {"dopri5": "dopri5, explicit", "rodas": "rodas, for stiff systems"}

@@ -8,13 +8,13 @@ from typing import cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.panel_layout import new_answer, tell_of_changes
-from mbs.app.desk.plots import line_chart
-from mbs.app.desk.plots_look import add_look, come_into_view
-from mbs.app.desk.simulation_panel_form import build_form
-from mbs.app.desk.simulation_panel_groups import Charts, groups_of
-from mbs.app.desk.simulation_panel_player import Player
-from mbs.app.desk.simulation_panel_settings import Texts, first_texts, settings_of
+from mbs.app.desk.panels.layout import new_answer, tell_of_changes
+from mbs.app.desk.panels.plots import line_chart
+from mbs.app.desk.panels.plots_look import add_look, come_into_view
+from mbs.app.desk.panels.simulation_form import build_form
+from mbs.app.desk.panels.simulation_groups import Charts, groups_of
+from mbs.app.desk.panels.simulation_player import Player
+from mbs.app.desk.panels.simulation_settings import Texts, first_texts, settings_of
 from mbs.app.tasks.exporting import file_stem
 from mbs.app.tasks.simulation import csv_bytes
 from mbs.app.tasks.simulation_film import Film, film

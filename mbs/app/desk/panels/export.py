@@ -11,9 +11,9 @@ from typing import Any, cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.export_panel_fmu import FmuAsked, fmu_form
-from mbs.app.desk.plots_fields import Look, several_field
-from mbs.app.desk.plots_look import add_look
+from mbs.app.desk.panels.export_fmu import FmuAsked, fmu_form
+from mbs.app.desk.panels.plots_fields import Look, several_field
+from mbs.app.desk.panels.plots_look import add_look
 from mbs.app.tasks import exporting
 from mbs.app.tasks.equations import entries
 from mbs.assembly import System

@@ -9,7 +9,7 @@ from functools import partial
 
 from nicegui import ui
 
-from mbs.app.desk.plots_fields import Look, choice_field, several_field, text_field
+from mbs.app.desk.panels.plots_fields import Look, choice_field, several_field, text_field
 from mbs.app.tasks.exporting import SOLVERS, FmuSettings
 from mbs.assembly import System
 

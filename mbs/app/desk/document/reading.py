@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from mbs.app.desk.document_mjcf import close_mjcf
+from mbs.app.desk.document.mjcf import close_mjcf
 from mbs.components import (
     Joint,
     KhalilBody,

@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from mbs.app.desk.document_cells import (
+from mbs.app.desk.document.cells import (
     COLUMNS,
     CellProblem,
     place_of,
     reader_of,
 )
-from mbs.app.desk.document_tables import Tables, Texts
+from mbs.app.desk.document.tables import Tables, Texts
 from mbs.errors import MbsError
 
 _ROW = re.compile(r"(?:^|/)(frame|body|loop) (\d+)\b")

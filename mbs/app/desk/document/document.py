@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
-from mbs.app.desk import document_rows
-from mbs.app.desk.document_cells import LONGEST_CELL, Cell, CellProblem, number
-from mbs.app.desk.document_problems import placed, unread
-from mbs.app.desk.document_reading import read_upload, table_of
-from mbs.app.desk.document_shown import shown_tables
-from mbs.app.desk.document_tables import Tables, require_cell, robot_table, tables_of
+from mbs.app.desk.document import rows as document_rows
+from mbs.app.desk.document.cells import LONGEST_CELL, Cell, CellProblem, number
+from mbs.app.desk.document.problems import placed, unread
+from mbs.app.desk.document.reading import read_upload, table_of
+from mbs.app.desk.document.shown import shown_tables
+from mbs.app.desk.document.tables import Tables, require_cell, robot_table, tables_of
 from mbs.app.tasks.exporting import toml
 from mbs.assembly import System
 from mbs.components import Mechanism

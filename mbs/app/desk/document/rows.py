@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mbs.app.desk.document_cells import GEOMETRY_COLUMNS, RANGES
-from mbs.app.desk.document_tables import Tables, Texts
+from mbs.app.desk.document.cells import GEOMETRY_COLUMNS, RANGES
+from mbs.app.desk.document.tables import Tables, Texts
 from mbs.errors import DescriptionError
 from mbs.formats.rows import BODY_SCALARS, InertiaRow
 

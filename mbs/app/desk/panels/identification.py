@@ -10,10 +10,10 @@ from typing import Any, cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.identification_panel_results import show_results
-from mbs.app.desk.panel_layout import new_answer, tell_of_changes
-from mbs.app.desk.plots_fields import Look, choice_field, several_field, text_field
-from mbs.app.desk.plots_look import add_look, come_into_view
+from mbs.app.desk.panels.identification_results import show_results
+from mbs.app.desk.panels.layout import new_answer, tell_of_changes
+from mbs.app.desk.panels.plots_fields import Look, choice_field, several_field, text_field
+from mbs.app.desk.panels.plots_look import add_look, come_into_view
 from mbs.app.tasks.identification import (
     EQUATIONS,
     METHODS,

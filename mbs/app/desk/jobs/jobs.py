@@ -19,7 +19,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any, NoReturn
 
 from mbs import errors
-from mbs.app.desk.document import Document
+from mbs.app.desk.document.document import Document
 from mbs.errors import MbsError
 from mbs.progress import listen
 
@@ -78,7 +78,7 @@ def _context() -> Any:
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["casadi", "mbs.app.desk.jobs_preload"])
+    context.set_forkserver_preload(["casadi", "mbs.app.desk.jobs.preload"])
     return context
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from nicegui import events, ui
 
-from mbs.app.desk.count_table import column
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.panel_layout import in_a_row
+from mbs.app.desk.panels.count_table import column
+from mbs.app.desk.panels.layout import in_a_row
 from mbs.app.tasks.postures import Posture, Postures
 
 _PAGE = 32

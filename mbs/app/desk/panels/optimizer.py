@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from mbs.app.desk.count_table import BEFORE, column, plain_table
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.optimizer_settings import optimizer_settings, optimizer_switch, passes_of
-from mbs.app.desk.panel_layout import (
+from mbs.app.desk.panels.count_table import BEFORE, column, plain_table
+from mbs.app.desk.panels.layout import (
     Asking,
     in_a_row,
     main_button,
@@ -15,6 +14,7 @@ from mbs.app.desk.panel_layout import (
     two_sides,
     waiting_note,
 )
+from mbs.app.desk.panels.optimizer_settings import optimizer_settings, optimizer_switch, passes_of
 from mbs.app.tasks.counts import CountRow, counts
 from mbs.operations import PASSES, Count
 

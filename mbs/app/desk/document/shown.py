@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from casadi import SX, Function
 
-from mbs.app.desk.document_cells import GEOMETRY_COLUMNS, INERTIA_COLUMNS, written
-from mbs.app.desk.document_tables import Tables, Texts
+from mbs.app.desk.document.cells import GEOMETRY_COLUMNS, INERTIA_COLUMNS, written
+from mbs.app.desk.document.tables import Tables, Texts
 from mbs.assembly import System
 from mbs.assembly.tables import LinkRow
 from mbs.formats.rows import GEOMETRY

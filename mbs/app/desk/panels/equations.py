@@ -6,18 +6,18 @@ from typing import cast
 
 from nicegui import ui
 
-from mbs.app.desk.count_table import BEFORE, count_table, steps_table
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.form import FIELD, Given, OptionForm
-from mbs.app.desk.optimizer_settings import passes_of
-from mbs.app.desk.panel_layout import (
+from mbs.app.desk.panels.count_table import BEFORE, count_table, steps_table
+from mbs.app.desk.panels.form import FIELD, Given, OptionForm
+from mbs.app.desk.panels.layout import (
     in_a_row,
     main_button,
     new_answer,
     tell_of_changes,
     two_sides,
 )
-from mbs.app.desk.text_view import text_view
+from mbs.app.desk.panels.optimizer_settings import passes_of
+from mbs.app.desk.panels.text_view import text_view
 from mbs.app.tasks.equations import EVERY_PASS, WORDS, Equations, entry, equations, languages
 from mbs.errors import MbsError
 from mbs.models.catalogue import Entry

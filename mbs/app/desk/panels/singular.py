@@ -8,9 +8,9 @@ from typing import cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.equations_panel import open_equations
-from mbs.app.desk.form import Given, OptionForm
-from mbs.app.desk.panel_layout import (
+from mbs.app.desk.panels.equations import open_equations
+from mbs.app.desk.panels.form import Given, OptionForm
+from mbs.app.desk.panels.layout import (
     Asking,
     in_a_row,
     main_button,
@@ -19,7 +19,7 @@ from mbs.app.desk.panel_layout import (
     two_sides,
     waiting_note,
 )
-from mbs.app.desk.text_view import text_view
+from mbs.app.desk.panels.text_view import text_view
 from mbs.app.tasks.equations import entry
 from mbs.app.tasks.singular import Factor, Singular, singular
 from mbs.errors import MbsError

@@ -8,9 +8,9 @@ from typing import Any, cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.equations_panel import open_equations
-from mbs.app.desk.form import FIELD, frame_label
-from mbs.app.desk.panel_layout import (
+from mbs.app.desk.panels.equations import open_equations
+from mbs.app.desk.panels.form import FIELD, frame_label
+from mbs.app.desk.panels.layout import (
     Asking,
     in_a_row,
     main_button,
@@ -19,8 +19,8 @@ from mbs.app.desk.panel_layout import (
     two_sides,
     waiting_note,
 )
-from mbs.app.desk.pose_fields import PoseFields
-from mbs.app.desk.postures_table import show_postures
+from mbs.app.desk.panels.pose_fields import PoseFields
+from mbs.app.desk.panels.postures_table import show_postures
 from mbs.app.tasks.equations import entry
 from mbs.app.tasks.postures import pose_of, postures
 from mbs.assembly import System

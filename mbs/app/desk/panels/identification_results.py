@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.plots import line_chart
+from mbs.app.desk.panels.plots import line_chart
 from mbs.app.tasks.identification import EstimateRow, Identified
 
 _POOR = 30.0

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from mbs.app.desk.document_cells import (
+from mbs.app.desk.document.cells import (
     ACTUATED,
     COLUMNS,
     GENERAL_ROWS,

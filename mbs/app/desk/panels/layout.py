@@ -10,7 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.document import Document
+from mbs.app.desk.document.document import Document
 
 
 def two_sides(width: str = "330px") -> tuple[ui.element, ui.element]:

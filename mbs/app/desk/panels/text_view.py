@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.panel_layout import in_a_row
+from mbs.app.desk.panels.layout import in_a_row
 
 _LONGEST = 200_000
 """Characters that are shown; all of them are copied and downloaded."""

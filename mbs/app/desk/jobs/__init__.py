@@ -1,0 +1,1 @@
+"""Long work in child processes that can be stopped, and the cards that show it."""

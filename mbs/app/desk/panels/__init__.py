@@ -1,0 +1,1 @@
+"""What the menus open: forms, equations, postures, tables, plots and downloads."""

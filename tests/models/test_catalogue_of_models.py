@@ -79,6 +79,8 @@ def test_a_refusal_says_why(systems):
     assert "four_bar has 2 at most" in entry("igm-pieper").refusal(systems["four_bar"])
     assert entry("igm-pieper").applies(systems["sr400"])
     delta = mbs.load("delta").assemble()
+    assert "solved by iteration" in entry("dgm").refusal(delta)
+    assert entry("dgm").refusal(systems["four_bar"]) == ""
     assert "delta has 1 at most" in entry("igm-pieper").refusal(delta)
     for one in entries():
         for system in systems.values():

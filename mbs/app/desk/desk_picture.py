@@ -83,10 +83,6 @@ class DeskPicture(DeskBase):
             self.session.refusal = ""
             await self.set_posture(q)
 
-    async def seek(self, q: Sequence[float]) -> None:
-        """Show a posture without keeping it: sliders stay."""
-        await self._pose(tuple(float(x) for x in q))
-
     async def _pose(self, q: Vector) -> None:
         drawn = self._scene
         if drawn is not None and len(q) == drawn.system.nq:

@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 from mbs import loops
+from mbs.assembly import System
+from mbs.errors import NoClosedForm
 from mbs.models.catalogue.entry import Entry
 from mbs.models.catalogue.options import BASE, TARGET, one_frame
 from mbs.models.catalogue.postures import INVERSE_GEOMETRY
 from mbs.models.geometry import direct_geometry, transform
+
+
+def _without_closed_form(system: System) -> str:
+    """Why the loops give no explicit equations, "" where they do or there are none."""
+    if not system.is_closed:
+        return ""
+    try:
+        loops.function(system)
+    except NoClosedForm:
+        return f"the loops of {system.name} have no closed form; they are solved by iteration"
+    return ""
+
 
 GEOMETRIC: tuple[Entry, ...] = (
     Entry(
@@ -17,7 +31,15 @@ GEOMETRIC: tuple[Entry, ...] = (
         (TARGET, one_frame("relative_to", "seen from frame", BASE)),
         transform,
     ),
-    Entry("dgm", "Geometric", "Fast geometric model", "0Tn(q)", (TARGET,), direct_geometry),
+    Entry(
+        "dgm",
+        "Geometric",
+        "Fast geometric model",
+        "0Tn(q)",
+        (TARGET,),
+        direct_geometry,
+        obstacle=_without_closed_form,
+    ),
     *INVERSE_GEOMETRY,
     Entry(
         "closure",
@@ -34,5 +56,6 @@ GEOMETRIC: tuple[Entry, ...] = (
         "q(q_a)",
         function=loops.function,
         structures="closed",
+        obstacle=_without_closed_form,
     ),
 )

@@ -113,10 +113,10 @@ def test_a_visitor_simulates_and_reads_a_mistake(monkeypatch):
 def test_the_slider_moves_the_picture(monkeypatch):
     seen = []
 
-    async def seek(desk, q):
+    async def set_posture(desk, q):
         seen.append(tuple(q))
 
-    monkeypatch.setattr(Desk, "seek", seek)
+    monkeypatch.setattr(Desk, "set_posture", set_posture)
 
     async def visit(user, desk):
         user.find(marker="simulate").click()

@@ -55,6 +55,7 @@ class Player:
     async def _toggle(self) -> None:
         if self._playing:
             self.stop()
+            await self._keep(float(self._slider.value))
         else:
             await self.play()
 
@@ -66,8 +67,12 @@ class Player:
         self.stop()
         instant = float(event.args)
         self._label.text = _told(instant)
+        await self._keep(instant)
+
+    async def _keep(self, instant: float) -> None:
+        """Make the posture of this instant that of the desk, its sliders included."""
         row = int(np.abs(self._film.times - instant).argmin())
-        await self._desk.seek(self._film.postures[row].tolist())
+        await self._desk.set_posture(self._film.postures[row].tolist())
 
     def _reached(self, instant: float) -> None:
         """What the picture shows now, where it plays this film; a closed panel ends it."""

@@ -35,7 +35,7 @@ idm = mbs.models.inverse_dynamics(system)
 ddm = mbs.models.direct_dynamics(system)
 lagrange = mbs.models.lagrange(system)
 energy = mbs.models.energy(system)
-print(f"\nModels\n  {idm}\n  {ddm}\n  {lagrange}\n  {energy}")
+print(f"\nModels\n  {idm!r}\n  {ddm!r}\n  {lagrange!r}\n  {energy!r}")
 
 # %% Check them against each other at a posture that closes the loop
 q = mbs.loops.solve(system, {"j1": 0.3})

@@ -100,15 +100,28 @@ def _offered(interface: Any, watch: Callable[..., None]) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
+def _functions() -> tuple[Any, Any, Any]:
+    """What C calls for messages and memory; made once, never freed."""
+    from fmpy import fmi2
+
+    return (
+        fmi2.fmi2CallbackLoggerTYPE(_log),
+        fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc),
+        fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free),
+    )
+
+
 def _callbacks() -> Any:
-    """The C functions that every instance is given; made once, never freed."""
+    """The C functions of an instance.
+
+    fmpy's proxy for messages knows one logger at a time, that of the last who asked, and other
+    users of fmpy may have freed theirs: so it is told ours for every instance.
+    """
     from fmpy import fmi2
     from fmpy.logging import addLoggerProxy
 
-    callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(_log)
-    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
-    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    logger, allocate, free = _functions()
+    callbacks = fmi2.fmi2CallbackFunctions(logger=logger, allocateMemory=allocate, freeMemory=free)
     with _LOCK:
         addLoggerProxy(ctypes.byref(callbacks))
     return callbacks

@@ -1,14 +1,32 @@
 """Unpacked FMUs and what tests do with their instances."""
 
+import ctypes
+
 import fmpy
 import numpy as np
 import pytest
+from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model, FMU3Slave
+from fmpy.logging import addLoggerProxy
 
 SOLVERS = pytest.mark.parametrize("solver", ["dopri5", "rodas", "rk4"])
 TIGHT = 1e-11
+
+
+_LOGGER = fmi2.fmi2CallbackLoggerTYPE(fmi2.printLogMessage)
+
+
+def _kept_callbacks():
+    """fmpy's, with a logger that lives: its proxy calls that of the last who asked."""
+    callbacks = fmi2.fmi2CallbackFunctions(
+        logger=_LOGGER,
+        allocateMemory=fmi2.defaultCallbacks.allocateMemory,
+        freeMemory=fmi2.defaultCallbacks.freeMemory,
+    )
+    addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
 
 
 class Fmu:
@@ -27,7 +45,7 @@ class Fmu:
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             instanceName="instance",
         )
-        instance.instantiate(callbacks=callbacks)
+        instance.instantiate(callbacks=callbacks or _kept_callbacks())
         self.prepare(instance, upto, start, tolerance)
         return instance
 

@@ -140,7 +140,7 @@ def test_values_of_wrong_kinds():
         (lambda: solve(system, None, guess=3), "guess is 3; give a dict"),
         (lambda: solve(system, None, parameters=[1]), "the parameters are .*; give a dict"),
         (lambda: solve(system, {"j1": [1.0, 2.0]}), "the position of j1 has 2 values; give one"),
-        (lambda: solve(None), "call assemble"),
+        (lambda: solve(None), "is not a System"),
     ):
         with pytest.raises(ModelError, match=message):
             call()

@@ -158,5 +158,5 @@ def test_joints_in_line_make_a_line_and_equal_points_are_one():
 
 
 def test_what_is_no_system_is_refused():
-    with pytest.raises(ModelError, match="call assemble"):
+    with pytest.raises(ModelError, match="is not a System"):
         skeleton(mbs.Mechanism("none"))

@@ -206,7 +206,7 @@ def test_a_joint_without_motor_takes_no_constant():
 
 @pytest.mark.parametrize("wrong", [None, "four_bar", Mechanism("m")])
 def test_only_systems_move(wrong):
-    with pytest.raises(ModelError, match="call assemble"):
+    with pytest.raises(ModelError, match="is not a System"):
         mbs.simulate.run(wrong, 1.0)
 
 

@@ -17,6 +17,9 @@ HOST = "127.0.0.1"
 _PATIENCE = 60.0
 """Seconds that a page may be without connection, on a busy machine, before it is loaded anew."""
 
+_DAY = 86400.0
+"""Seconds that the robot of a closed tab is kept."""
+
 _NAMES = ("127.0.0.1", "localhost", "[::1]")
 
 
@@ -46,6 +49,7 @@ def serve(port: int | None = None, robot: str | None = None, open_browser: bool 
     first = robot_document(robot or "rx90")
     number = free_port(port)
     serve_assets()
+    app.storage.max_tab_storage_age = _DAY
     app.add_middleware(Guard)
     app.on_startup(warm_up)
     address = f"http://{HOST}:{number}/"

@@ -106,7 +106,7 @@ def test_coupling_must_name_two_joints(pair, message):
 
 
 def test_a_mechanism_is_no_system():
-    with pytest.raises(ModelError, match="call assemble"):
+    with pytest.raises(ModelError, match="is not a System"):
         columns_of(mbs.robots.puma560())
 
 

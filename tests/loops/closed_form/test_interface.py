@@ -135,7 +135,7 @@ def test_loops_without_closed_form_say_why():
 
 
 def test_what_is_no_system():
-    with pytest.raises(ModelError, match="call assemble"):
+    with pytest.raises(ModelError, match="is not a System"):
         modes(mbs.load("four_bar"))
-    with pytest.raises(ModelError, match="call assemble"):
+    with pytest.raises(ModelError, match="is not a System"):
         function(mbs.load("four_bar"))

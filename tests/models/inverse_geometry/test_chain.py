@@ -52,5 +52,5 @@ def test_the_elbow_is_not_proposed_to_be_locked():
 
 
 def test_many_poses_need_a_system():
-    with pytest.raises(ModelError, match="made of a System"):
+    with pytest.raises(ModelError, match="is not a System"):
         solve_many("puma560", [np.eye(4)])

@@ -37,6 +37,7 @@ class JointSliders:
         self._modes: tuple[Mode, ...] = ()
         self._shape: tuple[object, ...] = ()
         self._held: Handle | None = None
+        self._typed: Handle | None = None
         self._turn = 0
         self._shown_mode: int | None = None
         with ui.element("div").classes("desk-joints"):
@@ -91,7 +92,8 @@ class JointSliders:
             value = q[item.handle.place]
             if not (self._desk.is_moving and item.handle == self._held):
                 item.slider.set_value(value)
-            item.field.set_value(f"{value:.4f}")
+            if item.handle != self._typed:
+                item.field.set_value(f"{value:.4f}")
         for place, label in self._follow.items():
             label.set_text(f"{system.coordinates[place].name} = {q[place]:.4f}")
         self._turn += 1
@@ -136,14 +138,21 @@ class JointSliders:
             throttle=_THROTTLE,
             leading_events=True,
         )
+        field.on("update:model-value", lambda: self._type(handle), args=[])
+        field.on("blur", lambda: self._type(None), args=[])
         field.on("change", lambda: self._written(made))
         return made
+
+    def _type(self, handle: Handle | None) -> None:
+        """Remember in which field somebody types, so that nothing is written over it."""
+        self._typed = handle
 
     async def _slid(self, handle: Handle, event: events.GenericEventArguments) -> None:
         self._held = handle
         await self._desk.move(handle.place, float(event.args))
 
     async def _written(self, item: _Slider) -> None:
+        self._typed = None
         try:
             value = number(str(item.field.value or ""), item.handle.name)
         except MbsError as error:

@@ -66,6 +66,14 @@ class DeskBase:
         """
         return self.session.require_system()
 
+    def checked_system(self) -> System | None:
+        """The robot as typed; None where something is wrong in it, which is told."""
+        try:
+            return self.system()
+        except MbsError as error:
+            self.complain(error)
+            return None
+
     async def aside(self, function: Callable[..., Any], *args: Any) -> Any:
         """What a short function returns, called in the one thread that builds graphs."""
         return await aside(function, *args)

@@ -23,7 +23,6 @@ from mbs.app.desk.panels.layout import (
 from mbs.app.desk.panels.text_view import text_buttons
 from mbs.app.tasks.base import BaseTable, base
 from mbs.app.tasks.equations import entry
-from mbs.errors import MbsError
 
 KEY = "base-parameters"
 
@@ -43,10 +42,7 @@ async def open_base(desk: Desk) -> None:
     """
     one = entry(KEY)
     given = cast(Given, desk.session.notes.setdefault(f"options {KEY}", {}))
-    try:
-        desk.system()
-    except MbsError as error:
-        desk.complain(error)
+    if desk.checked_system() is None:
         return
     with desk.open(one.title, key=KEY):
         left, shown = two_sides("240px")

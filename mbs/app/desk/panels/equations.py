@@ -19,7 +19,6 @@ from mbs.app.desk.panels.layout import (
 from mbs.app.desk.panels.optimizer_settings import passes_of
 from mbs.app.desk.panels.text_view import text_view
 from mbs.app.tasks.equations import EVERY_PASS, WORDS, Equations, entry, equations, languages
-from mbs.errors import MbsError
 from mbs.models.catalogue import Entry
 
 TITLES = {
@@ -51,10 +50,8 @@ async def open_equations(desk: Desk, key: str, language: str | None = None) -> N
         language: to write in at first; the one of last time when left out.
     """
     one = entry(key)
-    try:
-        system = desk.system()
-    except MbsError as error:
-        desk.complain(error)
+    system = desk.checked_system()
+    if system is None:
         return
     refusal = one.refusal(system)
     if refusal:

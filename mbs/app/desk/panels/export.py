@@ -36,10 +36,8 @@ def open_export(desk: Desk) -> None:
     Args:
         desk: of the page.
     """
-    try:
-        system = desk.system()
-    except MbsError as error:
-        desk.complain(error)
+    system = desk.checked_system()
+    if system is None:
         return
     asked = deepcopy(cast(_Asked, desk.session.notes.get(_NOTE, _Asked())))
     desk.session.notes[_NOTE] = asked

@@ -11,7 +11,7 @@ from nicegui import ui
 
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.panels.identification_results import show_results
-from mbs.app.desk.panels.layout import new_answer, tell_of_changes
+from mbs.app.desk.panels.layout import Asking, tell_of_changes
 from mbs.app.desk.panels.plots_fields import Look, choice_field, several_field, text_field
 from mbs.app.desk.panels.plots_look import add_look, come_into_view
 from mbs.app.tasks.identification import (
@@ -19,11 +19,11 @@ from mbs.app.tasks.identification import (
     METHODS,
     VELOCITIES,
     IdentificationSettings,
+    Identified,
     identify,
 )
 from mbs.app.tasks.identification_record import LARGEST, record_columns
 from mbs.assembly import System
-from mbs.errors import MbsError
 from mbs.messages import quoted
 
 _NOTE = "identification"
@@ -62,10 +62,8 @@ def open_identification(desk: Desk) -> None:
     Args:
         desk: of the page.
     """
-    try:
-        system = desk.system()
-    except MbsError as error:
-        desk.complain(error)
+    system = desk.checked_system()
+    if system is None:
         return
     asked = deepcopy(cast(_Asked, desk.session.notes.get(_NOTE, _Asked())))
     desk.session.notes[_NOTE] = asked
@@ -86,28 +84,27 @@ def open_identification(desk: Desk) -> None:
                 ui.label("Estimates and residuals appear here.").classes("desk-note")
 
     async def run() -> None:
-        button.disable()
-        try:
-            await _run(desk, asked, shown)
-        finally:
-            button.enable()
+        await _run(desk, asked, button, shown)
 
     tell_of_changes(desk, shown)
     button.on_click(run)
 
 
-async def _run(desk: Desk, asked: _Asked, shown: ui.element) -> None:
+async def _run(desk: Desk, asked: _Asked, button: ui.button, shown: ui.element) -> None:
     if not asked.content:
         desk.complain("there is no record yet; upload a file of comma-separated values first")
         return
-    task, document = partial(identify, quiet=True), desk.document
-    found = await desk.run("Identifying", task, asked.content, asked.settings())
-    if found is None or shown.is_deleted:
-        return
-    desk.session.notes[_FOUND] = (document, found)
-    with new_answer(desk, shown, document):
+    document = desk.document
+
+    def show(found: Identified) -> None:
+        desk.session.notes[_FOUND] = (document, found)
         show_results(desk, found)
-    come_into_view(shown)
+        come_into_view(shown)
+
+    task = partial(identify, quiet=True)
+    await Asking(desk, button, shown, show).run(
+        "Identifying", task, asked.content, asked.settings()
+    )
 
 
 def _explain(system: System) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
+from mbs.app.desk.panels.count_table import column
 from mbs.app.desk.panels.plots import line_chart
 from mbs.app.tasks.identification import EstimateRow, Identified
 
@@ -130,7 +131,7 @@ _VIEWS = {"Estimates": _estimates, "Residuals": _residuals, "Report": _report}
 
 
 def _table(columns: tuple[tuple[str, str, str], ...], rows: list[dict[str, Any]]) -> None:
-    heads = [{"name": n, "label": title, "field": n, "align": side} for n, title, side in columns]
+    heads = [column(*one) for one in columns]
     table = ui.table(rows=rows, columns=heads, row_key="name").props("dense flat hide-bottom")
     table.classes("desk-table")
 

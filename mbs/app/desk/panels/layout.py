@@ -94,11 +94,12 @@ class Asking:
         """Show what `task(system, *args)` returns; see `Desk.run`."""
         document = self.desk.document
         self.button.disable()
-        made = await self.desk.run(label, task, *args)
-        if self.shown.is_deleted:
-            return
-        self.button.enable()
-        if made is not None:
+        try:
+            made = await self.desk.run(label, task, *args)
+        finally:
+            if not self.button.is_deleted:
+                self.button.enable()
+        if made is not None and not self.shown.is_deleted:
             with new_answer(self.desk, self.shown, document):
                 self.show(made)
 

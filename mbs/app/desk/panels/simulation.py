@@ -19,7 +19,6 @@ from mbs.app.tasks.exporting import file_stem
 from mbs.app.tasks.simulation import csv_bytes
 from mbs.app.tasks.simulation_film import Film, film
 from mbs.assembly import System
-from mbs.errors import MbsError
 
 _NOTE = "simulation"
 _FILM = "simulated"
@@ -32,10 +31,8 @@ def open_simulation(desk: Desk) -> None:
     Args:
         desk: of the page.
     """
-    try:
-        system = desk.system()
-    except MbsError as error:
-        desk.complain(error)
+    system = desk.checked_system()
+    if system is None:
         return
     texts = first_texts(cast(Texts, desk.session.notes.get(_NOTE, {})))
     desk.session.notes[_NOTE] = texts
@@ -63,10 +60,8 @@ def open_simulation(desk: Desk) -> None:
 
 
 async def _run(desk: Desk, texts: Texts, shown: ui.element) -> None:
-    try:
-        system = desk.system()
-    except MbsError as error:
-        desk.complain(error)
+    system = desk.checked_system()
+    if system is None:
         return
     settings, document = settings_of(system, texts, desk.q), desk.document
     made = await desk.run(f"Simulating {system.name}", film, settings)

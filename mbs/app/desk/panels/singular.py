@@ -22,7 +22,6 @@ from mbs.app.desk.panels.layout import (
 from mbs.app.desk.panels.text_view import text_view
 from mbs.app.tasks.equations import entry
 from mbs.app.tasks.singular import Factor, Singular, singular
-from mbs.errors import MbsError
 
 KEY = "determinant"
 
@@ -35,10 +34,7 @@ async def open_singular(desk: Desk) -> None:
     """
     one = entry(KEY)
     given = cast(Given, desk.session.notes.setdefault(f"options {KEY}", {}))
-    try:
-        desk.system()
-    except MbsError as error:
-        desk.complain(error)
+    if desk.checked_system() is None:
         return
     with desk.open("Determinant and singular postures", key=KEY):
         left, shown = two_sides()

@@ -195,3 +195,19 @@ def test_mistakes_are_told_in_a_sentence(assembled):
     m.connect(m.world.at("L"), Revolute("j1", axis="x"), rod)
     with pytest.raises(ModelError, match="parameter 'L' has no value"):
         mbs.view.scene(m.assemble())
+
+
+def test_two_roots_a_slide_and_massless_links():
+    frames = [
+        {"antecedent": 0, "joint": "revolute"},
+        {"antecedent": 0, "joint": "prismatic", "d": 1},
+        {"antecedent": 1, "joint": "revolute", "d": 0.5},
+    ]
+    body = {"frame": 1, "XX": 1, "YY": 1, "ZZ": 1, "M": 1}
+    system = mbs.load({"name": "two_roots", "frame": frames, "body": [body]}).assemble()
+    q = [0.3, 0.2, 0.1]
+    poses = np.reshape(mbs.view.scene(system).poses(q), (-1, 3, 4))
+    for link in (1, 2, 3):
+        T = np.array(mbs.models.transform(system, link)(q))
+        np.testing.assert_allclose(poses[link], T[:3], atol=1e-12)
+    assert system.draw().svg.count("prismatic") == 1

@@ -55,11 +55,12 @@ class Adjustable:
     """A number of a system, or an expression of its symbols, by the name it would have as a symbol.
 
     Attributes:
-        name: kind and number of the link, such as M3, d4, Fv1; G1, G2, G3 for gravity; of the
-            place of a cut joint `joint.frame_a.x`.
+        name: kind and number of the link, such as M3, d4, Fv1; d4_1 for the first fixed frame on
+            the way to link 4; G1, G2, G3 for gravity; of the place of a cut joint
+            `joint.frame_a.x`.
         kind: a member of `GROUPS`.
-        owner: what it belongs to: ("link", number from 0), ("gravity", row), or the name of a cut
-            joint and its frame, "a" or "b".
+        owner: what it belongs to: ("link", number from 0), ("fixed frame", "4_1"), ("gravity",
+            row), or the name of a cut joint and its frame, "a" or "b".
         value: the number or expression.
         unit: of it.
         description: one line.
@@ -80,6 +81,12 @@ def adjustables(system: System) -> list[Adjustable]:
 
 
 def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
+    for k, frame in enumerate(link.via):
+        label = f"{j + 1}_{k + 1}"
+        for kind, value in zip(PLACEMENT, frame.parameters, strict=True):
+            text = f"Khalil parameter {kind} of fixed frame {k + 1} on the way to link {j + 1}"
+            owner = ("fixed frame", label)
+            yield Adjustable(f"{kind}{label}", kind, owner, value, _FIXED_UNITS[kind], text)
     values = dict(zip(TEN_PARAMETERS, elements(link.inertia.parameters), strict=True))
     values |= dict(zip(PLACEMENT, link.placement.parameters, strict=True))
     values |= {"Fv": link.Fv, "Fs": link.Fs}

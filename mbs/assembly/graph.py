@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi
 import numpy as np
@@ -56,10 +58,17 @@ class Edge:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Graph:
-    """Rigid bodies and the joints between them; node 0 holds the world."""
+    """Rigid bodies and the joints between them; node 0 holds the world.
+
+    Attributes:
+        nodes: the rigid bodies.
+        edges: the joints.
+        size: of the largest body, between joints on it; of the world where bodies have none [m].
+    """
 
     nodes: tuple[Node, ...]
     edges: tuple[Edge, ...]
+    size: float
 
 
 def connection_graph(
@@ -96,7 +105,7 @@ def connection_graph(
         for joint in mechanism.joints()
         if joint.name in joints
     )
-    return Graph(tuple(nodes), edges)
+    return Graph(tuple(nodes), edges, _size(len(nodes), edges, at))
 
 
 def _check_transmissions(mechanism: Mechanism) -> None:
@@ -243,6 +252,21 @@ def _edge(
         nodes[b].members[joint.name, "b"],
         _given_khalil(mechanism, joint, nodes[a], symbols),
     )
+
+
+def _size(nodes: int, edges: Sequence[Edge], at: _Evaluator) -> float:
+    """The largest distance between two joints of one body; one where there is none [m]."""
+    places = at(casadi.horzcat(SX(3, 0), *(p for e in edges for p in (e.pose_a.p, e.pose_b.p))))
+    on: list[list[Any]] = [[] for _ in range(nodes)]
+    for number, edge in enumerate(edges):
+        on[edge.a].append(places[:, 2 * number])
+        on[edge.b].append(places[:, 2 * number + 1])
+
+    def spread(points: Sequence[Any]) -> float:
+        gaps = (math.hypot(*(p - q)) for k, p in enumerate(points) for q in points[:k])
+        return max(gaps, default=0.0)
+
+    return max(map(spread, on[1:]), default=0.0) or spread(on[0]) or 1.0
 
 
 def _given_khalil(

@@ -4,18 +4,18 @@ The pose between two consecutive axes is decomposed into gamma, b, alpha, d, the
 Rz(gamma) Tz(b) commutes with the motion of the joint before, the gamma and b of the first joint on
 a link are moved into theta and r of the link itself: frame j then sits where the classical
 notation puts it, with x along the common perpendicular to the next axis. Frames that a table gave
-stay as they were given.
+stay as they were given. Where the common perpendicular is far, or a symbol may move it anywhere,
+the frame stays at the described origin, and fixed frames lead to it (`spatial.khalil.placed`).
 
 Source: Khalil & Kleinfinger 1986, section 2.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import casadi
-import numpy as np
 from casadi import DM, SX
 
 from mbs.assembly.graph import Edge, Graph, inertia_of
@@ -24,7 +24,7 @@ from mbs.assembly.tree import CarriedRotor, Frame, Link, Tree
 from mbs.components import Mechanism
 from mbs.components.motion import Freedom, Motion
 from mbs.expressions import to_sx
-from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z, snapped
+from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z, exact_product, placed
 
 _FLIP = Pose.turned(SX(DM([[1, 0, 0], [0, -1, 0], [0, 0, -1]])))
 _EFFORTS = ("Ia", "Fv", "Fs", "Fs_width", "stiffness", "rest")
@@ -74,18 +74,47 @@ class Framed:
     homes: tuple[tuple[int, Pose], ...]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Draft:
-    """A link whose frame may still slide and turn about its axis."""
+    """A link as it was described, before its frame is chosen.
+
+    Attributes:
+        name: of the motion.
+        joint: its name.
+        antecedent: number of the link before it, -1 for the base.
+        motion: that moves it; along or about z for revolute and prismatic ones.
+        pose: the frame of the motion at zero in that of the antecedent's motion, both as described.
+        given: the Khalil parameters of the pose, where it was described by them.
+        edge: the joint.
+        nodes: pose of every node on the link, and of the free end of a cut joint (-1), in the frame
+            of the motion.
+    """
 
     name: str
     joint: str
     antecedent: int
     motion: Motion
-    placement: Khalil
+    pose: Pose
+    given: Khalil | None
     edge: Edge
-    fixed_frame: bool = False
     nodes: dict[int, Pose] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Chosen:
+    """The frame of a link: where its placement puts it, on the axis of its joint.
+
+    Attributes:
+        via, placement: the frames that lead to it.
+        shift: from the described frame of the motion to the chosen one, a turn about and a slide
+            along the axis of the joint.
+        settled: whether the frame stays where it is.
+    """
+
+    via: tuple[Khalil, ...]
+    placement: Khalil
+    shift: Pose
+    settled: bool
 
 
 def khalil_frames(
@@ -111,10 +140,14 @@ def khalil_frames(
         else:
             home[branch.child] = last
             drafts[last].nodes[branch.child] = pose
+    chosen = _chosen_frames(drafts, graph.size)
 
     def place(node: int) -> tuple[int, Pose]:
         link = home[node]
-        return link, (base if link < 0 else drafts[link].nodes)[node]
+        return link, base[node] if link < 0 else placed_on(link, node)
+
+    def placed_on(link: int, node: int) -> Pose:
+        return chosen[link].shift.inverse() @ drafts[link].nodes[node]
 
     cuts = []
     for edge in spanning.cuts:
@@ -122,7 +155,7 @@ def khalil_frames(
         link_a, pose_a = place(edge.a)
         stub = stubs.get(id(edge))
         if stub is not None:
-            pose = drafts[stub].nodes[-1]
+            pose = placed_on(stub, -1)
             cuts.append(Cut(edge, stub, link_b, pose, pose_b @ edge.pose_b, True))
         else:
             cuts.append(
@@ -136,7 +169,7 @@ def khalil_frames(
             inertias[link] = inertias[link] + own.seen_from(MatrixTurn(pose.R), pose.p)
     gravity = casadi.vertcat(*(to_sx(g, symbols) for g in mechanism.world.gravity))
     rotors = [_rotor(draft.edge, place, symbols) for draft in drafts]
-    tree = Tree(_links(drafts, inertias, rotors, symbols), gravity)
+    tree = Tree(_links(drafts, chosen, inertias, rotors, symbols), gravity)
     return Framed(tree, tuple(draft.joint for draft in drafts), tuple(cuts), homes)
 
 
@@ -160,21 +193,15 @@ def _extend(
     freedoms = edge.joint.freedoms if branch.forward else edge.joint.freedoms[::-1]
     for freedom in freedoms:
         aligned = _aligned(freedom, branch.forward)
-        if given is not None and aligned.is_identity():
-            placement = given
-            if parent >= 0:
-                drafts[parent].fixed_frame = True
-        else:
-            placement = _settled(drafts, parent, Khalil.of_pose(here @ aligned))
         drafts.append(
             _Draft(
                 freedom.coordinate_of(edge.joint.name),
                 edge.joint.name,
                 parent,
                 freedom.motion,
-                placement,
+                here @ aligned,
+                given if aligned.is_identity() else None,
                 edge,
-                fixed_frame=placement is given,
             )
         )
         parent, here, given = len(drafts) - 1, aligned.inverse(), None
@@ -182,27 +209,44 @@ def _extend(
     return parent, here @ end
 
 
-def _settled(drafts: list[_Draft], parent: int, placement: Khalil) -> Khalil:
-    """The placement once gamma and b have moved into the parent's own theta and r."""
-    if parent < 0:
-        return placement
-    draft = drafts[parent]
-    if draft.fixed_frame or draft.motion not in _ALONG_Z:
-        draft.fixed_frame = True
-        return placement
-    draft.fixed_frame = True
-    shift = Khalil(placement.gamma, placement.b, SX(0), SX(0), SX(0), SX(0)).pose()
-    back = shift.inverse()
-    draft.placement = draft.placement.turned(placement.gamma).slid(placement.b)
-    draft.nodes = {node: back @ pose for node, pose in draft.nodes.items()}
-    return Khalil(SX(0), SX(0), placement.alpha, placement.d, placement.theta, placement.r)
+def _chosen_frames(drafts: Sequence[_Draft], size: float) -> list[_Chosen]:
+    """The frame of every link: as it was given, else Khalil's where it is near.
+
+    The gamma and b of the first link behind a revolute or prismatic joint move the frame of that
+    joint along and about its axis, unless it was given, so that they are zero in what follows.
+
+    Args:
+        drafts: the links as described.
+        size: of the mechanism [m].
+    """
+    chosen: list[_Chosen] = []
+    for draft in drafts:
+        before = chosen[draft.antecedent] if draft.antecedent >= 0 else None
+        via: tuple[Khalil, ...] = ()
+        placement, stays = draft.given, draft.motion not in _ALONG_Z
+        if placement is not None and (before is None or before.shift.is_identity()):
+            stays = True
+        else:
+            pose = draft.pose if before is None else before.shift.inverse() @ draft.pose
+            *fixed, placement = placed(pose, size)
+            if before is not None and not before.settled:
+                first, *others = (*fixed, placement)
+                moved, left = first.divided()
+                before.placement = before.placement.turned(moved.gamma).slid(moved.b)
+                before.shift = moved.pose()
+                *fixed, placement = (left, *others)
+            via = tuple(fixed)
+        if before is not None:
+            before.settled = True
+        chosen.append(_Chosen(via, placement, Pose.identity(), stays))
+    return chosen
 
 
 def _aligned(freedom: Freedom, forward: bool) -> Pose:
     """The frame with z along the axis of a freedom, reversed when the joint is run backwards."""
     if freedom.motion not in _ALONG_Z:
         return Pose.identity()
-    pose = Pose.turned(align_z(np.array(freedom.axis)))
+    pose = Pose.turned(align_z(freedom.axis))
     return pose if forward else pose @ _FLIP
 
 
@@ -217,7 +261,7 @@ def _rotor(
     axis = edge.joint.freedoms[0].axis if rotor.axis is None else rotor.axis
     return CarriedRotor(
         carrier=link,
-        axis=snapped(casadi.mtimes((pose @ edge.pose_a).R, SX(DM(list(axis))))),
+        axis=exact_product((pose @ edge.pose_a).R, SX(DM(list(axis)))),
         inertia=to_sx(rotor.inertia, symbols),
         ratio=to_sx(rotor.ratio, symbols),
     )
@@ -225,12 +269,13 @@ def _rotor(
 
 def _links(
     drafts: list[_Draft],
+    chosen: list[_Chosen],
     inertias: list[Inertia],
     rotors: list[CarriedRotor | None],
     symbols: Mapping[str, SX],
 ) -> tuple[Link, ...]:
     links, nq, nv = [], 0, 0
-    for draft, inertia, rotor in zip(drafts, inertias, rotors, strict=True):
+    for draft, frame, inertia, rotor in zip(drafts, chosen, inertias, rotors, strict=True):
         motion = draft.motion
         q, v = slice(nq, nq + motion.nq), slice(nv, nv + motion.nv)
         links.append(
@@ -238,7 +283,8 @@ def _links(
                 name=draft.name,
                 antecedent=draft.antecedent,
                 motion=motion,
-                placement=draft.placement,
+                via=frame.via,
+                placement=frame.placement,
                 inertia=inertia,
                 rotor=rotor,
                 q=q,

@@ -14,6 +14,7 @@ from mbs.assembly.drive_tables import attached_devices, shaft_rows
 from mbs.assembly.graph import Graph, connection_graph
 from mbs.assembly.joint_rows import joint_rows
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
+from mbs.assembly.proof import prove
 from mbs.assembly.rates import zero_position
 from mbs.assembly.sensors import attached_sensors
 from mbs.assembly.spanning_tree import spanning_tree
@@ -62,7 +63,8 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         given_order=mechanism.keep_order,
     )
     framed = khalil_frames(mechanism, graph, spanning, symbols)
-    _check_placements(framed, symbols, _trial_values(parameters))
+    places = _places(graph, framed)
+    prove(mechanism, framed, places, symbols, _trial_values(parameters))
     joints = {joint.name: joint for joint in mechanism.joints()}
     in_loops = _looped_joints(framed) | _driven_joints(mechanism)
     moved = [
@@ -73,7 +75,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     coordinates = position_coordinates(moved, actuated)
     _check_names(mechanism, coordinates)
     speeds = velocity_coordinates(moved, actuated)
-    places, cut = _places(graph, framed), _cut_coordinates(framed.cuts)
+    cut = _cut_coordinates(framed.cuts)
     joints_found = joint_rows(mechanism, places, framed.cuts, symbols)
     return System(
         name=mechanism.name,
@@ -107,25 +109,6 @@ def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
         p.name: 0.731 + 0.217 * number if p.default is None else p.default
         for number, p in enumerate(parameters)
     }
-
-
-def _check_placements(
-    framed: Framed, symbols: Mapping[str, SX], values: Mapping[str, float]
-) -> None:
-    """Refuse a frame whose Khalil parameters do not exist at the values of its symbols."""
-    p = casadi.vertcat(*symbols.values()) if symbols else SX(0, 1)
-    numbers = [values[name] for name in symbols]
-    for link in reversed(framed.tree.links):
-        placement = casadi.vertcat(*link.placement.parameters)
-        at = casadi.Function("placement", [p], [placement])
-        if not at(numbers).is_regular():
-            used = {symbol.name() for symbol in casadi.symvar(placement)}
-            told = ", ".join(f"{name} = {values[name]:g}" for name in symbols if name in used)
-            raise AssemblyError(
-                f"{link.name}: at {told} its axis is parallel to the one before it, where the"
-                " parameters that place it are not defined; give the symbol another value, or"
-                " a number in its place"
-            )
 
 
 def _check_names(mechanism: Mechanism, coordinates: Sequence[Coordinate]) -> None:

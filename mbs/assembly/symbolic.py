@@ -23,6 +23,9 @@ from mbs.spatial import Inertia, Khalil, Pose, elements
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 _Symbols = Mapping[str, SX]
+_Given = Mapping[tuple[str, int | str], _Symbols]
+"""Symbols by kind, by the owner of the number that they take the place of."""
+
 _OF_THE_JOINT = ("Ia", "Fv", "Fs")
 
 
@@ -160,9 +163,7 @@ def _with(
     given: dict[tuple[str, int | str], dict[str, SX]] = {}
     for row in rows:
         given.setdefault(row.owner, {})[row.kind] = symbols[row.name]
-    links = tuple(
-        _link(link, given.get(("link", j), {})) for j, link in enumerate(system.tree.links)
-    )
+    links = tuple(_link(j, link, given) for j, link in enumerate(system.tree.links))
     gravity = [given.get(("gravity", k), {}).get("G", system.tree.gravity[k]) for k in range(3)]
     joints = tuple(_joint(row, system.cuts, given) for row in system.joints)
     return replace(
@@ -184,27 +185,31 @@ def _with(
     )
 
 
-def _link(link: Link, values: _Symbols) -> Link:
-    if not values:
-        return link
+def _link(j: int, link: Link, given: _Given) -> Link:
+    via = tuple(
+        _frame(frame, given.get(("fixed frame", f"{j + 1}_{k}"), {}))
+        for k, frame in enumerate(link.via, 1)
+    )
+    values = given.get(("link", j), {})
     ten = zip(TEN_PARAMETERS, elements(link.inertia.parameters), strict=True)
     inertia = Inertia.from_parameters(casadi.vertcat(*(values.get(k, old) for k, old in ten)))
-    six = zip(PLACEMENT, link.placement.parameters, strict=True)
-    placement = Khalil(*(values.get(kind, old) for kind, old in six))
     rotor = link.rotor
     if rotor is not None and "Jm" in values:
         rotor = replace(rotor, inertia=values["Jm"])
     joint: dict[str, Any] = {name: values[name] for name in _OF_THE_JOINT if name in values}
-    return replace(link, inertia=inertia, placement=placement, rotor=rotor, **joint)
+    placement = _frame(link.placement, values)
+    return replace(link, inertia=inertia, via=via, placement=placement, rotor=rotor, **joint)
 
 
-_Given = Mapping[tuple[str, int | str], _Symbols]
+def _frame(frame: Khalil, values: _Symbols) -> Khalil:
+    six = zip(PLACEMENT, frame.parameters, strict=True)
+    return Khalil(*(values.get(kind, old) for kind, old in six)) if values else frame
 
 
 def _moved(pose: Pose, values: _Symbols) -> Pose:
     if not values:
         return pose
-    return Pose(pose.R, casadi.vertcat(*(values.get(k, pose.p[i]) for i, k in enumerate("xyz"))))
+    return pose.at(casadi.vertcat(*(values.get(k, pose.p[i]) for i, k in enumerate("xyz"))))
 
 
 def _sensor(sensor: AttachedSensor, joints: Sequence[JointRow]) -> AttachedSensor:

@@ -79,6 +79,8 @@ class LinkRow:
         motion: revolute, prismatic, spherical or free.
         gamma, b, alpha, d, theta, r: placement at the zero position [rad, m]; numbers, or
             expressions where a symbol is in them.
+        via: the same six of fixed frames between the antecedent and the placement; the link is
+            placed on the last of them. There are none where one frame says it.
     """
 
     number: int
@@ -91,6 +93,7 @@ class LinkRow:
     d: float | SX
     theta: float | SX
     r: float | SX
+    via: tuple[tuple[float | SX, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +168,14 @@ def link_rows(tree: Tree) -> tuple[LinkRow, ...]:
     """The links and the parameters of their frames."""
     rows = []
     for number, link in enumerate(tree.links, start=1):
-        parameters = (float(x) if x.is_constant() else x for x in link.placement.parameters)
-        rows.append(LinkRow(number, link.name, link.antecedent + 1, link.motion.value, *parameters))
+        *via, (gamma, b, alpha, d, theta, r) = (
+            tuple(float(x) if x.is_constant() else x for x in frame.parameters)
+            for frame in link.frames
+        )
+        before, motion = link.antecedent + 1, link.motion.value
+        rows.append(
+            LinkRow(number, link.name, before, motion, gamma, b, alpha, d, theta, r, tuple(via))
+        )
     return tuple(rows)
 
 

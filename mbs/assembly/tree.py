@@ -48,7 +48,10 @@ class Link:
         name: of the motion: the joint's name, with a suffix when the joint has several.
         antecedent: number of link i, or -1 for the base.
         motion: how frame j moves from its placement.
-        placement: frame j with respect to frame i at the zero position of the motion.
+        via: fixed frames between frame i and the placement, one after the other; none where the
+            common perpendicular of the axes of i and j is near.
+        placement: frame j with respect to the last of them, or to frame i, at the zero position of
+            the motion.
         inertia: of everything fixed on the link, about the origin of frame j and in its axes.
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
         Fv: viscous friction [N m s/rad or N s/m].
@@ -64,6 +67,7 @@ class Link:
     name: str
     antecedent: int
     motion: Motion
+    via: tuple[Khalil, ...]
     placement: Khalil
     inertia: Inertia
     Ia: SX
@@ -75,6 +79,18 @@ class Link:
     rotor: CarriedRotor | None
     q: slice
     v: slice
+
+    @property
+    def frames(self) -> tuple[Khalil, ...]:
+        """The fixed frames on link i, then frame j at the zero position."""
+        return *self.via, self.placement
+
+    def pose(self) -> Pose:
+        """Frame j seen from frame i at the zero position of the motion."""
+        pose = self.placement.pose()
+        for frame in reversed(self.via):
+            pose = frame.pose() @ pose
+        return pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from mbs.errors import DescriptionError
 from mbs.messages import quoted
-from mbs.spatial import align_z
+from mbs.spatial import align_z, unit_vector
 
 _NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -32,17 +33,15 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
         raise DescriptionError(
             f"{name}: axis {quoted(axis)} is not a direction; give three numbers"
         )
-    length = float(np.linalg.norm(values))
-    if length < 1e-9:
+    if math.hypot(*values) < 1e-9:
         raise DescriptionError(f"{name}: axis {quoted(axis)} has zero length; give a direction")
-    x, y, z = (float(v) for v in values / length)
-    return x, y, z
+    return unit_vector(values.tolist())
 
 
 def in_plane(
     axis: tuple[float, float, float],
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Two unit vectors u, v with u x v = axis; x and y for the axis z."""
-    R = align_z(np.array(axis))
+    R = align_z(axis)
     u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
     return (u[0], u[1], u[2]), (v[0], v[1], v[2])

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
-from mbs.components.placement import KhalilStep, Placement, Rotation, displacement
+from mbs.components.placement import (
+    KhalilStep,
+    Placement,
+    Rotation,
+    angle_expression,
+    displacement,
+)
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, renamed, with_values
 
@@ -49,8 +55,9 @@ class Point:
         where = f"{self.owner.name}.at_khalil"
         values = (gamma, b, alpha, d, theta, r)
         names = ("gamma", "b", "alpha", "d", "theta", "r")
+        readers: Sequence[Callable[[Scalar, str], Expression]] = (angle_expression, expression) * 3
         step = KhalilStep(
-            *(expression(v, f"{where}, {n}") for n, v in zip(names, values, strict=True))
+            *(r(v, f"{where}, {n}") for r, n, v in zip(readers, names, values, strict=True))
         )
         return replace(self, placement=self.placement.then(step))
 

@@ -5,22 +5,28 @@ A placement is read from left to right: each step starts where the one before it
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
 from casadi import DM, SX
 
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, renamed, to_sx
+from mbs.expressions import Expression, Number, Scalar, expression, renamed, to_sx
 from mbs.messages import quoted
-from mbs.spatial import Khalil, Pose, axis_turn, snapped, vector
+from mbs.spatial import Khalil, Pose, nearest_rotation, vector
 
 SymbolTable = Mapping[str, SX]
 """The CasADi symbol of every parameter, by name."""
 
-_EXACT = 1e-13
+_DIGITS = 11
+"""Significant digits from which on a number may be a multiple of pi/2 that was written down."""
+
+_WRITTEN = 6e-12
+"""How far the usual texts 1.5707963268 and 1.57079632679 are from pi/2, at most [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +51,7 @@ class Turned:
 
     def pose(self, symbols: SymbolTable) -> Pose:
         """The turned frame seen from the one before."""
-        return Pose.turned(axis_turn(self.axis, to_sx(self.angle, symbols)).matrix)
+        return Pose.about(self.axis, to_sx(self.angle, symbols))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +62,7 @@ class Oriented:
 
     def pose(self, symbols: SymbolTable) -> Pose:
         """The turned frame seen from the one before."""
-        return Pose.turned(snapped(SX(DM(np.array(self.rows)))))
+        return Pose.turned(SX(DM(self.rows)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,10 +160,7 @@ def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
             f"{where}: rotation {quoted(rotation)} is not a rotation; give ('z', angle), a sequence"
             " of such turns, or an orthonormal right-handed (3, 3) matrix"
         )
-    if not np.allclose(R @ R.T, np.eye(3), rtol=0, atol=_EXACT):
-        U, _, V = np.linalg.svd(R)  # digits were cut off: the nearest rotation
-        R = U @ V
-    return [Oriented(tuple((float(r[0]), float(r[1]), float(r[2])) for r in R))]
+    return [Oriented(nearest_rotation(R.tolist()))]
 
 
 def _is_turn(part: Any) -> bool:
@@ -167,4 +170,24 @@ def _is_turn(part: Any) -> bool:
 def _turn(where: str, axis: str, angle: Scalar) -> Turned:
     if axis not in ("x", "y", "z"):
         raise DescriptionError(f"{where}: rotation axis {axis!r} is not 'x', 'y' or 'z'; use one")
-    return Turned(axis, expression(angle, f"{where}, rotation about {axis}"))
+    return Turned(axis, angle_expression(angle, f"{where}, rotation about {axis}"))
+
+
+def angle_expression(angle: Scalar, where: str) -> Expression:
+    """An angle [rad]; a multiple of pi/2 that was written with 11 digits or more is exactly that.
+
+    1.57079632679 in a file means pi/2. Five units of 1e-12 would be a tilt that nobody meant, for
+    which every model pays in operations. A text with fewer digits is taken at its word.
+    """
+    value = expression(angle, where)
+    if not isinstance(value, Number):
+        return value
+    meant = round(value.value / (math.pi / 2)) * math.pi / 2
+    if not 0 < abs(value.value - meant) <= _WRITTEN:
+        return value
+    written = Decimal(repr(value.value)).as_tuple()
+    assert isinstance(written.exponent, int)
+    if meant == 0 or len(written.digits) < _DIGITS:
+        return value
+    last_digit = 10.0**written.exponent
+    return Number(meant) if abs(value.value - meant) < last_digit else value

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
-from casadi import SX, Function
+import casadi
+from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
@@ -20,7 +20,7 @@ from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable, write_par
 from mbs.formats.rows import BODY_SCALARS, GEOMETRY
 from mbs.messages import quoted
 from mbs.operations.graph import graph_of
-from mbs.spatial import Khalil, Pose, align_z
+from mbs.spatial import Khalil, Pose, align_z, placed
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 Text = Callable[[SX], str]
@@ -34,9 +34,10 @@ _OF_THE_JOINT = [name for name in BODY_SCALARS if name not in TEN_PARAMETERS]
 def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     """Write a mechanism as a robot file of SYMORO.
 
-    Link j of the system is frame j of the file, its joint variable q<j>; bodies that are welded
-    together are one link. Symbols stay symbols, and their values are in comments that
-    `mbs.load` reads. Names of joints and bodies and limits are lost.
+    Link j of the system is frame j of the file, its joint variable q<j>; where fixed frames lead
+    to a link they come before it. Bodies that are welded together are one link. Symbols stay
+    symbols, and their values are in comments that `mbs.load` reads. Names of joints and bodies and
+    limits are lost.
 
     Args:
         system: of revolute and prismatic motions; cut joints are one of the two. A Mechanism is
@@ -58,26 +59,68 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
 
 
 def _table(system: System) -> RobotTable:
+    """The table of frames: fixed frames first, then the links that they lead to, then the cuts."""
     _check(system)
     text = _text_of(system)
-    links, cuts = system.tree.links, system.cuts
-    frames = [_frame(system, j, text) for j in range(len(links))]
-    moving = [_cut_frame(cut, cut.link_a, cut.pose_a, text) for cut in cuts]
-    fixed = [_cut_frame(cut, cut.link_b, cut.pose_b, text, sigma=2) for cut in cuts]
-    first = len(links) + 1
-    loops = [CutRow((first + k, first + len(cuts) + k), _kind(cut)) for k, cut in enumerate(cuts)]
-    names = [f"q{j}" for j in range(1, len(links) + 1)]
-    posture = dict(zip(names, system.posture, strict=True)) if cuts else {}
+    size = max(map(_length, _shifts(system)), default=0.0) or 1.0
+    frames: list[FrameRow] = []
+    number = {-1: 0}  # of the frame of each link; of the base
+    for j, link in enumerate(system.tree.links):
+        before = number[link.antecedent]
+        for frame in link.via:
+            frames.append(FrameRow(before, 2, None, **_geometry(frame, text)))
+            before = len(frames)
+        motor = system.speeds[j].actuated
+        kind = _SIGMA[link.motion]
+        frames.append(FrameRow(before, kind, motor, **_geometry(link.placement, text)))
+        number[j] = len(frames)
+    moving, fixed = list[FrameRow](), list[FrameRow]()
+    for cut in system.cuts:
+        for link_number, pose, rows in (
+            (cut.link_a, cut.pose_a, moving),
+            (cut.link_b, cut.pose_b, fixed),
+        ):
+            axis = cut.edge.joint.freedoms[0].axis
+            *via, own = placed(pose @ Pose.turned(align_z(axis)), size)
+            before = number[link_number]
+            for frame in via:
+                frames.append(FrameRow(before, 2, None, **_geometry(frame, text)))
+                before = len(frames)
+            sigma = _SIGMA[cut.edge.joint.freedoms[0].motion] if rows is moving else 2
+            motor_of_cut = False if rows is moving else None
+            rows.append(FrameRow(before, sigma, motor_of_cut, **_geometry(own, text)))
+    first, count = len(frames) + 1, len(system.cuts)
+    loops = [
+        CutRow((first + k, first + count + k), _kind(cut)) for k, cut in enumerate(system.cuts)
+    ]
+    names = [f"q{number[j]}" for j in range(len(system.tree.links))]
+    posture = dict(zip(names, system.posture, strict=True)) if system.cuts else {}
     return RobotTable(
         name=system.name,
         frames=(*frames, *moving, *fixed),
-        bodies=tuple(_body(j, link, text) for j, link in enumerate(links, 1)),
+        bodies=tuple(_body(number[j], link, text) for j, link in enumerate(system.tree.links)),
         loops=tuple(loops),
         gravity=tuple(text(system.tree.gravity[k]) for k in range(3)),
         parameters={p.name: p.default for p in system.parameters if p.default is not None},
         source=system.source,
         guess={name: value for name, value in posture.items() if value},
     )
+
+
+def _shifts(system: System) -> Iterator[SX]:
+    """Positions of the links and of the cut joints on the links before them [m]."""
+    defaults = SX(DM(system.p_default))
+    for p in (
+        *(link.pose().p for link in system.tree.links),
+        *(pose.p for cut in system.cuts for _, pose in cut.frames),
+    ):
+        yield SX(casadi.substitute(p, system.p, defaults)) if casadi.symvar(p) else p
+
+
+def _length(p: SX) -> float:
+    """Of a shift in numbers [m]; zero where a symbol has no value."""
+    length = float(casadi.norm_2(DM(p)))
+    return length if length == length else 0.0
 
 
 def _check(system: System) -> None:
@@ -108,24 +151,6 @@ def _check(system: System) -> None:
                 f"{system.name}/{cut.edge.joint.name}: a table of frames cuts loops at revolute"
                 " or prismatic joints without friction, rotor and motor; cut the loop elsewhere"
             )
-
-
-def _frame(system: System, j: int, text: Text) -> FrameRow:
-    link = system.tree.links[j]
-    return FrameRow(
-        link.antecedent + 1,
-        _SIGMA[link.motion],
-        system.speeds[j].actuated,
-        **_geometry(link.placement, text),
-    )
-
-
-def _cut_frame(cut: Cut, link: int, pose: Pose, text: Text, sigma: int | None = None) -> FrameRow:
-    freedom = cut.edge.joint.freedoms[0]
-    along = pose @ Pose.turned(align_z(np.array(freedom.axis)))
-    placement = _geometry(Khalil.of_pose(along), text)
-    kind = _SIGMA[freedom.motion] if sigma is None else sigma
-    return FrameRow(link + 1, kind, None if kind == 2 else False, **placement)
 
 
 def _geometry(placement: Khalil, text: Text) -> dict[str, Any]:

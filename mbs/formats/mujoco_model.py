@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -76,7 +77,7 @@ def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:
 
 def matrix_of(quat: Sequence[float]) -> Any:
     """(3, 3) rotation of a quaternion (w, x, y, z) of any length but zero."""
-    w, x, y, z = np.asarray(quat, dtype=float) / np.linalg.norm(quat)
+    w, x, y, z = np.asarray(quat, dtype=float) / math.hypot(*quat)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

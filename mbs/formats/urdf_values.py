@@ -78,7 +78,7 @@ def read_inertial(reader: Reader, link: Element) -> Inertial:
     tensor = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
     for axis, angle in reversed(turns):
         R = _turn(axis, angle)
-        tensor = R @ tensor @ R.T
+        tensor = np.einsum("ij,jk,lk->il", R, tensor, R)
     tensor = (tensor + tensor.T) / 2
     return Inertial(reader.number(mass, "value", 0.0), com, tensor.tolist())
 

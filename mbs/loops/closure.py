@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import casadi
-import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly import System
@@ -150,7 +149,7 @@ def _cut_rows(system: System, q: SX, cut: Cut) -> Rows:
     if isinstance(joint, Rod):
         return _rod(pose, to_sx(joint.length, system.symbol_table))
     axis = getattr(joint, "axis", (0.0, 0.0, 1.0))
-    inside = Pose.turned(align_z(np.array(axis)))
+    inside = Pose.turned(align_z(axis))
     along = inside.inverse() @ pose @ inside
     return _ROWS[type(joint)](along, joint)
 

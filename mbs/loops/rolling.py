@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi
-import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly import System
@@ -93,7 +92,7 @@ def rolling_discs(system: System) -> Iterator[tuple[Cut, RollingDisc]]:
 
 def pose_on_plane(system: System, q: SX, cut: Cut, disc: RollingDisc) -> Pose:
     """Frame_b of a rolling disc in axes at frame_a whose z is the normal of the plane."""
-    plane = Pose.turned(align_z(np.array(disc.normal)))
+    plane = Pose.turned(align_z(disc.normal))
     return plane.inverse() @ relative_pose(system.tree, q, *cut.frames)
 
 

@@ -110,7 +110,7 @@ def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
     angles: list[SX] = []
     for j, link in enumerate(tree.links):
         i, at = link.antecedent, link.placement
-        seat = _moving(Screw.about("z", at.gamma, at.b), Screw.about("x", at.alpha, at.d))
+        seat = _moving(*(screw for frame in link.via for screw in frame.fixed), *at.seat)
         angle = at.theta + q[link.q] if link.motion is Motion.REVOLUTE else at.theta
         run: tuple[int, ...] = (j,)
         if link.motion is Motion.REVOLUTE and i >= 0 and _continues(tree.links[i], seat):
@@ -124,7 +124,7 @@ def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
 
 def _continues(before: Link, seat: tuple[Screw, ...]) -> bool:
     """Whether a revolute joint on this seat has the axis direction of the one before."""
-    return before.motion is Motion.REVOLUTE and all(step.turn.c.is_one() for step in seat)
+    return before.motion is Motion.REVOLUTE and not any(_turns(step) for step in seat)
 
 
 def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
@@ -155,4 +155,9 @@ def _joint(
 
 def _moving(*steps: Screw) -> tuple[Screw, ...]:
     """The steps that move anything."""
-    return tuple(step for step in steps if not (step.turn.c.is_one() and step.t.is_zero()))
+    return tuple(step for step in steps if _turns(step) or not step.t.is_zero())
+
+
+def _turns(step: Screw) -> bool:
+    """Whether it turns; the cosine of a small angle is one, its sine is not zero."""
+    return not (step.turn.s.is_zero() and step.turn.c.is_one())

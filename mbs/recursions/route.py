@@ -18,6 +18,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
 from mbs.recursions.cost import cost
 from mbs.spatial import (
+    Khalil,
     MatrixTurn,
     Pose,
     Rotation,
@@ -91,12 +92,7 @@ def way_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[Step]:
 def _link_steps(k: int, link: Link, q: SX) -> list[Step]:
     place, motion = link.placement, link.motion
     slid = place.r + q if motion is Motion.PRISMATIC else place.r
-    steps: list[Step] = [
-        Spin(place.gamma),
-        Shift(vector([0, 0, place.b])),
-        Tilt(axis_turn("x", place.alpha)),
-        Shift(vector([place.d, 0, 0])),
-    ]
+    steps = [step for frame in link.via for step in _fixed_steps(frame)] + _seat_steps(place)
     if motion in (Motion.REVOLUTE, Motion.PRISMATIC):
         steps.append(JointAt(k))
     if motion is Motion.REVOLUTE:
@@ -110,12 +106,27 @@ def _link_steps(k: int, link: Link, q: SX) -> list[Step]:
     return [*(step for step in steps if not _is_idle(step)), OriginOf(k)]
 
 
+def _seat_steps(frame: Khalil) -> list[Step]:
+    """From one frame to the axis of the next."""
+    return [
+        Spin(frame.gamma),
+        Shift(vector([0, 0, frame.b])),
+        Tilt(axis_turn("x", frame.alpha)),
+        Shift(vector([frame.d, 0, 0])),
+    ]
+
+
+def _fixed_steps(frame: Khalil) -> list[Step]:
+    """From one frame to the next, which does not move."""
+    return [*_seat_steps(frame), Spin(frame.theta), Shift(vector([0, 0, frame.r]))]
+
+
 def _is_idle(step: Step) -> bool:
     match step:
         case Spin(angle=angle):
             return bool(angle.is_zero())
-        case Tilt(rotation=Turn(c=c)):
-            return bool(c.is_one())
+        case Tilt(rotation=Turn(s=s, c=c)):
+            return bool(s.is_zero() and c.is_one())
         case Shift(p=p):
             return is_zero(p)
     return False

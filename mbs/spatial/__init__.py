@@ -6,11 +6,19 @@ operation counts of the models low.
 
 from mbs.spatial.angles import sin_cos
 from mbs.spatial.inertia import Inertia
-from mbs.spatial.khalil import Khalil
+from mbs.spatial.khalil import Khalil, placed
 from mbs.spatial.pose import Pose
 from mbs.spatial.pseudo_inertia import Body, PseudoInertia
 from mbs.spatial.quaternion import quaternion_rate, quaternion_rotation
-from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, align_z, axis_turn
+from mbs.spatial.rotation import (
+    MatrixTurn,
+    Rotation,
+    Turn,
+    align_z,
+    axis_turn,
+    nearest_rotation,
+    unit_vector,
+)
 from mbs.spatial.screw import (
     Displacement,
     FreeDisplacement,
@@ -20,7 +28,16 @@ from mbs.spatial.screw import (
     origin,
     wrench_through,
 )
-from mbs.spatial.vectors import cross, elements, exact_sum, is_zero, skew, snapped, vector, zeros
+from mbs.spatial.vectors import (
+    cross,
+    elements,
+    exact_product,
+    exact_sum,
+    is_zero,
+    skew,
+    vector,
+    zeros,
+)
 from mbs.spatial.wrench import Wrench, add_wrenches, carried
 
 __all__ = [
@@ -44,14 +61,17 @@ __all__ = [
     "carried",
     "cross",
     "elements",
+    "exact_product",
     "exact_sum",
     "is_zero",
+    "nearest_rotation",
     "origin",
+    "placed",
     "quaternion_rate",
     "quaternion_rotation",
     "sin_cos",
     "skew",
-    "snapped",
+    "unit_vector",
     "vector",
     "wrench_through",
     "zeros",

@@ -6,14 +6,16 @@ import casadi
 from casadi import SX
 
 _QUARTER = math.pi / 2
-_SNAP = 1e-9
+_SNAP = 1e-14
+"""An angle this near to a quarter turn is one [rad]: sums of a few multiples of pi/2 are off by
+some 4e-16 each. A tilt that a file describes is larger, and stays."""
 
 
 def sin_cos(angle: SX) -> tuple[SX, SX]:
     """Sine and cosine of an angle [rad], with the quarter turns in it taken out exactly.
 
-    sin(pi/2) is 1 and sin(pi/2 + q) is cos(q), so that constants fold. An angle that a file
-    wrote within 1e-9 of a quarter turn is taken as the quarter turn.
+    sin(pi/2) is 1 and sin(pi/2 + q) is cos(q), so that constants fold. An angle within rounding
+    of a quarter turn is the quarter turn.
     """
     constant, rest = _split(angle)
     quarters = round(constant / _QUARTER)

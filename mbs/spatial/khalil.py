@@ -2,21 +2,42 @@
 
 T_ij = Rz(gamma) Tz(b) Rx(alpha) Tx(d) Rz(theta) Tz(r)
 
+Any pose is one of them, or a few one after the other: `placed` finds them. Two axes that are
+nearly parallel have their common perpendicular far away, and an angle between them that is a
+symbol may be zero or negative; a fixed frame between the two then takes the place of the far one.
+
 Source: Khalil & Kleinfinger 1986.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import casadi
-from casadi import SX
+from casadi import DM, SX, Function
 
 from mbs.spatial.pose import Pose
 from mbs.spatial.rotation import axis_turn
-from mbs.spatial.vectors import vector
+from mbs.spatial.screw import Screw
+from mbs.spatial.vectors import exact_sum, vector
 
-_QUARTER = casadi.pi / 2 + 1e-9
+_QUARTER = math.pi / 2
+
+_FARTHEST = 3.0
+"""How far along its axis a frame may move to a common perpendicular, in sizes of the mechanism:
+links keep their own size in the tables, and no digit of a position is lost."""
+
+_LEAST_SINE = 0.5
+"""Where lengths are symbols their numbers are not known: axes that make 30 degrees at least have
+their common perpendicular within twice the offset, whatever the symbols are."""
+
+_NOISE = 1e-14
+"""Lengths below this part of the size of the mechanism are the rounding of who computed them."""
+
+_TIE = 1e-9
+"""An angle gamma this near to a quarter turn counts as one for the choice of its sense [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +72,39 @@ class Khalil:
 
     def pose(self) -> Pose:
         """The frame j seen from frame i."""
-        gamma, alpha, theta = (
-            axis_turn(axis, angle)
-            for axis, angle in (("z", self.gamma), ("x", self.alpha), ("z", self.theta))
-        )
-        R = casadi.mtimes(casadi.mtimes(gamma.matrix, alpha.matrix), theta.matrix)
-        return Pose(R, self.position())
+        R = Pose.about("z", self.gamma) @ Pose.about("x", self.alpha) @ Pose.about("z", self.theta)
+        if not R.chain:
+            return Pose(R.R, self.position())
+        first = Pose.about("z", self.gamma) @ Pose.moved(vector([self.d, 0, self.b]))
+        last = Pose.about("z", self.theta) @ Pose.moved(vector([0, 0, self.r]))
+        return Pose(R.R, self.position(), (first @ Pose.about("x", self.alpha) @ last).chain)
+
+    @property
+    def seat(self) -> tuple[Screw, ...]:
+        """From frame i to the axis of joint j: gamma and b, then alpha and d."""
+        return Screw.about("z", self.gamma, self.b), Screw.about("x", self.alpha, self.d)
+
+    @property
+    def fixed(self) -> tuple[Screw, ...]:
+        """From frame i to frame j when nothing moves between them."""
+        if not self._shifts_across:
+            return *self.seat, Screw.about("z", self.theta, self.r)
+        turn = Screw.about("z", exact_sum(self.gamma, SX(-_QUARTER)), self.b)
+        return turn, Screw.about("y", SX(0), self.d), Screw.about("z", SX(0), self.r)
+
+    def divided(self) -> tuple[Khalil, Khalil]:
+        """Its gamma and b, which commute with a motion about and along z_i, and what is left."""
+        zero, gamma = SX(0), self.gamma
+        left = zero
+        if self._shifts_across:
+            gamma, left = exact_sum(gamma, SX(-_QUARTER)), SX(_QUARTER)
+        return Khalil(gamma, self.b, zero, zero, zero, zero), replace(self, gamma=left, b=zero)
+
+    @property
+    def _shifts_across(self) -> bool:
+        """Whether it is a shift along y, written by an x axis that is a quarter turn ahead."""
+        ahead = self.theta.is_constant() and float(self.theta) == -_QUARTER
+        return bool(self.alpha.is_zero() and ahead)
 
     def position(self) -> SX:
         """(3, 1) origin of frame j in frame i [m]; theta has no part in it."""
@@ -71,63 +119,234 @@ class Khalil:
         """The frame slid further along its own z axis."""
         return replace(self, r=self.r + distance)
 
-    @staticmethod
-    def of_pose(pose: Pose) -> Khalil:
-        """The parameters of a frame that may stand anywhere.
 
-        Parallel axes leave one distance free: b is then zero and r takes the offset. Structure
-        (parallel, intersecting) is read from constants that are exact, so that geometry with
-        symbols stays as simple as with numbers.
-        """
-        R, p = pose.R, pose.p
-        if R[0, 2].is_zero() and R[1, 2].is_zero():
-            return _parallel(R, p)
-        sign = -1.0 if _points_back(_atan2(R[0, 2], -R[1, 2])) else 1.0
-        gamma = _atan2(sign * R[0, 2], -sign * R[1, 2])
-        turn = axis_turn("z", gamma)
-        x, y, z = (turn.apply_inverse(p)[k] for k in range(3))
-        s_alpha, c_alpha = -turn.apply_inverse(R[:, 2])[1], R[2, 2]
-        r = -y / s_alpha
-        return Khalil(
-            gamma=gamma,
-            b=_clean(z - r * c_alpha),
-            alpha=_atan2(s_alpha, c_alpha),
-            d=_clean(x),
-            theta=_atan2(sign * R[2, 0], sign * R[2, 1]),
-            r=_clean(r),
+def placed(pose: Pose, size: float) -> tuple[Khalil, ...]:
+    """The frames that lead to a pose, one after the other; the last one stands at it.
+
+    It is one frame where the common perpendicular of the two axes is near. Otherwise fixed frames
+    come before it: one for a shift across both axes, one for every further turn by a symbol. What
+    holds of numbers is never said of a symbol: its sign, or that its sine is not zero.
+
+    Parallel axes leave one distance free: b is then zero and r takes the offset.
+
+    Args:
+        pose: of numbers, or made of turns by symbols about coordinate axes.
+        size: of the mechanism, such as the length of its largest link [m].
+
+    Raises:
+        ValueError: symbols turn the pose in a way that its chain does not tell.
+    """
+    if not pose.chain and not pose.R.is_constant():
+        raise ValueError("a pose that symbols turn has no chain of turns")
+    segments, theta, r = _segments(pose, size)
+    frames: list[Khalil] = []
+    slide = SX(0)  # along z, left over by the segment before
+    for number, segment in enumerate(segments):
+        last = number == len(segments) - 1
+        segment.z = exact_sum(segment.z, slide)
+        turn, height = (theta, r) if last else (SX(0), SX(0))
+        found, slide = _frames(segment, turn, size)
+        if last:
+            found[-1] = found[-1].slid(exact_sum(height, slide))
+        frames += found
+    return tuple(frames)
+
+
+@dataclass(slots=True)
+class _Segment:
+    """Rz(gamma), a shift (x, y, z) in the axes that it makes, Rx(alpha)."""
+
+    gamma: SX
+    x: SX
+    y: SX
+    z: SX
+    alpha: SX
+
+    def shift(self, x: SX, y: SX, z: SX) -> None:
+        """A further shift in the axes before alpha."""
+        self.x, self.y, self.z = exact_sum(self.x, x), exact_sum(self.y, y), exact_sum(self.z, z)
+
+    def shift_behind(self, x: SX, y: SX, z: SX) -> None:
+        """A further shift in the axes behind alpha."""
+        self.shift(*_turned("x", self.alpha, x, y, z))
+
+
+def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
+    """A pose as segments, then theta and r of the last frame."""
+    segments: list[_Segment] = []
+    # what follows the last turn about x: a turn about z, then a shift in the axes that it makes
+    theta, x, y, z = SX(0), SX(0), SX(0), SX(0)
+    for axis, angle, p in _elementary(pose):
+        if axis == "z":
+            x, y, _ = _turned("z", -angle, x, y, SX(0))
+            theta = exact_sum(theta, angle)
+        elif axis == "x" and theta.is_zero() and segments:
+            before = segments[-1]
+            before.shift_behind(x, y, z)
+            before.alpha = exact_sum(before.alpha, angle)
+            x, y, z = SX(0), SX(0), SX(0)
+            if before.alpha.is_zero():
+                segments.pop()
+                theta, x, y, z = before.gamma, before.x, before.y, before.z
+        elif axis == "x":
+            segments.append(_Segment(theta, x, y, z, angle))
+            theta, x, y, z = SX(0), SX(0), SX(0), SX(0)
+        elif theta.is_zero() and segments:
+            segments[-1].shift_behind(p[0], p[1], SX(0))
+            z = exact_sum(z, p[2])
+        else:
+            x, y, z = exact_sum(x, p[0]), exact_sum(y, p[1]), exact_sum(z, p[2])
+    if segments:
+        segments[-1].shift_behind(*_turned("z", theta, x, y, SX(0)))
+        r = z
+    elif theta.is_constant() or _direction(pose.p[0], pose.p[1]) is not None:
+        # parallel axes, the shift seen from before the turn
+        segments, r = [_Segment(SX(0), pose.p[0], pose.p[1], pose.p[2], SX(0))], SX(0)
+    else:
+        segments, theta, r = [_Segment(theta, x, y, z, SX(0))], SX(0), SX(0)
+    for segment in segments:
+        _clean(segment, size)
+    return segments, theta, SX(0) if _is_noise(r, size) else r
+
+
+def _elementary(pose: Pose) -> Iterator[tuple[str, SX, Sequence[SX]]]:
+    """The pose as turns about z and x by an angle, and shifts ("" for the axis)."""
+    nothing = (SX(0), SX(0), SX(0))
+    for step in pose.steps:
+        if isinstance(step, Pose):
+            yield "", SX(0), (step.p[0], step.p[1], step.p[2])
+            gamma, alpha, theta = _euler_angles(DM(step.R).full().tolist())
+            turns = [("z", gamma), ("x", alpha), ("z", theta)]
+            yield from ((axis, SX(angle), nothing) for axis, angle in turns if angle)
+        elif step.axis == "y":
+            yield "z", SX(_QUARTER), nothing
+            yield "x", step.angle, nothing
+            yield "z", SX(-_QUARTER), nothing
+        else:
+            yield step.axis, step.angle, nothing
+
+
+def _euler_angles(R: Sequence[Sequence[float]]) -> tuple[float, float, float]:
+    """Angles with R = Rz(gamma) Rx(alpha) Rz(theta), gamma within a quarter turn of zero."""
+    if R[0][2] == 0 and R[1][2] == 0:
+        if R[2][2] > 0:
+            return 0.0, 0.0, _atan2(R[1][0], R[0][0])
+        return 0.0, math.pi, _atan2(-R[1][0], R[0][0])
+    gamma = math.atan2(R[0][2], -R[1][2])
+    sign = -1.0 if abs(gamma) > _QUARTER + _TIE else 1.0
+    gamma = math.atan2(sign * R[0][2], -sign * R[1][2])
+    sine = sign * math.hypot(R[0][2], R[1][2])
+    alpha = math.atan2(sine, R[2][2])
+    if abs(sine) > _LEAST_SINE:
+        return gamma, alpha, _atan2(sign * R[2][0], sign * R[2][1])
+    # of axes that are nearly parallel gamma alone says little: theta follows from it
+    s, c = math.sin(gamma), math.cos(gamma)
+    along, across = c * R[0][0] + s * R[1][0], c * R[1][0] - s * R[0][0]
+    up = math.cos(alpha) * across + math.sin(alpha) * R[2][0]
+    if abs(up) < _NOISE:
+        return gamma, alpha, 0.0 if along > 0 else math.pi
+    if abs(along) < _NOISE:
+        return gamma, alpha, math.copysign(_QUARTER, up)
+    return gamma, alpha, _atan2(up, along)
+
+
+def _atan2(y: float, x: float) -> float:
+    """The angle; half a turn is positive, also where y is a negative zero."""
+    return math.atan2(y + 0.0, x)
+
+
+def _frames(segment: _Segment, theta: SX, size: float) -> tuple[list[Khalil], SX]:
+    """The frames of a segment and of the turn about z behind it, and a slide along the last z."""
+    gamma, alpha, x, y, z = segment.gamma, segment.alpha, segment.x, segment.y, segment.z
+    sine, cosine = axis_turn("x", alpha).s, axis_turn("x", alpha).c
+    if sine.is_zero():
+        alpha = SX(0.0 if float(cosine) > 0 else math.pi)
+        towards = 0.0 if y.is_zero() else _direction(x, y)
+        if towards is not None:
+            # parallel axes: x along the shift between them
+            length = x if y.is_zero() else _turned("z", SX(-towards), x, y, SX(0))[0]
+            gamma = exact_sum(gamma, SX(towards))
+            theta = exact_sum(theta, -cosine * towards)
+            return [Khalil(gamma, SX(0), alpha, length, theta, SX(0))], cosine * z
+    elif y.is_zero():
+        return [Khalil(gamma, z, alpha, x, theta, SX(0))], SX(0)
+    elif sine.is_constant():
+        r = -y / sine
+        b = exact_sum(z, -r * cosine)
+        if _is_near(b, r, abs(float(sine)), size):
+            return [Khalil(gamma, b, alpha, x, theta, SX(0))], r
+    ahead = exact_sum(gamma, SX(_QUARTER))
+    across = Khalil(ahead, z, SX(0), y, SX(-_QUARTER), SX(0))
+    return [across, Khalil(SX(0), SX(0), alpha, x, theta, SX(0))], SX(0)
+
+
+def _is_near(b: SX, r: SX, sine: float, size: float) -> bool:
+    """Whether the common perpendicular is near both frames."""
+    if b.is_constant() and r.is_constant():
+        return max(abs(float(b)), abs(float(r))) <= _FARTHEST * size
+    return sine >= _LEAST_SINE
+
+
+def _turned(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
+    """The shift behind a turn about "x" or "z", seen from before it; zeros stay zeros."""
+    turn = axis_turn(axis, angle)
+    if axis == "x":
+        y, z = exact_sum(turn.c * y, -turn.s * z), exact_sum(turn.s * y, turn.c * z)
+    elif not (x.is_zero() and y.is_zero()):
+        x, y = exact_sum(turn.c * x, -turn.s * y), exact_sum(turn.s * x, turn.c * y)
+    return x, y, z
+
+
+def _clean(segment: _Segment, size: float) -> None:
+    """Zero in the place of lengths that are rounding, or that vanish whatever the symbols are."""
+    lengths = (segment.x, segment.y, segment.z)
+    x, y, z = (SX(0) if _is_noise(length, size) else length for length in lengths)
+    if not all(length.is_constant() for length in (x, y, z)):
+        samples = _samples(x, y, z)
+        largest = [max(map(abs, sample)) for sample in samples]
+        x, y, z = (
+            SX(0)
+            if samples
+            and all(abs(s[k]) <= _NOISE * m for s, m in zip(samples, largest, strict=True))
+            else length
+            for k, length in enumerate((x, y, z))
         )
+    segment.x, segment.y, segment.z = x, y, z
 
 
-def _points_back(angle: SX) -> bool:
-    """Whether the angle is a number beyond a quarter turn; the opposite sense then reads better."""
-    return bool(angle.is_constant() and abs(float(angle)) > _QUARTER)
+def _is_noise(length: SX, size: float) -> bool:
+    return bool(length.is_constant() and abs(float(length)) <= _NOISE * size)
 
 
-def _parallel(R: SX, p: SX) -> Khalil:
-    up = R[2, 2]
-    gamma = SX(0) if p[1].is_zero() else _atan2(p[1], p[0])
-    turn = axis_turn("z", gamma)
-    x_axis = turn.apply_inverse(R[:, 0])
-    return Khalil(
-        gamma=gamma,
-        b=SX(0),
-        alpha=_atan2(SX(0), up),
-        d=_clean(turn.apply_inverse(p)[0]),
-        theta=_atan2(up * x_axis[1], x_axis[0]),
-        r=up * p[2],
-    )
-
-
-def _atan2(y: SX, x: SX) -> SX:
-    """The angle; of a lone symbol along one axis it is taken as pointing in its positive sense."""
+def _direction(x: SX, y: SX) -> float | None:
+    """The angle of (x, y), to within half a turn, where it is the same for all symbols [rad]."""
+    if x.is_constant() and y.is_constant():
+        return math.atan2(float(y), float(x))
     if y.is_zero():
-        return SX(0) if not x.is_constant() or float(x) >= 0 else SX(casadi.pi)
+        return 0.0
     if x.is_zero():
-        sign = 1.0 if not y.is_constant() or float(y) > 0 else -1.0
-        return SX(sign * casadi.pi / 2)
-    return SX(casadi.atan2(y, x))
+        return _QUARTER
+    samples = [sample for sample in _samples(x, y) if math.hypot(*sample) > 0]
+    if not samples:
+        return None
+    first = max(samples, key=lambda sample: math.hypot(*sample))
+    towards = math.atan2(first[1], first[0])
+    s, c = math.sin(towards), math.cos(towards)
+    same = all(abs(c * y - s * x) <= _NOISE * math.hypot(x, y) for x, y in samples)
+    return towards if same else None
 
 
-def _clean(value: SX) -> SX:
-    """A constant that is rounding noise of a metre-sized mechanism is zero."""
-    return SX(0) if value.is_constant() and abs(float(value)) < 1e-13 else value
+def _samples(*lengths: SX) -> list[tuple[float, ...]]:
+    """Values of lengths at a few values of the symbols in them, of both signs."""
+    symbols = casadi.symvar(casadi.vertcat(*lengths))
+    at = Function("lengths", [casadi.vertcat(*symbols)], [casadi.densify(casadi.vertcat(*lengths))])
+    # irregular numbers between 0.3 and 1.7, each sign pattern another one
+    rows = [
+        [
+            (-1) ** (k * (m + 1) // 2) * (0.3 + 1.4 * ((0.618034 * (5 * k + m + 1)) % 1))
+            for m in range(len(symbols))
+        ]
+        for k in range(6)
+    ]
+    values = (tuple(DM(at(row)).full().ravel().tolist()) for row in rows)
+    return [value for value in values if all(map(math.isfinite, value))]

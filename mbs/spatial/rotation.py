@@ -6,18 +6,33 @@ angle is a multiple of a quarter turn: two turns are cheaper than the matrix the
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import casadi
-import numpy as np
 from casadi import DM, SX
-from numpy.typing import NDArray
 
 from mbs.spatial.angles import sin_cos
-from mbs.spatial.vectors import snapped
+
+Rows = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+"""A (3, 3) matrix of numbers, row by row."""
 
 _AXES = "xyz"
+
+_NOISE = 1e-14
+"""Elements of a unit vector or rotation below this came from the rounding of whoever computed it:
+a product of a few rotations is off by some 1e-15. Tilts that were meant are far larger."""
+
+_ORTHONORMAL = 5e-16
+"""What R'R may differ from the identity: two units of the last digit of one."""
+
+_ROUNDS = 8
+"""The iteration doubles the digits each time, from 1e-6 on; setting zeros costs another two."""
+
+_TIE = 1e-6
+"""Elements of a unit vector that differ by less are equal for a choice between axes."""
 
 
 class Rotation(Protocol):
@@ -140,15 +155,50 @@ def axis_turn(axis: str, angle: SX) -> Turn:
     return Turn(axis, s, c)
 
 
-def align_z(direction: NDArray[np.float64]) -> SX:
-    """A constant rotation whose z axis is the unit vector `direction`.
+def align_z(direction: Sequence[float]) -> SX:
+    """A constant rotation whose z axis is along `direction`, three numbers.
 
     For a coordinate axis the other two are coordinate axes too, so that no oblique numbers
     appear: x, y and z of the new frame are (y, z, x) for direction x and (z, x, y) for y.
     """
-    z = direction / np.linalg.norm(direction)
-    major = int(np.argmax(np.abs(z)))
-    helper = np.eye(3)[major - 1]
-    y = helper - z * float(z @ helper)
-    y /= np.linalg.norm(y)
-    return snapped(SX(DM(np.column_stack([np.cross(y, z), y, z]))))
+    z = unit_vector([float(x) for x in direction])
+    # the axis that z is nearest to; of nearly equal ones the first, whatever their last digits
+    largest = max(map(abs, z))
+    major = next(k for k in range(3) if abs(z[k]) > largest - _TIE)
+    helper = [0.0, 0.0, 0.0]
+    helper[major - 1] = 1.0
+    y = unit_vector([h - z[major - 1] * x for h, x in zip(helper, z, strict=True)])
+    x = [y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0]]
+    return casadi.densify(SX(DM([[x[k], y[k], z[k]] for k in range(3)])))
+
+
+def unit_vector(vector: Sequence[float]) -> tuple[float, float, float]:
+    """The direction of three numbers, what is only rounding in it zero."""
+    length = math.hypot(*vector)
+    x, y, z = (0.0 if abs(x) <= _NOISE * length else x / length for x in vector)
+    length = math.hypot(x, y, z)  # a second time: the first one leaves a unit of the last digit
+    return x / length, y / length, z / length
+
+
+def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -> Rows:
+    """The rotation next to a (3, 3) matrix whose digits were cut off, its noise taken out.
+
+    Elements below the noise become zero, an element alone in its row becomes 1 or -1, and the rows
+    are made orthonormal again, all together, so that the result is a rotation to the last digit.
+
+    Source: Higham 1986 for the iteration to the orthogonal polar factor.
+    """
+    R = [[float(x) for x in row] for row in matrix]
+    for _ in range(_ROUNDS):
+        R = [[0.0 if abs(x) < noise else x for x in row] for row in R]
+        for row in R:
+            if sum(x != 0 for x in row) == 1:
+                row[:] = [math.copysign(1.0, x) if x else 0.0 for x in row]
+        gram = [[sum(R[k][i] * R[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+        off = max(abs(gram[i][j] - (i == j)) for i in range(3) for j in range(3))
+        if off <= _ORTHONORMAL:
+            break
+        half = [[1.5 * (i == j) - 0.5 * gram[i][j] for j in range(3)] for i in range(3)]
+        R = [[sum(R[i][k] * half[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+    first, second, third = ((row[0], row[1], row[2]) for row in R)
+    return first, second, third

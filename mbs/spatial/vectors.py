@@ -6,8 +6,9 @@ from typing import cast
 import casadi
 from casadi import SX
 
-_SNAP = 1e-12
 _ROUNDING = 2e-15
+"""Part of its terms that a sum may have left from their rounding: some ten units of their last
+digit, far above what two or three roundings leave and far below any tilt that was meant."""
 
 
 def vector(elements: Iterable[SX | float]) -> SX:
@@ -58,17 +59,33 @@ def exact_sum(a: SX, b: SX) -> SX:
     return SX(0 if abs(total) <= _ROUNDING * (abs(first) + abs(second)) else total)
 
 
-def snapped(value: SX) -> SX:
-    """The same matrix, dense, with constants within 1e-12 of -1, 0 or 1 put exactly there.
+def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
+    """A B + C, dense; an element is zero where numbers cancel but for their last digits.
 
-    Rotations that come from files carry pi/2 with a dozen digits; without this their zeros
-    never fold.
+    Rotations that undo each other leave 1e-17 in the place of a zero, which would never fold. What
+    is small by itself, such as the sine of a tilt of 1e-12, stays.
     """
-    exact = casadi.densify(value)
-    for place, element in enumerate(elements(exact)):
-        if element.is_constant():
-            number = float(element)
-            nearest = round(number)
-            if number != nearest and abs(nearest) <= 1 and abs(number - nearest) < _SNAP:
-                exact[place] = nearest
-    return exact
+    product = casadi.mtimes(A, B) if C is None else C + casadi.mtimes(A, B)
+    dense = casadi.densify(product)
+    largest = _largest_number(B) if C is None else max(_largest_number(B), _largest_number(C))
+    rows = dense.shape[0]
+    for place, element in enumerate(elements(dense)):
+        if not element.is_constant():
+            continue
+        number = abs(float(element))
+        # elements of A, a rotation, are at most one: most sums are told by the largest number
+        if 0 < number <= 2 * _ROUNDING * largest:
+            row, column = place % rows, place // rows
+            terms = [A[row, k] * B[k, column] for k in range(A.shape[1])]
+            if C is not None:
+                terms.append(C[row, column])
+            if number <= _ROUNDING * max(_largest_number(term) for term in terms):
+                dense[place] = 0
+    return dense
+
+
+def _largest_number(value: SX) -> float:
+    """The largest constant element, by its size; zero where there is none."""
+    if value.is_constant():
+        return float(casadi.norm_inf(casadi.vec(value))) if value.nnz() else 0.0
+    return max((abs(float(e)) for e in elements(value) if e.is_constant()), default=0.0)

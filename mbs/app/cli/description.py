@@ -87,6 +87,9 @@ def _links(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, Any
                 "antecedent": row.antecedent,
                 "motion": row.motion,
                 **dict(placed),
+                "via": [
+                    dict(zip(GEOMETRY, map(scalar, f.parameters), strict=True)) for f in link.via
+                ],
                 "bodies": bodies,
             }
         )

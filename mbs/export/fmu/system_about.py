@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import casadi
 from casadi import SX
@@ -67,20 +67,22 @@ def _geometry(system: System) -> Table:
     return Table(
         "Placement of the links",
         ("link", "moved by", "on", "γ [rad]", "b [m]", "α [rad]", "d [m]", "θ [rad]", "r [m]"),
-        tuple(_placement(system, row) for row in system.links),
+        tuple(placement for row in system.links for placement in _placements(system, row)),
         "Parameters of Khalil and Kleinfinger at the zero of the coordinate, which is added to θ"
-        " or r.",
+        " or r. A fixed frame on the way to link 4 is numbered 4.1.",
     )
 
 
-def _placement(system: System, row: LinkRow) -> tuple[str, ...]:
+def _placements(system: System, row: LinkRow) -> Iterator[tuple[str, ...]]:
+    """The fixed frames that lead to a link, then the link."""
+    before = _place(row.antecedent - 1)
+    for number, fixed in enumerate(row.via, 1):
+        name = f"{row.number}.{number}"
+        yield name, "fixed", before, *_texts(system, (SX(x) for x in fixed))
+        before = f"frame {name}"
     numbers = (row.gamma, row.b, row.alpha, row.d, row.theta, row.r)
-    return (
-        str(row.number),
-        f"{row.motion} {row.name}",
-        _place(row.antecedent - 1),
-        *_texts(system, (SX(x) for x in numbers)),
-    )
+    what = f"{row.motion} {row.name}"
+    yield str(row.number), what, before, *_texts(system, (SX(x) for x in numbers))
 
 
 def _inertias(system: System) -> Table:

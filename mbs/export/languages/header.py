@@ -107,17 +107,24 @@ def _ascii(line: str) -> str:
 
 
 def tables(function: Function) -> tuple[str, ...]:
-    """The geometric parameters of the links, as the classic output lists them."""
+    """The geometric parameters of the links, as the classic output lists them.
+
+    A fixed frame that leads to link 4 is numbered 4.1 and has sigma 2.
+    """
     system = getattr(function, "system", None)
     if system is None:
         return ()
     keys = ("ant", "sigma", "gamma", "b", "alpha", "d", "theta", "r")
-    rows = [("j", *keys)]
+    rows: list[tuple[str, ...]] = [("j", *keys)]
     sigma = {"revolute": "0", "prismatic": "1"}
     for row in system.links:
+        before = str(row.antecedent)
+        for number, fixed in enumerate(row.via, 1):
+            rows.append((f"{row.number}.{number}", before, "2", *map(_cell, fixed)))
+            before = f"{row.number}.{number}"
         place = (row.gamma, row.b, row.alpha, row.d, row.theta, row.r)
         kind = sigma.get(row.motion, row.motion)
-        rows.append((str(row.number), str(row.antecedent), kind, *map(_cell, place)))
+        rows.append((str(row.number), before, kind, *map(_cell, place)))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in rows]
     return ("", "Geometric parameters", "", *lines)

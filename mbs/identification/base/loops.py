@@ -25,7 +25,7 @@ from mbs.components.motion import Freedom, Motion
 from mbs.identification.base.lambda_transform import lambda_transform
 from mbs.identification.base.rules import Key, on_link
 from mbs.recursions.poses import base_poses, link_poses
-from mbs.spatial import Pose, align_z, snapped
+from mbs.spatial import Pose, align_z, nearest_rotation
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 Array = NDArray[np.float64]
@@ -91,7 +91,7 @@ def _shared(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
 
 
 def _along(freedom: Freedom) -> Pose:
-    return Pose.turned(align_z(np.array(freedom.axis)))
+    return Pose.turned(align_z(freedom.axis))
 
 
 def pair_relations(
@@ -111,7 +111,12 @@ def pair_relations(
             relative = np.einsum("sji,sjk->sik", R[a], R[b])
             if _constant(relative):
                 same = not base_moves and (a == 0 or _side_by_side(poses, a, b))
-                yield from _shared_by_pair(a - 1, b - 1, snapped(SX(DM(relative[0]))), same)
+                yield from _shared_by_pair(a - 1, b - 1, _rotation(relative[0]), same)
+
+
+def _rotation(R: Array) -> SX:
+    """A constant rotation as measured at closed configurations, which are open by some 1e-13."""
+    return SX(DM(nearest_rotation(R.tolist(), noise=1e-12)))
 
 
 def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:

@@ -75,7 +75,7 @@ def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
             combinations = [("M", {}, {"M": 1})]
     if not combinations:
         return
-    pose = link.placement.pose()
+    pose = link.pose()
     if link.motion is Motion.PRISMATIC:
         pose = Pose.turned(pose.R)
     through = lambda_transform(pose) if link.antecedent >= 0 else None
@@ -136,7 +136,7 @@ def _prismatic(structure: Structure, j: int) -> Iterator[Removal]:
     if structure.rests(before):
         yield from _nothing(j, _MOMENTS)
     elif structure.one_direction(before) and structure.parallel(turning[0], j):
-        through = lambda_transform(structure.tree.links[j].placement.pose())
+        through = lambda_transform(structure.tree.links[j].pose())
         for name in ("MX", "MY"):
             antecedent = structure.tree.links[j].antecedent
             yield Removal((j, name), on_link(antecedent, _column(through, name)))
@@ -213,7 +213,7 @@ def _mass_before(link: Link) -> dict[Key, SX]:
     """A mass at the origin of frame j that is fixed on link i, taken away."""
     if link.antecedent < 0:
         return {}
-    through = lambda_transform(link.placement.pose())
+    through = lambda_transform(link.pose())
     return on_link(link.antecedent, -_column(through, "M"))
 
 

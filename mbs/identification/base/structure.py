@@ -131,7 +131,7 @@ class Structure:
         pose = Pose.identity()
         path = self.tree.path(j)
         for link in path[path.index(k) + 1 :]:
-            pose = pose @ self.tree.links[link].placement.pose()
+            pose = pose @ self.tree.links[link].pose()
         return pose.inverse()
 
 
@@ -140,7 +140,7 @@ def structure_of(system: System, *, base_moves: bool = False) -> Structure:
     tree = system.tree
     poses: list[Pose] = []
     for link in tree.links:
-        own = link.placement.pose()
+        own = link.pose()
         poses.append(own if link.antecedent < 0 else poses[link.antecedent] @ own)
     turns = casadi.horzcat(SX(3, 0), *(pose.R for pose in poses))
     origins = casadi.horzcat(SX(3, 0), *(pose.p for pose in poses))

@@ -75,7 +75,7 @@ def _terms(effects: Mapping[Key, SX], places: Mapping[Key, int]) -> Terms | None
 def depends_on_symbols(system: System) -> bool:
     """Whether lengths, angles or gravity of the system have symbols in them."""
     tree = system.tree
-    placements = [x for link in tree.links for x in link.placement.parameters]
+    placements = [x for link in tree.links for frame in link.frames for x in frame.parameters]
     frames = [x for cut in system.cuts for x in (cut.pose_a.matrix, cut.pose_b.matrix)]
     couplings = [c for coupling in system.couplings for c in coupling.coefficients]
     geometry = casadi.veccat(*placements, *frames, *couplings, tree.gravity)

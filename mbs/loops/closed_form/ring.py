@@ -13,7 +13,6 @@ from collections.abc import Container
 from dataclasses import dataclass, field, replace
 
 import casadi
-import numpy as np
 from casadi import SX
 
 from mbs.assembly import System
@@ -178,9 +177,9 @@ def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
     walk.over(cut.pose_a.inverse())
     for k in back:
         _pass(walk, _unknown(system, k, -1), known, q)
-        walk.over(system.tree.links[k].placement.pose().inverse())
+        walk.over(system.tree.links[k].pose().inverse())
     for k in out:
-        walk.over(system.tree.links[k].placement.pose())
+        walk.over(system.tree.links[k].pose())
         _pass(walk, _unknown(system, k, 1), known, q)
     walk.over(cut.pose_b)
     if not cut.welded:
@@ -240,7 +239,7 @@ def _pass_cut(walk: _Walk, system: System, number: int, known: Container[int], q
         freedoms = (Freedom(Motion.PRISMATIC, joint.axis),)
     first = cut_places(system)[number]
     for k, freedom in reversed(list(enumerate(freedoms))):
-        aligned = Pose.turned(align_z(np.array(freedom.axis)))
+        aligned = Pose.turned(align_z(freedom.axis))
         name = freedom.coordinate_of(joint.name)
         walk.over(aligned)
         _pass(walk, Unknown(name, freedom.motion, first + k, -1, cut=True), known, q)

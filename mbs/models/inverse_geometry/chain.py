@@ -157,7 +157,7 @@ def _chained(
     base = system.frame("base")[1].inverse()
     gaps, free = [base], list[Link]()
     for link in links:
-        gaps[-1] = gaps[-1] @ link.placement.pose()
+        gaps[-1] = gaps[-1] @ link.pose()
         if link.name in held:
             gaps[-1] = gaps[-1] @ _moved(link, held[link.name])
         else:

@@ -37,7 +37,7 @@ def _geometry(system: System, row: LinkRow) -> Texts:
     cells = dict.fromkeys(GEOMETRY_COLUMNS, "")
     cells |= {key: _text(getattr(row, key)) for key in GEOMETRY}
     cells |= {
-        "antecedent": str(row.antecedent),
+        "antecedent": " + ".join((str(row.antecedent), *map(_fixed_frame, row.via))),
         "joint": row.motion,
         "actuated": "yes" if any(speed.actuated for speed in speeds) else "no",
         "name": row.name,
@@ -45,6 +45,16 @@ def _geometry(system: System, row: LinkRow) -> Texts:
     if len(places) == 1 and places[0].limits is not None:
         cells["limits"] = ", ".join(map(_text, places[0].limits))
     return tuple(cells[column] for column in GEOMETRY_COLUMNS)
+
+
+def _fixed_frame(six: tuple[float | SX, ...]) -> str:
+    """A fixed frame on the way to a link, by its parameters that are not zero."""
+    values = (f"{k} {_text(x)}" for k, x in zip(GEOMETRY, six, strict=True) if not _is_zero(x))
+    return f"fixed frame ({', '.join(values)})"
+
+
+def _is_zero(value: float | SX) -> bool:
+    return not isinstance(value, SX) and value == 0
 
 
 def _inertia(system: System, j: int) -> Texts:

@@ -1,0 +1,300 @@
+"""The proof of an assembly: the bodies of the tree stand where the description puts them.
+
+Two walks from the world, in numpy alone, at random positions and values of the symbols. One
+multiplies what the components say, connection by connection; the other the frames of the links.
+They share no formula, so that a convention which holds for one sign of a symbol only, or digits
+that cancel, cannot be right in both.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly.graph import Port, is_weld
+from mbs.assembly.khalil_frames import Framed
+from mbs.assembly.tables import Places
+from mbs.assembly.tree import Frame, Tree
+from mbs.components import Mechanism
+from mbs.components.motion import Freedom, Motion
+from mbs.components.placement import KhalilStep, Oriented, Placement, Translation, Turned
+from mbs.errors import AssemblyError
+from mbs.expressions import Expression, Number, Operation, Parameter
+from mbs.expressions.arithmetic import arithmetic
+
+Array = NDArray[np.float64]
+"""(..., 4, 4) transforms, (samples, 4, 4) where symbols are in them."""
+
+_SEED = 20261122
+
+_SAME = 1e-12
+"""Difference of an element that rounding does not make: a chain of a hundred joints is off by some
+1e-14, a frame on the wrong side by the length of a link. Positions count in reaches."""
+
+_FUNCTIONS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt, "atan2": np.arctan2}
+
+
+def prove(
+    mechanism: Mechanism,
+    framed: Framed,
+    places: Places,
+    symbols: Mapping[str, SX],
+    values: Mapping[str, float],
+) -> None:
+    """Refuse a tree whose bodies or joints stand elsewhere than their description says.
+
+    Args:
+        mechanism: the components.
+        framed: the tree made of them.
+        places: link and pose of every body and every frame of a joint.
+        symbols: CasADi symbol of every parameter.
+        values: a number for every parameter, the default where there is one.
+
+    Raises:
+        AssemblyError: names the body or joint, and the values of the symbols.
+    """
+    rng = np.random.default_rng(_SEED)
+    some = rng.uniform(0.3, 1.7, len(symbols)) * rng.choice([-1.0, 1.0], len(symbols))
+    # the defaults, numbers of both signs, and the same with all signs the other way
+    rows = np.array(
+        [[values[n] for n in symbols], *([some, -some] if symbols else [])], dtype=float
+    )
+    known = dict(zip(symbols, rows.T, strict=True))
+    q = {link.name: _positions(rng, link.motion, len(rows)) for link in framed.tree.links}
+    free = {(c.edge.joint.name, "free"): c.frames[0] for c in framed.cuts if c.welded}
+    frames = {**places, **free}
+    with np.errstate(all="ignore"):  # an expression need not have a value everywhere
+        described = _described(mechanism, framed, known, q)
+        told = np.array([np.broadcast_to(described[port], (len(rows), 4, 4)) for port in frames])
+        found = _assembled(framed.tree, list(frames.values()), symbols, rows, q)
+        off = np.abs(found - told)
+        off[..., :3, 3] /= float(np.nanmax(np.abs(told[..., :3, 3]), initial=0.0)) or 1.0
+    # where the description has no value, such as the root of a negative number, there is none
+    off = np.where(np.isfinite(told), np.where(np.isfinite(off), off, np.inf), 0.0)
+    if np.max(off, initial=0.0) > _SAME:
+        number, sample, *_ = np.unravel_index(int(np.argmax(off)), off.shape)
+        name, port = list(frames)[number]
+        what = f"frame {port!r} of joint {name!r}" if port else f"body {name!r}"
+        where = ", ".join(f"{symbol} = {at[sample]:.6g}" for symbol, at in known.items())
+        raise AssemblyError(
+            f"{mechanism.name}: the assembled tree puts {what} {np.max(off):.3g} away from where it"
+            f" is described{' at ' if where else ''}{where}; this is a fault of mbs: please report"
+            " the description, and place the joint in other words until then"
+        )
+
+
+def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
+    """(samples, nq) random positions of a joint; quaternions are unit."""
+    values = rng.uniform(-2.0, 2.0, (samples, motion.nq))
+    if motion in (Motion.SPHERICAL, Motion.FREE):
+        values[:, -4:] /= np.linalg.norm(values[:, -4:], axis=1, keepdims=True)
+    return values
+
+
+# --- what the components say ---------------------------------------------------------------------
+
+
+def _described(
+    mechanism: Mechanism, framed: Framed, known: Mapping[str, Array], q: Mapping[str, Array]
+) -> dict[tuple[str, str], Array]:
+    """Where every body and every frame of a joint stands in the world; the free end of kept cut joints too."""
+    ways: dict[Port, list[tuple[Port, Callable[[], Array]]]] = {}
+
+    def connect(a: Port, b: Port, out: Callable[[], Array], back: Callable[[], Array]) -> None:
+        ways.setdefault(a, []).append((b, out))
+        ways.setdefault(b, []).append((a, back))
+
+    for a, b in mechanism.connections:
+        there, here = (_placement(point.placement, known) for point in (a, b))
+        connect(
+            (a.owner.name, a.port),
+            (b.owner.name, b.port),
+            lambda there=there, here=here: there @ _inverse(here),  # type: ignore[misc]
+            lambda there=there, here=here: here @ _inverse(there),  # type: ignore[misc]
+        )
+    cut = {c.edge.joint.name: c for c in framed.cuts}
+    kept = [name for name, c in cut.items() if c.welded]
+    for joint in mechanism.joints():
+        name = joint.name
+        moves = () if is_weld(mechanism, joint) else joint.freedoms
+        if name not in cut:
+            connect(
+                (name, "a"),
+                (name, "b"),
+                lambda name=name, moves=moves: _motion(name, moves, q),  # type: ignore[misc]
+                lambda name=name, moves=moves: _motion_back(name, moves, q),  # type: ignore[misc]
+            )
+    found: dict[tuple[str, str], Array] = {(mechanism.world.name, ""): np.eye(4)}
+    queue = deque(found)
+    while queue:
+        port = queue.popleft()
+        for neighbour, transform in ways.get(port, []):
+            if neighbour not in found:
+                found[neighbour] = found[port] @ transform()
+                queue.append(neighbour)
+    for name in kept:
+        joint = cut[name].edge.joint
+        found[name, "free"] = found[name, "a"] @ _motion(name, joint.freedoms, q)
+    return found
+
+
+def _placement(placement: Placement, known: Mapping[str, Array]) -> Array:
+    T: Array = np.eye(4)
+    for step in placement.steps:
+        match step:
+            case Translation(x=x, y=y, z=z):
+                T = T @ _shift(*(_number(value, known) for value in (x, y, z)))
+            case Turned(axis=axis, angle=angle):
+                T = T @ _turn(axis, _number(angle, known))
+            case Oriented(rows=rows):
+                R = np.eye(4)
+                R[:3, :3] = rows
+                T = T @ R
+            case KhalilStep():
+                six = (step.gamma, step.b, step.alpha, step.d, step.theta, step.r)
+                T = T @ _khalil(*(np.asarray(_number(value, known)) for value in six))
+    return T
+
+
+def _number(value: Expression, known: Mapping[str, Array]) -> Any:
+    """The value of an expression, a number or one for every sample."""
+    if isinstance(value, Number):
+        return value.value
+    if isinstance(value, Parameter):
+        return known[value.name]
+    assert isinstance(value, Operation)
+    operands = [_number(argument, known) for argument in value.arguments]
+    result = arithmetic(value.operator, operands)
+    return _FUNCTIONS[value.operator](*operands) if result is None else result
+
+
+def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
+    """Frame_b of a joint in its frame_a."""
+    T: Array = np.eye(4)
+    for freedom in freedoms:
+        T = T @ _moved(freedom, q[freedom.coordinate_of(name)])
+    return T
+
+
+def _motion_back(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
+    """Frame_a in frame_b, where frame_b is nearer to the base; a quaternion turns the farther."""
+    T: Array = np.eye(4)
+    for freedom in reversed(freedoms):
+        moved = _moved(freedom, q[freedom.coordinate_of(name)])
+        free = freedom.motion in (Motion.SPHERICAL, Motion.FREE)
+        T = T @ (moved if free else _inverse(moved))
+    return T
+
+
+def _moved(freedom: Freedom, q: Array) -> Array:
+    """(samples, 4, 4) what one elementary motion does; Rodrigues' formula for a turn."""
+    T = np.tile(np.eye(4), (len(q), 1, 1))
+    x, y, z = freedom.axis
+    match freedom.motion:
+        case Motion.PRISMATIC:
+            T[:, :3, 3] = q * freedom.axis
+        case Motion.REVOLUTE:
+            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            s, c = np.sin(q)[:, :, None], np.cos(q)[:, :, None]
+            T[:, :3, :3] = np.eye(3) + s * K + (1 - c) * np.einsum("ij,jk->ik", K, K)
+        case _:
+            T[:, :3, :3] = _of_quaternion(q[:, -4:])
+            if freedom.motion is Motion.FREE:
+                T[:, :3, 3] = q[:, :3]
+    return T
+
+
+def _of_quaternion(q: Array) -> Array:
+    """(samples, 3, 3) of unit quaternions w, x, y, z."""
+    w, e = q[:, 0, None, None], q[:, 1:]
+    x, y, z = e.T
+    zero = np.zeros_like(x)
+    K = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    return np.array(np.eye(3) + 2 * w * K + 2 * np.einsum("sij,sjk->sik", K, K))
+
+
+def _shift(x: Any, y: Any, z: Any) -> Array:
+    shape = np.broadcast_shapes(*(np.shape(value) for value in (x, y, z)))
+    T = np.zeros((*shape, 4, 4))
+    T[..., range(4), range(4)] = 1.0
+    T[..., 0, 3], T[..., 1, 3], T[..., 2, 3] = x, y, z
+    return T
+
+
+def _turn(axis: str, angle: Any) -> Array:
+    k = "xyz".index(axis)
+    i, j = (k + 1) % 3, (k + 2) % 3
+    T = np.zeros((*np.shape(angle), 4, 4))
+    T[..., k, k] = T[..., 3, 3] = 1.0
+    T[..., i, i] = T[..., j, j] = np.cos(angle)
+    T[..., j, i] = np.sin(angle)
+    T[..., i, j] = -T[..., j, i]
+    return T
+
+
+def _inverse(T: Array) -> Array:
+    """The transform back."""
+    back = np.zeros_like(T)
+    R = np.swapaxes(T[..., :3, :3], -1, -2)
+    back[..., :3, :3] = R
+    back[..., :3, 3] = -np.einsum("...ij,...j->...i", R, T[..., :3, 3])
+    back[..., 3, 3] = 1.0
+    return back
+
+
+# --- what the tree says --------------------------------------------------------------------------
+
+
+def _assembled(
+    tree: Tree,
+    frames: Sequence[Frame],
+    symbols: Mapping[str, SX],
+    rows: Array,
+    q: Mapping[str, Array],
+) -> Array:
+    """(frames, samples, 4, 4) where frames on the links stand."""
+    own = [casadi.vertcat(*frame.parameters) for link in tree.links for frame in link.frames]
+    six = np.moveaxis(_at_samples(own, symbols, rows)[..., 0], -1, 0)
+    placed = iter(_khalil(*six))
+    poses = [np.tile(np.eye(4), (len(rows), 1, 1))]  # of the base, then of the links
+    for link in tree.links:
+        T = poses[link.antecedent + 1]
+        for _ in link.frames:
+            T = T @ next(placed)
+        poses.append(T @ _moved(Freedom(link.motion), q[link.name]))
+    inside = _at_samples([pose.matrix for _, pose in frames], symbols, rows)
+    return np.array(poses)[[link + 1 for link, _ in frames]] @ inside
+
+
+def _at_samples(values: Sequence[SX], symbols: Mapping[str, SX], rows: Array) -> Array:
+    """(values, samples, rows, columns) matrices of one shape at every sample."""
+    if not values:
+        return np.zeros((0, len(rows), 0, 0))
+    shape = values[0].shape
+    stacked = casadi.horzcat(*(casadi.densify(value) for value in values))
+    if symbols:
+        at = Function("values", [casadi.vertcat(*symbols.values())], [stacked])
+        numbers = np.array([DM(at(row)).full() for row in rows])
+    else:
+        numbers = DM(stacked).full()[None]
+    return numbers.reshape(len(rows), shape[0], len(values), shape[1]).transpose(2, 0, 1, 3)
+
+
+def _khalil(gamma: Array, b: Array, alpha: Array, d: Array, theta: Array, r: Array) -> Array:
+    """(..., 4, 4) the transform of Khalil & Kleinfinger 1986, written out."""
+    cg, sg, ca, sa = np.cos(gamma), np.sin(gamma), np.cos(alpha), np.sin(alpha)
+    ct, st = np.cos(theta), np.sin(theta)
+    zero, one = np.zeros_like(cg * b * ca * d * ct * r), np.ones_like(cg * b * ca * d * ct * r)
+    rows = [
+        [cg * ct - sg * ca * st, -cg * st - sg * ca * ct, sg * sa, d * cg + r * sg * sa],
+        [sg * ct + cg * ca * st, -sg * st + cg * ca * ct, -cg * sa, d * sg - r * cg * sa],
+        [sa * st, sa * ct, ca, r * ca + b],
+        [zero, zero, zero, one],
+    ]
+    return np.moveaxis(np.array([[x + zero for x in row] for row in rows]), (0, 1), (-2, -1))

@@ -103,7 +103,7 @@ def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
 def _described(
     mechanism: Mechanism, framed: Framed, known: Mapping[str, Array], q: Mapping[str, Array]
 ) -> dict[tuple[str, str], Array]:
-    """Where every body and every frame of a joint stands in the world; the free end of kept cut joints too."""
+    """Where every body and joint stands in the world, and the free ends of kept cut joints."""
     ways: dict[Port, list[tuple[Port, Callable[[], Array]]]] = {}
 
     def connect(a: Port, b: Port, out: Callable[[], Array], back: Callable[[], Array]) -> None:

@@ -21,6 +21,7 @@ from mbs.formats.mujoco_closures import add_closures
 from mbs.formats.mujoco_joints import add_joints
 from mbs.formats.mujoco_model import MjcfModel, matrix_of, placed
 from mbs.formats.urdf import parse_xml
+from mbs.messages import install_command
 
 
 def read_mjcf(path: str | Path) -> Mechanism:
@@ -80,7 +81,8 @@ def _mujoco() -> Any:
         import mujoco
     except ImportError:
         raise DescriptionError(
-            'MJCF files are read by mujoco, which is not installed; install "mbs[import]"'
+            "MJCF files are read by mujoco, which is not installed; run: "
+            + install_command("import")
         ) from None
     return mujoco
 

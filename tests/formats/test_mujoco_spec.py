@@ -313,7 +313,7 @@ def test_bad_file_is_refused(xml, tmp_path):
 
 def test_missing_mujoco_is_said(xml, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(DescriptionError, match=r'install "mbs\[import\]"'):
+    with pytest.raises(DescriptionError, match=r'install "casadi-mbs\[import\]"'):
         read_mjcf(xml(TREE))
 
 

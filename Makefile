@@ -16,11 +16,14 @@ endif
 
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --editable
 
-.PHONY: help demo test lint types layers docs clean
+LOWEST := build/lowest/bin/python
+
+.PHONY: help demo test test-lowest lint types layers docs clean
 
 help:
 	@echo "make demo     install mbs into $(VENV) and run examples/01_four_bar.py; files go to build/four_bar"
 	@echo "make test     install the tools and run every check: lint, types, layers, tests"
+	@echo "make test-lowest  the tests with the lowest versions that pyproject.toml allows, in build/lowest; Python 3.11 or 3.12"
 	@echo "make lint     ruff: style and format"
 	@echo "make types    mypy, strict"
 	@echo "make layers   import-linter: no module imports a higher layer"
@@ -33,6 +36,17 @@ demo: $(VENV)/.demo
 
 test: lint types layers
 	@$(RUN)/python -m pytest -n 2 --dist worksteal
+
+# Old packages say that newer ones, on which they stand, have deprecated something: no error here.
+test-lowest: build/lowest/.made
+	@$(LOWEST) -m pytest -n 2 --dist worksteal -W default::DeprecationWarning $(TESTS)
+
+build/lowest/.made: pyproject.toml .ci/lowest
+	$(PYTHON) -m venv --clear build/lowest
+	@$(LOWEST) .ci/lowest dev cross tables > build/lowest/versions.txt
+	$(LOWEST) -m pip install --quiet --disable-pip-version-check --only-binary :all: \
+	  --constraint build/lowest/versions.txt --editable ".[dev,cross,tables]"
+	@touch $@
 
 lint: $(VENV)/.dev
 	@$(RUN)/ruff check .

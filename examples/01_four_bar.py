@@ -1,8 +1,8 @@
 """A four-bar mechanism, from its parts to C code, an FMU, a simulation and a picture.
 
 Run it with `python examples/01_four_bar.py [folder]`; files go to `build/four_bar` if no folder is
-named. It needs matplotlib (`pip install "mbs[plot]"`), and a C compiler for the C program and the
-FMU (`pip install "mbs[cross]"` brings one).
+named. It needs matplotlib (`pip install "casadi-mbs[plot]"`), and a C compiler for the C program
+and the FMU (`pip install "casadi-mbs[cross]"` brings one).
 """
 
 # %% Compose: joints connect points of bodies; the loop is found, never declared

@@ -1,8 +1,8 @@
 """The PUMA 560 arm from the catalogue: its models, what they cost, a fall, C code and an FMU.
 
 Run it with `python examples/02_puma560.py [folder]`; files go to `build/puma560` if no folder is
-named. It needs matplotlib (`pip install "mbs[plot]"`), and a C compiler for the FMU
-(`pip install "mbs[cross]"` brings one).
+named. It needs matplotlib (`pip install "casadi-mbs[plot]"`), and a C compiler for the FMU
+(`pip install "casadi-mbs[cross]"` brings one).
 """
 
 # %% Load: a name of the catalogue; a .toml, .par, .urdf or MJCF file is loaded the same way

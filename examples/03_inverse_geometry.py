@@ -1,7 +1,8 @@
 """Every posture of a PUMA 560 for one pose, the path of a straight line, and the equations.
 
 Run it with `python examples/03_inverse_geometry.py [folder]`; files go to
-`build/inverse_geometry` if no folder is named. It needs matplotlib (`pip install "mbs[plot]"`).
+`build/inverse_geometry` if no folder is named. It needs matplotlib
+(`pip install "casadi-mbs[plot]"`).
 """
 
 # %% A pose, and every posture that takes it

@@ -1,7 +1,7 @@
 """A motion that shows the parameters of a PUMA 560, and the parameters found from it.
 
 Run it with `python examples/04_identification.py [folder]`; files go to `build/identification` if
-no folder is named. It needs matplotlib (`pip install "mbs[plot]"`).
+no folder is named. It needs matplotlib (`pip install "casadi-mbs[plot]"`).
 """
 
 # %% What can be identified: the base parameters with rotor inertias and friction

@@ -1,8 +1,8 @@
 """A hatch with a stop and its controller as FMUs: events, a coupled system, a parameter study.
 
 Run it with `python examples/05_co_simulation.py [folder]`; files go to `build/co_simulation` if no
-folder is named. It needs a C compiler (`pip install "mbs[cross]"` brings one) and matplotlib
-(`pip install "mbs[plot]"`).
+folder is named. It needs a C compiler (`pip install "casadi-mbs[cross]"` brings one) and matplotlib
+(`pip install "casadi-mbs[plot]"`).
 """
 
 # %% A hatch that falls on its frame, bounces and rests; a motor lifts it again

@@ -1,7 +1,7 @@
 """Swing-up of an acrobot with the least effort, by multiple shooting.
 
 Run it with `python examples/06_acrobot.py [folder]`; the picture goes to `build/acrobot` if no
-folder is named. It needs matplotlib (`pip install "mbs[plot]"`).
+folder is named. It needs matplotlib (`pip install "casadi-mbs[plot]"`).
 """
 
 # %% Two unit rods of 1 kg, a motor at the elbow alone

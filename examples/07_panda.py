@@ -1,7 +1,7 @@
 """A Panda from point to point: with the least effort, then in the least time its torques allow.
 
 Run it with `python examples/07_panda.py [folder]`; the picture goes to `build/panda` if no folder
-is named. It needs matplotlib (`pip install "mbs[plot]"`).
+is named. It needs matplotlib (`pip install "casadi-mbs[plot]"`).
 """
 
 # %% The inverse model, compiled with its first and second derivatives

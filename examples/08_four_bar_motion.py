@@ -1,7 +1,8 @@
 """A four-bar linkage moved with the least effort, with its loop solved and with its loop kept.
 
 Run it with `python examples/08_four_bar_motion.py [folder]`; the picture goes to
-`build/four_bar_motion` if no folder is named. It needs matplotlib (`pip install "mbs[plot]"`).
+`build/four_bar_motion` if no folder is named. It needs matplotlib
+(`pip install "casadi-mbs[plot]"`).
 """
 
 # %% A crank-rocker in gravity: thin rods

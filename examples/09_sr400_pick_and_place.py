@@ -1,7 +1,7 @@
 """An SR400 carries a load over a wall: its parallelogram is solved inside the equations.
 
 Run it with `python examples/09_sr400_pick_and_place.py [folder]`; the picture goes to `build/sr400`
-if no folder is named. It needs matplotlib (`pip install "mbs[plot]"`).
+if no folder is named. It needs matplotlib (`pip install "casadi-mbs[plot]"`).
 """
 
 # %% Six motors, nine joints, one loop

@@ -1,7 +1,7 @@
 """A quadruped jumps forward and turns: stance, flight, impact and stance, with feet that grip.
 
 Run it with `python examples/10_quadruped_jump.py [folder]`; the picture goes to `build/quadruped`
-if no folder is named. It needs matplotlib (`pip install "mbs[plot]"`).
+if no folder is named. It needs matplotlib (`pip install "casadi-mbs[plot]"`).
 """
 
 # %% A trunk that moves freely, and four legs of three motors each

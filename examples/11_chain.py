@@ -1,7 +1,7 @@
 """A crab moves a chain of N links and leaves it at rest: the least effort, for growing N.
 
 Run it with `python examples/11_chain.py [folder]`; the picture goes to `build/chain` if no folder
-is named. It needs matplotlib (`pip install "mbs[plot]"`).
+is named. It needs matplotlib (`pip install "casadi-mbs[plot]"`).
 """
 
 # %% N passive links hang from a crab on a rail; its motor is the only one

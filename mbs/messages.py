@@ -1,8 +1,10 @@
-"""Parts of messages: values as Python writes them, and the nearest known name."""
+"""Parts of messages: values as Python writes them, the nearest known name, how to install."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+DISTRIBUTION = "casadi-mbs"
+"""Name of the package on an index, where `mbs`, the name of the import, is another project."""
 _LONGEST_QUOTE = 80
 _LONGEST_LIST = 20
 
@@ -15,6 +17,15 @@ def quoted(value: object) -> str:
         text = f"a {type(value).__name__} of more digits than can be read"
     half = _LONGEST_QUOTE // 2
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:half]}...{text[-half:]}"
+
+
+def install_command(extra: str) -> str:
+    """What installs an extra of this package, from an index and in a clone of its source.
+
+    Args:
+        extra: a key of [project.optional-dependencies] in pyproject.toml.
+    """
+    return f'pip install "{DISTRIBUTION}[{extra}]" (or, in a clone, pip install -e ".[{extra}]")'
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

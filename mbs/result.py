@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from mbs.errors import ExportError, ModelError
 from mbs.files import whole_file
+from mbs.messages import install_command
 
 Array = npt.NDArray[np.float64]
 
@@ -186,7 +187,7 @@ class Result:
 
     def to_pandas(self) -> Any:
         """The signals as a pandas DataFrame indexed by time; units in `.attrs["units"]`."""
-        pandas = optional_module("pandas", "pip install pandas")
+        pandas = optional_module("pandas", "tables")
         index = pandas.Index(self.time, name="time")
         frame = pandas.DataFrame(self.values.copy(), index=index, columns=list(self.names))
         frame.attrs["units"] = dict(self.units)
@@ -194,7 +195,7 @@ class Result:
 
     def to_xarray(self) -> Any:
         """The signals as an xarray Dataset over time, each with its unit as attribute."""
-        xarray = optional_module("xarray", "pip install xarray")
+        xarray = optional_module("xarray", "tables")
         signals = {n: ("time", self[n].copy(), {"units": u}) for n, u in self.units.items()}
         return xarray.Dataset(
             signals,
@@ -259,27 +260,30 @@ def _label(unit: str) -> str:
     return quantity if unit == "1" else f"{quantity} [{unit}]"
 
 
-def optional_module(module: str, remedy: str) -> Any:
+def optional_module(module: str, extra: str) -> Any:
     """A module that an extra brings.
 
+    Args:
+        module: its name.
+        extra: of this package.
+
     Raises:
-        ModelError: it is not installed; the message ends with the remedy.
+        ModelError: it is not installed; the message says how to install the extra.
     """
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        raise ModelError(f"{module} is not installed; run: {remedy}") from error
+        raise ModelError(f"{module} is not installed; run: {install_command(extra)}") from error
 
 
 def _figure(rows: int, *, shown: bool) -> Any:
     size = (8.0, 1.0 + 2.5 * max(rows, 1))
-    remedy = 'pip install "mbs[plot]"'
-    optional_module("matplotlib", remedy)
+    optional_module("matplotlib", "plot")
     if shown:
-        return optional_module("matplotlib.pyplot", remedy).figure(
+        return optional_module("matplotlib.pyplot", "plot").figure(
             figsize=size, layout="constrained"
         )
-    return optional_module("matplotlib.figure", remedy).Figure(figsize=size, layout="constrained")
+    return optional_module("matplotlib.figure", "plot").Figure(figsize=size, layout="constrained")
 
 
 def _save(figure: Any, path: str | os.PathLike[str]) -> None:

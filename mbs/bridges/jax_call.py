@@ -11,6 +11,7 @@ from casadi import Function, densify
 from numpy.typing import NDArray
 
 from mbs.errors import ModelError
+from mbs.messages import install_command
 from mbs.native import batch
 from mbs.native.batch import Batch
 from mbs.native.compiled import require_function
@@ -58,7 +59,7 @@ def _jax() -> Any:
     try:
         jax = importlib.import_module("jax")
     except ImportError as error:
-        raise ModelError('JAX is not installed; use pip install "mbs[jax]"') from error
+        raise ModelError(f"JAX is not installed; run: {install_command('jax')}") from error
     if not jax.config.jax_enable_x64:
         raise ModelError(
             "JAX calculates with 32 bits; use jax.config.update('jax_enable_x64', True) first"

@@ -26,8 +26,7 @@ def add_closures(
         DescriptionError: an equality is of a kind that mbs does not model.
     """
     model, kinds = mjcf.data, mjcf.mujoco.mjtEq
-    flags = mjcf.mujoco.mjtDisableBit
-    if model.opt.disableflags & (int(flags.mjDSBL_EQUALITY) | int(flags.mjDSBL_CONSTRAINT)):
+    if not mjcf.flags.equalities:
         return
     for k in range(model.neq):
         kind = kinds(int(model.eq_type[k]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbs.formats.mujoco_model import MjcfModel, joint_transmissions
+from mbs.formats.mujoco_model import MjcfModel
 
 _Range = tuple[float, float]
 
@@ -13,7 +13,8 @@ def effort_range(mjcf: MjcfModel, j: int) -> _Range | None:
     """(lower, upper) of the effort of joint j [N m or N], None where it is not limited.
 
     The sum of the forcerange of its actuators times their gear, within the actuatorfrcrange of the
-    joint; a motor, which has no dynamics and no feedback, is limited by its ctrlrange too.
+    joint; a motor, which has no dynamics and no feedback, is limited by its ctrlrange too, unless
+    the flag clampctrl is disabled.
 
     Args:
         mjcf: the model.
@@ -21,12 +22,7 @@ def effort_range(mjcf: MjcfModel, j: int) -> _Range | None:
     """
     model = mjcf.data
     lower, upper = 0.0, 0.0
-    acting = [
-        k
-        for k in range(model.nu)
-        if int(model.actuator_trntype[k]) in joint_transmissions(mjcf.mujoco)
-        and int(model.actuator_trnid[k, 0]) == j
-    ]
+    acting = mjcf.actuators_of(j)
     for k in acting:
         gear = float(model.actuator_gear[k, 0])
         ends = sorted(gear * end for end in _force(mjcf, k)) if gear else (0.0, 0.0)
@@ -51,7 +47,7 @@ def _force(mjcf: MjcfModel, k: int) -> _Range:
         and int(model.actuator_biastype[k]) == int(kinds.mjtBias.mjBIAS_NONE)
         and int(model.actuator_dyntype[k]) == int(kinds.mjtDyn.mjDYN_NONE)
     )
-    if plain and model.actuator_ctrllimited[k]:
+    if plain and model.actuator_ctrllimited[k] and mjcf.flags.control_ranges:
         gain = float(model.actuator_gainprm[k, 0])
         ends = sorted(gain * float(end) for end in model.actuator_ctrlrange[k])
         low, high = max(low, ends[0]), min(high, ends[1])

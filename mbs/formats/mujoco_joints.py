@@ -52,23 +52,24 @@ def _between(mjcf: MjcfModel, k: int, j: int) -> Body:
 
 
 def _joint(mjcf: MjcfModel, j: int) -> Joint:
-    model, kinds = mjcf.data, mjcf.mujoco.mjtJoint
+    model, kinds, flags = mjcf.data, mjcf.mujoco.mjtJoint, mjcf.flags
     kind, dof = kinds(int(model.jnt_type[j])), int(model.jnt_dofadr[j])
+    driven = bool(mjcf.actuators_of(j))
     common: dict[str, Any] = {
         "name": mjcf.joints[j],
-        "actuated": j in mjcf.driven if model.nu else None,
+        "actuated": driven if model.nu else None,
         "Ia": float(model.dof_armature[dof]),
-        "Fv": float(model.dof_damping[dof]),
-        "Fs": float(model.dof_frictionloss[dof]),
+        "Fv": float(model.dof_damping[dof]) if flags.dampers else 0.0,
+        "Fs": float(model.dof_frictionloss[dof]) if flags.friction else 0.0,
     }
     if kind == kinds.mjJNT_FREE:
-        return Free(**{**common, "actuated": j in mjcf.driven})
+        return Free(**{**common, "actuated": driven})
     if kind == kinds.mjJNT_BALL:
         return Spherical(**common)
-    if model.jnt_limited[j]:
+    if model.jnt_limited[j] and flags.limits:
         common["limits"] = tuple(float(value) for value in model.jnt_range[j])
     common["effort"] = effort_range(mjcf, j)
-    if model.jnt_stiffness[j]:
+    if model.jnt_stiffness[j] and flags.springs:
         common["stiffness"] = float(model.jnt_stiffness[j])
         common["rest"] = float(model.qpos_spring[model.jnt_qposadr[j]])
     axis = tuple(float(value) for value in model.jnt_axis[j])

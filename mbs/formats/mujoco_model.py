@@ -11,6 +11,7 @@ import numpy as np
 
 from mbs.components import Point
 from mbs.formats.files import component_name
+from mbs.formats.mujoco_flags import Flags
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,8 @@ class MjcfModel:
         data: the mujoco.MjModel.
         path: of the file, for messages.
         bodies, joints, sites, equalities: names, by MuJoCo's numbers.
-        driven: numbers of the joints that an actuator drives.
+        acting: numbers of the actuators that are not switched off and act on a joint.
+        flags: what acts in the model.
     """
 
     mujoco: Any
@@ -32,7 +34,8 @@ class MjcfModel:
     joints: tuple[str, ...]
     sites: tuple[str, ...]
     equalities: tuple[str, ...]
-    driven: frozenset[int]
+    acting: tuple[int, ...]
+    flags: Flags
 
     @staticmethod
     def of(mujoco: Any, model: Any, path: str) -> MjcfModel:
@@ -45,6 +48,7 @@ class MjcfModel:
         bodies = tuple(_apart(name, {*joints, "base"}, "body") for name in bodies)
         sites = _names((model.site(k).name for k in range(model.nsite)), "site")
         taken = {*bodies, *joints, "base"}
+        flags = Flags.of(mujoco, model)
         return MjcfModel(
             mujoco,
             model,
@@ -53,12 +57,18 @@ class MjcfModel:
             joints,
             tuple(_apart(name, taken, "site") for name in sites),
             _names((model.eq(k).name for k in range(model.neq)), "equality"),
-            frozenset(
-                int(model.actuator_trnid[k, 0])
+            tuple(
+                k
                 for k in range(model.nu)
                 if int(model.actuator_trntype[k]) in joint_transmissions(mujoco)
+                and flags.drives(int(model.actuator_group[k]))
             ),
+            flags,
         )
+
+    def actuators_of(self, j: int) -> list[int]:
+        """Numbers of the actuators that act on joint j."""
+        return [k for k in self.acting if int(self.data.actuator_trnid[k, 0]) == j]
 
 
 def joint_transmissions(mujoco: Any) -> tuple[int, ...]:

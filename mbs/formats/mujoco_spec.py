@@ -21,6 +21,7 @@ from mbs.formats.mujoco_closures import add_closures
 from mbs.formats.mujoco_joints import add_joints
 from mbs.formats.mujoco_model import MjcfModel, matrix_of, placed
 from mbs.formats.urdf import parse_xml
+from mbs.messages import install_command
 
 
 def read_mjcf(path: str | Path) -> Mechanism:
@@ -35,6 +36,9 @@ def read_mjcf(path: str | Path) -> Mechanism:
     Of actuators only the joints that they drive are read, those without one are passive then. The
     inputs of the models are joint efforts; gear, kp, ctrlrange and the dynamics of an actuator
     belong to what commands it, and a position or velocity servo to a controller.
+
+    What the flags of the file and its groups of actuators switch off is left out: springs, dampers,
+    Coulomb friction, gravity, equalities, ranges of joints and of controls, actuators.
 
     Raises:
         DescriptionError: mujoco is not installed, the file is missing or malformed, or it has
@@ -80,7 +84,8 @@ def _mujoco() -> Any:
         import mujoco
     except ImportError:
         raise DescriptionError(
-            'MJCF files are read by mujoco, which is not installed; install "mbs[import]"'
+            "MJCF files are read by mujoco, which is not installed; run: "
+            + install_command("import")
         ) from None
     return mujoco
 
@@ -120,7 +125,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
 
 
 def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
-    if mjcf.data.opt.disableflags & int(mjcf.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+    if not mjcf.flags.gravity:
         return (0.0, 0.0, 0.0)
     return tuple(float(value) for value in mjcf.data.opt.gravity)
 

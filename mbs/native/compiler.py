@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mbs.errors import CompilerError
+from mbs.messages import install_command
 
 FLAGS = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
 """Contraction is off so that compiled code gives the very bits of the interpreted Function."""
@@ -84,7 +85,7 @@ def _find(wanted: str, path: str) -> Compiler:
         if compiler is not None:
             return compiler
     raise CompilerError(
-        'no C compiler was found; install gcc or clang, or run pip install "mbs[cross]"'
+        "no C compiler was found; install gcc or clang, or run: " + install_command("cross")
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import metadata
 
 from mbs.errors import CompilerError
-from mbs.messages import did_you_mean, quoted
+from mbs.messages import did_you_mean, install_command, quoted
 from mbs.native.compiler import LIBRARY_SUFFIX, Compiler
 
 _OLD_GLIBC = "2.17"
@@ -73,8 +73,8 @@ def cross_compiler(goal: Platform) -> Compiler:
     """
     if importlib.util.find_spec("ziglang") is None:
         raise CompilerError(
-            f"libraries for {goal.name} are made with ziglang, which is not installed; run"
-            ' pip install "mbs[cross]"'
+            f"libraries for {goal.name} are made with ziglang, which is not installed; run: "
+            + install_command("cross")
         )
     command = (sys.executable, "-m", "ziglang", "cc", "-target", goal.target)
     return Compiler(command, metadata.version("ziglang"))

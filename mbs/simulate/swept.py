@@ -150,7 +150,7 @@ class Sweep:
         Returns:
             the table; `.attrs["failures"]` has what failed cases said.
         """
-        pandas = optional_module("pandas", "pip install pandas")
+        pandas = optional_module("pandas", "tables")
         names = list(dict.fromkeys(name for case in self.cases for name in case))
         given = {name: [case.get(name, np.nan) for case in self.cases] for name in names}
         frame = pandas.DataFrame({**given, **self.summary(measures)})
@@ -168,7 +168,7 @@ class Sweep:
             over the names that were varied where the cases are every combination of their values;
             else over the number of the case.
         """
-        xarray = optional_module("xarray", "pip install xarray")
+        xarray = optional_module("xarray", "tables")
         columns, axes = self.summary(measures), _axes(self.cases)
         if axes is None:
             names = list(dict.fromkeys(name for case in self.cases for name in case))

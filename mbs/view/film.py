@@ -34,7 +34,7 @@ def save_still(painter: Painter, poses: Array, path: PathLike) -> None:
     Raises:
         ExportError: the file cannot be written.
     """
-    matplotlib = optional_module("matplotlib", 'pip install "mbs[plot]"')
+    matplotlib = optional_module("matplotlib", "plot")
     figure = painter.paint(poses)
     with (
         whole_file(path) as scratch,
@@ -50,7 +50,7 @@ def save_gif(painter: Painter, poses: Array, path: PathLike, fps: float) -> None
     Raises:
         ExportError: the file cannot be written.
     """
-    images = optional_module("PIL.Image", 'pip install "mbs[plot]"')
+    images = optional_module("PIL.Image", "plot")
     middle = images.fromarray(next(_frames(painter, poses[len(poses) // 2 :])))
     palette = middle.quantize(_COLOURS, method=images.Quantize.MAXCOVERAGE)
     small = [
@@ -108,7 +108,7 @@ def _feed(command: list[str], frames: Iterator[Image], path: PathLike) -> None:
 
 def _frames(painter: Painter, poses: Array) -> Iterator[Image]:
     """(height, width, 3) pictures, of even height and width."""
-    canvases = optional_module("matplotlib.backends.backend_agg", 'pip install "mbs[plot]"')
+    canvases = optional_module("matplotlib.backends.backend_agg", "plot")
     painter.figure.set_dpi(_FILM_DOTS)
     canvas: Any = canvases.FigureCanvasAgg(painter.figure)
     with progress("painting", 0.0, float(len(poses)), quiet=False) as reached:

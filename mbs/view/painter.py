@@ -16,7 +16,6 @@ from mbs.view.posed import Array
 from mbs.view.primitives import Label, Span, Spring
 from mbs.view.scene import HIDDEN, Scene
 
-_REMEDY = 'pip install "mbs[plot]"'
 _LIGHT = np.array([0.35, 0.85, 0.55])
 """Towards the light: right, up, towards the eye."""
 
@@ -50,7 +49,7 @@ class Painter:
 
     def paint(self, poses: Sequence[float] | Array) -> Any:
         """Paint the scene at poses (12 links,), as `Scene.poses` gives them; the Figure."""
-        matplotlib = optional_module("matplotlib.collections", _REMEDY)
+        matplotlib = optional_module("matplotlib.collections", "plot")
         axes, places = self.axes, np.reshape(poses, (-1, 3, 4))
         axes.clear()
         axes.set_axis_off()
@@ -148,7 +147,7 @@ class Painter:
         return flat[kept], far + part[:, None] * (near_colour - far)
 
     def _labels(self, places: Array) -> None:
-        effects = optional_module("matplotlib.patheffects", _REMEDY)
+        effects = optional_module("matplotlib.patheffects", "plot")
         halo = [effects.withStroke(linewidth=2.5, foreground=self._colour("background"))]
         for item in self.scene.primitives:
             if isinstance(item, Label) and item.role in self.shown:
@@ -185,8 +184,8 @@ def painter(scene: Scene, view: str, theme: Theme, shown: Collection[str] = ()) 
     Raises:
         ModelError: matplotlib is missing, or there is no such view.
     """
-    optional_module("matplotlib", _REMEDY)
-    figures = optional_module("matplotlib.figure", _REMEDY)
+    optional_module("matplotlib", "plot")
+    figures = optional_module("matplotlib.figure", "plot")
     roles = frozenset(item.role for item in scene.primitives) - set(HIDDEN) | set(shown)
     solid = [
         (item.link, faces)

@@ -41,7 +41,7 @@ def test_no_compiler_says_what_to_install(monkeypatch, tmp_path):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(CompilerError, match=r"install gcc or clang, or run pip install"):
+    with pytest.raises(CompilerError, match=r"install gcc or clang, or run: pip install"):
         find_compiler()
 
 

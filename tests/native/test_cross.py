@@ -41,5 +41,5 @@ def test_an_unknown_platform_is_refused_with_a_proposal():
 
 def test_without_ziglang_the_message_says_what_to_install(monkeypatch):
     monkeypatch.setattr(cross.importlib.util, "find_spec", lambda _: None)
-    with pytest.raises(CompilerError, match=r'aarch64-linux.*pip install "mbs\[cross\]"'):
+    with pytest.raises(CompilerError, match=r'aarch64-linux.*pip install "casadi-mbs\[cross\]"'):
         cross_compiler(PLATFORMS["aarch64-linux"])

@@ -47,11 +47,16 @@ Output = Annotated[
 
 def examples(*lines: str) -> str:
     """The end of a help page: commands that work as they stand."""
-    escaped = (line.replace("[", r"\[") for line in lines)
-    return "\n".join(["[bold]Examples[/bold]", *(f"[dim]$[/dim] {line}" for line in escaped)])
+    commands = (f"[dim]$[/dim] {_without_markup(line)}" for line in lines)
+    return "\n".join(["[bold]Examples[/bold]", *commands])
 
 
 def help_of(command: Callable[..., None]) -> str:
     """The docstring of a command, each paragraph on one line so that terminals wrap it."""
-    paragraphs = (inspect.getdoc(command) or "").split("\n\n")
+    paragraphs = _without_markup(inspect.getdoc(command) or "").split("\n\n")
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+
+
+def _without_markup(text: str) -> str:
+    """The text with its brackets kept where rich would take them as markup."""
+    return text.replace("[", r"\[")

@@ -35,7 +35,8 @@ def app(
 ) -> None:
     """Open the desk: robots, equations, simulation and identification on a page.
 
-    It listens on the loopback address only. It needs the extra app: pip install "mbs[app]".
+    It listens on the loopback address only. It needs the extra app: pip install
+    "casadi-mbs[app]" (or, in a clone, pip install -e ".[app]").
     """
     from mbs.app.desk.server import serve
 

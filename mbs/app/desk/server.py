@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbs.errors import MbsError
-from mbs.messages import quoted
+from mbs.messages import install_command, quoted
 
 if TYPE_CHECKING:
     from mbs.app.desk.document.document import Document
@@ -152,5 +152,5 @@ def require_nicegui() -> None:
         import nicegui  # noqa: F401
     except ImportError:
         raise MbsError(
-            'the desk is shown by nicegui, which is not installed; install "mbs[app]"'
+            "the desk is shown by nicegui, which is not installed; run: " + install_command("app")
         ) from None

@@ -15,6 +15,7 @@ from mbs.assembly.model_function import ModelFunction, require_system
 from mbs.errors import ModelError
 from mbs.identification.base.application import with_parameters
 from mbs.identification.base.check import Check
+from mbs.identification.base.constant_symbols import deciding_symbols, with_constants
 from mbs.identification.base.elsewhere import checked_elsewhere, numbers_at
 from mbs.identification.base.grouping import Grouping, coefficients
 from mbs.identification.base.loops import Postures
@@ -29,7 +30,7 @@ from mbs.identification.base.numeric import (
 from mbs.identification.base.samples import default_parameters, parameter_samples
 from mbs.identification.base.states import closed_positions
 from mbs.identification.base.structure import Structure, structure_of
-from mbs.identification.base.symbolic import depends_on_symbols, grouped_by_rules
+from mbs.identification.base.symbolic import grouped_by_rules
 from mbs.identification.base.text import equation, table
 from mbs.identification.base.turning import postures_needed
 from mbs.identification.regressors.columns import Column, chosen_columns, values_of
@@ -43,7 +44,8 @@ class BaseParameters:
     """Base inertial parameters of a system: K_base = B K, and D K = D_kept K_base.
 
     Attributes:
-        system: whose parameters they are.
+        system: whose parameters they are; of the numeric method, one in which the symbols that
+            the regressor depends on are constants.
         method: "symbolic" or "numeric".
         columns: all parameters K.
         kept: those that remain, with others added to them.
@@ -151,7 +153,9 @@ def base_parameters(
     The symbolic method applies rules to the joints, from the last to the first, then to closed
     loops; it keeps symbols of lengths and angles. Random states check the result. What the rules
     did not find is told in `check` and, where it does not depend on symbols, applied too. The
-    numeric method takes the rank of the regressor in random states, at the defaults of symbols.
+    numeric method takes the rank of the regressor in random states, at the defaults of the symbols
+    on which the regressor depends; they are constants in the result: `.system`, `.function` and
+    `.apply()` have no such parameter, only those that are inertial parameters themselves.
 
     Source: Gautier & Khalil 1990 and Khalil & Bennis 1995 for the rules, Gautier 1991 for the
     rank.
@@ -165,47 +169,76 @@ def base_parameters(
         moving_base: whether the base has a motion of its own, which no joint effort produces.
 
     Raises:
-        ModelError: the method or a name is unknown, or the loops cannot be closed.
+        ModelError: the method or a name is unknown, the loops cannot be closed, or the numeric
+            method meets a length, an angle or gravity that is a symbol without default.
     """
     require_system(system)
     _check_method(system, method, order)
     chosen = chosen_columns(system, columns, {})
     first = _first(system, chosen, order or ())
-    p = default_parameters(system)
-    sample = Sample.of(system, chosen, p, seed, base_moves=moving_base)
     preference = preferred_order(chosen, first)
+    deciding = deciding_symbols(system, chosen, base_moves=moving_base)
+    if method == "numeric":
+        # What is found at the defaults of these symbols holds there alone.
+        system = with_constants(system, deciding)
+    sample = Sample.of(system, chosen, default_parameters(system), seed, base_moves=moving_base)
     if method == "numeric":
         grouping, check = grouped_by_rank(sample, preference)
-    else:
-        structure = structure_of(system, base_moves=moving_base)
-        grouping, check = _by_rules(system, sample, structure, preference, seed)
-    return _result(system, method, chosen, grouping, check)
+        return _result(system, method, chosen, grouping, _at_constants(check, deciding))
+    structure = structure_of(system, base_moves=moving_base)
+    found = _by_rules(system, sample, structure, preference, seed, symbolic=bool(deciding))
+    if found is None:
+        numeric = base_parameters(
+            system, "numeric", columns=chosen, seed=seed, moving_base=moving_base
+        )
+        told = f"The rules are not exact, so the rank groups the parameters: {numeric.check.text}"
+        return replace(
+            numeric, method=method, check=replace(numeric.check, agrees=False, text=told)
+        )
+    return _result(system, method, chosen, *found)
+
+
+def _at_constants(check: Check, names: Sequence[str]) -> Check:
+    """The check, which says at which constants the grouping holds."""
+    if not names:
+        return check
+    return replace(
+        check, text=f"{check.text}; it holds at the defaults of {', '.join(names)} alone"
+    )
 
 
 def _by_rules(
-    system: System, sample: Sample, structure: Structure, order: Sequence[int], seed: int
-) -> tuple[Grouping, Check]:
-    """The grouping that the rules find, checked and completed by random states."""
-    grouping = grouped_by_rules(system, sample.columns, _postures(system, seed), structure)
+    system: System,
+    sample: Sample,
+    structure: Structure,
+    order: Sequence[int],
+    seed: int,
+    *,
+    symbolic: bool,
+) -> tuple[Grouping, Check] | None:
+    """The grouping that the rules find, checked and completed by random states.
+
+    None where the rules are not exact and the rank has to decide.
+    """
+    postures = _postures(system, seed, symbolic=symbolic)
+    grouping = grouped_by_rules(system, sample.columns, postures, structure)
     beta = numbers_at(system, sample.columns, grouping, default_parameters(system))
     check = checked(sample, grouping, beta, order)
-    if check.agrees and depends_on_symbols(system) and not system.is_closed:
+    if check.agrees and symbolic and not system.is_closed:
         doubt = checked_elsewhere(system, sample.columns, grouping, order, structure)
         return grouping, doubt or check
-    return _completed(system, sample, grouping, check, order)
+    return _completed(sample, grouping, check, order, symbolic=symbolic)
 
 
 def _completed(
-    system: System, sample: Sample, grouping: Grouping, check: Check, order: Sequence[int]
-) -> tuple[Grouping, Check]:
+    sample: Sample, grouping: Grouping, check: Check, order: Sequence[int], *, symbolic: bool
+) -> tuple[Grouping, Check] | None:
     """The grouping with the relations that the rules missed, where they hold for all symbols."""
     if check.agrees:
         return grouping, check
     if not check.relations:
-        found, rank = grouped_by_rank(sample, order)
-        told = f"{check.text}; the parameters are grouped by rank instead"
-        return found, replace(rank, agrees=False, text=told)
-    if depends_on_symbols(system):
+        return None
+    if symbolic:
         told = f"{check.text}; at the defaults of the symbols only, so they are not applied"
         return grouping, replace(check, text=told)
     found = applied(grouping, remainder(sample, grouping, order), grouping.kept)
@@ -213,14 +246,13 @@ def _completed(
     return found, replace(check, applied=True, text=told)
 
 
-def _postures(system: System, seed: int) -> list[Postures]:
+def _postures(system: System, seed: int, *, symbolic: bool) -> list[Postures]:
     """Closed postures at the defaults of the symbols, and at other values where there are any.
 
     They are others than those of the check.
     """
     if not system.is_closed:
         return []
-    symbolic = depends_on_symbols(system)
     values = parameter_samples(system, system.p)[:2] if symbolic else [default_parameters(system)]
     count = postures_needed(system)
     return [Postures(closed_positions(system, p, count, seed + 1), p) for p in values]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import casadi
 from casadi import SX
 
 from mbs.assembly import System
@@ -70,13 +69,3 @@ def _terms(effects: Mapping[Key, SX], places: Mapping[Key, int]) -> Terms | None
     if any(key not in places for key in effects):
         return None
     return {places[key]: x for key, x in effects.items()}
-
-
-def depends_on_symbols(system: System) -> bool:
-    """Whether lengths, angles or gravity of the system have symbols in them."""
-    tree = system.tree
-    placements = [x for link in tree.links for frame in link.frames for x in frame.parameters]
-    frames = [x for cut in system.cuts for x in (cut.pose_a.matrix, cut.pose_b.matrix)]
-    couplings = [c for coupling in system.couplings for c in coupling.coefficients]
-    geometry = casadi.veccat(*placements, *frames, *couplings, tree.gravity)
-    return bool(casadi.symvar(geometry))

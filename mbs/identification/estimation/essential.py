@@ -69,7 +69,7 @@ def essential(
         raise ModelError(
             f"essential parameters: {estimate.method} has no deviations; use weighted()"
         )
-    distribution = optional_module("scipy.stats", 'pip install "mbs[identify]"').f
+    distribution = optional_module("scipy.stats", "identify").f
     free, dropped = _freedom(estimate), list[int]()
     while True:
         kept, values, covariance = _without(estimate, dropped)

@@ -62,6 +62,6 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
 
 
 def _filtered(values: Array, numerator: list[float], corner: float, rate: float) -> Array:
-    signal = optional_module("scipy.signal", 'pip install "mbs[identify]"')
+    signal = optional_module("scipy.signal", "identify")
     b, a = signal.bilinear(numerator, [1.0, 2 * corner, corner**2], fs=rate)
     return np.asarray(signal.lfilter(b, a, values, axis=0), dtype=float)

@@ -123,7 +123,7 @@ def zero_phase(values: Array, rate: float, bandwidth: float, order: int = ORDER)
             f"filter: {len(values)} samples are too few for it; give a record of more than"
             f" {padding} samples"
         )
-    signal = optional_module("scipy.signal", 'pip install "mbs[identify]"')
+    signal = optional_module("scipy.signal", "identify")
     sections = signal.butter(order, bandwidth, fs=rate, output="sos")
     return np.asarray(signal.sosfiltfilt(sections, values, axis=0), dtype=float)
 

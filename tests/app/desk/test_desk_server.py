@@ -79,7 +79,7 @@ def test_the_first_robot_is_a_name_or_a_file(tmp_path):
 
 def test_without_nicegui_one_sentence_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "nicegui", None)
-    with pytest.raises(MbsError, match=r'install "mbs\[app\]"'):
+    with pytest.raises(MbsError, match=r'install "casadi-mbs\[app\]"'):
         require_nicegui()
 
 

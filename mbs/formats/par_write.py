@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from mbs.comments import in_bracket_comment
 from mbs.components.bodies import KhalilBody
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar, expression, parameters_of, to_float
@@ -52,7 +53,7 @@ def _lines(table: RobotTable) -> Iterator[str]:
     _check_symbols(table)
     yield f"(* Robotname = '{re.sub(r'[^A-Za-z0-9 _-]', '_', table.name)}' *)"
     if table.source:
-        yield f"(* Source = '{_one_line(table.source)}' *)"
+        yield f"(* Source = '{in_bracket_comment(table.source)}' *)"
     yield from _remarks(table, NJ)
     yield f"NL = {NL}\nNJ = {NJ}\nNF = {NF}\nType = {_kind(table)}"
     yield "\n(* Geometric parameters *)"
@@ -156,10 +157,6 @@ def _extras(table: RobotTable, keys: Iterable[str]) -> Iterator[str]:
     for key in keys:
         if key in table.extras:
             yield _vector(key, (_text(text) for text in table.extras[key]))
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split()).replace("*)", "* )")
 
 
 def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:

@@ -8,7 +8,15 @@ from typing import Any
 
 from sympy.printing.pycode import PythonCodePrinter
 
-from mbs.export.languages.language import Language, plain_number, sections, value_text, wrapped
+from mbs.comments import in_docstring
+from mbs.export.languages.language import (
+    Language,
+    kept_inside,
+    plain_number,
+    sections,
+    value_text,
+    wrapped,
+)
 from mbs.export.languages.printers import printer_of
 from mbs.export.languages.unit import Unit
 
@@ -56,9 +64,9 @@ class Python(Language):
         yield from ("import numpy as np", "", "")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrapped(f"def {unit.name}({arguments}):")
-        header = [line.replace("\\", "/").replace('"""', "'''") for line in unit.header]
-        yield f'    """{header[0]}'
-        yield from (f"    {line}".rstrip() for line in header[1:])
+        first, *others = kept_inside(unit.header, in_docstring)
+        yield f'    """{first}'
+        yield from (f"    {line}".rstrip() for line in others)
         yield '    """'
         yield from body
 

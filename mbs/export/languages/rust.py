@@ -54,7 +54,8 @@ class Rust(Language):
 
     def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from commented(unit.header, "///")
+        # No `///`: examples in the documentation of Rust are compiled and run by its tests.
+        yield from commented(unit.header, "//")
         arguments = [f"{argument.name}: &[f64]" for argument in unit.inputs]
         arguments += [f"{argument.name}: &mut [f64]" for argument in unit.outputs]
         yield f"#[allow({_LINTS})]"

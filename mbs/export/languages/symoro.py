@@ -7,7 +7,15 @@ from typing import Any
 
 from sympy.printing.pycode import PythonCodePrinter
 
-from mbs.export.languages.language import Language, plain_number, sections, value_text, wrapped
+from mbs.comments import in_bracket_comment
+from mbs.export.languages.language import (
+    Language,
+    kept_inside,
+    plain_number,
+    sections,
+    value_text,
+    wrapped,
+)
 from mbs.export.languages.printers import printer_of
 from mbs.export.languages.unit import Unit
 
@@ -38,7 +46,10 @@ class Symoro(Language):
 
     def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from unit.header
+        first, *others = kept_inside(unit.header, in_bracket_comment)
+        yield f"(* {first}"
+        yield from (f"   {line}".rstrip() for line in others)
+        yield "*)"
         yield from unit.tables
         yield from ("", "Equations:", "")
         for _, lines in sections(unit):

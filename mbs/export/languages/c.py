@@ -21,7 +21,7 @@ from mbs.export.languages.unit import Argument, Unit
 
 _CHOICE = "({0}) ? {1} : {2}"
 _FORMS = {
-    "step": "(double)(({0} > 0) - ({0} < 0))",
+    "step": "({0} > 0 ? 1.0 : {0} < 0 ? -1.0 : {0})",
     "Abs": "fabs({0})",
     **{name: f"{name}({{0}}, {{1}})" for name in ("fmod", "copysign", "fmin", "fmax", "hypot")},
     **{"floor_": "floor({0})", "ceil_": "ceil({0})", "log1p": "log1p({0})", "expm1": "expm1({0})"},

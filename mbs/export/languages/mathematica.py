@@ -35,6 +35,7 @@ _FORMS = {
     "copysign": "If[{1} < 0, -Abs[{0}], Abs[{0}]]",
     "fmin": "Min[{0}, {1}]",
     "fmax": "Max[{0}, {1}]",
+    "denied": "Not[{0}]",
     "hypot": "Sqrt[{0}^2 + {1}^2]",
     "log1p": "Log[1 + {0}]",
     "expm1": "(Exp[{0}] - 1)",

@@ -28,13 +28,14 @@ _NUMPY = {
 }
 _OF_TWO = {
     **{"atan2": "arctan2", "fmod": "fmod", "copysign": "copysign", "hypot": "hypot"},
-    **{"fmin": "minimum", "fmax": "maximum"},
+    **{"fmin": "fmin", "fmax": "fmax"},
 }
-_JOINS = {"And": " & ", "Or": " | "}
+_JOINS = {"both": " & ", "either": " | "}
 _CHOICE = "np.where({0}, {1}, {2})"
 _FORMS = {
     **{name: f"np.{function}({{0}})" for name, function in _NUMPY.items()},
     **{name: f"np.{function}({{0}}, {{1}})" for name, function in _OF_TWO.items()},
+    "denied": "np.logical_not({0})",
     "erf": "np.vectorize(math.erf, [float])({0})",
 }
 _WORDS = (*keyword.kwlist, "np", "math", "float", "shape")

@@ -24,7 +24,7 @@ _FORMS = {
     **{name: f"f64::{method}({{0}}, {{1}})" for name, method in _OF_TWO.items()},
     "fmod": "({0} % {1})",
     "powi": "{0}.powi({1})",
-    "step": "(if {0} > 0.0 {{ 1.0_f64 }} else if {0} < 0.0 {{ -1.0 }} else {{ 0.0 }})",
+    "step": "(if {0} > 0.0 {{ 1.0_f64 }} else if {0} < 0.0 {{ -1.0 }} else {{ {0} }})",
     "erf": "",
 }
 _WORDS = """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,11 +55,20 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
         raise ModelError(
             f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
         )
-    write_par(_table(system), path_of(path))
+    write_par(robot_table(system), path_of(path))
 
 
-def _table(system: System) -> RobotTable:
-    _check(system)
+def robot_table(system: System, file: str = ".par") -> RobotTable:
+    """The table of frames of a system; link j is frame j, its joint q<j>.
+
+    Args:
+        system: as for `par`.
+        file: ending of the file that it is for, in messages.
+
+    Raises:
+        ModelError: it has a motion or a coupling that a table cannot say.
+    """
+    _check(system, file)
     text = _text_of(system)
     links, cuts = system.tree.links, system.cuts
     frames = [_frame(system, j, text) for j in range(len(links))]
@@ -68,45 +78,49 @@ def _table(system: System) -> RobotTable:
     loops = [CutRow((first + k, first + len(cuts) + k), _kind(cut)) for k, cut in enumerate(cuts)]
     names = [f"q{j}" for j in range(1, len(links) + 1)]
     posture = dict(zip(names, system.posture, strict=True)) if cuts else {}
-    return RobotTable(
+    table = RobotTable(
         name=system.name,
         frames=(*frames, *moving, *fixed),
         bodies=tuple(_body(j, link, text) for j, link in enumerate(links, 1)),
         loops=tuple(loops),
         gravity=tuple(text(system.tree.gravity[k]) for k in range(3)),
-        parameters={p.name: p.default for p in system.parameters if p.default is not None},
         source=system.source,
         guess={name: value for name, value in posture.items() if value},
     )
+    # symbols may have cancelled, such as a length along the axis of the last link
+    defaults = {p.name: p.default for p in system.parameters if p.name in table.symbols}
+    values = {name: value for name, value in defaults.items() if value is not None}
+    return replace(table, parameters=values)
 
 
-def _check(system: System) -> None:
+def _check(system: System, file: str) -> None:
     if system.forces:
         raise ModelError(
             f"{system.name}: force element {system.forces[0].element.name!r} cannot be said in a"
-            " .par file; take it out"
+            f" {file} file; take it out"
         )
     for link in system.tree.links:
         if link.motion not in _SIGMA:
             raise ModelError(
-                f"{system.name}/{link.name}: a .par file has no {link.motion.value} joint; use"
+                f"{system.name}/{link.name}: a {file} file has no {link.motion.value} joint; use"
                 " revolute and prismatic joints"
             )
         if link.rotor is not None:
             raise ModelError(
-                f"{system.name}/{link.name}: a .par file has no rotor on a moving link; give its"
-                " inertia seen at the joint as Ia"
+                f"{system.name}/{link.name}: no rotor is written to a {file} file; give its inertia"
+                " seen at the joint as Ia"
             )
     if system.couplings:
         raise ModelError(
-            f"{system.name}/{system.couplings[0].name}: a .par file has no couplings; remove it"
+            f"{system.name}/{system.couplings[0].name}: a {file} file has no couplings; remove it"
         )
     for cut in system.cuts:
         freedoms = cut.edge.joint.freedoms
         if cut.welded or len(freedoms) != 1 or freedoms[0].motion not in _SIGMA:
             raise ModelError(
-                f"{system.name}/{cut.edge.joint.name}: a table of frames cuts loops at revolute"
-                " or prismatic joints without friction, rotor and motor; cut the loop elsewhere"
+                f"{system.name}/{cut.edge.joint.name}: loops are written to a {file} file cut at"
+                " revolute or prismatic joints without friction, rotor and motor; cut the loop"
+                " elsewhere"
             )
 
 
@@ -140,7 +154,8 @@ def _body(j: int, link: Link, text: Text) -> InertiaRow:
     ten = link.inertia.parameters
     values: dict[str, Any] = {name: text(ten[k]) for k, name in enumerate(TEN_PARAMETERS)}
     values |= {name: text(getattr(link, name)) for name in _OF_THE_JOINT}
-    return InertiaRow(j, grouped=True, **values)
+    row = InertiaRow(j, grouped=True, **values)
+    return replace(row, grouped=False) if row.is_body else row
 
 
 def _text_of(system: System) -> Text:

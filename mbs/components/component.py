@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
+from mbs.comments import seen
 from mbs.components.placement import (
     KhalilStep,
     Placement,
@@ -76,10 +77,14 @@ class Component:
     name: str
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
+        if (
+            not isinstance(self.name, str)
+            or not _NAME.fullmatch(self.name)
+            or self.name != seen(self.name)
+        ):
             raise DescriptionError(
-                f"{type(self).__name__} {self.name!r}: a name has no blanks, quotes or empty parts;"
-                " choose another name"
+                f"{type(self).__name__} {self.name!r}: a name has no blanks, quotes, control"
+                " characters or empty parts; choose another name"
             )
 
     def expressions(self) -> Iterator[Expression]:

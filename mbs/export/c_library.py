@@ -13,8 +13,9 @@ import numpy as np
 from casadi import MX, Function
 
 from mbs.assembly.model_function import ModelFunction
+from mbs.comments import in_c_comment
 from mbs.errors import ExportError, ModelError
-from mbs.export.c_names import check_function_names, comment, library_name, parameter_names
+from mbs.export.c_names import check_function_names, library_name, parameter_names
 from mbs.files import path_of, write_texts
 from mbs.messages import quoted
 from mbs.native.compiled import generated, require_function, unwritten
@@ -216,7 +217,7 @@ def _prototype(entry: _Entry) -> str:
     ]
     inside, outside = ", ".join(model.name_in()), ", ".join(model.name_out())
     return _PROTOTYPE.format(
-        signature=f"{entry.name}({inside}) -> {outside}",
+        signature=in_c_comment(f"{entry.name}({inside}) -> {outside}"),
         arguments="".join(lines),
         name=entry.name,
         upper=entry.name.upper(),
@@ -228,7 +229,7 @@ def _prototype(entry: _Entry) -> str:
 def _elements(model: Function, name: str) -> str:
     """What the elements of an input or output are, where the model knows their names."""
     known = model.elements(name) if isinstance(model, ModelFunction) else []
-    return ": " + ", ".join(comment(f"{e} [{unit}]") for e, unit in known) if known else ""
+    return ": " + ", ".join(in_c_comment(f"{e} [{unit}]") for e, unit in known) if known else ""
 
 
 def _example(models: Sequence[_Entry], name: str) -> str:

@@ -100,7 +100,9 @@ def check_function_names(names: Sequence[str], where: str) -> None:
 
 
 def parameter_names(names: Iterable[str], taken: Iterable[str]) -> list[str]:
-    """Names of parameters in C, each the given one where it is free and an identifier.
+    """Names of parameters in C, each the given one where it is free.
+
+    What is no letter, digit or underscore of ASCII becomes an underscore.
 
     Args:
         names: wanted.
@@ -109,6 +111,7 @@ def parameter_names(names: Iterable[str], taken: Iterable[str]) -> list[str]:
     used = set(taken)
     free = []
     for name in names:
+        name = re.sub(r"\W", "_", name, flags=re.ASCII)
         if not name[:1].isalpha():
             name = f"x_{name}"
         while name in used or name in _RESERVED:
@@ -116,8 +119,3 @@ def parameter_names(names: Iterable[str], taken: Iterable[str]) -> list[str]:
         used.add(name)
         free.append(name)
     return free
-
-
-def comment(text: str) -> str:
-    """The text on one line, unable to end or begin a comment of C."""
-    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").split())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import casadi
@@ -55,12 +56,22 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
         raise ModelError(
             f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
         )
-    write_par(_table(system), path_of(path))
+    write_par(robot_table(system), path_of(path))
 
 
-def _table(system: System) -> RobotTable:
-    """The table of frames: fixed frames first, then the links that they lead to, then the cuts."""
-    _check(system)
+def robot_table(system: System, file: str = ".par") -> RobotTable:
+    """The table of frames of a system: link j is frame j, its joint q<j>.
+
+    Fixed frames come before the link that they lead to, which moves its number; cuts are last.
+
+    Args:
+        system: as for `par`.
+        file: ending of the file that it is for, in messages.
+
+    Raises:
+        ModelError: it has a motion or a coupling that a table cannot say.
+    """
+    _check(system, file)
     text = _text_of(system)
     size = max(map(_length, _shifts(system)), default=0.0) or 1.0
     frames: list[FrameRow] = []
@@ -95,16 +106,19 @@ def _table(system: System) -> RobotTable:
     ]
     names = [f"q{number[j]}" for j in range(len(system.tree.links))]
     posture = dict(zip(names, system.posture, strict=True)) if system.cuts else {}
-    return RobotTable(
+    table = RobotTable(
         name=system.name,
         frames=(*frames, *moving, *fixed),
         bodies=tuple(_body(number[j], link, text) for j, link in enumerate(system.tree.links)),
         loops=tuple(loops),
         gravity=tuple(text(system.tree.gravity[k]) for k in range(3)),
-        parameters={p.name: p.default for p in system.parameters if p.default is not None},
         source=system.source,
         guess={name: value for name, value in posture.items() if value},
     )
+    # symbols may have cancelled, such as a length along the axis of the last link
+    defaults = {p.name: p.default for p in system.parameters if p.name in table.symbols}
+    values = {name: value for name, value in defaults.items() if value is not None}
+    return replace(table, parameters=values)
 
 
 def _shifts(system: System) -> Iterator[SX]:
@@ -123,33 +137,34 @@ def _length(p: SX) -> float:
     return length if length == length else 0.0
 
 
-def _check(system: System) -> None:
+def _check(system: System, file: str) -> None:
     if system.forces:
         raise ModelError(
             f"{system.name}: force element {system.forces[0].element.name!r} cannot be said in a"
-            " .par file; take it out"
+            f" {file} file; take it out"
         )
     for link in system.tree.links:
         if link.motion not in _SIGMA:
             raise ModelError(
-                f"{system.name}/{link.name}: a .par file has no {link.motion.value} joint; use"
+                f"{system.name}/{link.name}: a {file} file has no {link.motion.value} joint; use"
                 " revolute and prismatic joints"
             )
         if link.rotor is not None:
             raise ModelError(
-                f"{system.name}/{link.name}: a .par file has no rotor on a moving link; give its"
-                " inertia seen at the joint as Ia"
+                f"{system.name}/{link.name}: no rotor is written to a {file} file; give its inertia"
+                " seen at the joint as Ia"
             )
     if system.couplings:
         raise ModelError(
-            f"{system.name}/{system.couplings[0].name}: a .par file has no couplings; remove it"
+            f"{system.name}/{system.couplings[0].name}: a {file} file has no couplings; remove it"
         )
     for cut in system.cuts:
         freedoms = cut.edge.joint.freedoms
         if cut.welded or len(freedoms) != 1 or freedoms[0].motion not in _SIGMA:
             raise ModelError(
-                f"{system.name}/{cut.edge.joint.name}: a table of frames cuts loops at revolute"
-                " or prismatic joints without friction, rotor and motor; cut the loop elsewhere"
+                f"{system.name}/{cut.edge.joint.name}: loops are written to a {file} file cut at"
+                " revolute or prismatic joints without friction, rotor and motor; cut the loop"
+                " elsewhere"
             )
 
 
@@ -165,7 +180,8 @@ def _body(j: int, link: Link, text: Text) -> InertiaRow:
     ten = link.inertia.parameters
     values: dict[str, Any] = {name: text(ten[k]) for k, name in enumerate(TEN_PARAMETERS)}
     values |= {name: text(getattr(link, name)) for name in _OF_THE_JOINT}
-    return InertiaRow(j, grouped=True, **values)
+    row = InertiaRow(j, grouped=True, **values)
+    return replace(row, grouped=False) if row.is_body else row
 
 
 def _text_of(system: System) -> Text:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from mbs.comments import seen
 from mbs.errors import DescriptionError
 from mbs.messages import quoted
 
@@ -30,5 +31,5 @@ def read_text(path: str | Path) -> str:
 
 
 def component_name(text: str) -> str:
-    """The text with blanks, dots and quotes replaced by underscores."""
-    return _NOT_IN_NAMES.sub("_", text.strip())
+    """The text with blanks, dots and quotes replaced by underscores, without unseen letters."""
+    return seen(_NOT_IN_NAMES.sub("_", text.strip()))

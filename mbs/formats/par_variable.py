@@ -9,6 +9,9 @@ from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Operation, Parameter, parameters_of
 
 _USUAL = {0: r"(th|theta|q|t)_?{j}", 1: r"(r|q|R)_?{j}"}
+_SHORT = {0: "th", 1: "r"}
+"""The name of SYMORO, which is the variable among several that would be."""
+
 _KIND = {0: "revolute", 1: "prismatic"}
 
 
@@ -16,7 +19,7 @@ def split_variable(where: str, value: Expression, j: int, sigma: int) -> tuple[s
     """The joint variable of frame j and what is added to it.
 
     It is the only symbol in the expression or, among several, the one that is named after the
-    joint: th2, theta2, q2 or t2 in a revolute, r2 or q2 in a prismatic joint 2.
+    joint: th2, else theta2, q2 or t2 in a revolute, r2, else q2 in a prismatic joint 2.
 
     Args:
         where: of the expression, for the messages.
@@ -47,12 +50,13 @@ def _variable(where: str, value: Expression, j: int, sigma: int) -> str:
     names = list(dict.fromkeys(p.name for p in parameters_of(value)))
     if len(names) == 1:
         return names[0]
+    if f"{_SHORT[sigma]}{j}" in names:
+        return f"{_SHORT[sigma]}{j}"
     usual = [name for name in names if re.fullmatch(_USUAL[sigma].format(j=j), name)]
     if len(usual) != 1:
-        choice = "th" if sigma == 0 else "r"
         raise DescriptionError(
             f"{where} is {value}, which does not show the variable of this {_KIND[sigma]} joint;"
-            f" name it {choice}{j}"
+            f" name it {_SHORT[sigma]}{j}"
         )
     return usual[0]
 

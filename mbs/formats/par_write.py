@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from mbs.components.bodies import KhalilBody
+from mbs.comments import in_bracket_comment
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar, expression, parameters_of, to_float
 from mbs.files import write_text
@@ -20,7 +20,6 @@ from mbs.formats.par_file import (
 )
 from mbs.formats.rows import FrameRow, InertiaRow
 from mbs.formats.table import RobotTable, require_table
-from mbs.spatial.inertia import TEN_PARAMETERS
 
 _GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
 _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}
@@ -52,7 +51,7 @@ def _lines(table: RobotTable) -> Iterator[str]:
     _check_symbols(table)
     yield f"(* Robotname = '{re.sub(r'[^A-Za-z0-9 _-]', '_', table.name)}' *)"
     if table.source:
-        yield f"(* Source = '{_one_line(table.source)}' *)"
+        yield f"(* Source = '{in_bracket_comment(table.source)}' *)"
     yield from _remarks(table, NJ)
     yield f"NL = {NL}\nNJ = {NJ}\nNF = {NF}\nType = {_kind(table)}"
     yield "\n(* Geometric parameters *)"
@@ -86,16 +85,8 @@ def _remarks(table: RobotTable, NJ: int) -> Iterator[str]:
             value, usual = expression(getattr(row, kind)), getattr(InertiaRow(row.frame), kind)
             if row.frame <= NJ and to_float(value) != usual:
                 yield f"(* {kind} {row.frame} = {_text(value)} *)"
-        if row.grouped and not _is_body(row):
+        if row.grouped and not row.is_body:
             yield f"(* grouped {row.frame} = 1 *)"
-
-
-def _is_body(row: InertiaRow) -> bool:
-    try:
-        KhalilBody("body", **{name: getattr(row, name) for name in TEN_PARAMETERS})
-    except DescriptionError:
-        return False
-    return True
 
 
 def _springs(table: RobotTable, NJ: int) -> Iterator[str]:
@@ -156,10 +147,6 @@ def _extras(table: RobotTable, keys: Iterable[str]) -> Iterator[str]:
     for key in keys:
         if key in table.extras:
             yield _vector(key, (_text(text) for text in table.extras[key]))
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split()).replace("*)", "* )")
 
 
 def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:

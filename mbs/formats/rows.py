@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from mbs.components import Rotor
-from mbs.expressions import Scalar, expression, to_float
+from mbs.components import KhalilBody, Rotor
+from mbs.errors import DescriptionError
+from mbs.expressions import Number, Scalar, expression, to_float
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
@@ -100,6 +102,18 @@ class InertiaRow:
     rotor: Rotor | None = None
     name: str = ""
     grouped: bool = False
+
+    @property
+    def is_body(self) -> bool:
+        """Whether its inertial parameters are those of a body; symbols leave it open."""
+        values: dict[str, Any] = {name: expression(getattr(self, name)) for name in TEN_PARAMETERS}
+        if not all(isinstance(value, Number) for value in values.values()):
+            return False
+        try:
+            KhalilBody("body", **values)
+        except DescriptionError:
+            return False
+        return True
 
     @property
     def drive(self) -> list[str]:

@@ -85,6 +85,12 @@ class RobotTable:
         """Numbers of the frames on either side of the cut joints."""
         return frozenset(frame for loop in self.loops for frame in loop.cut)
 
+    @property
+    def symbols(self) -> frozenset[str]:
+        """Names of the symbols in its rows."""
+        scalars = _scalars((self.frames, self.bodies, self.gravity))
+        return frozenset(symbol.name for scalar in scalars for symbol in parameters_of(scalar))
+
     def joint_name(self, j: int) -> str:
         """The name of the joint of frame j."""
         return self.frames[j - 1].name or f"q{j}"

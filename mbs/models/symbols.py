@@ -111,7 +111,10 @@ def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols
         return ModelSymbols(q, v, v, "", None, poses)
     v = SX.sym("v_a", len(system.active))
     reduced = reduction(system, q, v)
-    return ModelSymbols(q, v, casadi.mtimes(reduced.G, v), "_a", reduced, poses)
+    # dense: joints of a sub-loop that cannot move have structural zeros in G, and `substitute`
+    # takes vectors of one pattern only
+    v_tree = casadi.densify(casadi.mtimes(reduced.G, v))
+    return ModelSymbols(q, v, v_tree, "_a", reduced, poses)
 
 
 def solution_order(system: System, s: ModelSymbols) -> list[int]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import casadi
 
+from mbs.comments import in_c_comment
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.native.array_calls import with_array_calls
@@ -103,11 +104,26 @@ def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
     Args:
         functions: what to write.
         options: of `casadi.CodeGenerator`.
+
+    Raises:
+        ModelError: an input or output is called by what would end a comment or a string of C.
     """
     generator = casadi.CodeGenerator("generated", options)
     for function in functions:
+        _check_names(function)
         generator.add(function)
     return str(generator.dump())
+
+
+def _check_names(function: casadi.Function) -> None:
+    """CasADi writes names of inputs and outputs into comments and strings as they are."""
+    for part in (function, *function.find_functions()):
+        for name in (*part.name_in(), *part.name_out()):
+            if name != in_c_comment(name) or '"' in name:
+                raise ModelError(
+                    f"{part.name()}: the name {quoted(name)} cannot be written as C; call inputs"
+                    " and outputs by letters, digits and underscores"
+                )
 
 
 def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:

@@ -123,6 +123,26 @@ def test_classic_text_has_tables_and_ends():
     assert equations.endswith("*=*\n")
 
 
+def test_conditions_stand_as_they_are():
+    """No condition is simplified, none loses its brackets, and NaN is not below 1 nor above."""
+    x = SX.sym("x", 2)
+    a, b = x[0], x[1]
+    never = casadi.logic_and(a < 1, casadi.logic_not(a < 1))
+    mixed = casadi.logic_or(casadi.logic_and(a < 1, b < 1), never)
+    function = vector([casadi.if_else(mixed, a, b)], x)
+    assert "(((x1 < 1.0) && (x2 < 1.0)) || ((x1 < 1.0) && (!(x1 < 1.0))))" in mbs.export.code(
+        function, "c"
+    )
+    assert "not (x1 < 1)" in mbs.export.code(function, "maple")
+    assert "&&" in mbs.export.code(function, "matlab")
+
+
+def test_the_smaller_of_a_number_and_nan_is_the_number():
+    x = SX.sym("x", 2)
+    function = vector([casadi.fmin(x[0], x[1])], x)
+    assert "ifelse(x1 <= x2 || isnan(x2), x1, x2)" in mbs.export.code(function, "julia")
+
+
 # ---- refusals ----
 
 

@@ -7,8 +7,11 @@ from support.random_trees import random_tree
 
 import mbs
 import mbs.models
+from mbs.app.tasks.exporting import toml
 from mbs.components import Body, Free, Mechanism, Revolute, Rotor, Spherical
-from mbs.errors import ExportError, ModelError
+from mbs.errors import DescriptionError, ExportError, ModelError
+from mbs.formats import RobotTable, read_par, write_par
+from mbs.formats.rows import FrameRow, InertiaRow
 
 
 def efforts(system, q, v, a, names):
@@ -69,6 +72,93 @@ def test_symbols_stay_symbols(tmp_path):
     np.testing.assert_allclose(np.array(theirs), np.array(ours), rtol=1e-12)
 
 
+def slider(length, height, Fv="sqrt(L*L)"):
+    """A turntable with a slide, whose length along the axis cancels."""
+    m = Mechanism("slider", parameters={"L": -0.4, "M2": 0.3})
+    m.add(Body("ballast", mass="(M2 + L)^2", com=(0, 0, 1), inertia=(1, 1, 1)))
+    m.connect(m.world, m.components["ballast"])
+    table = m.add(Body("table", mass=2.0, com=(0.1, 0, 0), inertia=(0.1, 0.2, 0.3)))
+    block = m.add(Body("block", mass=1.0, com=(0.1, 0.2, 0.3), inertia=(0.1, 0.2, 0.3)))
+    m.connect(m.world.at(0, 0, length), Revolute("j1", axis="z", Fv=Fv), table)
+    m.connect(table.at(0.2, 0, height), Revolute("j2", axis="x"), block)
+    return m
+
+
+@pytest.mark.parametrize(
+    ("length", "height", "Fv", "left"),
+    [
+        ("L", "-L", 0.1, set()),
+        ("L - L + M2", 0.1, 0.0, set()),
+        ("L", "L - L + M2", "sqrt(L*L)", {"L", "M2"}),
+        (0.0, "sqrt(M2^2)", "sqrt((L - M2)^2)/2", {"L", "M2"}),
+        (0.0, "atan2(M2, L)", "tan(L)^2/cos(M2)", {"L", "M2"}),
+    ],
+)
+def test_symbols_that_cancel_and_roots_of_squares(length, height, Fv, left, tmp_path):
+    system, after = same_models(slider(length, height, Fv), tmp_path / "slider.par")
+    assert left <= {p.name for p in after.parameters} <= {"L", "M2"}
+    (tmp_path / "slider.toml").write_bytes(toml(system))
+    again = mbs.load(tmp_path / "slider.toml").assemble()
+    q, v, a = np.random.default_rng(4).uniform(-1, 1, (3, 2))
+    for p in ({}, {"L": 0.7, "M2": -0.9}):
+        ours, *theirs = (
+            mbs.models.inverse_dynamics(s)(q, v, a, *values)
+            for s in (system, after, again)
+            for values in [[s.parameter_values({k: x for k, x in p.items() if k in names(s)})]]
+        )
+        for other in theirs:
+            np.testing.assert_allclose(np.array(other), np.array(ours), rtol=1e-11, atol=1e-12)
+
+
+def names(system):
+    return [p.name for p in system.parameters]
+
+
+def test_base_parameters_with_symbols_survive(tmp_path):
+    """The values of a link belong to no body, and one of them is a symbol."""
+    table = RobotTable(
+        "grouped",
+        (FrameRow(0, name="a"),),
+        (InertiaRow(1, XX=-2.0, ZZ="Z", MX="3*Z", grouped=True),),
+        parameters={"Z": 0.2},
+    )
+    system = mbs.formats.to_mechanism(table).assemble()
+    write_par(table, tmp_path / "table.par")
+    mbs.export.par(system, tmp_path / "system.par")
+    (tmp_path / "system.toml").write_bytes(toml(system))
+    for file in ("table.par", "system.par", "system.toml"):
+        again = mbs.load(tmp_path / file).assemble()
+        assert float(mbs.models.inertia_matrix(again)(0, 0.7)) == 0.7
+    assert read_par(tmp_path / "table.par").bodies[0].grouped
+    kept = RobotTable("kept", (FrameRow(0),), (InertiaRow(1, ZZ=1.0, grouped=True),))
+    write_par(kept, tmp_path / "kept.par")
+    assert "grouped" not in (tmp_path / "kept.par").read_text()
+
+
+def test_messages_speak_of_the_file_that_is_written(tmp_path):
+    m = Mechanism("m")
+    m.connect(m.world, Spherical("j"), m.add(Body("b", mass=1.0, inertia=(1, 1, 1))))
+    system = m.assemble()
+    with pytest.raises(ModelError, match=r"a \.toml file has no spherical joint"):
+        toml(system)
+    with pytest.raises(ModelError, match=r"a \.par file has no spherical joint"):
+        mbs.export.par(system, tmp_path / "m.par")
+
+
+@pytest.mark.parametrize("name", ["q1", "th2", "t1", "theta1", "r1"])
+def test_symbols_named_like_joint_variables(name, tmp_path):
+    """Those of the variables in the file are refused, the others read as what they are."""
+    m = Mechanism("m", parameters={name: 0.3})
+    a, b = (m.add(Body(n, mass=1.0, inertia=(1, 1, 1))) for n in "ab")
+    m.connect(m.world, Revolute("j1", axis="z"), a.at(0.1, 0, 0, rotation=("z", name)))
+    m.connect(a.at(name, 0, 0), Revolute("j2", axis="x"), b)
+    if name != "th2":
+        same_models(m, tmp_path / "m.par")
+        return
+    with pytest.raises(DescriptionError, match="th2 has the name of a joint variable"):
+        mbs.export.par(m, tmp_path / "m.par")
+
+
 def test_closed_loops_keep_their_cuts_and_posture(tmp_path):
     system = mbs.load("four_bar").assemble()
     mbs.export.par(system, tmp_path / "four_bar.par")
@@ -93,7 +183,7 @@ def test_rotors_on_moving_links_are_refused(tmp_path):
     m = Mechanism("m")
     joint = Revolute("j", axis="z", rotor=Rotor(inertia=1e-4, ratio=50))
     m.connect(m.world, joint, m.add(Body("b", mass=1.0, inertia=(1, 1, 1))))
-    with pytest.raises(ModelError, match=r"m/j: a \.par file has no rotor"):
+    with pytest.raises(ModelError, match=r"m/j: no rotor is written to a \.par file"):
         mbs.export.par(m, tmp_path / "m.par")
 
 

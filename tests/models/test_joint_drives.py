@@ -229,3 +229,21 @@ def test_spring_of_a_joint_that_closes_a_loop():
     slope = (around[0] - around[1]) / 2e-5
     assert abs(slope) == pytest.approx(1, abs=1e-6)
     assert float(MODELS.gravity_effort(elastic)(q)) == pytest.approx(moved * slope, rel=1e-6)
+
+
+def test_rotor_inertia_of_a_free_body_is_seen_from_the_world():
+    """Ia (a + w x v) along the axes of the body: its velocity is in axes that turn."""
+
+    def body(Ia):
+        m = mbs.Mechanism("body", gravity=(0, 0, 0))
+        hull = m.add(Body("hull", mass=2.0, com=(0.1, 0.2, 0.3), inertia=(0.4, 0.5, 0.6)))
+        m.connect(m.world, Free("base", Ia=Ia), hull)
+        return mbs.models.inverse_dynamics(m.assemble())
+
+    rng = np.random.default_rng(1)
+    q = rng.standard_normal(7)
+    q[3:] /= np.linalg.norm(q[3:])
+    v, a = rng.standard_normal((2, 6))
+    extra = np.array(body(0.7)(q, v, a) - body(0.0)(q, v, a)).ravel()
+    seen = a + np.concatenate([np.cross(v[3:], v[:3]), np.zeros(3)])
+    np.testing.assert_allclose(extra, 0.7 * seen, atol=1e-12)

@@ -9,6 +9,7 @@ import numpy as np
 from support.closed_mechanisms import planar_loop
 from support.dae_mechanisms import CLOSED, OPEN
 from support.driven_trees import driven_tree
+from support.immobile_loops import triangle
 from support.random_trees import random_state
 
 import mbs
@@ -97,6 +98,8 @@ ALONE = {
         "direct_geometry": last(models.direct_geometry),
     },
     "observed": {"measurements": models.measurements, "devices": models.devices},
+    "still_triangle": {"measurements": models.measurements},
+    "turning_triangle": {"measurements": models.measurements},
 }
 """What not every mechanism has, by the mechanism."""
 
@@ -129,10 +132,12 @@ SYSTEMS = {
     "loop": planar,
     **{n: CLOSED[n] for n in ("four_bar", "rssr", "rolling")},
     "observed": observed,
+    "still_triangle": lambda: triangle(moves=False, rigid=False),
+    "turning_triangle": lambda: triangle(moves=True, rigid=False),
 }
 """Trees and loops, seeded; with quaternions, symbols, springs, rotors, friction, rolling."""
 
-LOOPS = ("loop", "four_bar", "rssr", "rolling")
+LOOPS = ("loop", "four_bar", "rssr", "rolling", "still_triangle", "turning_triangle")
 
 PAIRS = [
     (name, builder)

@@ -20,7 +20,8 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.export.fmu.description import Solver
-from mbs.formats import RobotTable, read_par, write_toml
+from mbs.export.par import robot_table
+from mbs.formats import RobotTable, write_toml
 from mbs.messages import did_you_mean
 
 SOLVERS: tuple[str, ...] = get_args(Solver)
@@ -146,13 +147,8 @@ def toml(system: System) -> bytes:
     Raises:
         ModelError: a table of frames cannot say it.
     """
-
-    def write(path: Path) -> None:
-        between = path.with_suffix(".par")
-        export.par(system, between)
-        write_toml(_named(read_par(between), system), path)
-
-    return _written(write, "robot.toml")
+    table = _named(robot_table(system, ".toml"), system)
+    return _written(lambda path: write_toml(table, path), "robot.toml")
 
 
 def _named(table: RobotTable, system: System) -> RobotTable:

@@ -7,14 +7,21 @@ from typing import Any
 
 from sympy.printing.c import C99CodePrinter
 
-from mbs.export.c_names import comment, parameter_names
-from mbs.export.languages.language import Language, sections, value_text, wrapped
+from mbs.comments import in_c_comment
+from mbs.export.c_names import parameter_names
+from mbs.export.languages.language import (
+    Language,
+    kept_inside,
+    sections,
+    value_text,
+    wrapped,
+)
 from mbs.export.languages.printers import printer_of
 from mbs.export.languages.unit import Argument, Unit
 
 _CHOICE = "({0}) ? {1} : {2}"
 _FORMS = {
-    "step": "(double)(({0} > 0) - ({0} < 0))",
+    "step": "({0} > 0 ? 1.0 : {0} < 0 ? -1.0 : {0})",
     "Abs": "fabs({0})",
     **{name: f"{name}({{0}}, {{1}})" for name in ("fmod", "copysign", "fmin", "fmax", "hypot")},
     **{"floor_": "floor({0})", "ceil_": "ceil({0})", "log1p": "log1p({0})", "expm1": "expm1({0})"},
@@ -40,9 +47,7 @@ class C(Language):
     def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         yield "/*"
-        for text in unit.header:
-            indent = " " * (len(text) - len(text.lstrip()))
-            yield f" * {indent}{comment(text)}".rstrip()
+        yield from (f" * {line}".rstrip() for line in kept_inside(unit.header, in_c_comment))
         yield from (" */", "#include <math.h>", "")
         arguments = [f"const double *{argument.name}" for argument in unit.inputs]
         arguments += [f"double *{argument.name}" for argument in unit.outputs]

@@ -20,13 +20,17 @@ _FORMS = {
     **{name: f"{name}({{0}})" for name in _SAME.split()},
     **{"atan2": "atan2({0}, {1})", "Abs": "abs({0})", "hypot": "hypot({0}, {1})"},
     **{"fmod": "mod({0}, {1})", "copysign": "sign({0}, {1})"},
-    **{"fmin": "min({0}, {1})", "fmax": "max({0}, {1})"},
-    "step": "merge(0.0d0, sign(1.0d0, {0}), {0} == 0.0d0)",
+    # what `min` and `max` make of NaN is left open by the standard
+    "fmin": "merge({0}, {1}, {0} <= {1} .or. {1} /= {1})",
+    "fmax": "merge({0}, {1}, {0} >= {1} .or. {1} /= {1})",
+    "step": "merge(sign(1.0d0, {0}), {0}, abs({0}) > 0.0d0)",
+    "denied": ".not. {0}",
     "floor_": "(aint({0}) - merge(1.0d0, 0.0d0, {0} < aint({0})))",
     "ceil_": "(aint({0}) + merge(1.0d0, 0.0d0, {0} > aint({0})))",
     "log1p": "log(1.0d0 + {0})",
     "expm1": "(exp({0}) - 1.0d0)",
 }
+_JOINS = {"both": " .and. ", "either": " .or. "}
 _WORDS = """
 abs aint asin acos atan sinh cosh tanh asinh acosh atanh exp log erf atan2 hypot mod sign min max
 merge sin cos tan sqrt
@@ -51,7 +55,7 @@ class Fortran(Language):
     def printer(self) -> Any:
         """A printer of sympy."""
         signs = {"Unequality": "/="}
-        return printer_of(FCodePrinter, self.title, _number, _FORMS, "{0}**{1}", signs)
+        return printer_of(FCodePrinter, self.title, _number, _FORMS, "{0}**{1}", signs, _JOINS)
 
     def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import textwrap
-import unicodedata
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import casadi
 from casadi import Function
 
+from mbs.comments import ascii_line
 from mbs.export.languages.quantities import Elements, elements_of, joint_label
 from mbs.export.languages.unit import Argument
 from mbs.operations.counts import Count, count_graph
@@ -53,7 +53,7 @@ def header(
         lines += _argument(direction, port, argument, elements, names[k])
     lines += ["", *_paragraph(_cost(graph))]
     lines.append(f"Units are SI and radians. Written by mbs {__version__}.")
-    return tuple(_ascii(line) for line in lines)
+    return tuple(lines)
 
 
 def _argument(
@@ -96,14 +96,9 @@ def _tally(count: Count) -> str:
 
 
 def _paragraph(text: str) -> list[str]:
-    together = re.sub(r" \[", "\0[", " ".join(text.split()))
+    together = re.sub(r" \[", "\0[", ascii_line(text))
     lines = textwrap.wrap(together, _WIDTH, subsequent_indent="    ")
     return [line.replace("\0", " ") for line in lines]
-
-
-def _ascii(line: str) -> str:
-    """The line with accents left out, which every compiler takes."""
-    return unicodedata.normalize("NFKD", line).encode("ascii", "ignore").decode("ascii")
 
 
 def tables(function: Function) -> tuple[str, ...]:

@@ -26,8 +26,8 @@ _FORMS = {
     "ceil_": "ceil({0})",
     "fmod": "rem({0}, {1})",
     "copysign": "copysign({0}, {1})",
-    "fmin": "min({0}, {1})",
-    "fmax": "max({0}, {1})",
+    "fmin": "ifelse({0} <= {1} || isnan({1}), {0}, {1})",  # `min` of NaN and 1 is NaN
+    "fmax": "ifelse({0} >= {1} || isnan({1}), {0}, {1})",
     "hypot": "hypot({0}, {1})",
     "log1p": "log1p({0})",
     "expm1": "expm1({0})",
@@ -35,7 +35,7 @@ _FORMS = {
 }
 _WORDS = """
 sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt abs sign floor ceil rem
-copysign min max hypot log1p expm1 pi im NaN Inf
+copysign ifelse isnan hypot log1p expm1 pi im NaN Inf
 baremodule begin break catch const continue do else elseif end export false finally for function
 global if import let local macro module quote return struct true try using while
 abstract mutable primitive type where in isa outer

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+from mbs.comments import in_line_comment
 from mbs.export.languages.unit import Argument, Line, Unit
 
 WIDTH = 100
@@ -137,8 +138,19 @@ def wrapped(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> 
 
 def commented(header: Sequence[str], mark: str) -> Iterator[str]:
     """A header as comments to the end of the line."""
+    yield from (f"{mark} {line}".rstrip() for line in kept_inside(header, in_line_comment))
+
+
+def kept_inside(header: Sequence[str], rule: Callable[[str], str]) -> Iterator[str]:
+    """The lines of a header, indented as they are, for a comment.
+
+    Args:
+        header: what to say.
+        rule: of `mbs.comments`, for the syntax of the comment.
+    """
     for line in header:
-        yield f"{mark} {line}".rstrip()
+        text = line.lstrip(" ")
+        yield " " * (len(line) - len(text)) + rule(text)
 
 
 def value_text(line: Line, printer: Any, choice: str) -> str:

@@ -23,10 +23,12 @@ _FORMS = {
     "hypot": r"\operatorname{hypot}\left(%s, %s\right)",
     "log1p": r"\log\left(1 + %s\right)",
     "expm1": r"\left(e^{%s} - 1\right)",
+    "denied": r"\neg \left(%s\right)",
     "atan2": r"\operatorname{atan2}\left(%s, %s\right)",
 }
+_JOINS = {"both": r" \wedge ", "either": r" \vee "}
 _LONGEST = 150
-_DEEPER, _SHALLOWER = ("{", r"\left"), ("}", r"\right")
+_DEEPER, _SHALLOWER = ("{", r"\left", r"\begin"), ("}", r"\right", r"\end")
 
 
 class _Printer(LatexPrinter):  # type: ignore[misc]
@@ -36,7 +38,11 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
         return str(self._print(expr))
 
     def _print(self, expr: Any, **kwargs: Any) -> Any:
-        form = _FORMS.get(type(expr).__name__)
+        name = type(expr).__name__
+        if name in _JOINS:
+            parts = (rf"\left({self._print(arg)}\right)" for arg in expr.args)
+            return _JOINS[name].join(parts)
+        form = _FORMS.get(name)
         if form is None:
             return super()._print(expr, **kwargs)
         return form % tuple(self._print(arg) for arg in expr.args)

@@ -19,11 +19,12 @@ from mbs.export.languages.language import (
 from mbs.export.languages.printers import printer_of
 from mbs.export.languages.unit import Argument, Unit
 
-_JOINS = {"And": " and ", "Or": " or "}
+_JOINS = {"both": " and ", "either": " or "}
 _CHOICE = "piecewise({0}, {1}, {2})"
 _FORMS = {
     "atan2": "arctan({0}, {1})",
     "step": "signum({0})",
+    "denied": "not {0}",
     "Abs": "abs({0})",
     "floor_": "floor({0})",
     "ceil_": "ceil({0})",

@@ -8,9 +8,11 @@ from typing import Any
 
 from sympy.printing.mathematica import MCodePrinter
 
+from mbs.comments import in_wolfram_comment
 from mbs.export.languages.language import (
     Language,
     grid_texts,
+    kept_inside,
     plain_number,
     sections,
     value_text,
@@ -33,6 +35,7 @@ _FORMS = {
     "copysign": "If[{1} < 0, -Abs[{0}], Abs[{0}]]",
     "fmin": "Min[{0}, {1}]",
     "fmax": "Max[{0}, {1}]",
+    "denied": "Not[{0}]",
     "hypot": "Sqrt[{0}^2 + {1}^2]",
     "log1p": "Log[1 + {0}]",
     "expm1": "(Exp[{0}] - 1)",
@@ -64,9 +67,9 @@ class Mathematica(Language):
 
     def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        header = [re.sub(r"\(\*|\*\)", "**", line) for line in unit.header]
-        yield f"(* {header[0]}"
-        yield from (f"   {line}".rstrip() for line in header[1:])
+        first, *others = kept_inside(unit.header, in_wolfram_comment)
+        yield f"(* {first}"
+        yield from (f"   {line}".rstrip() for line in others)
         yield "*)"
         arguments = ", ".join(f"{argument.name}_" for argument in unit.inputs)
         names = ", ".join(unit.locals)

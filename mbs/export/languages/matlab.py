@@ -26,7 +26,8 @@ _FORMS = {
     "floor_": "floor({0})",
     "ceil_": "ceil({0})",
     "fmod": "rem({0}, {1})",
-    "copysign": "(abs({0})*(1 - 2*({1} < 0)))",
+    "copysign": "(abs({0})*(1 - 2*({1} < 0 || 1/{1} < 0)))",  # 1/-0 is minus infinity
+    "denied": "~{0}",
     "fmin": "min({0}, {1})",
     "fmax": "max({0}, {1})",
     "hypot": "hypot({0}, {1})",

@@ -16,6 +16,7 @@ from mbs.operations.graph import Graph
 _FORMS = {
     **{name: f"{name}({{0}})" for name in ("sin", "cos", "tan", "sqrt")},
     "atan2": "atan2({0}, {1})",
+    "Abs": "sqrt({0}^2)",  # CasADi makes it of a root of a square; the grammar has none
 }
 
 

@@ -31,7 +31,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
         forms: how functions are called, by the name of the function.
         power: how a power is written.
         comparisons: how comparisons are written.
-        joins: how conditions are joined, where the printer of sympy cannot be used.
+        joins: how conditions are joined, by "both" and "either".
         number: how a number is written.
         title: of the language, for messages.
     """
@@ -79,7 +79,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
 
     def _print_Pow(self, expr: Any, **kwargs: Any) -> str:
         base, exponent = expr.args
-        if exponent == S.Half:
+        if exponent is S.Half:  # and not the number 0.5, whose power of minus infinity is no NaN
             return _called(self.forms["sqrt"], [self._print(base)])
         level = precedence(expr)
         if exponent == S.NegativeOne:
@@ -134,13 +134,14 @@ def printer_of(
             for other arguments; an empty text for those that the language does not have.
         power: how a power is written, such as `{0}^{1}`.
         comparisons: signs that differ from those of C.
-        joins: of conditions, put between brackets.
+        joins: of conditions, put between brackets, for "both" and "either"; those of C when left
+            out. A condition that is denied is the form "denied".
     """
     values = {
-        "forms": {"sqrt": "sqrt({0})", **forms},
+        "forms": {"sqrt": "sqrt({0})", "denied": "!{0}", **forms},
         "power": power,
         "comparisons": {**_COMPARISONS, **(comparisons or {})},
-        "joins": joins or {},
+        "joins": joins or {"both": " && ", "either": " || "},
         "number": staticmethod(number),
         "title": title,
     }

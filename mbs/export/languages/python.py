@@ -8,7 +8,15 @@ from typing import Any
 
 from sympy.printing.pycode import PythonCodePrinter
 
-from mbs.export.languages.language import Language, plain_number, sections, value_text, wrapped
+from mbs.comments import in_docstring
+from mbs.export.languages.language import (
+    Language,
+    kept_inside,
+    plain_number,
+    sections,
+    value_text,
+    wrapped,
+)
 from mbs.export.languages.printers import printer_of
 from mbs.export.languages.unit import Unit
 
@@ -20,13 +28,14 @@ _NUMPY = {
 }
 _OF_TWO = {
     **{"atan2": "arctan2", "fmod": "fmod", "copysign": "copysign", "hypot": "hypot"},
-    **{"fmin": "minimum", "fmax": "maximum"},
+    **{"fmin": "fmin", "fmax": "fmax"},
 }
-_JOINS = {"And": " & ", "Or": " | "}
+_JOINS = {"both": " & ", "either": " | "}
 _CHOICE = "np.where({0}, {1}, {2})"
 _FORMS = {
     **{name: f"np.{function}({{0}})" for name, function in _NUMPY.items()},
     **{name: f"np.{function}({{0}}, {{1}})" for name, function in _OF_TWO.items()},
+    "denied": "np.logical_not({0})",
     "erf": "np.vectorize(math.erf, [float])({0})",
 }
 _WORDS = (*keyword.kwlist, "np", "math", "float", "shape")
@@ -56,9 +65,9 @@ class Python(Language):
         yield from ("import numpy as np", "", "")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrapped(f"def {unit.name}({arguments}):")
-        header = [line.replace("\\", "/").replace('"""', "'''") for line in unit.header]
-        yield f'    """{header[0]}'
-        yield from (f"    {line}".rstrip() for line in header[1:])
+        first, *others = kept_inside(unit.header, in_docstring)
+        yield f'    """{first}'
+        yield from (f"    {line}".rstrip() for line in others)
         yield '    """'
         yield from body
 

@@ -24,7 +24,7 @@ _FORMS = {
     **{name: f"f64::{method}({{0}}, {{1}})" for name, method in _OF_TWO.items()},
     "fmod": "({0} % {1})",
     "powi": "{0}.powi({1})",
-    "step": "(if {0} > 0.0 {{ 1.0_f64 }} else if {0} < 0.0 {{ -1.0 }} else {{ 0.0 }})",
+    "step": "(if {0} > 0.0 {{ 1.0_f64 }} else if {0} < 0.0 {{ -1.0 }} else {{ {0} }})",
     "erf": "",
 }
 _WORDS = """
@@ -54,7 +54,8 @@ class Rust(Language):
 
     def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from commented(unit.header, "///")
+        # No `///`: examples in the documentation of Rust are compiled and run by its tests.
+        yield from commented(unit.header, "//")
         arguments = [f"{argument.name}: &[f64]" for argument in unit.inputs]
         arguments += [f"{argument.name}: &mut [f64]" for argument in unit.outputs]
         yield f"#[allow({_LINTS})]"

@@ -51,19 +51,24 @@ _OURS = {
 }
 """Functions that sympy has under other meanings, or not at all; see `Forms`."""
 
-_UNDEFINED = {name: sympy.Function(name) for name in _OURS.values()}
+_JOINS = {casadi.OP_AND: "both", casadi.OP_OR: "either"}
+"""Conditions that are joined; those of sympy drop, sort and simplify what they are given."""
+
+_UNDEFINED = {name: sympy.Function(name) for name in (*_OURS.values(), *_JOINS.values(), "denied")}
 _COMPARE = {
     casadi.OP_LT: sympy.Lt,
     casadi.OP_LE: sympy.Le,
     casadi.OP_EQ: sympy.Eq,
     casadi.OP_NE: sympy.Ne,
 }
-_DENIED = {
-    casadi.OP_LT: sympy.Ge,
-    casadi.OP_LE: sympy.Gt,
-    casadi.OP_EQ: sympy.Ne,
-    casadi.OP_NE: sympy.Eq,
+_OPPOSITE = {
+    casadi.OP_EQ: casadi.OP_NE,
+    casadi.OP_NE: casadi.OP_EQ,
+    casadi.OP_AND: casadi.OP_OR,
+    casadi.OP_OR: casadi.OP_AND,
 }
+"""What denies an operation; that of a < b is not a >= b, since NaN is neither."""
+
 _MIRRORED = {
     sympy.Lt: sympy.Gt,
     sympy.Le: sympy.Ge,
@@ -109,17 +114,17 @@ class Writer:
         node = self.plan.graph.nodes[number]
         if node.op == casadi.OP_NOT:
             return self.condition(node.args[0], not denied)
-        if node.op in (casadi.OP_AND, casadi.OP_OR):
-            parts = [self.condition(k, denied) for k in node.args]
-            join = sympy.And if (node.op == casadi.OP_AND) != denied else sympy.Or
-            return join(*parts, evaluate=False)
-        compare = _DENIED if denied else _COMPARE
-        if node.op not in compare:
-            return compare[casadi.OP_NE](self.value(number), number_of(0.0), evaluate=False)
-        relation, (a, b) = compare[node.op], map(self.value, node.args)
+        op = _OPPOSITE.get(node.op, node.op) if denied else node.op
+        if op in _JOINS:
+            return _joined(_JOINS[op], [self.condition(k, denied) for k in node.args])
+        if op not in _COMPARE:
+            op = casadi.OP_EQ if denied else casadi.OP_NE
+            return _COMPARE[op](self.value(number), number_of(0.0), evaluate=False)
+        relation, (a, b) = _COMPARE[op], map(self.value, node.args)
         if a.is_Float:
-            return _MIRRORED.get(relation, relation)(b, a, evaluate=False)
-        return relation(a, b, evaluate=False)
+            relation, a, b = _MIRRORED.get(relation, relation), b, a
+        holds = relation(a, b, evaluate=False)
+        return _UNDEFINED["denied"](holds) if denied and op == node.op else holds
 
     def _operation(self, node: Node) -> Expr:
         if node.op == casadi.OP_CONST:
@@ -132,6 +137,8 @@ class Writer:
             return self._square(values[0])
         if node.op in _SYMPY:
             return _SYMPY[node.op](*values, evaluate=False)
+        if node.op == casadi.OP_FMOD and values[1].is_zero:
+            values[1] = product(values[1], values[0])  # Fortran refuses to divide by a literal zero
         if node.op in _OURS:
             return _UNDEFINED[_OURS[node.op]](*values)
         raise ModelError(
@@ -225,6 +232,12 @@ def _product(sign: int, factors: list[Expr]) -> Expr:
 
 def _pow(base: Expr, exponent: Expr) -> Expr:
     return Pow(base, exponent, evaluate=False)
+
+
+def _joined(join: str, conditions: list[Expr]) -> Expr:
+    """Conditions joined, those that are joined alike in one row."""
+    parts = (c.args if type(c).__name__ == join else (c,) for c in conditions)
+    return _UNDEFINED[join](*(part for some in parts for part in some))
 
 
 def _inverse(value: Expr) -> Expr:

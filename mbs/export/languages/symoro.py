@@ -7,17 +7,27 @@ from typing import Any
 
 from sympy.printing.pycode import PythonCodePrinter
 
-from mbs.export.languages.language import Language, plain_number, sections, value_text, wrapped
+from mbs.comments import in_bracket_comment
+from mbs.export.languages.language import (
+    Language,
+    kept_inside,
+    plain_number,
+    sections,
+    value_text,
+    wrapped,
+)
 from mbs.export.languages.printers import printer_of
 from mbs.export.languages.unit import Unit
 
 _SAME = "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf"
+_JOINS = {"both": " and ", "either": " or "}
 _CHOICE = "Piecewise(({1}, {0}), ({2}, True))"
 _FORMS = {
     **{name: f"{name}({{0}})" for name in _SAME.split()},
     **{"atan2": "atan2({0}, {1})", "step": "sign({0})", "Abs": "Abs({0})"},
     **{"floor_": "floor({0})", "ceil_": "ceiling({0})"},
     **{"fmin": "Min({0}, {1})", "fmax": "Max({0}, {1})"},
+    "denied": "not {0}",
     "hypot": "sqrt({0}**2 + {1}**2)",
     "log1p": "log(1 + {0})",
     "expm1": "(exp({0}) - 1)",
@@ -34,11 +44,16 @@ class Symoro(Language):
 
     def printer(self) -> Any:
         """A printer of sympy."""
-        return printer_of(PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}")
+        return printer_of(
+            PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
+        )
 
     def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from unit.header
+        first, *others = kept_inside(unit.header, in_bracket_comment)
+        yield f"(* {first}"
+        yield from (f"   {line}".rstrip() for line in others)
+        yield "*)"
         yield from unit.tables
         yield from ("", "Equations:", "")
         for _, lines in sections(unit):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
         raise DescriptionError(
             f"{name}: axis {quoted(axis)} is not a direction; give three numbers"
         )
-    length = float(np.linalg.norm(values))
+    length = math.hypot(*values)
     if length < 1e-9:
         raise DescriptionError(f"{name}: axis {quoted(axis)} has zero length; give a direction")
     x, y, z = (float(v) for v in values / length)

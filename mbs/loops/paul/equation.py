@@ -105,7 +105,7 @@ def _mark(equation: Equation) -> object:
     table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
     size = np.linalg.norm(table, axis=0)
     table /= np.where(size > 0, size, 1.0) * np.where(_leading(table) < 0, -1.0, 1.0)
-    return equation.variables, tuple(keys), np.round(table, 6).tobytes()
+    return equation.variables, tuple(keys), (np.round(table, 6) + 0.0).tobytes()  # -0.0 is 0.0
 
 
 def _leading(table: Values) -> NDArray[np.float64]:

@@ -21,6 +21,7 @@ from mbs.loops.paul.knowledge import Variable
 from mbs.loops.sequence import Step, step
 from mbs.loops.sequence.step import Found
 from mbs.loops.sequence.two_roots import angle_of
+from mbs.solvers.rank import graded
 
 Matrix = NDArray[np.float64]
 Variables = tuple[Variable, ...]
@@ -102,7 +103,7 @@ def _best(
         if np.min(np.abs(det) / size) < _SMALL:
             continue
         cost = sum(first[k].cost for k in chosen)
-        rank = (unsteady(det), float(cost), -float(np.min(np.abs(det))))
+        rank = (unsteady(det), float(cost), -graded(float(np.min(np.abs(det)))))
         choices.append((tuple(first[k] for k in chosen), rank))
     return sorted(choices, key=lambda choice: choice[1])[:_CHOICES]
 

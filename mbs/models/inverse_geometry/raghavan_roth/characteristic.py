@@ -96,7 +96,7 @@ def characteristic(problem: Problem) -> Characteristic:
         raise NoClosedForm(
             f"the loop has {problem.size} joints; the characteristic matrix is for six"
         )
-    loops = sorted(_loops(problem), key=lambda loop: loop.merit, reverse=True)
+    loops = sorted(_loops(problem), key=lambda loop: graded(loop.merit), reverse=True)
     for loop in loops[:_TRIED]:
         found = _characteristic(problem, loop)
         if found.regularity > _REGULAR:

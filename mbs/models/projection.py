@@ -16,6 +16,7 @@ from mbs.loops.scales import scales
 from mbs.loops.velocity import independent_constraint_rows, kept_rows
 from mbs.models.contacts import Contacts, Modes
 from mbs.models.prescribed import Prescribed
+from mbs.solvers.partial_ldl import partial_ldl
 
 Array = NDArray[np.float64]
 
@@ -127,9 +128,8 @@ def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, 
     B = rows * casadi.mtimes(J, casadi.diag(DM(columns)))
     every = casadi.vertcat(SX(J.shape[0] - off.numel(), 1), off)
     S = casadi.sparsify(casadi.mtimes(B, B.T)) + casadi.diag(every)
-    D, LT, order = casadi.ldl(S)
     squares = casadi.fmax(casadi.densify(casadi.diag(S)), 1)
-    independent = _NEARLY_DEPENDENT * squares[order] < D
+    D, LT, order, independent = partial_ldl(S, _NEARLY_DEPENDENT * squares)
     x = casadi.ldl_solve(rows * r, casadi.if_else(independent, D, _NEVER), LT, order)
     return DM(columns) * casadi.mtimes(B.T, casadi.densify(x)), casadi.mmin(independent)
 

@@ -27,7 +27,7 @@ Matrix = NDArray[np.float64]
 Variables = tuple[Variable, ...]
 
 _SMALL = 1e-5
-_CHOICES = 4
+_CHOICES = 8
 _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
 

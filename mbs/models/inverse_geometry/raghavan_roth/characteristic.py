@@ -24,6 +24,7 @@ from mbs.models.inverse_geometry.raghavan_roth.arithmetic import (
 from mbs.models.inverse_geometry.raghavan_roth.elimination import at, eliminations
 from mbs.models.inverse_geometry.raghavan_roth.pairs import Array
 from mbs.models.inverse_geometry.raghavan_roth.pencil import Pencil, pencil, regularity
+from mbs.solvers.rank import graded
 from mbs.spatial import Pose
 
 _REGULAR = 1e-10

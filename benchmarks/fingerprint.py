@@ -15,9 +15,8 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import casadi
@@ -72,8 +71,13 @@ def names() -> list[str]:
     return [*catalogue(), *VARIANTS]
 
 
-def fingerprint(name: str) -> dict[str, Any]:
-    """What is decided about one mechanism, and a digest of every text that it leads to."""
+def fingerprint(name: str, base: bool = False) -> dict[str, Any]:
+    """What is decided about one mechanism, and a digest of every text that it leads to.
+
+    Args:
+        name: of the mechanism.
+        base: whether base parameters are named too, which takes as long as all else.
+    """
     build = VARIANTS.get(name)
     system = build() if build else mbs.load(name).assemble()
     found = {
@@ -89,7 +93,7 @@ def fingerprint(name: str) -> dict[str, Any]:
         found[key] = _model(system, model)
     if name in catalogue():
         found["branches"] = _branches(system)
-        if system.nv <= FEW:
+        if base and system.nv <= FEW:
             found["base parameters"] = list(base_parameters(system).names)
     return found
 
@@ -143,11 +147,11 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def under(kernel: str, threads: str, chosen: Sequence[str] = ()) -> dict[str, Any]:
-    """The fingerprints as a process finds them that takes these kernels of linear algebra."""
+def under(kernel: str, threads: str, *given: str) -> dict[str, Any]:
+    """What a process prints that takes these kernels of linear algebra, for these arguments."""
     around = {"OPENBLAS_CORETYPE": kernel, "OPENBLAS_NUM_THREADS": threads}
     environment = {**os.environ, **around, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    command = [sys.executable, __file__, *chosen]
+    command = [sys.executable, __file__, *given]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     found: dict[str, Any] = json.loads(done.stdout)
     return found
@@ -168,24 +172,26 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="mechanisms; all of them when left out")
     parser.add_argument("--kernels", nargs="*", help=f"such as {' '.join(KERNELS)}; these if bare")
     parser.add_argument("--threads", nargs="*", default=THREADS)
+    parser.add_argument("--base", action="store_true", help="name base parameters too")
     given = parser.parse_args()
     if given.kernels is None:
-        print(json.dumps({name: fingerprint(name) for name in given.names or names()}))
+        found = {name: fingerprint(name, given.base) for name in given.names or names()}
+        print(json.dumps(found))
         return
-    sys.exit(1 if _compared(given.kernels or KERNELS, given.threads, given.names) else 0)
+    arguments = ["--base"] * given.base + given.names
+    sys.exit(1 if _compared(given.kernels or KERNELS, given.threads, arguments) else 0)
 
 
-def _compared(kernels: Sequence[str], threads: Sequence[str], chosen: Sequence[str]) -> int:
+def _compared(kernels: Sequence[str], threads: Sequence[str], arguments: Sequence[str]) -> int:
     """How many differences there are to the first kernel; each is printed."""
+    ways = [(kernel, number) for kernel in kernels for number in threads]
     first, found = None, 0
-    for kernel in kernels:
-        for number in threads:
-            begin = time.perf_counter()
-            other = under(kernel, number, chosen)
+    with ThreadPoolExecutor(min(2, os.cpu_count() or 1)) as workers:
+        every = workers.map(lambda way: under(*way, *arguments), ways)
+        for (kernel, number), other in zip(ways, every, strict=True):
             first = other if first is None else first
             lines = list(differences(first, other))
-            spent = time.perf_counter() - begin
-            print(f"{kernel}, {number} threads: {len(lines)} differences, {spent:.0f} s")
+            print(f"{kernel}, {number} threads: {len(other)} mechanisms, {len(lines)} differences")
             print("".join(f"  {line}\n" for line in lines), end="", flush=True)
             found += len(lines)
     return found

@@ -153,9 +153,7 @@ class Programme:
     def _graph(self) -> tuple[MX, MX, MX]:
         """Variables, W' (k, m samples) and bounded (r, samples)."""
         variables = MX.sym("x", self.joints * (2 * self.harmonics - 1))
-        moved = casadi.reshape(
-            _product(self._rates(), variables), self.samples, 3 * self.joints
-        ).T
+        moved = casadi.reshape(_product(self._rates(), variables), self.samples, 3 * self.joints).T
         q, v, a = casadi.vertsplit(moved, self.joints)
         W, bounded = self.instant.map(self.samples)(q, v, a)
         return variables, W, bounded

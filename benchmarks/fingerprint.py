@@ -60,7 +60,7 @@ BOTH: dict[str, Callable[[System], Function]] = {
 }
 
 MANY = 30
-"""Coordinates beyond which no model is built: it takes long, and what is chosen is known by then."""
+"""Coordinates beyond which no model is built, which takes long; what is chosen is known by then."""
 
 FEW = 12
 """Coordinates up to which base parameters are listed: they take long in large mechanisms."""

@@ -24,7 +24,7 @@ class Root:
     Attributes:
         x: (n,) the unknowns.
         residual: Euclidean norm of the residual there.
-        converged: whether its largest element is below the tolerance.
+        converged: whether every element is below its tolerance.
     """
 
     x: Vector
@@ -36,7 +36,7 @@ def gauss_newton(
     function: Residual,
     start: Vector,
     *,
-    tolerance: float = 1e-12,
+    tolerance: float | Vector = 1e-12,
     iterations: int = 100,
     rank_tolerance: float = 1e-9,
 ) -> Root:
@@ -49,7 +49,7 @@ def gauss_newton(
     Args:
         function: residual and Jacobian.
         start: (n,) first guess; the root found is near to it.
-        tolerance: of the largest absolute residual.
+        tolerance: of the absolute residual, one for all elements or one for each.
         iterations: at most.
         rank_tolerance: singular values below this part of the largest count as zero.
 
@@ -61,7 +61,7 @@ def gauss_newton(
     if not _finite(r, J):
         return Root(x, np.inf, False)
     for _ in range(iterations):
-        if _largest(r) <= tolerance:
+        if np.all(np.abs(r) <= tolerance):
             break
         step = smallest_solution(J, -r, rank_tolerance)
         length = 1.0
@@ -78,7 +78,7 @@ def gauss_newton(
         x, r, J = trial, r_trial, J_trial
         if stalled:
             break
-    return Root(x, _norm(r), _largest(r) <= tolerance)
+    return Root(x, _norm(r), bool(np.all(np.abs(r) <= tolerance)))
 
 
 def _norm(x: Vector) -> float:
@@ -88,7 +88,3 @@ def _norm(x: Vector) -> float:
 
 def _finite(r: Vector, J: Vector) -> bool:
     return bool(np.all(np.isfinite(r)) and np.all(np.isfinite(J)))
-
-
-def _largest(r: Vector) -> float:
-    return float(np.max(np.abs(r), initial=0.0))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Matrix = NDArray[np.float64]
 
 RELATIVE_GAP = 1e-8
-"""Singular values below this part of the largest count as zero: rounding leaves 1e-16 of it, so that
-as many orders are free below the gap as above it."""
+"""Singular values below this part of the largest count as zero: rounding leaves 1e-16 of it, and
+there are as many orders between it and the gap as between the gap and one."""
 
 EQUAL = 1e-6
 """Relative difference below which two scores are equal, and the first of them is taken.

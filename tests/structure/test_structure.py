@@ -1,4 +1,4 @@
-"""What is chosen for a mechanism hangs on the mechanism alone: not on the processor, not on rounding."""
+"""What is chosen for a mechanism hangs on it alone: not on the processor, not on rounding."""
 
 import os
 from concurrent.futures import ThreadPoolExecutor

@@ -99,9 +99,9 @@ def resting_coefficients(period: float, harmonics: int) -> Array:
         period: [s].
         harmonics: two or more.
     """
-    w = 2 * np.pi / period * np.arange(1, harmonics + 1)
+    w = np.asarray(2 * np.pi / period * np.arange(1, harmonics + 1), dtype=float)
     # v(0) is the sum of a_k, a(0) that of w_k b_k: each half has one condition of its own
-    halves = [_across(condition) for condition in (np.ones(harmonics), w)]
+    halves = [_across(condition) for condition in (w**0, w)]
     none = np.zeros((harmonics, harmonics - 1))
     return np.block([[halves[0], none], [none, halves[1]]])
 
@@ -116,7 +116,8 @@ def _across(direction: Array) -> Array:
     v = unit.copy()
     v[0] += 1.0
     reflection = np.eye(len(v)) - np.outer(v, v) / v[0]
-    return reflection[:, 1:]
+    across: Array = reflection[:, 1:]
+    return across
 
 
 def between_samples(samples: int, harmonics: int) -> float:

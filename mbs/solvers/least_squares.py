@@ -23,7 +23,7 @@ def smallest_solution(A: Array, b: Array, gap: float) -> Array:
     Libraries of linear algebra sum in an order that depends on the processor and on the number of
     threads, and so do the last digits of their solutions. Here each sum has one order.
 
-    Source: Golub & Van Loan 2013, algorithm 5.4.1 and section 5.5.6.
+    Source: Golub & Van Loan 2013, section 5.4.
 
     Args:
         A: (m, n).

@@ -14,16 +14,23 @@ ifeq ($(strip $(NATIVE_CC)),)
 CROSS := ,cross
 endif
 
+OTHER_KERNELS := tests/solvers/test_least_squares.py tests/solvers/test_partial_ldl.py \
+    tests/loops/test_posture.py tests/robots/test_benchmarks_pendulum.py \
+    tests/simulate/test_over_constrained.py \
+    tests/bridges/test_opti.py::test_four_bar_finds_its_optimum \
+    tests/identification/exciting/test_excitation.py::test_a_platform_that_follows_keeps_its_height
+
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --editable
 
 LOWEST := build/lowest/bin/python
 
-.PHONY: help demo test test-lowest lint types layers docs clean
+.PHONY: help demo test test-lowest kernels lint types layers docs clean
 
 help:
 	@echo "make demo     install mbs into $(VENV) and run examples/01_four_bar.py; files go to build/four_bar"
 	@echo "make test     install the tools and run every check: lint, types, layers, tests"
 	@echo "make test-lowest  the tests with the lowest versions that pyproject.toml allows, in build/lowest; Python 3.11 or 3.12"
+	@echo "make kernels  a part of the tests with the linear algebra of another processor"
 	@echo "make lint     ruff: style and format"
 	@echo "make types    mypy, strict"
 	@echo "make layers   import-linter: no module imports a higher layer"
@@ -47,6 +54,12 @@ build/lowest/.made: pyproject.toml .ci/lowest
 	$(LOWEST) -m pip install --quiet --disable-pip-version-check --only-binary :all: \
 	  --constraint build/lowest/versions.txt --editable ".[dev,cross,tables]"
 	@touch $@
+
+# What is asked of another processor, tried on this one: NumPy's OpenBLAS takes the kernels that the
+# variable names, and rounds in another way.
+kernels: $(VENV)/.dev
+	@$(RUN)/python benchmarks/fingerprint.py --kernels Nehalem Zen --threads 1
+	@OPENBLAS_CORETYPE=Nehalem $(RUN)/python -m pytest -n 2 --dist worksteal $(OTHER_KERNELS)
 
 lint: $(VENV)/.dev
 	@$(RUN)/ruff check .

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
+from casadi import Function
 from numpy.typing import NDArray
 
 from mbs.assembly import Closure, LoopRow, System
@@ -19,6 +20,7 @@ from mbs.loops.closing import Closing, closure_parameters
 from mbs.loops.closure import row_labels
 from mbs.loops.posture import closed_posture
 from mbs.loops.rolling import SLIPS, rolling_discs
+from mbs.loops.sizes import constraint_sizes, mechanism_size
 from mbs.loops.velocity import constraint_jacobian
 from mbs.solvers.rank import independent_rows, null_space_of, rank
 
@@ -29,8 +31,10 @@ _TRIES = 25
 _SEED = 20260102
 _REACH = 0.5
 _GAP = 1e-5
-"""Singular values below this part of the largest count as zero: Gauss-Newton ends about the
-square root of its tolerance away from a singular posture, where they are not smaller."""
+"""Singular values below this part of the largest count as zero: Gauss-Newton ends about the square
+root of its tolerance, 1e-6, away from a singular posture, where they are not smaller. At regular
+postures of the catalogue those that count are above 1e-2 and the others below 1e-13, in lengths of
+the size of the mechanism. A loop that holds a motion by less than 1e-5 of it counts as free."""
 _SAME_SHARE = 1e-6
 
 
@@ -52,14 +56,15 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
     nearby = Closing(system, p).nearby(posture, _REACH, _TRIES, _SEED)
     postures = [posture, *islice(nearby, _POSTURES)]
     J = constraint_jacobian(system)
+    rows, columns = _measures(system, p)
     jacobians = [np.array(J(q, p)) for q in postures]
-    ranks = _ranks(jacobians)
+    ranks = _ranks([m / rows * columns for m in jacobians])
     generic = max(ranks)
     posture = postures[ranks.index(generic)]
     regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
     labels = _labels(system)
     positions = sum(len(rows) for rows, _ in labels)
-    held = max(_ranks([J[:positions] for J in regular])) if positions else 0
+    held = max(_ranks([(m / rows * columns)[:positions] for m in regular])) if positions else 0
     kept = _kept_rows(regular, positions, held, generic - held)
     active = _independent_velocities(system, chosen, regular, system.nv - generic)
     closure = Closure(
@@ -94,6 +99,14 @@ def _assembled(system: System, guess: Mapping[str, float], p: Matrix) -> Matrix:
 
 def _names(system: System) -> list[str]:
     return [coordinate.name for coordinate in system.coordinates]
+
+
+def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
+    """What rows are divided by, (m, 1), and columns multiplied by, (nv,), to be free of units."""
+    at = Function("sizes", [system.p], [mechanism_size(system), constraint_sizes(system)])
+    size, rows = at(p)
+    slides = [speed.unit.startswith("m") for speed in system.speeds]
+    return np.array(rows), np.where(slides, float(size), 1.0)
 
 
 def _ranks(jacobians: Sequence[Matrix]) -> list[int]:

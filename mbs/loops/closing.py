@@ -13,14 +13,21 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.rates import norm_rows
 from mbs.loops.closure import closure_rows, facing, row_labels
+from mbs.loops.sizes import mechanism_size, row_sizes
 from mbs.solvers.gauss_newton import gauss_newton
 
 Vector = NDArray[np.float64]
 
 TOLERANCE = 1e-12
+"""Largest closure row where an iteration ends, in parts of the size of the mechanism: rounding of
+sums of some tens of terms of size one stays below it, what Newton's method leaves before its last
+step, 1e-8 or more, does not."""
+
+CLOSED = 1e-10
+"""The same of postures that formulas or others give: hundreds of roundings, no missing step."""
 
 OPEN = 1e-6
-"""Largest closure row of a posture that counts as closed [m or 1]."""
+"""The same of postures that a user gives, with seven digits; forces are wrong by as little."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +69,20 @@ class Closing:
         r, J = (np.array(m) for m in self._functions()[0](q, self.p))
         return r.ravel(), J[:, self.free]
 
+    @property
+    def size(self) -> float:
+        """The size of the mechanism [m]."""
+        return float(self._functions()[2](self.p)[0])
+
+    @property
+    def sizes(self) -> Vector:
+        """(m,) what the rows are measured by: the size of the mechanism for lengths [m], or 1."""
+        return np.array(self._functions()[2](self.p)[1]).ravel()
+
+    def openness(self, q: Vector) -> float:
+        """The largest row at q, (nq,), in parts of the size of the mechanism."""
+        return float(np.max(np.abs(self.rows(q)[0]) / self.sizes, initial=0.0))
+
     def nearest(self, q: Vector) -> Closed:
         """The posture that Gauss-Newton reaches from q (nq,)."""
         start = np.array(q, dtype=float)
@@ -69,7 +90,7 @@ class Closing:
         def residual(x: Vector) -> tuple[Vector, Vector]:
             return self.rows(_replaced(start, self.free, x))
 
-        root = gauss_newton(residual, start[self.free], tolerance=TOLERANCE)
+        root = gauss_newton(residual, start[self.free], tolerance=TOLERANCE * self.sizes)
         found = _replaced(start, self.free, root.x)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
@@ -109,8 +130,8 @@ class Closing:
         names = [coordinate.name for coordinate in self.system.coordinates]
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.held)
 
-    def _functions(self) -> tuple[Function, Function]:
-        functions: tuple[Function, Function] = self.system.cached(
+    def _functions(self) -> tuple[Function, Function, Function]:
+        functions: tuple[Function, Function, Function] = self.system.cached(
             "closing", lambda: _functions(self.system)
         )
         return functions
@@ -131,12 +152,18 @@ def closure_parameters(system: System, values: Mapping[str, float] | None = None
     return np.array(system.parameter_values(values, needed), dtype=float)
 
 
-def _functions(system: System) -> tuple[Function, Function]:
+def _functions(system: System) -> tuple[Function, Function, Function]:
     q = SX.sym("q", system.nq)
     r = casadi.densify(casadi.vertcat(closure_rows(system, q), norm_rows(system.tree, q)))
     J = casadi.densify(casadi.jacobian(r, q))
     equations = Function("equations", [q, system.p], [r, J])
-    return equations, Function("facing", [q, system.p], [facing(system, q)])
+    norms = norm_rows(system.tree, q)
+    sizes = casadi.vertcat(row_sizes(system), SX.ones(norms.shape))
+    return (
+        equations,
+        Function("facing", [q, system.p], [facing(system, q)]),
+        Function("sizes", [system.p], [mechanism_size(system), sizes]),
+    )
 
 
 def _replaced(q: Vector, places: Sequence[int], values: Vector) -> Vector:

@@ -9,6 +9,7 @@ Source: Khalil & Creusot 1997, section 3.4; rows by joint type as in Haug 1989, 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import casadi
 from casadi import DM, SX, Function
@@ -59,8 +60,8 @@ def closure(system: System) -> Function:
 
 def closure_rows(system: System, q: SX) -> SX:
     """(m, 1) all closure rows at the positions q, (nq, 1)."""
-    symbols, _, rows = _equations(system)
-    return casadi.substitute(rows, symbols, q)
+    found = _equations(system)
+    return casadi.substitute(found.rows, found.q, q)
 
 
 def independent_closure(system: System, q: SX) -> SX:
@@ -91,25 +92,43 @@ def square_closure(system: System, q: SX, passive: Sequence[int]) -> SX:
 
 def row_labels(system: System) -> list[tuple[str, list[str]]]:
     """For each loop and coupling its name and what its rows are."""
-    return _equations(system)[1]
+    return _equations(system).labels
 
 
-def _equations(system: System) -> tuple[SX, list[tuple[str, list[str]]], SX]:
-    """Symbols q, the labels of the rows by loop, and all rows at the symbols; written once."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equations:
+    """What closes the loops, written once for a system.
 
-    def build() -> tuple[SX, list[tuple[str, list[str]]], SX]:
+    Attributes:
+        q: (nq, 1) the symbols.
+        labels: of the rows, by loop.
+        rows: (m, 1) all of them.
+        cosines: (k, 1) that must be positive.
+    """
+
+    q: SX
+    labels: list[tuple[str, list[str]]]
+    rows: SX
+    cosines: SX
+
+
+def _equations(system: System) -> _Equations:
+    def build() -> _Equations:
         q = SX.sym("q", system.nq)
-        loops = [(cut.edge.joint.name, _cut_rows(system, q, cut)) for cut in system.cuts]
+        loops, cosines = list[tuple[str, Rows]](), list[SX]()
+        for cut in system.cuts:
+            pose = relative_pose(system.tree, q, *cut.frames)
+            loops.append((cut.edge.joint.name, _cut_rows(system, q, cut, pose)))
+            cosines.extend(_facing(cut, pose))
         for coupling in system.couplings:
             value = q[coupling.driven] - coupling.value(q[coupling.driver])
             loops.append((coupling.name, [("coordinate", value)]))
         labels = [(name, [label for label, _ in rows]) for name, rows in loops]
         values = [value for _, rows in loops for _, value in rows]
-        return q, labels, casadi.densify(casadi.vertcat(SX(0, 1), *values))
+        every = casadi.densify(casadi.vertcat(SX(0, 1), *values))
+        return _Equations(q, labels, every, casadi.vertcat(SX(0, 1), *cosines))
 
-    equations: tuple[SX, list[tuple[str, list[str]]], SX] = system.cached(
-        "closure equations", build
-    )
+    equations: _Equations = system.cached("closure equations", build)
     return equations
 
 
@@ -119,17 +138,19 @@ def facing(system: System, q: SX) -> SX:
     The rows of a joint with an axis are zero for opposed axes as well; a posture is only right
     when these are positive.
     """
-    cosines: list[SX] = []
-    for cut in system.cuts:
-        pose = relative_pose(system.tree, q, *cut.frames)
-        joint = cut.edge.joint
-        if cut.welded or isinstance(joint, (Fixed, Prismatic)):
-            cosines.extend(pose.R[k, k] for k in range(3))
-        elif isinstance(joint, ConstantVelocity):
-            cosines.append(0.5 * (casadi.trace(pose.R) - _along(pose, joint.axis)))
-        elif isinstance(joint, (Revolute, Cylindrical, Planar)):
-            cosines.append(_along(pose, joint.axis))
-    return casadi.vertcat(*cosines) if cosines else SX(0, 1)
+    found = _equations(system)
+    return casadi.substitute(found.cosines, found.q, q)
+
+
+def _facing(cut: Cut, pose: Pose) -> list[SX]:
+    joint = cut.edge.joint
+    if cut.welded or isinstance(joint, (Fixed, Prismatic)):
+        return [pose.R[k, k] for k in range(3)]
+    if isinstance(joint, ConstantVelocity):
+        return [0.5 * (casadi.trace(pose.R) - _along(pose, joint.axis))]
+    if isinstance(joint, (Revolute, Cylindrical, Planar)):
+        return [_along(pose, joint.axis)]
+    return []
 
 
 def _along(pose: Pose, axis: Sequence[float]) -> SX:
@@ -138,12 +159,12 @@ def _along(pose: Pose, axis: Sequence[float]) -> SX:
     return casadi.dot(z, casadi.mtimes(pose.R, z))
 
 
-def _cut_rows(system: System, q: SX, cut: Cut) -> Rows:
+def _cut_rows(system: System, q: SX, cut: Cut, pose: Pose) -> Rows:
+    """The rows of a cut joint, whose frame_b has this pose in its frame_a."""
     joint = cut.edge.joint
     if isinstance(joint, RollingDisc):
         on_plane = pose_on_plane(system, q, cut, joint)
         return [("force normal", contact(on_plane, joint, radius_of(system, joint)).height)]
-    pose = relative_pose(system.tree, q, *cut.frames)
     if cut.welded:
         return [*_position(pose, "xyz"), *_orientation(pose)]
     if isinstance(joint, Rod):

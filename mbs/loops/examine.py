@@ -16,6 +16,7 @@ from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters
 from mbs.loops.closure import closure_rows
 from mbs.loops.scales import scales
+from mbs.loops.sizes import row_sizes
 from mbs.loops.velocity import (
     constraint_jacobian,
     determining_rows,
@@ -36,6 +37,7 @@ class PostureState:
 
     Attributes:
         residual: largest closure row [m or 1].
+        opening: the same with lengths as parts of the size of the mechanism.
         mobility: number of independent velocities at this posture.
         generic: the same at postures that are not singular.
         leads: 1 where the independent joints lead the others well, 0 where they cannot: the
@@ -43,6 +45,7 @@ class PostureState:
     """
 
     residual: float
+    opening: float
     mobility: int
     generic: int
     leads: float
@@ -50,7 +53,7 @@ class PostureState:
     @property
     def is_closed(self) -> bool:
         """Whether the loops are closed."""
-        return self.residual <= OPEN
+        return self.opening <= OPEN
 
     @property
     def is_singular(self) -> bool:
@@ -81,11 +84,11 @@ def examine(
         raise ModelError(f"{system.name}: an open chain has no loops that could be examined")
     position = np.array(system.position(q))
     p = closure_parameters(system, parameters)
-    residual, leads = (float(x) for x in posture_health(system)(position, p))
+    residual, leads, opening = (float(x) for x in posture_health(system)(position, p))
     found = scales(system)
     J = np.array(constraint_jacobian(system)(position, p)) * found.rows.reshape(-1, 1)
     J *= found.columns([speed.unit for speed in system.speeds])
-    return PostureState(residual, system.nv - rank(J), system.closure.mobility, leads)
+    return PostureState(residual, opening, system.nv - rank(J), system.closure.mobility, leads)
 
 
 def require_led(system: System, q: Vector, p: Vector) -> None:
@@ -100,8 +103,8 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
         Unclosable: the posture leaves the loops open.
         SingularPosture: the independent joints do not determine how the others move.
     """
-    residual, leads = (float(x) for x in posture_health(system)(q, p))
-    if residual > OPEN:
+    residual, leads, opening = (float(x) for x in posture_health(system)(q, p))
+    if opening > OPEN:
         raise Unclosable(
             f"{system.name}: q leaves the loops open by {residual:.3g}; take a posture of"
             " mbs.loops.solve"
@@ -116,16 +119,20 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
 
 
 def posture_health(system: System) -> Function:
-    """``health(q, p) -> residual, leads``; see `PostureState`."""
+    """``health(q, p) -> residual, leads, opening``; see `PostureState`."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
         assert system.closure is not None
-        residual = casadi.mmax(casadi.fabs(casadi.vertcat(0, closure_rows(system, q))))
+        rows = closure_rows(system, q)
+        residual, opening = (
+            casadi.mmax(casadi.fabs(casadi.vertcat(0, own)))
+            for own in (rows, rows / row_sizes(system))
+        )
         varies, passive = system.closure.varies, list(system.closure.passive)
         J_p = _scaled(system, determining_rows(system, q).J)[:, passive]
         leads = _independence(J_p.T if varies else J_p)
-        return Function("health", [q, system.p], [residual, leads], {"cse": True})
+        return Function("health", [q, system.p], [residual, leads, opening], {"cse": True})
 
     function: Function = system.cached("posture health", build)
     return function

@@ -13,7 +13,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
-from mbs.loops.closing import Closed, Closing, Vector, closure_parameters
+from mbs.loops.closing import TOLERANCE, Closed, Closing, Vector, closure_parameters
 from mbs.loops.wanted import wanted_pose
 from mbs.messages import did_you_mean, quoted
 from mbs.recursions.route import relative_pose
@@ -71,9 +71,20 @@ class Goal:
             np.vstack([weight * J, slope[e]]),
         )
 
+    @property
+    def sizes(self) -> Vector:
+        """(m,) what the rows of `residual` are measured by: lengths by the size of the loops."""
+        pose = [self.closing.size if k < 3 else 1.0 for k in self.elements]
+        return np.concatenate([self.closing.sizes, pose])
+
+    def openness(self, q: Vector) -> float:
+        """The largest row at q, (nq,), in parts of the size of the mechanism."""
+        return float(np.max(np.abs(self.residual(q)[0]) / self.sizes, initial=0.0))
+
     def nearest(self, q: Vector) -> Closed:
         """The posture that Gauss-Newton reaches from q, (nq,), with loops and pose together."""
-        root = gauss_newton(self.residual, q, iterations=_ITERATIONS)
+        tolerance = TOLERANCE * self.sizes
+        root = gauss_newton(self.residual, q, tolerance=tolerance, iterations=_ITERATIONS)
         return Closed(root.x, root.residual, root.converged and self.closing.faces(root.x))
 
     def approached(self, q: Vector) -> Closed:

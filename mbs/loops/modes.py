@@ -13,10 +13,9 @@ from mbs.errors import LoopError
 from mbs.loops.closed_form.places import extent, independent_places
 from mbs.loops.closed_form.plan import plan
 from mbs.loops.closed_form.stage import every_posture
-from mbs.loops.closing import Closing, Vector, closure_parameters
+from mbs.loops.closing import CLOSED, Closing, Vector, closure_parameters
 from mbs.loops.independent import Given, independent_positions
 
-_OPEN = 1e-10
 _SAME = 1e-9
 _MOST = 4096
 
@@ -82,7 +81,7 @@ def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> M
     if system.is_closed:
         closing = Closing(system, p)
         residual = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
-        if residual > _OPEN or not closing.faces(q):
+        if closing.openness(q) > CLOSED or not closing.faces(q):
             return None
     return Mode(tuple(float(x) for x in q), branch, residual)
 

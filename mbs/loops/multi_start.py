@@ -54,7 +54,7 @@ def _tidy(closing: Closing, q: Vector) -> Vector:
     """The posture with small angles where that is the same one: not so across a gear."""
     tidy = within_half_turn(closing.system, q)
     tidy[list(closing.held)] = q[list(closing.held)]
-    return tidy if np.max(np.abs(closing.rows(tidy)[0]), initial=0.0) < OPEN else q
+    return tidy if closing.openness(tidy) < OPEN else q
 
 
 def _distance(closing: Closing, q: Vector, other: Vector) -> float:

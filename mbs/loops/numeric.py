@@ -7,11 +7,14 @@ from mbs.assembly import System
 from mbs.errors import NoClosedForm
 from mbs.loops.closed_form.places import independent_places
 from mbs.loops.closing import closure_parameters
-from mbs.loops.closure import closure_rows, facing, square_closure
+from mbs.loops.closure import facing, square_closure
 from mbs.loops.continuation import LARGEST_MOVE
+from mbs.loops.sizes import relative_rows, row_sizes
 
 _STAGES = 128
 _OPEN = 1e-9
+"""Sum of all rows, in parts of the size of the mechanism, where Newton's method ended: it leaves
+1e-13, or has missed by far."""
 
 
 def follow_active(system: System) -> Function:
@@ -70,7 +73,11 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
         SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
     )
     merged = _merged(system, active, passive)(z, q_a)
-    residual = casadi.substitute(square_closure(system, q, passive), q, merged)
+    rows = square_closure(system, q, passive)
+    if system.closure is not None and not system.closure.varies:
+        own = row_sizes(system)[list(system.closure.rows)]
+        rows = casadi.vertcat(rows[: own.numel()] / own, rows[own.numel() :])
+    residual = casadi.substitute(rows, q, merged)
     equations = Function("phi", [z, q_a, system.p], [residual])
     options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}
     return casadi.rootfinder("newton", "fast_newton", equations, options)
@@ -90,7 +97,7 @@ def _stage(system: System, active: list[int], passive: list[int]) -> Function:
 def _closed(system: System) -> Function:
     """1 where every row is closed and no axis is opposed, else 0; NaN counts as open."""
     q = SX.sym("q", system.nq)
-    openness = casadi.sum1(casadi.fabs(closure_rows(system, q)))  # a maximum would drop NaN
+    openness = casadi.sum1(casadi.fabs(relative_rows(system, q)))  # a maximum would drop NaN
     cosines = facing(system, q)
     faces = casadi.mmin(cosines) > 0 if cosines.numel() else SX(1)
     return Function("closed", [q, system.p], [casadi.logic_and(openness < _OPEN, faces)])

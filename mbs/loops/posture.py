@@ -11,7 +11,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.rates import quaternion_slices
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops.alike import difference
-from mbs.loops.closing import OPEN, Closed, Closing, Vector, closure_parameters
+from mbs.loops.closing import CLOSED, OPEN, Closed, Closing, Vector, closure_parameters
 from mbs.loops.continuation import followed_posture
 from mbs.loops.function import posture_on
 from mbs.loops.independent import fixed_positions, independent_names
@@ -23,7 +23,6 @@ _LARGEST_ANGLE = np.pi
 _GUESSES = 16
 _NEAR = 0.3
 """Distance from a guess [rad or m] within which the first posture found is taken."""
-_CLOSED = 1e-10
 
 
 def solve(
@@ -113,7 +112,7 @@ def _unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
     for part in quaternion_slices(closing.system.tree):
         near[part] = q[part]
     near[list(closing.held)] = q[list(closing.held)]
-    return near if float(np.max(np.abs(closing.rows(near)[0]), initial=0.0)) < _CLOSED else q
+    return near if closing.openness(near) < CLOSED else q
 
 
 def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:
@@ -161,9 +160,9 @@ def require_closed(
     Raises:
         LoopError: says how far it is open.
     """
-    r, _ = Closing(system, closure_parameters(system, parameters)).rows(q)
-    worst = float(np.max(np.abs(r), initial=0.0))
-    if worst > OPEN:
+    closing = Closing(system, closure_parameters(system, parameters))
+    if closing.openness(q) > OPEN:
+        worst = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
         raise LoopError(
             f"{system.name}: the posture leaves the loops open by {worst:.3g};"
             " use mbs.loops.solve to get one that closes them"

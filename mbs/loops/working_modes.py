@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.rates import quaternion_slices
 from mbs.errors import LoopError, ModelError
 from mbs.loops.alike import difference, within_half_turn
-from mbs.loops.closing import Vector
+from mbs.loops.closing import CLOSED, Vector
 from mbs.loops.goal import Goal, goal
 from mbs.messages import quoted
 from mbs.solvers.rank import rank
@@ -20,7 +20,6 @@ from mbs.solvers.rank import rank
 _TRIES, _LEAST, _SEED = 500, 60, 20260103
 _SAME = 1e-6
 _LOOSE = 1e-5
-_OPEN = 1e-10
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +123,7 @@ def _tidy(wanted: Goal, q: Vector) -> Vector:
     tidy = within_half_turn(system, q)
     for part in quaternion_slices(system.tree):
         tidy[part] *= -1.0 if tidy[part.start] < 0 else 1.0
-    return tidy if np.max(np.abs(wanted.residual(tidy)[0])) < _OPEN else q
+    return tidy if wanted.openness(tidy) < CLOSED else q
 
 
 def _require_isolated(wanted: Goal, q: Vector) -> None:

@@ -26,7 +26,7 @@ from mbs.recursions.articulated_body import articulated_accelerations, inertia_p
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.poses import link_poses
 from mbs.recursions.tree_factorization import solve_tree, velocity_antecedents
-from mbs.solvers.rank import rank
+from mbs.solvers.rank import first_best, rank
 
 _METHODS = ("auto", "articulated", "composite")
 _ARTICULATED = 260  # operations that articulated bodies take at most for one more velocity
@@ -212,4 +212,4 @@ def _loose_in_loops(system: System) -> int | None:
     A = np.array(inertia_matrix(system)(list(system.posture)))
     size = 1 / np.sqrt(np.maximum(np.diag(A), 1e-30))
     A = A * np.outer(size, size)
-    return None if rank(A) == len(A) else int(np.argmax(np.abs(np.linalg.svd(A)[2][-1])))
+    return None if rank(A) == len(A) else first_best(np.abs(np.linalg.svd(A)[2][-1]))

@@ -14,8 +14,9 @@ import numpy as np
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.rates import norm_rows, position_rate, quaternion_slices
-from mbs.loops.closure import closure_rows, facing, square_closure
+from mbs.assembly.rates import position_rate, quaternion_slices
+from mbs.loops.closure import facing, square_closure
+from mbs.loops.sizes import relative_rows
 from mbs.models.composition import dense_function
 from mbs.models.contacts import contacts_of, require_lasting_rows
 from mbs.models.devices import device_equations, state_count
@@ -252,9 +253,8 @@ def _closure_step(system: System, layout: MinimalLayout) -> Function:
     dependents, s = list(layout.dependents), _point(system, layout, ())
     symbols, q, z = SX.sym("q", system.nq), SX.zeros(system.nq), s.z
     q[list(layout.positions)], q[dependents] = s.q, z
-    norms = norm_rows(system.tree, symbols)
     kept = square_closure(system, symbols, dependents)
-    every = casadi.vertcat(closure_rows(system, symbols), norms)
+    every = relative_rows(system, symbols)
     kept, every = casadi.substitute([kept, every], [symbols], [q])
     cosines = casadi.substitute(facing(system, symbols), symbols, q)
     opposed = casadi.mmin(cosines) <= 0 if cosines.numel() else SX(0)

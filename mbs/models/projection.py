@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.rates import norm_rows, normalised
-from mbs.loops.closure import closure_rows, independent_closure
+from mbs.loops.closure import independent_closure
 from mbs.loops.scales import scales
+from mbs.loops.sizes import constraint_sizes, relative_rows
 from mbs.loops.velocity import independent_constraint_rows, kept_rows
 from mbs.models.contacts import Contacts, Modes
 from mbs.models.prescribed import Prescribed
+from mbs.solvers.partial_ldl import partial_ldl
 
 Array = NDArray[np.float64]
 
@@ -52,7 +54,7 @@ def projected(
         touch: contacts and what they do; none when left out.
 
     Returns:
-        q (nq, 1), v (nv, 1), and the largest row.
+        q (nq, 1), v (nv, 1), and the largest row, lengths as parts of the size of the mechanism.
     """
     if not system.is_closed and not motions and touch is None:
         return normalised(system.tree, q), v, SX(0)
@@ -64,10 +66,11 @@ def projected(
         for motion, law in zip(motions, laws, strict=True)
         if motion.position is not None
     ]
-    loops, every = SX(0, 1), SX(0, 1)
+    loops, measures = SX(0, 1), SX(0, 1)
     J = SX(0, system.nv)
     if system.is_closed:
-        loops, every = independent_closure(system, symbols), closure_rows(system, symbols)
+        loops = independent_closure(system, symbols)
+        measures = constraint_sizes(system)[kept_rows(system)]
         J = independent_constraint_rows(system, symbols)
     distance, place_off, still, slide_off = _touched(system, symbols, v, touch)
     r = casadi.vertcat(loops, norms, *places, distance)
@@ -85,7 +88,8 @@ def projected(
     )
     step_q, _ = _shortest(J_q, r, place_off, first[: loops.numel()], places_of)
     step_v, awake = _shortest(J, speed, slide_off, first, speeds_of)
-    rows = casadi.vertcat(every, norms, *places, distance, speed)
+    relative = casadi.vertcat(speed[: measures.numel()] / measures, speed[measures.numel() :])
+    rows = casadi.vertcat(relative_rows(system, symbols), *places, distance, relative)
     residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
     values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])
     return q - values[0], v - values[1], values[2]
@@ -127,9 +131,8 @@ def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, 
     B = rows * casadi.mtimes(J, casadi.diag(DM(columns)))
     every = casadi.vertcat(SX(J.shape[0] - off.numel(), 1), off)
     S = casadi.sparsify(casadi.mtimes(B, B.T)) + casadi.diag(every)
-    D, LT, order = casadi.ldl(S)
     squares = casadi.fmax(casadi.densify(casadi.diag(S)), 1)
-    independent = _NEARLY_DEPENDENT * squares[order] < D
+    D, LT, order, independent = partial_ldl(S, _NEARLY_DEPENDENT * squares)
     x = casadi.ldl_solve(rows * r, casadi.if_else(independent, D, _NEVER), LT, order)
     return DM(columns) * casadi.mtimes(B.T, casadi.densify(x)), casadi.mmin(independent)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from math import pi
 
 import numpy as np
@@ -14,7 +15,7 @@ Vector = tuple[float, float, float]
 def round_bar(name: str, r: Vector, diameter: float, density: float) -> Body:
     """A round bar from the reference frame to r [m]; diameter [m], density [kg/m^3]."""
     along = np.array(r)
-    length, radius = float(np.linalg.norm(along)), diameter / 2
+    length, radius = math.hypot(*r), diameter / 2
     mass = density * pi * radius**2 * length
     axis = np.outer(along, along) / length**2
     across = mass * (3 * radius**2 + length**2) / 12

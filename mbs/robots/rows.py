@@ -38,7 +38,8 @@ def body(
         The row with the ten parameters about the origin of the frame.
     """
     c = np.array(com, dtype=float)
-    J = np.diag(about_com) + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    square = float(np.sum(c * c))  # not c @ c: its last digit hangs on the processor
+    J = np.diag(about_com) + mass * (square * np.eye(3) - np.outer(c, c))
     return about_origin(number, mass, com, J, **values)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import acos, atan2, pi
+from math import acos, atan2, hypot, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ def stewart_platform() -> Mechanism:
     base, top = leg_ends()
     for k, (low, high) in enumerate(zip(base, top, strict=True)):
         x, y, z = high - low
-        length = float(np.linalg.norm(high - low))
+        length = hypot(x, y, z)
         along = [("z", atan2(y, x)), ("y", acos(z / length))]
         barrel = m.add(_tube(f"barrel{k + 1}", 2.0, (0, 0, _BARREL / 2), _BARREL))
         piston = m.add(_tube(f"piston{k + 1}", 0.8, (0, 0, -_PISTON / 2), _PISTON))

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mbs.solvers.least_squares import smallest_solution
+
 Vector = NDArray[np.float64]
 Residual = Callable[[Vector], tuple[Vector, Vector]]
 """x -> residual (m,), Jacobian (m, n)."""
@@ -22,7 +24,7 @@ class Root:
     Attributes:
         x: (n,) the unknowns.
         residual: Euclidean norm of the residual there.
-        converged: whether its largest element is below the tolerance.
+        converged: whether every element is below its tolerance.
     """
 
     x: Vector
@@ -34,19 +36,20 @@ def gauss_newton(
     function: Residual,
     start: Vector,
     *,
-    tolerance: float = 1e-12,
+    tolerance: float | Vector = 1e-12,
     iterations: int = 100,
     rank_tolerance: float = 1e-9,
 ) -> Root:
     """Damped Gauss-Newton with the smallest step that solves the linearised equations.
 
     The step is the minimum-norm least-squares solution, so that dependent equations and free
-    unknowns do no harm; it is halved until the residual falls.
+    unknowns do no harm; it is halved until the residual falls. Its arithmetic is plain, so that
+    the same start leads to the same digits on every processor.
 
     Args:
         function: residual and Jacobian.
         start: (n,) first guess; the root found is near to it.
-        tolerance: of the largest absolute residual.
+        tolerance: of the absolute residual, one for all elements or one for each.
         iterations: at most.
         rank_tolerance: singular values below this part of the largest count as zero.
 
@@ -58,29 +61,30 @@ def gauss_newton(
     if not _finite(r, J):
         return Root(x, np.inf, False)
     for _ in range(iterations):
-        if _largest(r) <= tolerance:
+        if np.all(np.abs(r) <= tolerance):
             break
-        step = np.linalg.lstsq(J, -r, rcond=rank_tolerance)[0]
+        step = smallest_solution(J, -r, rank_tolerance)
         length = 1.0
         while length > 1e-6:
             trial = x + length * step
             r_trial, J_trial = function(trial)
-            lower = np.linalg.norm(r_trial) < np.linalg.norm(r)
+            lower = _norm(r_trial) < _norm(r)
             if lower and _finite(r_trial, J_trial):
                 break
             length /= 2
         else:
             break
-        stalled = length * np.linalg.norm(step) < _STALLED
+        stalled = length * _norm(step) < _STALLED
         x, r, J = trial, r_trial, J_trial
         if stalled:
             break
-    return Root(x, float(np.linalg.norm(r)), _largest(r) <= tolerance)
+    return Root(x, _norm(r), bool(np.all(np.abs(r) <= tolerance)))
+
+
+def _norm(x: Vector) -> float:
+    """Its sum has one order, other than that of a dot product."""
+    return float(np.sqrt(np.sum(x * x)))
 
 
 def _finite(r: Vector, J: Vector) -> bool:
     return bool(np.all(np.isfinite(r)) and np.all(np.isfinite(J)))
-
-
-def _largest(r: Vector) -> float:
-    return float(np.max(np.abs(r), initial=0.0))

@@ -10,9 +10,35 @@ from numpy.typing import NDArray
 Matrix = NDArray[np.float64]
 
 RELATIVE_GAP = 1e-8
-"""Singular values below this part of the largest count as zero."""
+"""Singular values below this part of the largest count as zero: rounding leaves 1e-16 of it, and
+there are as many orders between it and the gap as between the gap and one."""
+
+EQUAL = 1e-6
+"""Relative difference below which two scores are equal, and the first of them is taken.
+
+It is orders wider than the rounding that scores carry (1e-15, and 1e-12 where configurations closed
+by iteration are behind them), and orders narrower than what makes one choice better than another.
+"""
 
 _FLOOR = 1e-12
+"""Length of a row that counts as none: rounding of rows of about unit length leaves 1e-16."""
+
+
+def first_best(scores: Sequence[float] | Matrix, equal: float = EQUAL) -> int:
+    """The number of the largest score; of those that are equal but for rounding, the first.
+
+    Args:
+        scores: not all of them -inf, none NaN.
+        equal: a score counts as the largest when it is less by this part of it at most.
+    """
+    values = np.asarray(scores, dtype=float)
+    largest = float(values.max())
+    return int(np.argmax(values >= largest - equal * abs(largest)))
+
+
+def graded(score: float) -> float:
+    """A score without the digits that are rounding, for sorting: six digits are left."""
+    return float(f"{score:.6g}")
 
 
 def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
@@ -51,11 +77,12 @@ def independent_rows(
     chosen: list[int] = []
     for k in range(count):
         lengths = np.array([np.linalg.norm(matrix, axis=1) for matrix in rest])
-        score = np.mean(np.log(lengths + _FLOOR), axis=0)
+        score = np.exp(np.mean(np.log(lengths + _FLOOR), axis=0))
         score[chosen] = -np.inf
-        pivot = first[k] if k < len(first) else int(np.argmax(score))
+        pivot = first[k] if k < len(first) else first_best(score)
         for number, matrix in enumerate(rest):
             direction = matrix[pivot] / max(float(lengths[number, pivot]), _FLOOR)
-            rest[number] = matrix - np.outer(matrix @ direction, direction)
+            along = np.sum(matrix * direction, axis=1)
+            rest[number] = matrix - along[:, None] * direction
         chosen.append(pivot)
     return sorted(chosen)

@@ -16,6 +16,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.identification.base.quotient import quotient
+from mbs.solvers.rank import first_best
 
 Terms = Mapping[int, SX]
 """Coefficients of some of the columns, by their numbers from 0."""
@@ -93,7 +94,9 @@ def related(
     able = [k for k, size in least.items() if size > zero]
     if not able:
         return grouping
-    pivot = max(able, key=lambda k: (ranks(k), least[k]))
+    highest = max(map(ranks, able))
+    last = [k for k in able if ranks(k) == highest]
+    pivot = last[first_best([float(least[k]) for k in last])]
     left = [k for k, size in most.items() if k != pivot and size > zero]
     return grouping.replaced(pivot, {k: -quotient(rest[k], rest[pivot]) for k in left})
 

@@ -24,6 +24,7 @@ from mbs.identification.base.rules import Key
 from mbs.loops.reduction import reduction_matrix
 from mbs.recursions.poses import link_poses
 from mbs.recursions.velocities import link_velocities
+from mbs.solvers.rank import first_best
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 _SAME = 1e-9
@@ -102,7 +103,7 @@ def _one_direction(rows: Array) -> Array | None:
     U, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     if sizes[0] < _SAME or sizes[1] > _SAME * sizes[0]:
         return None
-    axis: Array = U[:, 0] * np.sign(U[np.argmax(np.abs(U[:, 0])), 0])
+    axis: Array = U[:, 0] * np.sign(U[first_best(np.abs(U[:, 0])), 0])
     axis[np.abs(axis) < _SAME] = 0.0
     unit: Array = axis / np.linalg.norm(axis)
     return unit

@@ -99,10 +99,25 @@ def resting_coefficients(period: float, harmonics: int) -> Array:
         period: [s].
         harmonics: two or more.
     """
-    start = np.zeros(1)
-    conditions = [harmonic_terms(start, period, harmonics, order) for order in (1, 2)]
-    unit = [row / np.linalg.norm(row) for row in conditions]
-    return np.asarray(np.linalg.svd(np.vstack(unit))[2][2:].T, dtype=float)
+    w = np.asarray(2 * np.pi / period * np.arange(1, harmonics + 1), dtype=float)
+    # v(0) is the sum of a_k, a(0) that of w_k b_k: each half has one condition of its own
+    halves = [_across(condition) for condition in (w**0, w)]
+    none = np.zeros((harmonics, harmonics - 1))
+    return np.block([[halves[0], none], [none, halves[1]]])
+
+
+def _across(direction: Array) -> Array:
+    """(n, n - 1) orthonormal columns across a direction (n,): a reflection of the axes.
+
+    It is written out, since the basis that a singular value decomposition gives differs from
+    processor to processor, and with it every motion that is drawn at random in it.
+    """
+    unit = direction / np.sqrt(np.sum(direction * direction))
+    v = unit.copy()
+    v[0] += 1.0
+    reflection = np.eye(len(v)) - np.outer(v, v) / v[0]
+    across: Array = reflection[:, 1:]
+    return across
 
 
 def between_samples(samples: int, harmonics: int) -> float:

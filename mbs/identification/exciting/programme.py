@@ -26,6 +26,9 @@ Array = npt.NDArray[np.float64]
 
 _STARTS = 30
 _FILLED = 0.9
+_ROUNDING = 1e-12
+"""Part of the largest element of its column below which an element of the rates is zero: sines are
+rounded to 1e-16, and the least of those that are not zero is far above 1e-6."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +131,7 @@ class Programme:
         criterion = CriterionFunction(self.criterion, W.shape[0])
         rates = self._bounded_rates()
         rows, ends = self._bounded_models(tightened)
-        g = casadi.vertcat(casadi.sparsify(DM(rates[0])) @ variables, casadi.vec(bounded[rows, :]))
+        g = casadi.vertcat(_product(rates[0], variables), casadi.vec(bounded[rows, :]))
         scale = np.concatenate([rates[2] - rates[1], np.tile(_spans(ends), self.samples)])
         lower = np.concatenate([rates[1], np.tile(ends[:, 0], self.samples)]) / scale
         upper = np.concatenate([rates[2], np.tile(ends[:, 1], self.samples)]) / scale
@@ -150,9 +153,7 @@ class Programme:
     def _graph(self) -> tuple[MX, MX, MX]:
         """Variables, W' (k, m samples) and bounded (r, samples)."""
         variables = MX.sym("x", self.joints * (2 * self.harmonics - 1))
-        moved = casadi.reshape(
-            casadi.sparsify(DM(self._rates())) @ variables, self.samples, 3 * self.joints
-        ).T
+        moved = casadi.reshape(_product(self._rates(), variables), self.samples, 3 * self.joints).T
         q, v, a = casadi.vertsplit(moved, self.joints)
         W, bounded = self.instant.map(self.samples)(q, v, a)
         return variables, W, bounded
@@ -195,6 +196,14 @@ class Programme:
         rows = [k for k, limit in enumerate(every) if limit.is_finite]
         ends = [(every[k].lower + tightened[k], every[k].upper - tightened[k]) for k in rows]
         return rows, np.array(ends).reshape(-1, 2)
+
+
+def _product(A: Array, x: MX) -> MX:
+    """A x, dense also where rows of A are zero, as those of velocities at rest are."""
+    sizes = np.abs(A)
+    structure = np.where(sizes > _ROUNDING * sizes.max(axis=0, initial=0.0), A, 0.0)
+    product: MX = casadi.densify(casadi.sparsify(DM(structure)) @ x)
+    return product
 
 
 def _spans(ends: Array) -> Array:

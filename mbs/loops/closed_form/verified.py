@@ -84,8 +84,7 @@ def _may_close(
         reached[list(stage.places)] = values[:, way if k == number else stage.chosen]
     if not np.all(np.isfinite(reached)):
         return True
-    rows, _ = Closing(system, p).rows(reached[: system.nq])
-    return float(np.max(np.abs(rows), initial=0.0)) < OPEN
+    return Closing(system, p).openness(reached[: system.nq]) < OPEN
 
 
 def _only(stage: Stage, kept: Sequence[int]) -> Stage:

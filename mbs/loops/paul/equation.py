@@ -17,6 +17,10 @@ Key = tuple[int, ...]
 PRODUCTS = 2
 """The most variables of an equation with products of them."""
 
+_ALIKE = 2
+"""How many equations are kept that are multiples of each other: which of them is cheapest is seen
+once steps are built of them."""
+
 _WEIGHT = (0, 3, 2, 2, 2, 2, 1, 1, 1, 4, 4, 4, 6, 6, 6)
 
 
@@ -87,15 +91,17 @@ def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...
     """
     slides = frozenset(k for k, joint in enumerate(knowledge.ring.joints) if not joint.turns)
     sums = [(known.members, at) for known, _, at in knowledge.open_sums()]
-    found = dict[object, Equation]()
+    found = dict[object, list[Equation]]()
     for split in splits(knowledge):
         for row, terms in simple_rows(split, slides, most):
             new = _equation(row, terms, slides, sums)
             if new is not None:
-                mark = _mark(new)
-                if mark not in found or new.cost < found[mark].cost:
-                    found[mark] = new
-    return tuple(found.values())
+                found.setdefault(_mark(new), []).append(new)
+    return tuple(
+        equation
+        for equal in found.values()
+        for equation in sorted(equal, key=lambda own: own.cost)[:_ALIKE]
+    )
 
 
 def _mark(equation: Equation) -> object:
@@ -105,7 +111,7 @@ def _mark(equation: Equation) -> object:
     table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
     size = np.linalg.norm(table, axis=0)
     table /= np.where(size > 0, size, 1.0) * np.where(_leading(table) < 0, -1.0, 1.0)
-    return equation.variables, tuple(keys), np.round(table, 6).tobytes()
+    return equation.variables, tuple(keys), (np.round(table, 6) + 0.0).tobytes()  # -0.0 is 0.0
 
 
 def _leading(table: Values) -> NDArray[np.float64]:

@@ -21,12 +21,13 @@ from mbs.loops.paul.knowledge import Variable
 from mbs.loops.sequence import Step, step
 from mbs.loops.sequence.step import Found
 from mbs.loops.sequence.two_roots import angle_of
+from mbs.solvers.rank import graded
 
 Matrix = NDArray[np.float64]
 Variables = tuple[Variable, ...]
 
 _SMALL = 1e-5
-_CHOICES = 4
+_CHOICES = 8
 _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
 
@@ -102,7 +103,7 @@ def _best(
         if np.min(np.abs(det) / size) < _SMALL:
             continue
         cost = sum(first[k].cost for k in chosen)
-        rank = (unsteady(det), float(cost), -float(np.min(np.abs(det))))
+        rank = (unsteady(det), float(cost), -graded(float(np.min(np.abs(det)))))
         choices.append((tuple(first[k] for k in chosen), rank))
     return sorted(choices, key=lambda choice: choice[1])[:_CHOICES]
 

@@ -19,7 +19,7 @@ from mbs.loops.paul.two_unknowns import two_unknowns
 from mbs.loops.sequence import Problem, Sequence, Step
 
 _KERNELS = ((sums, linear, one_unknown), (eliminated, two_unknowns))
-_CHOICES = 4
+_CHOICES = 8
 _SIMPLE = (Motion.REVOLUTE, Motion.PRISMATIC)
 
 

@@ -163,7 +163,7 @@ def test_closed_robot_keeps_its_loop_closed() -> None:
         effort=30.0,
         objective="scaled_condition",
         starts=1,
-        rounds=20,
+        rounds=40,  # after 20 the start that was drawn still shows: 57 to 110
     )
     t = np.linspace(0, 6, 25)
     postures = found.posture(t)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mbs.models.inverse_geometry.raghavan_roth.elimination import Elimination
 from mbs.models.inverse_geometry.raghavan_roth.pairs import SIZE, SLOPES, Array
+from mbs.solvers.rank import first_best
 from mbs.spatial import Pose
 
 _ZERO = 1e-12
@@ -88,7 +89,7 @@ def dialytic(elimination: Elimination, E: SX) -> SX:
 def _pivot(values: Array) -> tuple[int, int]:
     """The row and the column of the entry that is largest where it is smallest."""
     smallest = np.min(np.abs(values), axis=0)
-    r, c = np.unravel_index(np.argmax(smallest), smallest.shape)
+    r, c = np.unravel_index(first_best(smallest.ravel()), smallest.shape)
     return int(r), int(c)
 
 

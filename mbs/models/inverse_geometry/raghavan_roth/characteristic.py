@@ -24,6 +24,7 @@ from mbs.models.inverse_geometry.raghavan_roth.arithmetic import (
 from mbs.models.inverse_geometry.raghavan_roth.elimination import at, eliminations
 from mbs.models.inverse_geometry.raghavan_roth.pairs import Array
 from mbs.models.inverse_geometry.raghavan_roth.pencil import Pencil, pencil, regularity
+from mbs.solvers.rank import graded
 from mbs.spatial import Pose
 
 _REGULAR = 1e-10
@@ -96,7 +97,7 @@ def characteristic(problem: Problem) -> Characteristic:
         raise NoClosedForm(
             f"the loop has {problem.size} joints; the characteristic matrix is for six"
         )
-    loops = sorted(_loops(problem), key=lambda loop: loop.merit, reverse=True)
+    loops = sorted(_loops(problem), key=lambda loop: graded(loop.merit), reverse=True)
     for loop in loops[:_TRIED]:
         found = _characteristic(problem, loop)
         if found.regularity > _REGULAR:

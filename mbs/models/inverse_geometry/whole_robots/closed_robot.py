@@ -23,7 +23,7 @@ from mbs.loops.closed_form.places import spin_places
 from mbs.loops.closed_form.plan import plan_from
 from mbs.loops.closed_form.posed import Posed, plan_to
 from mbs.loops.closed_form.stage import Stage, every_posture, started_at
-from mbs.loops.closing import TOLERANCE, Closing
+from mbs.loops.closing import CLOSED, TOLERANCE, Closing
 from mbs.loops.goal import Goal, goal
 from mbs.loops.multi_start import closed_postures
 from mbs.loops.working_modes import working_modes
@@ -31,7 +31,6 @@ from mbs.models.inverse_geometry.chain import Chain
 
 Array = NDArray[np.float64]
 
-_OPEN = 1e-10
 _SAME = 1e-7
 _SEED = 20260108
 _AGREE = 1e-7
@@ -212,26 +211,25 @@ def _agreeing(system: System, known: Known, q: Array, ways: _Ways) -> _Ways:
 def _closed(closing: Closing, ways: _Ways) -> Iterator[ClosedPosture]:
     """Those in which the loops are closed."""
     for found, branch in ways:
-        q, residual = found, _largest(closing.rows(found)[0])
-        if residual > TOLERANCE:
+        q = found
+        if closing.openness(q) > TOLERANCE:
             nearest = closing.nearest(found)
             if np.max(np.abs(nearest.q - found)) < _MOVED:
-                q, residual = nearest.q, _largest(closing.rows(nearest.q)[0])
-        if residual < _OPEN and closing.faces(q):
-            yield ClosedPosture(q, ", ".join(branch), residual)
+                q = nearest.q
+        if closing.openness(q) < CLOSED and closing.faces(q):
+            yield ClosedPosture(q, ", ".join(branch), _largest(closing.rows(q)[0]))
 
 
 def _reaching(wanted: Goal, ways: _Ways) -> Iterator[ClosedPosture]:
     """Those in which the loops are closed and the frame is where it is wanted."""
     for found, branch in ways:
         q = found[: wanted.closing.system.nq]
-        residual = _largest(wanted.residual(q)[0])
-        if TOLERANCE < residual < _MOVED:
+        if TOLERANCE < wanted.openness(q) < _MOVED:
             nearest = wanted.nearest(q)
             if np.max(np.abs(nearest.q - q)) < _MOVED:
-                q, residual = nearest.q, _largest(wanted.residual(nearest.q)[0])
-        if residual < _OPEN and wanted.closing.faces(q):
-            yield ClosedPosture(q, ", ".join(branch), residual)
+                q = nearest.q
+        if wanted.openness(q) < CLOSED and wanted.closing.faces(q):
+            yield ClosedPosture(q, ", ".join(branch), _largest(wanted.residual(q)[0]))
 
 
 def _distinct(system: System, postures: Iterable[ClosedPosture]) -> list[ClosedPosture]:

@@ -82,11 +82,15 @@ class MinimalState(MinimalLayout):
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`; p are the parameters, here and in `events` with the
             modes behind them.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
+        slopes: `slopes(x, z, p) -> J`, how the equations that the Newton step solves change with z,
+            (nz, nz); None in open chains, and where they are of least squares, whose determinant
+            has no sign.
         events: of rigid stops and dry friction; None where there are none.
     """
 
     rhs: Function
     closure: Function | None
+    slopes: Function | None
     events: MinimalEvents | None
 
 
@@ -112,10 +116,12 @@ def minimal_state(
     equations = _equations(system, observe, layout, drive)
     if drive.effort is not None or drive.device is not None:
         equations = controlled(equations, drive, layout.extra)
+    closure, slopes = _closure_step(system, layout) if layout.dependents else (None, None)
     return MinimalState(
         **{field.name: getattr(layout, field.name) for field in fields(layout)},
         rhs=equations.rhs,
-        closure=_closure_step(system, layout) if layout.dependents else None,
+        closure=closure,
+        slopes=slopes,
         events=equations.events,
     )
 
@@ -247,8 +253,8 @@ def _terminal_pose(system: System, q: SX) -> SX:
     return casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
 
 
-def _closure_step(system: System, layout: MinimalLayout) -> Function:
-    """`closure` of the state equation."""
+def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Function | None]:
+    """`closure` and `slopes` of the state equation."""
     dependents, s = list(layout.dependents), _point(system, layout, ())
     symbols, q, z = SX.sym("q", system.nq), SX.zeros(system.nq), s.z
     q[list(layout.positions)], q[dependents] = s.q, z
@@ -261,7 +267,9 @@ def _closure_step(system: System, layout: MinimalLayout) -> Function:
     residual = casadi.mmax(casadi.fabs(casadi.vertcat(every, opposed)))
     point = [s.x, z, system.p]
     slopes = Function("slopes", point, [casadi.jacobian(kept, z)], {"cse": True})
-    return newton_step(dense_function("rows", point, [kept, residual]), slopes)
+    step = newton_step(dense_function("rows", point, [kept, residual]), slopes)
+    varies = system.closure is not None and system.closure.varies
+    return step, None if varies else slopes
 
 
 def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float], list[float]]:

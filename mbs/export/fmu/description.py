@@ -141,6 +141,11 @@ class FmuModel:
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
             absolute closure row at z; None when there is no z.
+        slopes: `slopes(x, z, p) -> J`, how the equations of the closure change with z; the signs of
+            the determinants of its diagonal blocks tell on which side of a singular configuration
+            z is. None when nothing watches them.
+        passive: the first output that is a velocity of a dependent joint, the first that is an
+            acceleration of one, and how many of each there are.
         jumps: events; None when the motion is smooth.
         stop_time: default end of a simulation, s.
         tolerance: default relative tolerance of the integration.
@@ -163,6 +168,8 @@ class FmuModel:
     parameters: tuple[Variable, ...] = ()
     dependents: tuple[Variable, ...] = ()
     closure: casadi.Function | None = None
+    slopes: casadi.Function | None = None
+    passive: tuple[int, int, int] = (0, 0, 0)
     jumps: Jumps | None = None
     stop_time: float = 10.0
     tolerance: float = 1e-8

@@ -19,7 +19,8 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu,
         gp)`.
         Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
-        `mbs_sensitivity(x, z, p) -> steepness`. Where there are events, `mbs_first`,
+        `mbs_sensitivity(x, z, p) -> steepness`, and `mbs_slopes(x, z, p) -> J` where J is watched.
+        Where there are events, `mbs_first`,
         `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
         `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs. For
         an implicit solver `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
@@ -37,6 +38,9 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         loop, whole = [x, z, _own(model, p)], [x, z, p]
         answers.append(casadi.Function("mbs_closure", whole, _dense(model.closure.call(loop))))
         answers.append(casadi.Function("mbs_sensitivity", whole, [_steepness(model, loop)]))
+        if model.slopes is not None:
+            J = casadi.densify(model.slopes.call(loop)[0])
+            answers.append(casadi.Function("mbs_slopes", whole, [J]))
     if model.jumps is not None:
         answers.extend(_events(model.jumps, point))
         rates = _rates(model, point, du)

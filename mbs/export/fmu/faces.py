@@ -16,13 +16,14 @@ _CORE = (
     "inputs.c",
     "derivatives.c",
     "closure.c",
+    "guard.c",
     "solver.c",
     "switching.c",
     "exchange.c",
     "cosimulation.c",
     "saved.c",
 )
-_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "solver.h")
+_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "guard.h", "solver.h")
 _RUNTIME = ("stepper", "events")
 
 

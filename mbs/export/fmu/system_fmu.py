@@ -20,7 +20,7 @@ from mbs.export.fmu.pack import require_writable, write_fmu
 from mbs.export.fmu.system_about import about
 from mbs.export.fmu.variables import dependents, inputs, outputs, parameters, states
 from mbs.files import PathLike, path_of
-from mbs.models.minimal_state import consistent_start, minimal_state
+from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
 
 
 def fmu(
@@ -171,6 +171,8 @@ def fmu_model(
         dependents=dependents(system, state, z),
         rhs=state.rhs,
         closure=state.closure,
+        slopes=state.slopes,
+        passive=_passive(state),
         jumps=jumps(system, state),
         **asdict(settings),
         documentation="\n\n".join([system.report(), system.source]),
@@ -178,3 +180,9 @@ def fmu_model(
         sources=controller.sources,
         about=about(system),
     )
+
+
+def _passive(state: MinimalState) -> tuple[int, int, int]:
+    """Where velocities and accelerations of dependent joints stand in y, and their number."""
+    first, count = len(state.accelerations) + len(state.dependents), len(state.passive)
+    return first, first + count, count

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "closure.h"
+#include "guard.h"
 
 static const char *const CATEGORIES[] = {"logAll", "logStatusDiscard", "logStatusError"};
 enum { LOG_ALL, LOG_DISCARD, LOG_ERROR, N_CATEGORIES };
@@ -145,6 +146,9 @@ static int allocate(core *c) {
 #if NZ > 0
         mbs_closure_work, mbs_sensitivity_work,
 #endif
+#if NB > 0
+        mbs_slopes_work,
+#endif
 #if NK > 0
         mbs_first_work, mbs_indicators_work, mbs_rates_work, mbs_jump_work,
 #endif
@@ -230,6 +234,7 @@ core_status core_exit_initialization(core *c) {
     if (status) return status;
     stepper_start(&c->solver, c->m.time);
     status = core_start_events(c);
+    if (!status) status = guard_restart(c);
     if (status) return status;
     if (!c->m.cosimulation || c->event_mode) {
         c->m.mode = EVENT;

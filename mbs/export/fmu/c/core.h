@@ -50,6 +50,14 @@ typedef struct {
     int event, early; /* an event waits to be handled; the step ended before its end */
 } core_stop;
 
+/* What is watched between accepted configurations: guard.h. */
+typedef struct {
+    int on;
+    double time;
+    double sign[NB + 1];
+    double v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
+} core_watched;
+
 typedef struct {
     int mode, cosimulation;
     int stale;   /* the calculated values do not belong to the others any more */
@@ -62,6 +70,7 @@ typedef struct {
     double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
     double input_time;                  /* to which the inputs and their derivatives belong */
     double slopes[INPUT_ORDERS * NU + 1]; /* first derivatives of all inputs, then second ones */
+    core_watched watched;
     double offset[NK + 1]; /* added to an indicator that has not left zero yet: hysteresis */
     double events[EVENTS_MEMORY(NK)];
     double solver[STEPPER_MEMORY(NX)];

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "closure.h"
+#include "guard.h"
 
 /* Events that rounding of a time this long [s] cannot tell apart count as standing still. */
 #define CHATTER_SPAN 1e3
@@ -122,13 +123,17 @@ core_status core_start_events(core *c) {
 void core_restart(core *c) {
     stepper_restart(&c->solver);
     events_restart(&c->events);
+    guard_forget(c);
 }
 
 core_status core_step(core *c, double limit) {
-    int status = events_step(&c->events, c->m.values + STATES, limit);
+    int status = c->m.watched.on ? 0 : guard_restart(c);
+    if (status) return status;
+    status = events_step(&c->events, c->m.values + STATES, limit);
     c->m.time = stepper_time(&c->solver);
     c->m.stale = 1;
-    return status ? step_failed(c, status) : core_accept_states(c);
+    status = status ? (int)step_failed(c, status) : (int)core_accept_states(c);
+    return status ? (core_status)status : guard_pass(c);
 }
 
 int core_pending(const core *c) { return events_pending(&c->events); }
@@ -152,6 +157,7 @@ core_status core_settle(core *c, int *changed) {
     if (status != EVENTS_FIRED) return step_failed(c, status);
     if (memcmp(before, x, NX * sizeof *x)) *changed = 1;
     if (!c->m.cosimulation) set_offsets(c);
+    guard_forget(c);
     return core_accept_states(c);
 }
 
@@ -197,7 +203,10 @@ core_status core_start_events(core *c) {
     return CORE_OK;
 }
 
-void core_restart(core *c) { stepper_restart(&c->solver); }
+void core_restart(core *c) {
+    stepper_restart(&c->solver);
+    guard_forget(c);
+}
 
 /* The dependent coordinates are at hand where a step ends with an evaluation at its end. */
 static core_status accept_end(core *c, const double *x) {
@@ -211,10 +220,13 @@ static core_status accept_end(core *c, const double *x) {
 
 core_status core_step(core *c, double limit) {
     double *x = c->m.values + STATES;
-    int status = stepper_step(&c->solver, x, limit);
+    int status = c->m.watched.on ? 0 : guard_restart(c);
+    if (status) return status;
+    status = stepper_step(&c->solver, x, limit);
     c->m.time = stepper_time(&c->solver);
     c->m.stale = 1;
-    return status ? step_failed(c, status) : accept_end(c, x);
+    status = status ? (int)step_failed(c, status) : (int)accept_end(c, x);
+    return status ? (core_status)status : guard_pass(c);
 }
 
 int core_pending(const core *c) {

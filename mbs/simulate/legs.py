@@ -98,7 +98,9 @@ def integrated(
             f"{system.name}: {' or '.join(discs)} lies flat on its plane at t = {end:.6g} s, where"
             " no single point of a disc touches; end the run before, or keep it upright"
         )
-    x = integrate(state.rhs, x0, times, p=p, project=state.project, **options)
+    x = integrate(
+        state.rhs, x0, times, p=p, project=state.project, passage=state.passage, **options
+    )
     return [Leg(state, times, x)]
 
 
@@ -156,7 +158,16 @@ def _with_contacts(
     assert state.events is not None
     first = first_modes(system, x0, p)
     events = Events(*state.events, first)
-    motion = integrate_events(state.rhs, x0, times, events, p=p, project=state.project, **options)
+    motion = integrate_events(
+        state.rhs,
+        x0,
+        times,
+        events,
+        p=p,
+        project=state.project,
+        passage=state.passage,
+        **options,
+    )
     return Leg(state, times, motion.x, ContactMotion(first, motion.modes, motion.events))
 
 

@@ -22,6 +22,9 @@ static core_status step_failed(core *c, int status) {
         "", "", "too many steps", "the step size became too small",
         "the loops cannot be closed or the equations have no solution (unclosable or singular "
         "posture)", "the projection failed", "a derivative is not finite (singular posture?)",
+        "a singular configuration is not passed", "a singular configuration is not passed",
+        "a singular configuration is not passed",
+        "it starts in a singular configuration, and its velocities choose no branch of motion",
         "an event indicator has no value (unclosable or singular posture)",
         "a jump has no solution", "its jumps do not come to an end",
         "chattering, events follow each other and time stands still"};

@@ -109,7 +109,11 @@ def run_compiled(
         if status > _MORE:
             blamed = _event(library, driver, problem).fired if status in _CROWDED else ()
             raise failed(
-                library.mbs_time(driver), library.mbs_step(driver), _REASONS[status], blamed
+                library.mbs_time(driver),
+                library.mbs_step(driver),
+                _REASONS[status],
+                blamed,
+                x.tolist(),
             )
     return table, log
 

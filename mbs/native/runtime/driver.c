@@ -104,8 +104,11 @@ static int project(void *user, double t, double *x) {
     for (k = 0; k < ITERATIONS; k++) {
         double residual = 0.0, scale = 1.0;
         if (call(d, mbs_project, t, x, d->moved, &residual) || !isfinite(residual)) return 1;
-        memcpy(x, d->moved, sizeof(double) * (size_t)n);
         for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
+        if (stepper_all_finite(d->moved, n))
+            memcpy(x, d->moved, sizeof(double) * (size_t)n);
+        else if (!(residual < TOLERANCE * scale)) /* else x is on the rows, where they depend */
+            return 1;
         if (residual < TOLERANCE * scale) return 0;
     }
     return 1;

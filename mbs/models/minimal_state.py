@@ -127,7 +127,7 @@ def minimal_state(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Point:
+class Point:
     """Symbols, and the parts of x and u."""
 
     t: SX
@@ -143,13 +143,20 @@ class _Point:
     motions: SX
 
 
-def _point(system: System, layout: MinimalLayout, motors: Sequence[int]) -> _Point:
+def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> Point:
+    """Symbols of a state equation.
+
+    Args:
+        system: open or closed.
+        layout: what stands where.
+        motors: numbers in v of the efforts in u.
+    """
     in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
     in_u = [len(motors), len(system.devices), 6 * len(layout.frames)]
     in_u.append(sum(motion.size for motion in layout.motions))
     x, u = SX.sym("x", sum(in_x)), SX.sym("u", sum(in_u))
     parts = (*_split(x, in_x), *_split(u, in_u))
-    return _Point(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
+    return Point(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
 
 
 def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
@@ -161,9 +168,9 @@ def _equations(
 ) -> Equations:
     """The functions, where u has no w, and all efforts and inputs of devices that laws give."""
     motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
-    s = _point(system, layout, motors)
+    s = point_of(system, layout, motors)
     laws = input_motions(layout.motions, s.motions)
-    motion = _motion(system, layout, s, laws)
+    motion = motion_of(system, layout, s, laws)
     tau, rates, shown = device_equations(system, motion.v, s.states, s.inputs)
     for column, number in enumerate(motors):
         tau[number] += s.efforts[column]
@@ -172,7 +179,7 @@ def _equations(
     load = load_of(system, motion.q, external)
     moved = minimal_accelerations(system, motion, tau, load, given)
     rate = _rate(system, layout, motion, moved, rates)
-    y = _outputs(system, layout, motion, moved, shown)
+    y = outputs_vector(system, layout, motion, moved, shown)
     if observe is not None:
         vectors = motion.q, motion.v, moved.a, motion.v_a, moved.a_a, moved.every_effort
         y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *vectors, external)))
@@ -189,8 +196,8 @@ def _equations(
     )
 
 
-def _motion(
-    system: System, layout: MinimalLayout, s: _Point, laws: Sequence[tuple[SX, SX, SX]]
+def motion_of(
+    system: System, layout: MinimalLayout, s: Point, laws: Sequence[tuple[SX, SX, SX]]
 ) -> TreeMotion:
     """The motion of the tree, from states, dependent positions and prescribed motions."""
     q, v = SX.zeros(system.nq), SX.zeros(system.nv)
@@ -224,7 +231,7 @@ def _steadied_rate(system: System, motion: TreeMotion) -> SX:
     return rate
 
 
-def _outputs(
+def outputs_vector(
     system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, shown: SX
 ) -> SX:
     """The outputs y that every state equation has."""
@@ -255,7 +262,7 @@ def _terminal_pose(system: System, q: SX) -> SX:
 
 def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Function | None]:
     """`closure` and `slopes` of the state equation."""
-    dependents, s = list(layout.dependents), _point(system, layout, ())
+    dependents, s = list(layout.dependents), point_of(system, layout, ())
     symbols, q, z = SX.sym("q", system.nq), SX.zeros(system.nq), s.z
     q[list(layout.positions)], q[dependents] = s.q, z
     norms = norm_rows(system.tree, symbols)

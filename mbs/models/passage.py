@@ -37,6 +37,7 @@ def passage(
     rates: SX,
     motions: Sequence[Prescribed] = (),
     contact: ContactEquations | None = None,
+    inputs: SX | None = None,
 ) -> Passage | None:
     """The functions of passages; None where nothing is lost, or rows bind velocities alone.
 
@@ -47,6 +48,7 @@ def passage(
         rates: (nz, 1) of z.
         motions: coordinates that drives move along laws.
         contact: what rigid stops and dry friction do.
+        inputs: u, where the functions are to take (t, x, z, u, p), z empty.
     """
     closure = system.closure
     if closure is None or closure.slips or closure.varies:
@@ -101,7 +103,7 @@ def passage(
     (H,) = outputs_of(system, bias(system, "tree"), *at)
     measure = _regularity(system, q, unit[drives, :])
     regularity = casadi.substitute(measure, q, at[0])
-    txp = [t, x, p]
+    txp = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
     sizes = (nq, nv, rates.numel(), places.numel(), len(anchors))
     return Passage(
         rows=dense_function("rows", txp, rows),

@@ -21,6 +21,7 @@ from mbs.export.fmu.system_about import about
 from mbs.export.fmu.variables import dependents, inputs, outputs, parameters, states
 from mbs.files import PathLike, path_of
 from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
+from mbs.models.tree_state import tree_state
 
 
 def fmu(
@@ -157,6 +158,11 @@ def fmu_model(
         lambda seen: observed_values(system, request, seen),
         interface.drive(system, controller),
     )
+    tree = tree_state(
+        system,
+        lambda seen: observed_values(system, request, seen),
+        interface.drive(system, controller),
+    )
     x, z = consistent_start(system, state)
     x_variables = states(system, state, x)
     u_variables = (*inputs(system, state, interface.wrenches), *controller.inputs)
@@ -173,6 +179,7 @@ def fmu_model(
         closure=state.closure,
         slopes=state.slopes,
         passive=_passive(state),
+        tree=tree,
         jumps=jumps(system, state),
         **asdict(settings),
         documentation="\n\n".join([system.report(), system.source]),

@@ -10,12 +10,16 @@ import numpy as np
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.equations import functions, watched
+from mbs.models.tree_state import TreeState
 from mbs.native.compiled import generated, unwritten
 from mbs.native.plain_source import plain_source
 from mbs.solvers.block_triangular import Block, block_triangular
 
 _OPEN = ("mbs_rhs", "mbs_tangent", "mbs_adjoint")
 _LOOPS = ("mbs_closure", "mbs_sensitivity")
+_TREE = tuple(
+    f"mbs_tree_{name}" for name in ("rhs", "project", "rows", "forces", "regularity", "start")
+)
 _EVENTS = ("mbs_first", "mbs_indicators", "mbs_rates", "mbs_jump")
 
 _HEADER = """\
@@ -66,6 +70,8 @@ def header(model: FmuModel, guid: str) -> str:
     solver = ""
     if model.closure is not None:
         names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
+    if (tree := model.integrated) is not None:
+        names = (*names, *_TREE)
     if model.jumps is not None:
         names = (*names, *_EVENTS)
     if model.solver == "rodas":
@@ -86,7 +92,7 @@ def header(model: FmuModel, guid: str) -> str:
         passive_v=model.passive[0],
         passive_a=model.passive[1],
         n_passive=model.passive[2],
-        solver=solver,
+        solver=solver + ("" if tree is None else _tree_sizes(tree)),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
@@ -118,6 +124,7 @@ def source(model: FmuModel) -> str:
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
         _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
         *_block_tables(_blocks(model)),
+        *_tree_tables(model),
     ]
     return (
         '#include <math.h>\n\n#include "model.h"\n\n'
@@ -125,6 +132,26 @@ def source(model: FmuModel) -> str:
         + "\n/* The functions stay inside the library. */\n#define CASADI_SYMBOL_EXPORT\n"
         + code
     )
+
+
+def _tree_sizes(tree: TreeState) -> str:
+    sizes = ", ".join(map(str, tree.passage.size))
+    return (
+        f"#define MODEL_TREE {tree.start.numel_out(0)} /* its states */\n"
+        f"#define MODEL_PASSAGE {{{sizes}}}\n"
+        f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
+        "extern const int MODEL_TREE_STATES[], MODEL_TREE_DEPENDENTS[];\n"
+    )
+
+
+def _tree_tables(model: FmuModel) -> list[str]:
+    """Where the states, and the dependents, of the FMU stand among the states of its tree."""
+    if (tree := model.integrated) is None:
+        return []
+    return [
+        _table("const int MODEL_TREE_STATES", map(str, tree.states)),
+        _table("const int MODEL_TREE_DEPENDENTS", map(str, tree.dependents)),
+    ]
 
 
 def _blocks(model: FmuModel) -> tuple[Block, ...]:

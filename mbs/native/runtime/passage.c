@@ -741,8 +741,10 @@ int passage_project(passage *g, double t, double *x) {
 void passage_start(passage *g) {
     memset(g->memory, 0, sizeof(double) * (size_t)PASSAGE_MEMORY(g->s->n));
     g->memory[LARGEST] = g->model.typical;
-    g->ready = g->kept = g->charted = g->watch = 0;
+    passage_forget(g);
 }
+
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = 0; }
 
 /* The next count doubles of a block, or only how many there are so far. */
 static double *take(double *block, size_t *used, size_t count) {

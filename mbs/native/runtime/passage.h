@@ -61,6 +61,9 @@ void passage_free(passage *g);
 /* Before stepper_start. */
 void passage_start(passage *g);
 
+/* The memory was replaced: what stands beside it belongs to it no more. */
+void passage_forget(passage *g);
+
 /* Positions and velocities moved onto the rows in the chart of the last step; 1 where there is no
  * such chart, and the projection of the full step is to be used. */
 int passage_project(passage *g, double t, double *x);

@@ -38,6 +38,9 @@ static int ours(core *c, const core_state *s) {
 core_status core_restore(core *c, const core_state *state) {
     if (!core_allowed(c, ~INTERMEDIATE, "restoring a state") || !ours(c, state)) return CORE_ERROR;
     memcpy(&c->m, &state->m, sizeof c->m);
+#ifdef MODEL_TREE
+    if (c->passage) passage_forget(c->passage);
+#endif
     return CORE_OK;
 }
 
@@ -115,6 +118,10 @@ static int sane(const core_memory *m) {
     if (!all_finite(m->guess, NZ) || !all_finite(m->posture_z, NZ)) return 0;
     if (!all_finite(m->posture_x, NX) || !sane_inputs(m) || !sane_events(m)) return 0;
     if (!sane_watch(&m->watched)) return 0;
+#ifdef MODEL_TREE
+    if (!is_flag(m->loose) || !all_finite(m->tree, NT)) return 0;
+    if (!all_finite(m->passage, PASSAGE_MEMORY(NT))) return 0;
+#endif
     for (i = 0; i < STEPPER_MEMORY(0); i++)
         if (isnan(m->solver[i])) return 0;
     return 1;

@@ -209,7 +209,12 @@ core_status core_start_events(core *c) {
 void core_restart(core *c) {
     stepper_restart(&c->solver);
     guard_forget(c);
+#ifdef MODEL_TREE
+    c->m.loose = 1;
+#endif
 }
+
+#ifndef MODEL_TREE
 
 /* The dependent coordinates are at hand where a step ends with an evaluation at its end. */
 static core_status accept_end(core *c, const double *x) {
@@ -221,6 +226,24 @@ static core_status accept_end(core *c, const double *x) {
 #endif
 }
 
+#endif
+
+#ifdef MODEL_TREE
+
+core_status core_step(core *c, double limit) {
+    int status = 0;
+    if (c->m.loose) status = c->solver.project(c, c->m.time, c->m.tree);
+    if (status) return step_failed(c, STEPPER_PROJECTION_FAILED);
+    c->m.loose = 0;
+    status = stepper_step(&c->solver, c->m.tree, limit);
+    c->m.time = stepper_time(&c->solver);
+    c->m.stale = 1;
+    core_show_tree(c);
+    return status ? step_failed(c, status) : CORE_OK;
+}
+
+#else
+
 core_status core_step(core *c, double limit) {
     double *x = c->m.values + STATES;
     int status = c->m.watched.on ? 0 : guard_restart(c);
@@ -231,6 +254,8 @@ core_status core_step(core *c, double limit) {
     status = status ? (int)step_failed(c, status) : (int)accept_end(c, x);
     return status ? (core_status)status : guard_pass(c);
 }
+
+#endif
 
 int core_pending(const core *c) {
     (void)c;

@@ -59,10 +59,16 @@ def passage(
     t, x, p = point
     nq, nv = system.nq, system.nv
     q, v = SX.sym("q", nq), SX.sym("v", nv)
-    scale = DM(scales(system).rows)
-    J = constraint_rows(system, q)
+    J = casadi.sparsify(constraint_rows(system, q))
+    moving = sorted(set(J.sparsity().row()))  # a row that nothing moves says nothing
+    J = J[moving, :]
+    scale = DM(scales(system).rows[moving])
     bend = acceleration_bias(system, q, v, J)
-    loops = (scale * closure_rows(system, q), casadi.mtimes(casadi.diag(scale), J), -scale * bend)
+    loops = (
+        scale * closure_rows(system, q)[moving],
+        casadi.mtimes(casadi.diag(scale), J),
+        -scale * bend,
+    )
     count, held = loops[0].numel(), SX(0, 1)
     laws = [motion.law(t) for motion in motions]
     unit = SX(DM.eye(nv))
@@ -85,16 +91,17 @@ def passage(
     still = SX.zeros(len(anchors))
     b = casadi.vertcat(SX.zeros(count), *(law[1] for law in laws), still)
     c = casadi.vertcat(loops[2], *(law[2] for law in laws), still)
+    turns = nq > nv  # else N is the unit matrix, and J are the slopes of the places
     rate = position_rate(system.tree, q, v)
     rank = len(closure.rows) + len(motions) + (casadi.sum1(held) if anchors else 0)
     rows = [
         places,
         casadi.jacobian(places, q),
-        speeds,
+        speeds if turns else SX(0, nv),
         b,
         c,
-        casadi.jacobian(rate, v),
-        casadi.jtimes(rate, q, rate),
+        casadi.jacobian(rate, v) if turns else SX(0, nv),
+        casadi.jtimes(rate, q, rate) if turns else SX(0, 1),
         SX(rank),
     ]
     at = [x[:nq], x[nq : nq + nv]]

@@ -117,9 +117,24 @@ static int cholesky(double *M, int n) {
     return 0;
 }
 
+static int rows_at(passage *g, double t, const double *x, const passage_rows *rows) {
+    const passage_size *z = &g->size;
+    int j, nv = z->nv;
+    if (g->model.rows(g->s->user, t, x, rows)) return 1;
+    if (z->nq > nv) return 0;
+    memset(rows->N, 0, sizeof(double) * (size_t)(nv * nv));
+    memset(rows->bend, 0, sizeof(double) * (size_t)nv);
+    for (j = 0; j < nv; j++) {
+        rows->N[j * nv + j] = 1.0;
+        memcpy(rows->J + j * z->speeds, rows->slope + j * z->places,
+               sizeof(double) * (size_t)z->speeds);
+    }
+    return 0;
+}
+
 static int evaluate(passage *g, frame *p, double t, const double *x) {
     void *user = g->s->user;
-    if (g->model.rows(user, t, x, &p->rows) || g->model.forces(user, t, x, p->M, p->f, p->rate))
+    if (rows_at(g, t, x, &p->rows) || g->model.forces(user, t, x, p->M, p->f, p->rate))
         return 1;
     p->rank = (int)fmin(*p->rows.rank, fmin(g->size.nv, g->size.speeds));
     p->more = 0.0;
@@ -296,7 +311,7 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
     double *K = g->K, *r = g->r, total = 0.0;
     for (turn = 0; turn < NEWTON; turn++) {
         double move = 0.0, least = HUGE_VAL, most = 0.0;
-        if (g->model.rows(g->s->user, t, x, &p->rows)) return 1;
+        if (rows_at(g, t, x, &p->rows)) return 1;
         memcpy(r, p->rows.place, sizeof(double) * (size_t)m);
         for (i = first; i < after; i++) r[i] -= g->base.rows.place[i];
         for (j = 0; j < nq; j++)
@@ -351,7 +366,7 @@ static int predict(passage *g, double t, const double *xi, double *x, double *wa
     if (dt != 0.0) {
         memcpy(x, x0, sizeof(double) * (size_t)n);
         for (i = 0; i < nv; i++) x[nq + i] = D[i] / dt;
-        if (g->model.rows(g->s->user, g->memory[BASE_TIME], x, &p->rows)) return 1;
+        if (rows_at(g, g->memory[BASE_TIME], x, &p->rows)) return 1;
         along_rows(g, &g->base, p->rows.c, bend);
         to_velocity(g, &g->base, bend);
     }
@@ -404,7 +419,7 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     for (k = 0; k < d; k++)
         for (i = 0; i < nv; i++) v[i] += p->T[k * nv + i] * g->K[d * d + k];
     /* accelerations: a = L^-T (f, what acts along the rows as they ask) */
-    if (g->model.rows(g->s->user, t, x, &p->rows) ||
+    if (rows_at(g, t, x, &p->rows) ||
         g->model.forces(g->s->user, t, x, g->G, p->f, p->rate))
         return STEPPER_SINGULAR;
     for (i = 0; i < nv; i++) {
@@ -552,7 +567,7 @@ static int prepare(passage *g, double t, const double *x) {
     if (coordinates_of_base(g)) return STEPPER_SINGULAR;
     if (g->size.moving) particular(g, &g->base, g->drift);
     d = g->d;
-    if (g->model.rows(g->s->user, t, x, &g->here.rows)) return STEPPER_SINGULAR;
+    if (rows_at(g, t, x, &g->here.rows)) return STEPPER_SINGULAR;
     for (k = 0; k < d; k++) {
         g->own[k] = 0.0;
         for (i = 0; i < nq; i++) g->own[k] += g->C[i * d + k] * (x[i] - m[BASE + i]);
@@ -725,7 +740,7 @@ int passage_project(passage *g, double t, double *x) {
     int nq = g->size.nq, d = g->d, i, k;
     double *y = g->trial, h;
     if (!g->kept || !g->ready) return 1;
-    if (g->model.rows(g->s->user, t, x, &g->here.rows)) return 0;
+    if (rows_at(g, t, x, &g->here.rows)) return 0;
     for (k = 0; k < d; k++) {
         y[k] = 0.0;
         for (i = 0; i < nq; i++) y[k] += g->C[i * d + k] * (x[i] - g->memory[BASE + i]);

@@ -32,7 +32,8 @@ typedef struct {
 } passage_size;
 
 /* place (places,) and its slopes by q (places, nq); J (speeds, nv), b and c with J v = b and
- * J a = c; N (nq, nv) and bend (nq,) with q' = N v and q'' = N a + bend; the rank of J. */
+ * J a = c; N (nq, nv) and bend (nq,) with q' = N v and q'' = N a + bend; the rank of J. Where nq is
+ * nv the model leaves out J, which are the slopes, N, the unit matrix, and bend, which is zero. */
 typedef struct {
     double *place, *slope, *J, *b, *c, *N, *bend, *rank;
 } passage_rows;

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Body, Prismatic, Revolute
+from mbs.components import Body, CoulombFriction, Prismatic, Revolute, RigidStop
 from mbs.errors import SolverError
 
 GRAVITY = (0, -9.81, 0)
@@ -26,7 +26,7 @@ def linkage(lengths, guess, more=()):
     m.connect(b.at(coupler), closing := Revolute("j3"), c.at(rocker))
     m.cut(closing)
     for element in more:
-        m.add_force(element)
+        m.add(element)
     return m.assemble(guess=dict(zip(("j1", "j2", "j4"), guess, strict=True)))
 
 
@@ -151,3 +151,29 @@ def test_a_start_that_chooses_no_branch_is_refused(systems, v0):
     """The error names the configuration, the joint, and what would decide."""
     with pytest.raises(SolverError, match=r"velocities of one branch.*a0 = 0, b0 = 0.*hold b0"):
         mbs.simulate.run(systems["parallelogram"], 1.0, q0=[0.0, 0.0, 0.0], v0=v0, quiet=True)
+
+
+def test_a_crank_bounces_between_passages():
+    """An elastic stop keeps the energy, and comes a moment after the linkage has been flat."""
+    stop = RigidStop("stop", joint="j1", lower=-20.0, upper=7.5, restitution=1.0)
+    system = linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5), (stop,))
+    for tolerance in (1e-5, 1e-8):
+        result = mbs.simulate.run(
+            system, 3.0, v0={"j1": 9.0}, tolerance=tolerance, step=0.02, quiet=True
+        )
+        assert len(result.events) == 2
+        assert energy_error(result) < 10 * tolerance
+
+
+def test_coulomb_friction_acts_through_passages():
+    dry = CoulombFriction("dry", joint="j1", sliding=0.3, sticking=0.4)
+    system = linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5), (dry,))
+    rough, fine = (
+        mbs.simulate.run(system, 3.0, v0={"j1": 9.0}, tolerance=tolerance, step=0.01, quiet=True)
+        for tolerance in (1e-5, 1e-9)
+    )
+    assert np.ptp(fine["j1.q"]) > 4 * np.pi
+    assert rough["j1.q"] == pytest.approx(fine["j1.q"], abs=1e-3)
+    energy = fine["kinetic_energy"] + fine["potential_energy"]
+    work = np.trapezoid(fine["dry.effort"] * fine["j1.v"], fine.time)
+    assert energy[-1] - energy[0] == pytest.approx(work, abs=1e-3)

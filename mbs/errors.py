@@ -16,6 +16,8 @@
 A message is one sentence: which component, what value, which rule, what to do.
 """
 
+from collections.abc import Sequence
+
 
 class MbsError(Exception):
     """Base of all errors raised on purpose by mbs."""
@@ -54,7 +56,18 @@ class ModelError(MbsError, ValueError):
 
 
 class SolverError(MbsError, RuntimeError):
-    """A numerical method could not go on."""
+    """A numerical method could not go on.
+
+    Attributes:
+        state: the last state that an integration reached; empty where there is none.
+        singular: whether it stopped at a singular configuration.
+    """
+
+    def __init__(self, *args: object, state: Sequence[float] = (), singular: bool = False) -> None:
+        """As of every exception, with what is known of where it happened."""
+        super().__init__(*args)
+        self.state = tuple(state)
+        self.singular = singular
 
 
 class CompilerError(MbsError, RuntimeError):

@@ -22,8 +22,10 @@ from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.energy import energy
 from mbs.models.hybrid_dynamics import hybrid_dynamics
 from mbs.models.impacts import jump
+from mbs.models.passage import passage
 from mbs.models.prescribed import Prescribed
 from mbs.models.projection import projected
+from mbs.solvers.passage import Passage
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +41,14 @@ class FullState:
             stops and of dry friction, the last is the largest closure row.
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
             and dry friction, whose modes are then the last of p; None where there are none.
+        passage: for steps through singular configurations of the loops; None where there are none.
     """
 
     rhs: Function
     project: Function | None
     observe: Function
     events: tuple[Function, Function] | None = None
+    passage: Passage | None = None
 
 
 def full_state(
@@ -69,11 +73,13 @@ def full_state(
     u = SX.zeros(len(system.devices)) if inputs is None else SX(inputs(t, q, v, p))
     delivered, z_rate, y = device_equations(system, v, z, u)
     tau += delivered
+    given = SX(tau)
     contact = contact_equations(
         system, q, v, tau, {motion.velocity: motion.law(t)[2] for motion in motions}
     )
     a, tau = (contact.a, contact.tau) if contact else _accelerations(system, q, v, tau, motions, t)
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
+    through = passage(system, (t, x, p), given, z_rate, motions, contact)
     touch = (contact.contacts, contact.modes) if contact else None
     *kept, residual = projected(system, q, v, motions, t, touch)
     rows = closure_rows(system, q)
@@ -89,6 +95,7 @@ def full_state(
         project=dense_function("project", [t, x, p], moved) if keeps else None,
         observe=dense_function("observe", [t, x, p], observed),
         events=_events(system, contact, [t, x, p], motions) if contact else None,
+        passage=through,
     )
 
 

@@ -83,11 +83,15 @@ class MinimalState(MinimalLayout):
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`; p are the parameters, here and in `events` with the
             modes behind them.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
+        slopes: `slopes(x, z, p) -> J`, how the equations that the Newton step solves change with z,
+            (nz, nz); None in open chains, and where they are of least squares, whose determinant
+            has no sign.
         events: of rigid stops and dry friction; None where there are none.
     """
 
     rhs: Function
     closure: Function | None
+    slopes: Function | None
     events: MinimalEvents | None
 
 
@@ -113,16 +117,18 @@ def minimal_state(
     equations = _equations(system, observe, layout, drive)
     if drive.effort is not None or drive.device is not None:
         equations = controlled(equations, drive, layout.extra)
+    closure, slopes = _closure_step(system, layout) if layout.dependents else (None, None)
     return MinimalState(
         **{field.name: getattr(layout, field.name) for field in fields(layout)},
         rhs=equations.rhs,
-        closure=_closure_step(system, layout) if layout.dependents else None,
+        closure=closure,
+        slopes=slopes,
         events=equations.events,
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Point:
+class Point:
     """Symbols, and the parts of x and u."""
 
     t: SX
@@ -138,13 +144,20 @@ class _Point:
     motions: SX
 
 
-def _point(system: System, layout: MinimalLayout, motors: Sequence[int]) -> _Point:
+def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> Point:
+    """Symbols of a state equation.
+
+    Args:
+        system: open or closed.
+        layout: what stands where.
+        motors: numbers in v of the efforts in u.
+    """
     in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
     in_u = [len(motors), len(system.devices), 6 * len(layout.frames)]
     in_u.append(sum(motion.size for motion in layout.motions))
     x, u = SX.sym("x", sum(in_x)), SX.sym("u", sum(in_u))
     parts = (*_split(x, in_x), *_split(u, in_u))
-    return _Point(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
+    return Point(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
 
 
 def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
@@ -156,9 +169,9 @@ def _equations(
 ) -> Equations:
     """The functions, where u has no w, and all efforts and inputs of devices that laws give."""
     motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
-    s = _point(system, layout, motors)
+    s = point_of(system, layout, motors)
     laws = input_motions(layout.motions, s.motions)
-    motion = _motion(system, layout, s, laws)
+    motion = motion_of(system, layout, s, laws)
     tau, rates, shown = device_equations(system, motion.v, s.states, s.inputs)
     for column, number in enumerate(motors):
         tau[number] += s.efforts[column]
@@ -167,7 +180,7 @@ def _equations(
     load = load_of(system, motion.q, external)
     moved = minimal_accelerations(system, motion, tau, load, given)
     rate = _rate(system, layout, motion, moved, rates)
-    y = _outputs(system, layout, motion, moved, shown)
+    y = outputs_vector(system, layout, motion, moved, shown)
     if observe is not None:
         vectors = motion.q, motion.v, moved.a, motion.v_a, moved.a_a, moved.every_effort
         y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *vectors, external)))
@@ -184,8 +197,8 @@ def _equations(
     )
 
 
-def _motion(
-    system: System, layout: MinimalLayout, s: _Point, laws: Sequence[tuple[SX, SX, SX]]
+def motion_of(
+    system: System, layout: MinimalLayout, s: Point, laws: Sequence[tuple[SX, SX, SX]]
 ) -> TreeMotion:
     """The motion of the tree, from states, dependent positions and prescribed motions."""
     q, v = SX.zeros(system.nq), SX.zeros(system.nv)
@@ -219,7 +232,7 @@ def _steadied_rate(system: System, motion: TreeMotion) -> SX:
     return rate
 
 
-def _outputs(
+def outputs_vector(
     system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, shown: SX
 ) -> SX:
     """The outputs y that every state equation has."""
@@ -248,9 +261,9 @@ def _terminal_pose(system: System, q: SX) -> SX:
     return casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
 
 
-def _closure_step(system: System, layout: MinimalLayout) -> Function:
-    """`closure` of the state equation."""
-    dependents, s = list(layout.dependents), _point(system, layout, ())
+def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Function | None]:
+    """`closure` and `slopes` of the state equation."""
+    dependents, s = list(layout.dependents), point_of(system, layout, ())
     symbols, q, z = SX.sym("q", system.nq), SX.zeros(system.nq), s.z
     q[list(layout.positions)], q[dependents] = s.q, z
     kept = square_closure(system, symbols, dependents)
@@ -261,7 +274,9 @@ def _closure_step(system: System, layout: MinimalLayout) -> Function:
     residual = casadi.mmax(casadi.fabs(casadi.vertcat(every, opposed)))
     point = [s.x, z, system.p]
     slopes = Function("slopes", point, [casadi.jacobian(kept, z)], {"cse": True})
-    return newton_step(dense_function("rows", point, [kept, residual]), slopes)
+    step = newton_step(dense_function("rows", point, [kept, residual]), slopes)
+    varies = system.closure is not None and system.closure.varies
+    return step, None if varies else slopes
 
 
 def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float], list[float]]:

@@ -21,6 +21,8 @@ from mbs.errors import SolverError
 from mbs.loops.analysis import rows_at
 from mbs.loops.examine import row_independence
 from mbs.loops.rolling import least_upright, rolling_discs
+from mbs.loops.scales import scales
+from mbs.loops.velocity import constraint_jacobian
 from mbs.models.full_state import FullState
 from mbs.simulate.contacts import ContactMotion, first_modes
 from mbs.solvers import Events, integrate, integrate_events
@@ -82,7 +84,47 @@ def integrated(
         times: (m,) s, increasing.
         p: (np,) parameters.
         options: of `integrate`.
+
+    Raises:
+        SolverError: the integration cannot go on; at a singular configuration the message says
+            which one, and the joint that the loops do not hold there.
     """
+    try:
+        return _integrated(system, equations, x0, times, p, **options)
+    except SolverError as error:
+        if not error.singular or not error.state or not system.is_closed:
+            raise
+        raise SolverError(
+            f"{system.name}: {error}; {_lost(system, np.array(error.state[: system.nq]), p)}",
+            state=error.state,
+            singular=True,
+        ) from error
+
+
+def _lost(system: System, q: Array, p: Sequence[float]) -> str:
+    """A configuration in words, and the joint that moves most in what the rows hold least there."""
+    where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
+    found = scales(system)
+    J = np.array(constraint_jacobian(system)(q, np.array(p, dtype=float)))
+    J = J * found.rows.reshape(-1, 1) * found.columns([speed.unit for speed in system.speeds])
+    assert system.closure is not None
+    rank = system.nv - system.closure.mobility
+    if not rank or not np.isfinite(J).all():
+        return f"the configuration is {where}"
+    free = np.linalg.svd(J)[2][rank - 1 :]  # as many directions as are free there, at the least
+    moves = np.round(np.sum(free**2, axis=0), 6)  # the first of joints that move alike
+    name = system.speeds[int(np.argmax(moves))].name
+    return f"the configuration is {where}, and the loops hardly hold {name} there"
+
+
+def _integrated(
+    system: System,
+    equations: Callable[[System], FullState],
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    **options: Any,
+) -> list[Leg]:
     if system.closure is not None and system.closure.varies:
         return _with_other_rows(system, equations, x0, times, p, options)
     state = equations(system)
@@ -98,7 +140,9 @@ def integrated(
             f"{system.name}: {' or '.join(discs)} lies flat on its plane at t = {end:.6g} s, where"
             " no single point of a disc touches; end the run before, or keep it upright"
         )
-    x = integrate(state.rhs, x0, times, p=p, project=state.project, **options)
+    x = integrate(
+        state.rhs, x0, times, p=p, project=state.project, passage=state.passage, **options
+    )
     return [Leg(state, times, x)]
 
 
@@ -156,7 +200,16 @@ def _with_contacts(
     assert state.events is not None
     first = first_modes(system, x0, p)
     events = Events(*state.events, first)
-    motion = integrate_events(state.rhs, x0, times, events, p=p, project=state.project, **options)
+    motion = integrate_events(
+        state.rhs,
+        x0,
+        times,
+        events,
+        p=p,
+        project=state.project,
+        passage=state.passage,
+        **options,
+    )
     return Leg(state, times, motion.x, ContactMotion(first, motion.modes, motion.events))
 
 

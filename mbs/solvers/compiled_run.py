@@ -30,12 +30,16 @@ _REASONS = {
     4: "rhs",
     5: "projection",
     6: "finite",
-    7: "indicators",
-    8: "jump",
-    9: "settle",
-    10: "standstill",
+    7: "singular",
+    8: "singular",
+    9: "singular",
+    10: "undetermined",
+    11: "indicators",
+    12: "jump",
+    13: "settle",
+    14: "standstill",
 }
-_CROWDED = (9, 10)
+_CROWDED = (13, 14)
 _RUNTIME = ("stepper", "dopri5")
 
 
@@ -59,8 +63,11 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     if equations.indicators is not None:
         names.append("events")
         flags.append("-DMBS_EVENTS")
+    if equations.passage is not None:
+        names.extend(("dense", "passage"))
+        flags.append("-DMBS_PASSAGE")
     library = cached_library({"system.c": source, **_runtime(tuple(names))}, flags)
-    return _load(library, equations.indicators is not None)
+    return _load(library, equations.indicators is not None, equations.passage is not None)
 
 
 def run_compiled(
@@ -102,7 +109,11 @@ def run_compiled(
         if status > _MORE:
             blamed = _event(library, driver, problem).fired if status in _CROWDED else ()
             raise failed(
-                library.mbs_time(driver), library.mbs_step(driver), _REASONS[status], blamed
+                library.mbs_time(driver),
+                library.mbs_step(driver),
+                _REASONS[status],
+                blamed,
+                x.tolist(),
             )
     return table, log
 
@@ -122,7 +133,7 @@ def _runtime(names: tuple[str, ...]) -> dict[str, str]:
     return {name: (folder / name).read_text(encoding="utf-8") for name in files}
 
 
-def _load(path: Path, has_events: bool) -> ctypes.CDLL:
+def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
     library = ctypes.CDLL(str(path))
     handle, real, pointer = ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p
     integer = ctypes.c_longlong
@@ -140,6 +151,8 @@ def _load(path: Path, has_events: bool) -> ctypes.CDLL:
     if has_events:
         types["mbs_watch"] = (ctypes.c_int, [handle, ctypes.c_int, ctypes.c_int])
         types["mbs_event"] = (None, [handle, pointer, pointer])
+    if has_passage:
+        types["mbs_pass"] = (ctypes.c_int, [handle, ctypes.POINTER(ctypes.c_int), real])
     for name, (result, arguments) in types.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
@@ -156,6 +169,9 @@ def _opened(library: ctypes.CDLL, problem: Problem) -> Iterator[ctypes.c_void_p]
     try:
         if driver and indicators is not None:
             full = library.mbs_watch(driver, indicators.numel_out(0), problem.modes) != 0
+        if driver and not full and (through := problem.equations.passage) is not None:
+            sizes = (ctypes.c_int * len(through.size))(*through.size)
+            full = library.mbs_pass(driver, sizes, through.typical) != 0
         if full:
             raise SolverError(f"no memory is left to integrate {n} states; close other programs")
         yield driver

@@ -13,6 +13,11 @@ REASONS = {
     "rhs": "the right-hand side has no value there",
     "projection": "the projection onto the constraints does not converge; "
     "look for a singular posture",
+    "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
+    "around it; start elsewhere, or end the run before",
+    "undetermined": "the motion starts in a singular configuration, where branches of motion meet, "
+    "and its velocities are those of none of them; give velocities of one branch to all joints, or "
+    "start beside it",
     "finite": "a value is not finite; look for a singularity",
     "indicators": "an event indicator has no value there",
     "jump": "the jump of an event has no value there",
@@ -27,7 +32,12 @@ class Failure(Exception):
     """An evaluation had no answer, so the step must be shortened."""
 
 
-def failed(t: float, h: float, reason: str, fired: Sequence[int] = ()) -> SolverError:
+_SINGULAR = ("singular", "undetermined", "projection")
+
+
+def failed(
+    t: float, h: float, reason: str, fired: Sequence[int] = (), state: Sequence[float] = ()
+) -> SolverError:
     """The error that says when, with which step and why an integration stopped.
 
     Args:
@@ -35,10 +45,15 @@ def failed(t: float, h: float, reason: str, fired: Sequence[int] = ()) -> Solver
         h: step that was wanted next, s; 0 when there was none.
         reason: a key of REASONS.
         fired: numbers of the event indicators that are to blame.
+        state: the last one that was reached.
 
     Returns:
         an error to raise.
     """
     step = f" with step {h:.3g} s" if h > 0 else ""
     who = f"; indicators {', '.join(map(str, fired))}" if fired else ""
-    return SolverError(f"integration stopped at t = {t:.9g} s{step}: {REASONS[reason]}{who}")
+    return SolverError(
+        f"integration stopped at t = {t:.9g} s{step}: {REASONS[reason]}{who}",
+        state=state,
+        singular=reason in _SINGULAR,
+    )

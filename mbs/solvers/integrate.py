@@ -11,6 +11,7 @@ from mbs.native import compiler_found
 from mbs.solvers.compiled_run import library_of, run_compiled
 from mbs.solvers.events import Event, EventMotion, Events, modes_at
 from mbs.solvers.interpreted_run import run_interpreted
+from mbs.solvers.passage import Passage
 from mbs.solvers.problem import Problem, equations, numbers, problem
 
 Array = npt.NDArray[np.float64]
@@ -24,6 +25,7 @@ def integrate(
     *,
     p: npt.ArrayLike | None = None,
     project: casadi.Function | None = None,
+    passage: Passage | None = None,
     method: str = "dopri5",
     rtol: float = 1e-8,
     atol: float = 1e-8,
@@ -43,6 +45,8 @@ def integrate(
         p: (np,) parameters; none by default.
         project: `project(t, x, p) -> (x, residual)`, one Newton step onto the constraints with the
             largest residual; it is repeated after each step until the residual is below 1e-12.
+        passage: for steps through states where the constraints become dependent; without it the
+            integration stops there.
         method: "dopri5", Dormand and Prince's explicit pair; or "rodas", the linearly implicit
             RODAS5P for stiff equations, which uses the exact Jacobian of rhs.
         rtol: relative tolerance of the error of one step.
@@ -60,7 +64,7 @@ def integrate(
         SolverError: the integration cannot go on; the message says when and why.
         CompilerError: the compiler that CC names does not start.
     """
-    functions = equations(rhs, project, method, None)
+    functions = equations(rhs, project, method, None, passage)
     return _run(problem(functions, x0, times, p, (), (rtol, atol), max_step), progress, compiled)[0]
 
 
@@ -72,6 +76,7 @@ def integrate_events(
     *,
     p: npt.ArrayLike | None = None,
     project: casadi.Function | None = None,
+    passage: Passage | None = None,
     method: str = "dopri5",
     rtol: float = 1e-8,
     atol: float = 1e-8,
@@ -97,6 +102,7 @@ def integrate_events(
         events: indicators, jump and the first modes.
         p: (np,) parameters, without the modes.
         project: as in `integrate`, likewise the arguments below.
+        passage: as in `integrate`; it has the modes of the present too.
         method: "dopri5" or "rodas".
         rtol: relative tolerance of the error of one step.
         atol: absolute tolerance of the error of one step, in the units of the states.
@@ -113,7 +119,7 @@ def integrate_events(
             not come to an end, or events crowd until time stands still.
         CompilerError: the compiler that CC names does not start.
     """
-    functions = equations(rhs, project, method, events)
+    functions = equations(rhs, project, method, events, passage)
     given = problem(functions, x0, times, p, events.modes, (rtol, atol), max_step)
     table, log = _run(given, progress, compiled)
     happened = tuple(log)

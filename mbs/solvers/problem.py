@@ -1,6 +1,6 @@
 """An integration, its functions brought into one form and its arguments checked."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi
 import numpy as np
@@ -9,6 +9,7 @@ import numpy.typing as npt
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.solvers.events import Events
+from mbs.solvers.passage import Passage
 
 Array = npt.NDArray[np.float64]
 
@@ -27,6 +28,7 @@ class Equations:
         indicators: `mbs_indicators(t, x, p) -> g`; None, as the next two, without events.
         rates: `mbs_rates(t, x, p) -> dg/dt` along the motion.
         jump: `mbs_jump(t, x, p, fired) -> (x, modes)`.
+        passage: `mbs_rows`, `mbs_forces` and `mbs_regularity`; None where no rows become dependent.
     """
 
     rhs: casadi.Function
@@ -35,11 +37,13 @@ class Equations:
     indicators: casadi.Function | None = None
     rates: casadi.Function | None = None
     jump: casadi.Function | None = None
+    passage: Passage | None = None
 
     @property
     def all(self) -> list[casadi.Function]:
         """Those that there are."""
-        functions = (
+        through = self.passage
+        functions: tuple[casadi.Function | None, ...] = (
             self.rhs,
             self.jacobian,
             self.project,
@@ -47,6 +51,8 @@ class Equations:
             self.rates,
             self.jump,
         )
+        if through is not None:
+            functions = (*functions, through.rows, through.forces, through.regularity)
         return [f for f in functions if f is not None]
 
 
@@ -76,7 +82,11 @@ class Problem:
 
 
 def equations(
-    rhs: casadi.Function, project: casadi.Function | None, method: str, events: Events | None
+    rhs: casadi.Function,
+    project: casadi.Function | None,
+    method: str,
+    events: Events | None,
+    passage: Passage | None = None,
 ) -> Equations:
     """The functions under the names that the driver calls.
 
@@ -85,6 +95,7 @@ def equations(
         project: `project(t, x, p) -> (x, residual)`, or None.
         method: one of METHODS.
         events: None when there are none.
+        passage: None where no rows become dependent.
 
     Raises:
         ModelError: a function has the wrong inputs or outputs, or there is no such method.
@@ -109,9 +120,20 @@ def equations(
         f_xt = [casadi.jacobian(slope, v) for v in (x, t)]
         jacobian = _dense("mbs_jacobian", txp, *f_xt)
     g = None if project is None else _projection(project, txp)
+    through = None if passage is None else _passage(passage, txp)
     if events is None:
-        return Equations(f, jacobian, g)
-    return Equations(f, jacobian, g, *_event_functions(events, txp, slope))
+        return Equations(f, jacobian, g, passage=through)
+    return Equations(f, jacobian, g, *_event_functions(events, txp, slope), passage=through)
+
+
+def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
+    """The same under the names that the driver calls."""
+    return replace(
+        given,
+        rows=_dense("mbs_rows", txp, *given.rows.call(txp)),
+        forces=_dense("mbs_forces", txp, *given.forces.call(txp)),
+        regularity=_dense("mbs_regularity", txp, *given.regularity.call(txp)),
+    )
 
 
 def _first(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:

@@ -1,7 +1,8 @@
 """Steps with error control, dense output and projection: the twin of `native/runtime/stepper.c`.
 
-The twins serve where there is no C compiler, and take the same steps. A change here is a change
-there.
+The twins serve where there is no C compiler, and take the same steps, but those in the tangent
+coordinates of `native/runtime/passage.c`: at a singular configuration they stop. A change here is a
+change there.
 """
 
 import math
@@ -22,9 +23,7 @@ Projection = Callable[[float, Array], Array]
 EPSILON = float(np.finfo(float).eps)
 SAFETY, SHRINK, GROW, BETA = 0.9, 0.2, 10.0, 0.04
 NEAR_ZERO = 1e-10
-CALM, FORGET, CREEPING, LEAP_ERROR = 0.1, 0.95, 0.01, 100.0
 UNMOVED = 0.01
-LEAPS = (0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.5)
 
 
 @dataclass(slots=True)
@@ -42,8 +41,6 @@ class Stepper(ABC):
         last_step: length of the last step.
         last_end: time at its end.
         moved: whether the last projection moved the state, compared with the tolerances.
-        calm_step: length of recent steps that were not short.
-        calm: time and state before the last of them, where a leap would start.
     """
 
     rhs: RightHandSide
@@ -59,8 +56,6 @@ class Stepper(ABC):
     last_step: float = 0.0
     last_end: float = 0.0
     moved: bool = False
-    calm_step: float = 0.0
-    calm: tuple[float, Array] | None = None
     slope: Array | None = None
     dense: tuple[Array, ...] = ()
 
@@ -133,7 +128,6 @@ class Stepper(ABC):
     def restart(self, x: Array) -> None:
         """Go on from another state at the present time, with a new first step."""
         self.x, self.slope, self.h, self.error = x, None, 0.0, 1e-4
-        self.calm_step = 0.0
 
     def step(self, limit: float) -> int:
         """Try steps towards limit until one is accepted.
@@ -151,10 +145,6 @@ class Stepper(ABC):
             tried += 1
             if self.since_output > MAX_STEPS:
                 raise Failure("steps")
-            if self.h < CREEPING * self.calm_step:
-                if self._leap(limit):
-                    return tried
-                slope = self._opened(limit)
             if self._try_step(slope, limit):
                 return tried
 
@@ -168,48 +158,6 @@ class Stepper(ABC):
         self.h = min(self.h, self.max_step)
         return self.slope
 
-    def _remember(self, h: float) -> None:
-        """The state before a step of this length is where a leap would start."""
-        self.calm_step *= FORGET
-        if self.project is not None and h >= CALM * self.calm_step:
-            self.calm_step = max(h, self.calm_step)
-            self.calm = self.t, self.x
-
-    def _leap(self, limit: float) -> bool:
-        """From where steps were calm across what they creep up to, by the step of least error.
-
-        Returns:
-            whether a step does it.
-        """
-        assert self.calm is not None
-        t, x, wanted = self.t, self.x, self.h
-        (start, self.x), length = self.calm, self.calm_step
-        self.t, self.slope, self.calm_step = start, None, 0.0
-        lengths = [factor * length for factor in LEAPS if t < start + factor * length <= limit]
-        errors = [self._leap_error(h, limit) for h in lengths]
-        least = min(errors, default=math.inf)
-        if least <= LEAP_ERROR:
-            h = lengths[errors.index(least)]
-            try:
-                y, _ = self._attempt(h, self._opened(limit))
-                self._accept(y, start + h, h)
-            except Failure:
-                pass
-            else:
-                self.h, self.error = length, 1e-4
-                return True
-        self.t, self.x, self.h, self.slope = t, x, wanted, None
-        return False
-
-    def _leap_error(self, h: float, limit: float) -> float:
-        """The error of a step of this length, infinite where it cannot be made."""
-        try:
-            y, difference = self._attempt(h, self._opened(limit))
-        except Failure:
-            return math.inf
-        error = self._norm(difference, y)
-        return error if math.isfinite(error) else math.inf
-
     def _try_step(self, slope: Array, limit: float) -> bool:
         cut = self.t + 1.01 * self.h >= limit
         h = limit - self.t if cut else self.h
@@ -221,7 +169,6 @@ class Stepper(ABC):
             if not np.isfinite(error):
                 raise Failure("finite")
             if error <= 1.0:
-                self._remember(h)
                 self._accept(y, limit if cut else self.t + h, h)
                 self._lengthen(h, error, cut)
                 return True

@@ -92,7 +92,7 @@ def test_bytes_with_impossible_events_are_refused(fmu_of):
     instance = fmu.open(FMU2Slave)
     instance.doStep(0.0, 0.7)
     blob = instance.serializeFMUstate(instance.getFMUstate())
-    solver = 8 * (8 + 3 * 2)
+    solver = 8 * (6 + 2)
     events = len(blob) - solver - 8 * (4 + 6)
     for place in (events, events + 16, events + 32, events - 16):
         torn = bytearray(blob)

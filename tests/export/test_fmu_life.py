@@ -51,7 +51,8 @@ def test_bytes_that_are_no_state_are_refused(fmu):
     wrong += [(flags + 4 * k, "=i", 2) for k in (2, 3, 4)]
     wrong += [(time, "=d", np.nan), (tolerance, "=d", np.inf), (tolerance, "=d", 0.0)]
     wrong += [(at, "=d", np.nan), (parameter, "=d", -1.0)]
-    wrong += [(len(blob) - 8 * k - 8, "=d", np.nan) for k in range(8, 12)]
+    n = fmu.description.numberOfContinuousStates  # the last are the slopes of the solver
+    wrong += [(len(blob) - 8 * (n + k) - 8, "=d", np.nan) for k in range(4)]
     for place, form, value in wrong:
         torn = bytearray(blob)
         struct.pack_into(form, torn, place, value)

@@ -9,6 +9,7 @@ import casadi
 
 from mbs.export.fmu.about import About
 from mbs.export.fmu.description_checks import check
+from mbs.models.tree_state import TreeState
 
 Solver = Literal["dopri5", "rodas", "rk4"]
 Kind = Literal[
@@ -141,6 +142,13 @@ class FmuModel:
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
             absolute closure row at z; None when there is no z.
+        slopes: `slopes(x, z, p) -> J`, how the equations of the closure change with z; the signs of
+            the determinants of its diagonal blocks tell on which side of a singular configuration
+            z is. None when nothing watches them.
+        passive: the first output that is a velocity of a dependent joint, the first that is an
+            acceleration of one, and how many of each there are.
+        tree: the same motion in all coordinates, which "dopri5" integrates in co-simulation: it
+            passes configurations in which the states determine nothing. None where there is none.
         jumps: events; None when the motion is smooth.
         stop_time: default end of a simulation, s.
         tolerance: default relative tolerance of the integration.
@@ -163,6 +171,9 @@ class FmuModel:
     parameters: tuple[Variable, ...] = ()
     dependents: tuple[Variable, ...] = ()
     closure: casadi.Function | None = None
+    slopes: casadi.Function | None = None
+    passive: tuple[int, int, int] = (0, 0, 0)
+    tree: TreeState | None = None
     jumps: Jumps | None = None
     stop_time: float = 10.0
     tolerance: float = 1e-8
@@ -176,6 +187,11 @@ class FmuModel:
 
     def __post_init__(self) -> None:
         check(self)
+
+    @property
+    def integrated(self) -> TreeState | None:
+        """The tree, where co-simulation integrates it."""
+        return self.tree if self.solver == "dopri5" else None
 
     @property
     def identifier(self) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import casadi
 
 from mbs.export.fmu.description import FmuModel, Jumps, Variable
+from mbs.models.tree_state import TreeState
 
 
 def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
@@ -19,7 +20,9 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu,
         gp)`.
         Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
-        `mbs_sensitivity(x, z, p) -> steepness`. Where there are events, `mbs_first`,
+        `mbs_sensitivity(x, z, p) -> steepness`, and `mbs_slopes(x, z, p) -> J` where J is watched.
+    Of a tree, `mbs_tree_rhs` and others as
+        `TreeState` has them. Where there are events, `mbs_first`, `mbs_first`,
         `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
         `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs. For
         an implicit solver `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
@@ -37,6 +40,11 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         loop, whole = [x, z, _own(model, p)], [x, z, p]
         answers.append(casadi.Function("mbs_closure", whole, _dense(model.closure.call(loop))))
         answers.append(casadi.Function("mbs_sensitivity", whole, [_steepness(model, loop)]))
+        if model.slopes is not None:
+            J = casadi.densify(model.slopes.call(loop)[0])
+            answers.append(casadi.Function("mbs_slopes", whole, [J]))
+    if (tree := model.integrated) is not None:
+        answers.extend(_tree(tree, [t, casadi.MX.sym("X", tree.start.numel_out(0)), x, z, u, p]))
     if model.jumps is not None:
         answers.extend(_events(model.jumps, point))
         rates = _rates(model, point, du)
@@ -45,6 +53,26 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         slopes = _dense(_jacobian(model, point, du))
         answers.append(casadi.Function("mbs_jacobian", [*point, du], slopes))
     return tuple(answers)
+
+
+def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
+    """`mbs_tree_..(t, X, z, u, p)` of the tree, z ignored, and `mbs_tree_start(t, x, z, u, p)`."""
+    t, X, x, z, u, p = symbols
+    through = tree.passage
+    named = {
+        "rhs": tree.rhs,
+        "project": tree.project,
+        "rows": through.rows,
+        "forces": through.forces,
+        "regularity": through.regularity,
+    }
+    empty, point, first = [t, X, casadi.MX(0, 1), u, p], [t, X, z, u, p], [t, x, z, u, p]
+    functions = [
+        casadi.Function(f"mbs_tree_{name}", point, _dense(function.call(empty)))
+        for name, function in named.items()
+    ]
+    start = casadi.Function("mbs_tree_start", first, _dense(tree.start.call(first)))
+    return [*functions, start]
 
 
 def watched(model: FmuModel) -> tuple[str, ...]:

@@ -16,14 +16,17 @@ _CORE = (
     "inputs.c",
     "derivatives.c",
     "closure.c",
+    "guard.c",
     "solver.c",
     "switching.c",
     "exchange.c",
     "cosimulation.c",
     "saved.c",
 )
-_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "solver.h")
-_RUNTIME = ("stepper", "events")
+_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "guard.h", "solver.h")
+_RUNTIME = ("stepper", "events", "dense", "passage")
+_TABLEAU = "dopri5"
+"""What steps through singular configurations take, whichever the solver is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class Face:
 
     def compiled(self, solver: Solver) -> tuple[str, ...]:
         """The C files to compile with a solver, in the folder `sources` of the FMU."""
-        return ("model.c", *_CORE, *(f"{name}.c" for name in (*_RUNTIME, solver)), *self.sources)
+        return ("model.c", *_CORE, *(f"{name}.c" for name in _runtime(solver)), *self.sources)
 
     def fixed(self, solver: Solver) -> dict[str, str]:
         """The files that do not depend on the equations: name to text."""
@@ -51,7 +54,7 @@ class Face:
         standard = resources.files("fmpy") / "c-code"
         folders = (
             (own, (*_CORE, *_CORE_HEADERS, *self.sources, *self.headers)),
-            (runtime, tuple(f"{name}.{end}" for name in (*_RUNTIME, solver) for end in "ch")),
+            (runtime, tuple(f"{name}.{end}" for name in _runtime(solver) for end in "ch")),
             (standard, self.standard),
         )
         return {
@@ -59,6 +62,10 @@ class Face:
             for folder, names in folders
             for name in names
         }
+
+
+def _runtime(solver: Solver) -> tuple[str, ...]:
+    return (*_RUNTIME, *dict.fromkeys((_TABLEAU, solver)))
 
 
 FACES = {

@@ -20,7 +20,8 @@ from mbs.export.fmu.pack import require_writable, write_fmu
 from mbs.export.fmu.system_about import about
 from mbs.export.fmu.variables import dependents, inputs, outputs, parameters, states
 from mbs.files import PathLike, path_of
-from mbs.models.minimal_state import consistent_start, minimal_state
+from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
+from mbs.models.tree_state import tree_state
 
 
 def fmu(
@@ -157,6 +158,11 @@ def fmu_model(
         lambda seen: observed_values(system, request, seen),
         interface.drive(system, controller),
     )
+    tree = tree_state(
+        system,
+        lambda seen: observed_values(system, request, seen),
+        interface.drive(system, controller),
+    )
     x, z = consistent_start(system, state)
     x_variables = states(system, state, x)
     u_variables = (*inputs(system, state, interface.wrenches), *controller.inputs)
@@ -171,6 +177,9 @@ def fmu_model(
         dependents=dependents(system, state, z),
         rhs=state.rhs,
         closure=state.closure,
+        slopes=state.slopes,
+        passive=_passive(state),
+        tree=tree,
         jumps=jumps(system, state),
         **asdict(settings),
         documentation="\n\n".join([system.report(), system.source]),
@@ -178,3 +187,9 @@ def fmu_model(
         sources=controller.sources,
         about=about(system),
     )
+
+
+def _passive(state: MinimalState) -> tuple[int, int, int]:
+    """Where velocities and accelerations of dependent joints stand in y, and their number."""
+    first, count = len(state.accelerations) + len(state.dependents), len(state.passive)
+    return first, first + count, count

@@ -1,18 +1,25 @@
 """The generated C of an FMU: its tables and the functions that it evaluates."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
 
 import casadi
+import numpy as np
 
 from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.equations import functions, watched
+from mbs.models.tree_state import TreeState
 from mbs.native.compiled import generated, unwritten
 from mbs.native.plain_source import plain_source
+from mbs.solvers.block_triangular import Block, block_triangular
 
 _OPEN = ("mbs_rhs", "mbs_tangent", "mbs_adjoint")
 _LOOPS = ("mbs_closure", "mbs_sensitivity")
+_TREE = tuple(
+    f"mbs_tree_{name}" for name in ("rhs", "project", "rows", "forces", "regularity", "start")
+)
 _EVENTS = ("mbs_first", "mbs_indicators", "mbs_rates", "mbs_jump")
 
 _HEADER = """\
@@ -29,10 +36,16 @@ _HEADER = """\
 #define NM {nm}
 #define NZ {nz}
 #define NK {nk}
+#define NB {nb}
+#define PASSIVE_V {passive_v}
+#define PASSIVE_A {passive_a}
+#define N_PASSIVE {n_passive}
 {solver}
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
+/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
+extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
 
 {prototypes}
 #endif
@@ -56,7 +69,9 @@ def header(model: FmuModel, guid: str) -> str:
     names: tuple[str, ...] = _OPEN
     solver = ""
     if model.closure is not None:
-        names = (*names, *_LOOPS)
+        names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
+    if (tree := model.integrated) is not None:
+        names = (*names, *_TREE)
     if model.jumps is not None:
         names = (*names, *_EVENTS)
     if model.solver == "rodas":
@@ -73,7 +88,11 @@ def header(model: FmuModel, guid: str) -> str:
         nm=len(model.modes),
         nk=len(watched(model)),
         nz=len(model.dependents),
-        solver=solver,
+        nb=len(_blocks(model)),
+        passive_v=model.passive[0],
+        passive_a=model.passive[1],
+        n_passive=model.passive[2],
+        solver=solver + ("" if tree is None else _tree_sizes(tree)),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
@@ -104,6 +123,8 @@ def source(model: FmuModel) -> str:
         _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
         _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
+        *_block_tables(_blocks(model)),
+        *_tree_tables(model),
     ]
     return (
         '#include <math.h>\n\n#include "model.h"\n\n'
@@ -111,6 +132,45 @@ def source(model: FmuModel) -> str:
         + "\n/* The functions stay inside the library. */\n#define CASADI_SYMBOL_EXPORT\n"
         + code
     )
+
+
+def _tree_sizes(tree: TreeState) -> str:
+    sizes = ", ".join(map(str, tree.passage.size))
+    return (
+        f"#define MODEL_TREE {tree.start.numel_out(0)} /* its states */\n"
+        f"#define MODEL_PASSAGE {{{sizes}}}\n"
+        f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
+        "extern const int MODEL_TREE_STATES[], MODEL_TREE_DEPENDENTS[];\n"
+    )
+
+
+def _tree_tables(model: FmuModel) -> list[str]:
+    """Where the states, and the dependents, of the FMU stand among the states of its tree."""
+    if (tree := model.integrated) is None:
+        return []
+    return [
+        _table("const int MODEL_TREE_STATES", map(str, tree.states)),
+        _table("const int MODEL_TREE_DEPENDENTS", map(str, tree.dependents)),
+    ]
+
+
+def _blocks(model: FmuModel) -> tuple[Block, ...]:
+    """The diagonal blocks of the slopes of the closure; none where they are not watched."""
+    if model.slopes is None:
+        return ()
+    pattern = np.array(casadi.DM(model.slopes.sparsity_out(0), 1)) != 0
+    return block_triangular(pattern) or ()
+
+
+def _block_tables(blocks: Sequence[Block]) -> list[str]:
+    ends = accumulate(block.size for block in blocks)
+    rows = (row for block in blocks for row in block.rows)
+    columns = (column for block in blocks for column in block.columns)
+    names = ("MODEL_BLOCKS", "MODEL_ROWS", "MODEL_COLUMNS")
+    return [
+        _table(f"const int {name}", map(str, values))
+        for name, values in zip(names, (ends, rows, columns), strict=True)
+    ]
 
 
 def _code(functions: Iterable[casadi.Function]) -> str:

@@ -36,8 +36,7 @@ static int longest(const dense_qr *f, int k) {
     return best;
 }
 
-/* column -= weight v (v' column), where v is (1, tail). */
-static void reflect(const double *tail, double weight, int count, double *column) {
+void dense_reflect(const double *tail, double weight, int count, double *column) {
     double sum = column[0];
     int i;
     for (i = 1; i < count; i++) sum += tail[i] * column[i];
@@ -46,7 +45,7 @@ static void reflect(const double *tail, double weight, int count, double *column
     for (i = 1; i < count; i++) column[i] -= sum * tail[i];
 }
 
-static double make_reflection(double *v, int count) {
+double dense_reflection(double *v, int count) {
     double size = sqrt(square(v, count)), first = v[0];
     int i;
     if (size == 0.0 || count == 1) return 0.0;
@@ -62,8 +61,8 @@ void dense_factorize(dense_qr *f) {
     for (k = 0; k < f->steps; k++) {
         double *v = f->A + k * m + k;
         exchange(f, k, longest(f, k));
-        f->weight[k] = make_reflection(v, m - k);
-        for (j = k + 1; j < f->columns; j++) reflect(v, f->weight[k], m - k, f->A + j * m + k);
+        f->weight[k] = dense_reflection(v, m - k);
+        for (j = k + 1; j < f->columns; j++) dense_reflect(v, f->weight[k], m - k, f->A + j * m + k);
     }
 }
 
@@ -71,7 +70,7 @@ void dense_turn(const dense_qr *f, double *B, int count) {
     int j, k, m = f->rows;
     for (j = 0; j < count; j++)
         for (k = 0; k < f->steps; k++)
-            reflect(f->A + k * m + k, f->weight[k], m - k, B + j * m + k);
+            dense_reflect(f->A + k * m + k, f->weight[k], m - k, B + j * m + k);
 }
 
 void dense_solve(const dense_qr *f, double *B, int count, double least) {
@@ -102,6 +101,6 @@ void dense_complement(const dense_qr *f, double *V, int count) {
     for (j = 0; j < count; j++) {
         V[j * m + m - count + j] = 1.0;
         for (k = f->steps - 1; k >= 0; k--)
-            reflect(f->A + k * m + k, f->weight[k], m - k, V + j * m + k);
+            dense_reflect(f->A + k * m + k, f->weight[k], m - k, V + j * m + k);
     }
 }

@@ -19,6 +19,13 @@ typedef struct {
 
 void dense_factorize(dense_qr *f);
 
+/* A reflection that leaves only the first element of v (count,): v becomes that element and, below
+ * it, the tail of the vector (1, tail) that it is made of. Returns its weight. */
+double dense_reflection(double *v, int count);
+
+/* column (count,) -= weight v (v' column), where v is (1, tail); tail[0] is not read. */
+void dense_reflect(const double *tail, double weight, int count, double *column);
+
 /* B (rows, count) = Q' B. */
 void dense_turn(const dense_qr *f, double *B, int count);
 

@@ -5,6 +5,7 @@
  *   MBS_RODAS    mbs_jacobian(t, x, p) -> (d rhs / d x, d rhs / d t); else Dormand and Prince
  *   MBS_EVENTS   mbs_indicators(t, x, p) and mbs_rates(t, x, p), as many values each, and
  *                mbs_jump(t, x, p, fired) -> (x, modes); the modes are the last of p
+ *   MBS_PASSAGE  mbs_rows, mbs_forces and mbs_regularity, as passage.h has them
  */
 #include <math.h>
 #include <stdlib.h>
@@ -16,6 +17,10 @@
 #endif
 #ifdef MBS_EVENTS
 #include "events.h"
+#endif
+
+#ifdef MBS_PASSAGE
+#include "passage.h"
 #endif
 
 #ifdef _WIN32
@@ -45,6 +50,11 @@ GENERATED(mbs_indicators);
 GENERATED(mbs_rates);
 GENERATED(mbs_jump);
 #endif
+#ifdef MBS_PASSAGE
+GENERATED(mbs_rows);
+GENERATED(mbs_forces);
+GENERATED(mbs_regularity);
+#endif
 
 typedef struct {
     stepper solver;
@@ -57,6 +67,10 @@ typedef struct {
     events events;
     double *event_work;
     int n_modes;
+#endif
+#ifdef MBS_PASSAGE
+    passage *passage;
+    double *passage_memory;
 #endif
 } driver;
 
@@ -73,6 +87,10 @@ static int call(driver *d, value_of f, double t, const double *x, double *first,
 }
 
 static int rhs(void *user, double t, const double *x, double *xdot) {
+#ifdef MBS_PASSAGE
+    driver *d = user;
+    if (d->passage) passage_look(d->passage, t, x);
+#endif
     return call(user, mbs_rhs, t, x, xdot, NULL);
 }
 
@@ -80,11 +98,17 @@ static int rhs(void *user, double t, const double *x, double *xdot) {
 static int project(void *user, double t, double *x) {
     driver *d = user;
     int k, i, n = d->solver.n;
+#ifdef MBS_PASSAGE
+    if (d->passage && !passage_project(d->passage, t, x)) return 0;
+#endif
     for (k = 0; k < ITERATIONS; k++) {
         double residual = 0.0, scale = 1.0;
         if (call(d, mbs_project, t, x, d->moved, &residual) || !isfinite(residual)) return 1;
-        memcpy(x, d->moved, sizeof(double) * (size_t)n);
         for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
+        if (stepper_all_finite(d->moved, n))
+            memcpy(x, d->moved, sizeof(double) * (size_t)n);
+        else if (!(residual < TOLERANCE * scale)) /* else x is on the rows, where they depend */
+            return 1;
         if (residual < TOLERANCE * scale) return 0;
     }
     return 1;
@@ -120,6 +144,37 @@ static int jump(void *user, double t, double *x, const double *fired) {
 }
 #endif
 
+#ifdef MBS_PASSAGE
+static int rows(void *user, double t, const double *x, const passage_rows *r) {
+    driver *d = user;
+    double *const to[] = {r->place, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
+    d->arg[0] = &t;
+    d->arg[1] = x;
+    d->arg[2] = d->p;
+    memcpy(d->res, to, sizeof to);
+    return mbs_rows(d->arg, d->res, d->iw, d->w, 0);
+}
+
+static int forces(void *user, double t, const double *x, double *M, double *f, double *rate) {
+    ((driver *)user)->res[2] = rate;
+    return call(user, mbs_forces, t, x, M, f);
+}
+
+static int regularity(void *user, double t, const double *x, double *value) {
+    return call(user, mbs_regularity, t, x, value, NULL);
+}
+
+/* Before mbs_begin; size as passage_size. 1: out of memory. */
+EXPORT int mbs_pass(driver *d, const int *size, double typical) {
+    passage_size z = {size[0], size[1], size[2], size[3], size[4], size[5], size[6]};
+    passage_model model = {rows, forces, regularity, typical};
+    d->passage_memory = calloc((size_t)PASSAGE_MEMORY(d->solver.n), sizeof(double));
+    if (!d->passage_memory) return 1;
+    d->passage = passage_new(&d->solver, &z, &model, d->passage_memory);
+    return d->passage == NULL;
+}
+#endif
+
 static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
 
 EXPORT void mbs_close(driver *d) {
@@ -134,6 +189,10 @@ EXPORT void mbs_close(driver *d) {
     free(d->iw);
 #ifdef MBS_EVENTS
     free(d->event_work);
+#endif
+#ifdef MBS_PASSAGE
+    passage_free(d->passage);
+    free(d->passage_memory);
 #endif
     free(d);
 }
@@ -150,6 +209,9 @@ static void sizes(integer *size) {
 #endif
 #ifdef MBS_EVENTS
         mbs_indicators_work, mbs_rates_work,    mbs_jump_work,
+#endif
+#ifdef MBS_PASSAGE
+        mbs_rows_work,       mbs_forces_work,   mbs_regularity_work,
 #endif
     };
     size_t k;
@@ -184,7 +246,7 @@ static size_t work_size(size_t n) {
 /* control: rtol, atol, the longest step. NULL: out of memory. */
 EXPORT driver *mbs_open(int n, int n_p, const double *p, const double *control, double t) {
     driver *d = calloc(1, sizeof *d);
-    integer size[4] = {4, 2, 0, 0};
+    integer size[4] = {4, 8, 0, 0};
     if (!d) return NULL;
     sizes(size);
     d->n_p = n_p;

@@ -21,7 +21,7 @@
 
 enum {
     EVENTS_FIRED = -1, /* an event has just been settled; a table ends there: call again */
-    EVENTS_INDICATORS_FAILED = STEPPER_NOT_FINITE + 1,
+    EVENTS_INDICATORS_FAILED = STEPPER_UNDETERMINED + 1,
     EVENTS_JUMP_FAILED,
     EVENTS_DO_NOT_SETTLE, /* the jumps at one time do not come to an end */
     EVENTS_STAND_STILL    /* many events, and time hardly advances */

@@ -57,6 +57,6 @@ static void interpolate(const stepper *s, double a, double *row) {
 }
 
 void rk4_init(stepper *s, int n, stepper_rhs rhs, void *user, double *memory, double *work) {
-    static const stepper_method method = {NULL, attempt, keep, close, interpolate};
+    static const stepper_method method = {NULL, attempt, keep, close, interpolate, NULL};
     stepper_init(s, n, &method, rhs, user, memory, work);
 }

@@ -179,7 +179,7 @@ static void interpolate(const stepper *s, double a, double *row) {
 
 void rodas_init(stepper *s, int n, stepper_rhs rhs, stepper_jacobian jac, void *user,
                 double *memory, double *work) {
-    static const stepper_method method = {open, attempt, keep, close, interpolate};
+    static const stepper_method method = {open, attempt, keep, close, interpolate, NULL};
     stepper_init(s, n, &method, rhs, user, memory, work);
     s->jacobian = jac;
 }

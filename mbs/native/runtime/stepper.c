@@ -5,15 +5,12 @@
 #include <string.h>
 
 /* places in memory */
-enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, CALM_STEP, CALM_TIME, SLOPE };
+enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, SLOPE };
 
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 10.0, BETA = 0.04;
 static const double NEAR_ZERO = 1e-10; /* part of the limit below which time counts as zero */
 
-/* Steps are calm while they are longer than a tenth of those before, which are forgotten slowly. */
-static const double CALM = 0.1, FORGET = 0.95, CREEPING = 0.01, LEAP_ERROR = 100.0;
 static const double UNMOVED = 0.01; /* part of the tolerances that a move is not worth a slope */
-static const double LEAPS[] = {0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.5};
 
 void stepper_init(stepper *s, int n, const stepper_method *method, stepper_rhs rhs, void *user,
                   double *memory, double *work) {
@@ -39,7 +36,6 @@ void stepper_start(stepper *s, double t) {
 
 void stepper_restart(stepper *s) {
     s->memory[SLOPE_VALID] = 0.0;
-    s->memory[CALM_STEP] = 0.0;
     s->memory[ERROR] = 1e-4;
 }
 
@@ -55,8 +51,6 @@ double stepper_wanted_step(const stepper *s) { return s->memory[STEP]; }
 double stepper_last_step(const stepper *s) { return s->memory[LAST_STEP]; }
 
 double *stepper_slope(const stepper *s) { return s->memory + SLOPE; }
-static double *calm_state(const stepper *s) { return s->memory + SLOPE + s->n; }
-static double *present_state(const stepper *s) { return s->memory + SLOPE + 2 * s->n; }
 double *stepper_trial(const stepper *s) { return s->work; }
 double *stepper_candidate(const stepper *s) { return s->work + s->n; }
 
@@ -82,7 +76,7 @@ static double norm(const stepper *s, const double *v, const double *x, const dou
     int i;
     for (i = 0; i < s->n; i++) {
         double size = s->nominal ? s->nominal[i] : 1.0;
-        double r = v[i] / (s->atol * size + s->rtol * fmax(fabs(x[i]), fabs(y[i])));
+        double r = v[i] / (s->atol * size + s->noise + s->rtol * fmax(fabs(x[i]), fabs(y[i])));
         sum += r * r;
     }
     return s->n ? sqrt(sum / s->n) : 0.0;
@@ -122,7 +116,7 @@ static int accept(stepper *s, double *x, double t_new, double h) {
     int status = STEPPER_OK;
     s->method->keep(s, x, h);
     s->moved = 0;
-    if (s->project) status = project_candidate(s, x, t_new);
+    if (s->project && !s->kept_closed) status = project_candidate(s, x, t_new);
     if (status) return status;
     status = s->method->close(s, t_new);
     if (status) return status;
@@ -135,7 +129,8 @@ static int accept(stepper *s, double *x, double t_new, double h) {
 static int open_step(stepper *s, const double *x, double limit) {
     double *m = s->memory;
     if (m[SLOPE_VALID] == 0.0) {
-        int status = stepper_evaluate(s, m[TIME], x, stepper_slope(s));
+        int status = s->method->slope ? s->method->slope(s, x)
+                                      : stepper_evaluate(s, m[TIME], x, stepper_slope(s));
         if (!status && s->method->open) status = s->method->open(s, x);
         if (status) return status;
         m[SLOPE_VALID] = 1.0;
@@ -145,55 +140,11 @@ static int open_step(stepper *s, const double *x, double limit) {
     return STEPPER_OK;
 }
 
-/* The state before a step of this length is where a leap would start. */
-static void remember(stepper *s, const double *x, double h) {
-    double *m = s->memory;
-    m[CALM_STEP] *= FORGET;
-    if (!s->project || h < CALM * m[CALM_STEP]) return;
-    m[CALM_STEP] = fmax(h, m[CALM_STEP]);
-    m[CALM_TIME] = m[TIME];
-    memcpy(calm_state(s), x, sizeof(double) * (size_t)s->n);
-}
-
-static void put(stepper *s, double *x, double t, const double *from) {
-    memcpy(x, from, sizeof(double) * (size_t)s->n);
-    s->memory[TIME] = t;
-    stepper_close(s, NULL);
-}
-
-/* The error of a step of this length, infinite where it cannot be made. */
-static double leap_error(stepper *s, const double *x, double h) {
-    double error;
-    s->steps++;
-    s->rejected++;
-    if (s->method->attempt(s, x, h)) return HUGE_VAL;
-    error = norm(s, stepper_trial(s), x, stepper_candidate(s));
-    return isfinite(error) ? error : HUGE_VAL;
-}
-
-/* From where steps were calm across what they creep up to, by the step of the smallest error; 0
- * where none does it. */
-static int leap(stepper *s, double *x, double limit) {
-    double *m = s->memory, t = m[TIME], wanted = m[STEP], from = m[CALM_TIME], length = m[CALM_STEP];
-    double best = 0.0, least = LEAP_ERROR;
-    size_t k;
-    memcpy(present_state(s), x, sizeof(double) * (size_t)s->n);
-    put(s, x, from, calm_state(s));
-    m[CALM_STEP] = 0.0;
-    for (k = 0; k < sizeof LEAPS / sizeof *LEAPS && !open_step(s, x, limit); k++) {
-        double h = LEAPS[k] * length, error;
-        if (from + h <= t || from + h > limit) continue;
-        error = leap_error(s, x, h);
-        if (error <= least) best = h, least = error;
-    }
-    if (best > 0.0 && leap_error(s, x, best) <= least && !accept(s, x, from + best, best)) {
-        m[STEP] = length;
-        m[ERROR] = 1e-4;
-        return 1;
-    }
-    put(s, x, t, present_state(s));
-    m[STEP] = wanted;
-    return 0;
+/* How a failed try is shortened: by what its reason asks for, which is known of singular
+ * configurations; a quarter else. */
+static double shortened(int status) {
+    if (status == STEPPER_ENDS_SINGULAR || status == STEPPER_SINGULAR) return 0.83;
+    return status == STEPPER_CHART_LEFT ? 0.5 : 0.25;
 }
 
 /* One try of one step towards limit. STEPPER_MORE: accepted. STEPPER_OK: rejected, try again. */
@@ -201,6 +152,7 @@ static int try_step(stepper *s, double *x, double limit) {
     double *m = s->memory, t = m[TIME], h = m[STEP], error = 0.0, factor;
     int status, cut = t + 1.01 * h >= limit;
     if (cut) h = limit - t;
+    s->cut = cut;
     s->steps++;
     status = s->method->attempt(s, x, h);
     if (!status) {
@@ -208,7 +160,6 @@ static int try_step(stepper *s, double *x, double limit) {
         if (!isfinite(error)) status = STEPPER_NOT_FINITE;
     }
     if (!status && error <= 1.0) {
-        remember(s, x, h);
         status = accept(s, x, cut ? limit : t + h, h);
         if (!status) {
             factor = SAFETY * pow(m[ERROR], BETA) / pow(fmax(error, 1e-10), 0.2 - 0.75 * BETA);
@@ -219,7 +170,8 @@ static int try_step(stepper *s, double *x, double limit) {
         }
     }
     s->rejected++;
-    m[STEP] = h * (status ? 0.25 : fmax(SHRINK, SAFETY / pow(error, 0.2)));
+    if (status == STEPPER_UNDETERMINED) return status;
+    m[STEP] = h * (status ? shortened(status) : fmax(SHRINK, SAFETY / pow(error, 0.2)));
     if (m[STEP] > 4 * DBL_EPSILON * fmax(fabs(t), NEAR_ZERO * fabs(limit))) return STEPPER_OK;
     return status ? status : STEPPER_STEP_TOO_SMALL;
 }
@@ -228,11 +180,6 @@ int stepper_step(stepper *s, double *x, double limit) {
     int status = open_step(s, x, limit);
     while (!status) {
         if (s->since_output++ >= s->max_steps) return STEPPER_TOO_MANY_STEPS;
-        if (s->memory[STEP] < CREEPING * s->memory[CALM_STEP]) {
-            if (leap(s, x, limit)) return STEPPER_OK;
-            status = open_step(s, x, limit);
-            if (status) break;
-        }
         status = try_step(s, x, limit);
     }
     return status == STEPPER_MORE ? STEPPER_OK : status;

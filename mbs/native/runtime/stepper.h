@@ -7,19 +7,13 @@
  * Source: Hairer, Norsett and Wanner 1993, II.4 to II.6. Unlike their code, the step that error
  * control wants is remembered apart from the one that an end time cut short, and a projection
  * onto constraints may follow each accepted step.
- *
- * Constraints may become dependent in single states, where branches of motion meet. The motion
- * is smooth there, but rounding beside the branch is magnified the more the closer a state comes,
- * so that error control creeps up to such a state and never passes it. Steps that have become a
- * hundred times shorter than those before are therefore undone, and one step of the former
- * length leaps across.
  */
 #ifndef MBS_STEPPER_H
 #define MBS_STEPPER_H
 
 #include <stddef.h>
 
-#define STEPPER_MEMORY(n) (8 + 3 * (n))
+#define STEPPER_MEMORY(n) (6 + (n))
 
 enum {
     STEPPER_OK = 0,
@@ -28,7 +22,11 @@ enum {
     STEPPER_STEP_TOO_SMALL,    /* error control asks for a step below rounding of time */
     STEPPER_RHS_FAILED,        /* so did failures of the right-hand side */
     STEPPER_PROJECTION_FAILED, /* so did failures of the projection */
-    STEPPER_NOT_FINITE         /* so did values that are not finite */
+    STEPPER_NOT_FINITE,        /* so did values that are not finite */
+    STEPPER_SINGULAR,          /* so did a singular configuration, as in the next three cases */
+    STEPPER_ENDS_SINGULAR,     /* the step ends in one: shorten it a little */
+    STEPPER_CHART_LEFT,        /* a stage lies beyond what the coordinates of the step describe */
+    STEPPER_UNDETERMINED       /* the motion begins in one, and its velocities choose no branch */
 };
 
 /* All return 0, or anything else when they have no answer there: the step is then shortened. */
@@ -48,6 +46,7 @@ typedef struct {
     void (*keep)(stepper *s, const double *x, double h); /* the dense output of the attempt */
     int (*close)(stepper *s, double t); /* the slope that opens the next step, if it is known */
     void (*interpolate)(const stepper *s, double a, double *row); /* a: 0 .. 1 within the step */
+    int (*slope)(stepper *s, const double *x); /* stepper_slope at x; NULL: the right-hand side */
 } stepper_method;
 
 struct stepper {
@@ -63,6 +62,10 @@ struct stepper {
     long max_steps;
     double *memory, *work;
     long steps, rejected, since_output;
+    void *passage;   /* of a method that passes singular configurations, or NULL */
+    double noise;    /* what rounding adds to atol in the last attempt */
+    int cut;         /* the present attempt ends at a limit */
+    int kept_closed; /* the candidate is on the constraints: nothing projects it */
     int moved; /* whether the last projection moved the candidate, compared with the tolerances */
 };
 

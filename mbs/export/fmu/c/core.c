@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "closure.h"
+#include "guard.h"
 
 static const char *const CATEGORIES[] = {"logAll", "logStatusDiscard", "logStatusError"};
 enum { LOG_ALL, LOG_DISCARD, LOG_ERROR, N_CATEGORIES };
@@ -116,17 +117,10 @@ core_status core_accept_states(core *c) {
     return status ? closure_failed(c, status) : core_accept_posture(c, x, c->z);
 }
 
-core_status core_refresh(core *c) {
-    double *v = c->m.values, *x = v + STATES;
-    int i, status;
-    if (!c->m.stale) return CORE_OK;
-    status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
-    if (status) return closure_failed(c, status);
-    if (c->m.mode == INITIALIZATION && core_first_modes(c)) return CORE_ERROR;
-    if (core_call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
-        return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
-                              c->m.time);
-    memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
+/* What was calculated may be shown. */
+static core_status core_show(core *c) {
+    const double *v = c->m.values;
+    int i;
     for (i = 0; i < INDICATORS; i++) /* those are looked at when they are shown */
         if (!isfinite(v[i]))
             return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular "
@@ -135,15 +129,45 @@ core_status core_refresh(core *c) {
     return CORE_OK;
 }
 
+core_status core_refresh(core *c) {
+    double *v = c->m.values, *x = v + STATES;
+    int status;
+    if (!c->m.stale) return CORE_OK;
+#ifdef MODEL_TREE
+    if (c->m.cosimulation && !(c->m.mode & (INSTANTIATED | INITIALIZATION))) {
+        core_show_tree(c);
+        if (core_call_tree(c, v + DERIVATIVES, v + OUTPUTS))
+            return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
+                                  c->m.time);
+        return core_show(c);
+    }
+#endif
+    status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
+    if (status) return closure_failed(c, status);
+    if (c->m.mode == INITIALIZATION && core_first_modes(c)) return CORE_ERROR;
+    if (core_call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
+        return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
+                              c->m.time);
+    memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
+    return core_show(c);
+}
+
 static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
 
 static int allocate(core *c) {
-    long long size[4] = {9, 4, 0, 0}, other[4];
+    long long size[4] = {9, 8, 0, 0}, other[4];
     int i, f;
     static int (*const work[])(long long *, long long *, long long *, long long *) = {
         mbs_rhs_work, mbs_tangent_work, mbs_adjoint_work,
 #if NZ > 0
         mbs_closure_work, mbs_sensitivity_work,
+#endif
+#if NB > 0
+        mbs_slopes_work,
+#endif
+#ifdef MODEL_TREE
+        mbs_tree_rhs_work, mbs_tree_project_work, mbs_tree_rows_work, mbs_tree_forces_work,
+        mbs_tree_regularity_work, mbs_tree_start_work,
 #endif
 #if NK > 0
         mbs_first_work, mbs_indicators_work, mbs_rates_work, mbs_jump_work,
@@ -188,7 +212,10 @@ core *core_new(const char *name, int cosimulation, core_logger log, void *host) 
     c->host = host;
     c->m.cosimulation = cosimulation;
     to_start(c);
-    core_init_solver(c);
+    if (core_init_solver(c)) {
+        core_free(c);
+        return NULL;
+    }
     core_init_events(c);
     return c;
 }
@@ -200,6 +227,9 @@ void core_free(core *c) {
     free((void *)c->res);
     free(c->iw);
     free(c->w);
+#ifdef MODEL_TREE
+    passage_free(c->passage);
+#endif
     free(c);
 }
 
@@ -230,6 +260,10 @@ core_status core_exit_initialization(core *c) {
     if (status) return status;
     stepper_start(&c->solver, c->m.time);
     status = core_start_events(c);
+#ifdef MODEL_TREE
+    if (!status && c->m.cosimulation) status = core_start_tree(c);
+#endif
+    if (!status) status = guard_restart(c);
     if (status) return status;
     if (!c->m.cosimulation || c->event_mode) {
         c->m.mode = EVENT;

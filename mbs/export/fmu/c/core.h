@@ -25,6 +25,14 @@ enum {
     TIME_REFERENCE = N_VALUES /* the independent variable, where the face has it as a variable */
 };
 
+/* What co-simulation integrates: all coordinates of the tree where they are known, else the states. */
+#ifdef MODEL_TREE
+#define NT MODEL_TREE
+#else
+#define NT NX
+#endif
+#define MOST(a, b) ((a) > (b) ? (a) : (b))
+
 #define INPUT_ORDERS 3 /* derivatives of an input that a communication step may follow */
 
 typedef enum { CORE_OK, CORE_DISCARD, CORE_ERROR } core_status;
@@ -50,6 +58,14 @@ typedef struct {
     int event, early; /* an event waits to be handled; the step ended before its end */
 } core_stop;
 
+/* What is watched between accepted configurations: guard.h. */
+typedef struct {
+    int on;
+    double time;
+    double sign[NB + 1];
+    double v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
+} core_watched;
+
 typedef struct {
     int mode, cosimulation;
     int stale;   /* the calculated values do not belong to the others any more */
@@ -62,9 +78,14 @@ typedef struct {
     double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
     double input_time;                  /* to which the inputs and their derivatives belong */
     double slopes[INPUT_ORDERS * NU + 1]; /* first derivatives of all inputs, then second ones */
+    core_watched watched;
     double offset[NK + 1]; /* added to an indicator that has not left zero yet: hysteresis */
     double events[EVENTS_MEMORY(NK)];
-    double solver[STEPPER_MEMORY(NX)];
+#ifdef MODEL_TREE
+    int loose; /* the tree is to be moved onto its rows first */
+    double tree[NT], passage[PASSAGE_MEMORY(NT)];
+#endif
+    double solver[STEPPER_MEMORY(MOST(NX, NT))];
 } core_memory;
 
 typedef struct {
@@ -78,7 +99,10 @@ typedef struct {
     core_watch watch;             /* or NULL */
     stepper solver;
     events events;
-    double work[SOLVER_WORK(NX) + 1], event_work[EVENTS_WORK(NX, NK) + 1];
+#ifdef MODEL_TREE
+    passage *passage;
+#endif
+    double work[SOLVER_WORK(MOST(NX, NT)) + 1], event_work[EVENTS_WORK(NX, NK) + 1];
     double z[NZ + 1], u[NU + 1];
     const double **arg;
     double **res;

@@ -1,6 +1,8 @@
 /* Model exchange, where the integrator is outside; and event mode, which co-simulation has too. */
 #include "internal.h"
 
+#include "guard.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -10,6 +12,12 @@ core_status core_enter_event_mode(core *c) {
         return core_refuse(c, "%s: the instance was made without event mode; its events are "
                            "handled inside", c->name);
     if (!core_allowed(c, from, "entering event mode")) return CORE_ERROR;
+    if (!c->m.cosimulation) {
+        core_status status = core_refresh(c);
+        if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+        if (!status) status = guard_pass(c);
+        if (status) return status;
+    }
     c->m.mode = EVENT;
     return CORE_OK;
 }
@@ -24,7 +32,7 @@ core_status core_enter_continuous_mode(core *c) {
     if (!core_allowed(c, c->m.cosimulation ? 0 : EVENT, "entering continuous-time mode"))
         return CORE_ERROR;
     c->m.mode = CONTINUOUS;
-    return CORE_OK;
+    return guard_restart(c);
 }
 
 core_status core_completed_step(core *c) {
@@ -32,8 +40,8 @@ core_status core_completed_step(core *c) {
     if (!core_allowed(c, CONTINUOUS, "completing a step")) return CORE_ERROR;
     if (!NZ && !NK) return CORE_OK;
     status = core_arm_indicators(c);
-    return status ? status
-                  : core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+    if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+    return status ? status : guard_pass(c);
 }
 
 core_status core_set_time(core *c, double time) {

@@ -32,8 +32,16 @@ void core_begin_inputs(core *c);
 void core_end_inputs(core *c);
 
 /* The solver of co-simulation: once for an instance, and before it is used. */
-void core_init_solver(core *c);
+int core_init_solver(core *c); /* 1: no memory is left */
 void core_prepare_solver(core *c);
+
+#ifdef MODEL_TREE
+/* The tree: its first state; the states and dependents of the model from it; derivatives and
+ * outputs there. */
+core_status core_start_tree(core *c);
+void core_show_tree(core *c);
+int core_call_tree(core *c, double *xdot, double *y);
+#endif
 
 /* Events: once for an instance; the modes at the start; the first look. */
 void core_init_events(core *c);

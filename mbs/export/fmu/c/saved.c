@@ -38,6 +38,9 @@ static int ours(core *c, const core_state *s) {
 core_status core_restore(core *c, const core_state *state) {
     if (!core_allowed(c, ~INTERMEDIATE, "restoring a state") || !ours(c, state)) return CORE_ERROR;
     memcpy(&c->m, &state->m, sizeof c->m);
+#ifdef MODEL_TREE
+    if (c->passage) passage_forget(c->passage);
+#endif
     return CORE_OK;
 }
 
@@ -84,6 +87,14 @@ static int sane_inputs(const core_memory *m) {
            isfinite(m->input_time) && all_finite(m->slopes, INPUT_ORDERS * NU);
 }
 
+static int sane_watch(const core_watched *w) {
+    int i;
+    for (i = 0; i < NB; i++)
+        if (w->on && w->sign[i] != 1.0 && w->sign[i] != -1.0) return 0;
+    return is_flag(w->on) && isfinite(w->time) && all_finite(w->v, N_PASSIVE) &&
+           all_finite(w->a, N_PASSIVE);
+}
+
 static int sane_events(const core_memory *m) {
     int i;
     for (i = 0; i < EVENTS_MEMORY(NK) - NK; i++) /* all but the rates */
@@ -106,6 +117,11 @@ static int sane(const core_memory *m) {
     if (!m->stale && !all_finite(v, INDICATORS)) return 0;
     if (!all_finite(m->guess, NZ) || !all_finite(m->posture_z, NZ)) return 0;
     if (!all_finite(m->posture_x, NX) || !sane_inputs(m) || !sane_events(m)) return 0;
+    if (!sane_watch(&m->watched)) return 0;
+#ifdef MODEL_TREE
+    if (!is_flag(m->loose) || !all_finite(m->tree, NT)) return 0;
+    if (!all_finite(m->passage, PASSAGE_MEMORY(NT))) return 0;
+#endif
     for (i = 0; i < STEPPER_MEMORY(0); i++)
         if (isnan(m->solver[i])) return 0;
     return 1;

@@ -4,6 +4,9 @@
 #include "closure.h"
 #include "internal.h"
 
+#include <math.h>
+#include <string.h>
+
 static int rhs(void *user, double t, const double *x, double *xdot) {
     core *c = user;
     return closure_solve(c, x, c->z) || core_call_rhs(c, t, x, c->z, xdot, NULL);
@@ -23,7 +26,110 @@ static int jacobian(void *user, double t, const double *x, double *J, double *f_
 }
 #endif
 
-void core_init_solver(core *c) {
+#ifdef MODEL_TREE
+
+#define TOLERANCE 1e-12 /* largest row of the loops, for coordinates of size one */
+#define ITERATIONS 10
+
+static int tree_rhs(void *user, double t, const double *x, double *xdot) {
+    core *c = user;
+    passage_look(c->passage, t, x);
+    core_point(c, &t, x, c->z);
+    c->res[0] = xdot;
+    c->res[1] = NULL;
+    return mbs_tree_rhs(c->arg, c->res, c->iw, c->w, 0);
+}
+
+static int tree_project(void *user, double t, double *x) {
+    core *c = user;
+    double moved[NT], residual;
+    int k, i;
+    if (!passage_project(c->passage, t, x)) return 0;
+    for (k = 0; k < ITERATIONS; k++) {
+        double scale = 1.0;
+        core_point(c, &t, x, c->z);
+        c->res[0] = moved;
+        c->res[1] = &residual;
+        if (mbs_tree_project(c->arg, c->res, c->iw, c->w, 0) || !isfinite(residual)) return 1;
+        for (i = 0; i < NT; i++) scale = fmax(scale, fabs(x[i]));
+        if (stepper_all_finite(moved, NT))
+            memcpy(x, moved, sizeof moved);
+        else if (!(residual < TOLERANCE * scale))
+            return 1;
+        if (residual < TOLERANCE * scale) return 0;
+    }
+    return 1;
+}
+
+static int tree_rows(void *user, double t, const double *x, const passage_rows *r) {
+    core *c = user;
+    double *const to[] = {r->place, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
+    core_point(c, &t, x, c->z);
+    memcpy(c->res, to, sizeof to);
+    return mbs_tree_rows(c->arg, c->res, c->iw, c->w, 0);
+}
+
+static int tree_forces(void *user, double t, const double *x, double *M, double *f, double *rate) {
+    core *c = user;
+    core_point(c, &t, x, c->z);
+    c->res[0] = M;
+    c->res[1] = f;
+    c->res[2] = rate;
+    return mbs_tree_forces(c->arg, c->res, c->iw, c->w, 0);
+}
+
+static int tree_regularity(void *user, double t, const double *x, double *value) {
+    core *c = user;
+    core_point(c, &t, x, c->z);
+    c->res[0] = value;
+    return mbs_tree_regularity(c->arg, c->res, c->iw, c->w, 0);
+}
+
+static int init_tree(core *c) {
+    static const passage_size size = MODEL_PASSAGE;
+    static const passage_model model = {tree_rows, tree_forces, tree_regularity, MODEL_REGULARITY};
+    dopri5_init(&c->solver, NT, tree_rhs, c, c->m.solver, c->work);
+    c->solver.project = tree_project;
+    c->passage = passage_new(&c->solver, &size, &model, c->m.passage);
+    return c->passage == NULL;
+}
+
+core_status core_start_tree(core *c) {
+    double t = c->m.time;
+    passage_start(c->passage);
+    core_point(c, &t, c->m.values + STATES, c->m.values + DEPENDENTS);
+    c->res[0] = c->m.tree;
+    if (mbs_tree_start(c->arg, c->res, c->iw, c->w, 0) || !stepper_all_finite(c->m.tree, NT) ||
+        tree_project(c, t, c->m.tree))
+        return core_no_answer(c, "%s: the velocities have no solution at time %.9g", c->name, t);
+    return CORE_OK;
+}
+
+void core_show_tree(core *c) {
+    int i;
+    for (i = 0; i < NX; i++) c->m.values[STATES + i] = c->m.tree[MODEL_TREE_STATES[i]];
+    for (i = 0; i < NZ; i++) c->m.values[DEPENDENTS + i] = c->m.tree[MODEL_TREE_DEPENDENTS[i]];
+    memcpy(c->m.posture_x, c->m.values + STATES, NX * sizeof(double));
+    memcpy(c->m.posture_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
+}
+
+int core_call_tree(core *c, double *xdot, double *y) {
+    double every[NT];
+    int i;
+    core_point(c, &c->m.time, c->m.tree, c->z);
+    c->res[0] = every;
+    c->res[1] = y;
+    if (mbs_tree_rhs(c->arg, c->res, c->iw, c->w, 0)) return 1;
+    for (i = 0; i < NX; i++) xdot[i] = every[MODEL_TREE_STATES[i]];
+    return 0;
+}
+
+#endif
+
+int core_init_solver(core *c) {
+#ifdef MODEL_TREE
+    if (c->m.cosimulation) return init_tree(c);
+#endif
 #if defined MODEL_RODAS
     rodas_init(&c->solver, NX, rhs, jacobian, c, c->m.solver, c->work);
 #elif defined MODEL_FIXED_STEP
@@ -35,6 +141,7 @@ void core_init_solver(core *c) {
 #ifdef MODEL_FIXED_STEP
     stepper_fix(&c->solver, MODEL_FIXED_STEP);
 #endif
+    return 0;
 }
 
 void core_prepare_solver(core *c) {

@@ -3,6 +3,7 @@
 #define MBS_SOLVER_H
 
 #include "events.h"
+#include "passage.h"
 #include "model.h"
 
 #if defined MODEL_RODAS

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "closure.h"
+#include "guard.h"
 
 /* Events that rounding of a time this long [s] cannot tell apart count as standing still. */
 #define CHATTER_SPAN 1e3
@@ -21,6 +22,9 @@ static core_status step_failed(core *c, int status) {
         "", "", "too many steps", "the step size became too small",
         "the loops cannot be closed or the equations have no solution (unclosable or singular "
         "posture)", "the projection failed", "a derivative is not finite (singular posture?)",
+        "a singular configuration is not passed", "a singular configuration is not passed",
+        "a singular configuration is not passed",
+        "it starts in a singular configuration, and its velocities choose no branch of motion",
         "an event indicator has no value (unclosable or singular posture)",
         "a jump has no solution", "its jumps do not come to an end",
         "chattering, events follow each other and time stands still"};
@@ -122,13 +126,17 @@ core_status core_start_events(core *c) {
 void core_restart(core *c) {
     stepper_restart(&c->solver);
     events_restart(&c->events);
+    guard_forget(c);
 }
 
 core_status core_step(core *c, double limit) {
-    int status = events_step(&c->events, c->m.values + STATES, limit);
+    int status = c->m.watched.on ? 0 : guard_restart(c);
+    if (status) return status;
+    status = events_step(&c->events, c->m.values + STATES, limit);
     c->m.time = stepper_time(&c->solver);
     c->m.stale = 1;
-    return status ? step_failed(c, status) : core_accept_states(c);
+    status = status ? (int)step_failed(c, status) : (int)core_accept_states(c);
+    return status ? (core_status)status : guard_pass(c);
 }
 
 int core_pending(const core *c) { return events_pending(&c->events); }
@@ -152,6 +160,7 @@ core_status core_settle(core *c, int *changed) {
     if (status != EVENTS_FIRED) return step_failed(c, status);
     if (memcmp(before, x, NX * sizeof *x)) *changed = 1;
     if (!c->m.cosimulation) set_offsets(c);
+    guard_forget(c);
     return core_accept_states(c);
 }
 
@@ -197,7 +206,15 @@ core_status core_start_events(core *c) {
     return CORE_OK;
 }
 
-void core_restart(core *c) { stepper_restart(&c->solver); }
+void core_restart(core *c) {
+    stepper_restart(&c->solver);
+    guard_forget(c);
+#ifdef MODEL_TREE
+    c->m.loose = 1;
+#endif
+}
+
+#ifndef MODEL_TREE
 
 /* The dependent coordinates are at hand where a step ends with an evaluation at its end. */
 static core_status accept_end(core *c, const double *x) {
@@ -209,13 +226,36 @@ static core_status accept_end(core *c, const double *x) {
 #endif
 }
 
+#endif
+
+#ifdef MODEL_TREE
+
 core_status core_step(core *c, double limit) {
-    double *x = c->m.values + STATES;
-    int status = stepper_step(&c->solver, x, limit);
+    int status = 0;
+    if (c->m.loose) status = c->solver.project(c, c->m.time, c->m.tree);
+    if (status) return step_failed(c, STEPPER_PROJECTION_FAILED);
+    c->m.loose = 0;
+    status = stepper_step(&c->solver, c->m.tree, limit);
     c->m.time = stepper_time(&c->solver);
     c->m.stale = 1;
-    return status ? step_failed(c, status) : accept_end(c, x);
+    core_show_tree(c);
+    return status ? step_failed(c, status) : CORE_OK;
 }
+
+#else
+
+core_status core_step(core *c, double limit) {
+    double *x = c->m.values + STATES;
+    int status = c->m.watched.on ? 0 : guard_restart(c);
+    if (status) return status;
+    status = stepper_step(&c->solver, x, limit);
+    c->m.time = stepper_time(&c->solver);
+    c->m.stale = 1;
+    status = status ? (int)step_failed(c, status) : (int)accept_end(c, x);
+    return status ? (core_status)status : guard_pass(c);
+}
+
+#endif
 
 int core_pending(const core *c) {
     (void)c;

@@ -1,0 +1,121 @@
+"""The state equation of the whole tree with the inputs and outputs of the independent one.
+
+What integrates it passes configurations in which the independent joints determine nothing, and
+shows the same outputs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi
+from casadi import SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.rates import position_rate
+from mbs.models.composition import dense_function, outputs_of
+from mbs.models.contacts import contacts_of
+from mbs.models.devices import device_equations, state_count
+from mbs.models.direct_dynamics import direct_dynamics
+from mbs.models.minimal_accelerations import Accelerations
+from mbs.models.minimal_controller import Equations, controlled
+from mbs.models.minimal_drive import Drive
+from mbs.models.minimal_layout import minimal_layout
+from mbs.models.minimal_motion import TreeMotion, load_of, wrenches_of
+from mbs.models.minimal_state import Observe, Seen, motion_of, outputs_vector, point_of
+from mbs.models.passage import passage
+from mbs.models.projection import projected
+from mbs.solvers.passage import Passage
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TreeState:
+    """A state equation of X = [q; v; states of devices]; functions take (t, X, z, u, p), z empty.
+
+    Attributes:
+        rhs: `rhs(t, X, z, u, p) -> (Xdot, y)`, y the outputs of the independent state equation.
+        project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
+        start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
+        passage: of rows, forces and regularity.
+        states: numbers in X of the states x.
+        dependents: numbers in X of the dependents z.
+    """
+
+    rhs: Function
+    project: Function
+    start: Function
+    passage: Passage
+    states: tuple[int, ...]
+    dependents: tuple[int, ...]
+
+
+def tree_state(
+    system: System, observe: Observe | None = None, drive: Drive | None = None
+) -> TreeState | None:
+    """The state equation of the tree; None where it has no advantage, or is not known.
+
+    Args:
+        system: open or closed.
+        observe: as of `minimal_state`, likewise the next one.
+        drive: motions that are inputs, and contacts, are left to the independent state equation.
+    """
+    drive = Drive() if drive is None else drive
+    layout = minimal_layout(system, drive)
+    if not layout.dependents or layout.motions or len(contacts_of(system)):
+        return None
+    motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
+    s = point_of(system, layout, motors)
+    nq, nv = system.nq, system.nv
+    n = nq + nv
+    X, none = SX.sym("X", n + state_count(system)), SX.sym("z", 0)
+    q, v = X[:nq], X[nq:n]
+    tau, rates, shown = device_equations(system, v, X[n:], s.inputs)
+    for column, number in enumerate(motors):
+        tau[number] += s.efforts[column]
+    external = wrenches_of(system, q, layout.frames, s.wrenches)
+    load = load_of(system, q, external)
+    point = [s.t, X, none, s.u, system.p]
+    through = passage(system, (s.t, X, system.p), SX(tau + load), rates, inputs=s.u)
+    if through is None:
+        return None
+    (a, _) = outputs_of(system, direct_dynamics(system, coordinates="tree"), q, v, tau + load)
+    active = list(system.active)
+    moved = Accelerations(a[active], a, tau, None)
+    motion = TreeMotion(q, q, v[active], v, None, SX.zeros(nv))
+    y = outputs_vector(system, layout, motion, moved, shown)
+    if observe is not None:
+        seen = (q, v, a, v[active], a[active], moved.every_effort)
+        y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *seen, external)))
+    rate = casadi.vertcat(position_rate(system.tree, q, v), a, rates)
+    *kept, residual = projected(system, q, v, (), s.t)
+    rhs = dense_function("tree_rhs", point, [rate, y])
+    forces = through.forces
+    if drive.effort is not None or drive.device is not None:
+        at = dense_function("motion", point, [q, v])
+        sizes = (len(motors), len(system.devices))
+        sizes3 = (*sizes, s.u.numel() - sum(sizes))
+        rhs, forces = (
+            controlled(Equations(function, at, None, sizes3), drive, layout.extra).rhs
+            for function in (rhs, forces)
+        )
+    inputs = SX.sym("u", rhs.numel_in(3))
+    free = [s.t, X, none, inputs, system.p]
+    first = motion_of(system, layout, s, [])
+    start = casadi.vertcat(first.raw, first.v, s.states)
+    at_start = [s.t, s.x, s.z, inputs, system.p]
+    rows, regularity = (
+        dense_function(function.name(), free, list(function.call([s.t, X, none, s.u, system.p])))
+        for function in (through.rows, through.regularity)
+    )
+    return TreeState(
+        rhs=rhs,
+        project=dense_function("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
+        start=dense_function("tree_start", at_start, [start]),
+        passage=replace(through, rows=rows, forces=forces, regularity=regularity),
+        states=(
+            *layout.positions,
+            *(nq + k for k in layout.velocities),
+            *range(n, n + state_count(system)),
+        ),
+        dependents=layout.dependents,
+    )

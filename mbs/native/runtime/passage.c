@@ -1,0 +1,847 @@
+#include "passage.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "dense.h"
+#include "dopri5.h"
+
+/* Part of the largest regularity below which steps are made in the chart. A full step magnifies its
+ * errors by 1 / regularity and rounding by its square; at a fifth that is little, and a tenth of the
+ * way of a crank lies below it. */
+#define ON 0.2
+/* The regularity is foreseen for this many steps, a little more than the next one. */
+#define AHEAD 1.2
+/* Stages of a full step are looked at where it is below this many times ON at both ends. */
+#define WATCHED 3.0
+/* Part of the largest sigma below which values are means: rounding reaches u' as its inverse square,
+ * 3e-16 / (3e-5)^2 = 3e-7, and beyond it nothing is left; a larger part misses what a motion does
+ * beside the singular configuration, as that of a delta robot, whose legs pass one after another. */
+#define FLOOR 3e-5
+#define AWAY 2.0      /* floors from which on a state is regular */
+#define BESIDE 4.0    /* floors between neighbours in means: those next to the middle are regular */
+#define WIDEN 1.6     /* neighbours that are not regular are taken further apart, */
+#define WIDENINGS 8   /* this often: 1.6^8 = 43 times */
+/* Weights of neighbours 1, 2 and 3 on either side: what they give is exact for degree five. */
+static const double MEAN[3] = {0.75, -0.3, 0.05};
+/* sigma_min(C N T), part of its value at the origin, below which the chart has turned too far from
+ * the motion: its tangents are then 78 degrees away. */
+#define TURNED 0.2
+#define NEWTON 10       /* Newton steps onto the rows; quadratic convergence takes three or four */
+#define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
+#define OPEN 1e-8       /* largest row after that */
+/* Part of the way from the origin by which tangent and curvature may miss the branch: where it is
+ * about one, the other branch is as near. */
+#define MISS 0.3
+/* Part of the velocities, or of what they make of a step, by which a state may differ from where the
+ * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
+ * on another branch velocities differ by about their own size. */
+#define BREAK 0.01
+#define SLOW 10.0 /* tolerances that velocities may differ by in any case */
+/* Rounding of u' for accelerations of size one and sigma one: it is added to the tolerance. */
+#define NOISE 3e-16
+/* A start in a singular configuration is seen from this far back along its velocity [rad or m], or
+ * from half of it, and so on. */
+#define BACK 0.05
+#define BACKS 6
+#define MASSLESS 1e-10 /* part of the largest pivot of the inertia matrix below which one is none */
+
+/* places in memory */
+enum { SIGMA, LARGEST, REGULARITY, RISE, SEEN, SEEN_TIME, BASED, BASE_TIME, BASE };
+
+/* Rows and forces at a point, and the tangents there. */
+typedef struct {
+    passage_rows rows;
+    double *M, *f, *rate; /* M is replaced by its Cholesky factor L */
+    double *A, *weight;   /* L^-1 J' = Q R, reflections below R */
+    double *T;            /* (nv, d) tangents, orthonormal in the metric of M */
+    int *order;           /* column k of R belongs to row order[k] */
+    int rank;
+    double sigma; /* the last pivot of R: the distance from losing rank */
+    double more;  /* what is added to M as more J' J */
+} frame;
+
+struct passage {
+    stepper *s;
+    const stepper_method *inner;
+    passage_size size;
+    passage_model model;
+    double *memory, *block;
+    int *orders;
+    frame base, here;
+    double *C;            /* (d, nq) coordinates of positions */
+    double *drift;        /* (nv,) velocity of the base where rows move and u is zero */
+    double *own, *trial;  /* 2 d + nz coordinates of the state and of a stage */
+    double *slopes[7];    /* of them */
+    double *full[7];      /* slopes of x at the stages */
+    double *dense;        /* (5, n) */
+    double *at, *side, *sum;       /* points (n,), a sum of them */
+    double *K, *r, *y, *w, *G;     /* scratch */
+    double *ready_x;
+    double ready_time, least, sigma, most;
+    int d, ready, charted, kept, watch, singular;
+};
+
+/* Solve L y = b, or L' y = b, in place; L (n, n) by columns. */
+static void lower(const double *L, int n, double *b) {
+    int i, k;
+    for (k = 0; k < n; k++) {
+        b[k] /= L[k * n + k];
+        for (i = k + 1; i < n; i++) b[i] -= L[k * n + i] * b[k];
+    }
+}
+
+static void lower_transposed(const double *L, int n, double *b) {
+    int i, k;
+    for (k = n - 1; k >= 0; k--) {
+        for (i = k + 1; i < n; i++) b[k] -= L[k * n + i] * b[i];
+        b[k] /= L[k * n + k];
+    }
+}
+
+/* 1 where a pivot is too small. */
+static int cholesky(double *M, int n) {
+    double largest = 0.0;
+    int i, j, k;
+    for (k = 0; k < n; k++) largest = fmax(largest, M[k * n + k]);
+    for (k = 0; k < n; k++) {
+        double *column = M + k * n;
+        if (!(column[k] > MASSLESS * largest)) return 1;
+        column[k] = sqrt(column[k]);
+        for (i = k + 1; i < n; i++) column[i] /= column[k];
+        for (j = k + 1; j < n; j++)
+            for (i = j; i < n; i++) M[j * n + i] -= column[i] * column[j];
+    }
+    return 0;
+}
+
+static int rows_at(passage *g, double t, const double *x, const passage_rows *rows) {
+    const passage_size *z = &g->size;
+    int j, nv = z->nv;
+    if (g->model.rows(g->s->user, t, x, rows)) return 1;
+    if (z->nq > nv) return 0;
+    memset(rows->N, 0, sizeof(double) * (size_t)(nv * nv));
+    memset(rows->bend, 0, sizeof(double) * (size_t)nv);
+    for (j = 0; j < nv; j++) {
+        rows->N[j * nv + j] = 1.0;
+        memcpy(rows->J + j * z->speeds, rows->slope + j * z->places,
+               sizeof(double) * (size_t)z->speeds);
+    }
+    return 0;
+}
+
+static int evaluate(passage *g, frame *p, double t, const double *x) {
+    void *user = g->s->user;
+    if (rows_at(g, t, x, &p->rows) || g->model.forces(user, t, x, p->M, p->f, p->rate))
+        return 1;
+    p->rank = (int)fmin(*p->rows.rank, fmin(g->size.nv, g->size.speeds));
+    p->more = 0.0;
+    return !stepper_all_finite(p->M, g->size.nv * g->size.nv) ||
+           !stepper_all_finite(p->f, g->size.nv);
+}
+
+/* L of M; of M + more J' J where links without mass leave M singular: on the rows it moves alike. */
+static int factor_mass(passage *g, frame *p) {
+    int n = g->size.nv, m = g->size.speeds, i, j, k;
+    double *copy = g->G, mass = 0.0, length = 0.0;
+    memcpy(copy, p->M, sizeof(double) * (size_t)(n * n));
+    if (!cholesky(p->M, n)) return 0;
+    for (k = 0; k < n; k++) mass += copy[k * n + k];
+    for (k = 0; k < n * m; k++) length += p->rows.J[k] * p->rows.J[k];
+    if (!(length > 0.0) || !(mass > 0.0)) return 1;
+    p->more = mass / length;
+    for (j = 0; j < n; j++)
+        for (i = 0; i < n; i++) {
+            double sum = 0.0;
+            for (k = 0; k < m; k++) sum += p->rows.J[i * m + k] * p->rows.J[j * m + k];
+            p->M[j * n + i] = copy[j * n + i] + p->more * sum;
+        }
+    return cholesky(p->M, n);
+}
+
+/* L^-1 J' = Q R by reflections, the longest remaining column first, as many as the rank. */
+static void factor_rows(passage *g, frame *p) {
+    int n = g->size.nv, m = g->size.speeds, i, j, k;
+    for (j = 0; j < m; j++) {
+        for (i = 0; i < n; i++) p->A[j * n + i] = p->rows.J[i * m + j];
+        lower(p->M, n, p->A + j * n);
+        p->order[j] = j;
+    }
+    for (k = 0; k < p->rank; k++) {
+        double most = -1.0;
+        int longest = k, kept = p->order[k];
+        for (j = k; j < m; j++) {
+            double size = 0.0;
+            for (i = k; i < n; i++) size += p->A[j * n + i] * p->A[j * n + i];
+            if (size > most) most = size, longest = j;
+        }
+        for (i = 0; i < n && longest != k; i++) {
+            double value = p->A[k * n + i];
+            p->A[k * n + i] = p->A[longest * n + i];
+            p->A[longest * n + i] = value;
+        }
+        p->order[k] = p->order[longest];
+        p->order[longest] = kept;
+        p->weight[k] = dense_reflection(p->A + k * n + k, n - k);
+        for (j = k + 1; j < m; j++)
+            dense_reflect(p->A + k * n + k, p->weight[k], n - k, p->A + j * n + k);
+    }
+    p->sigma = p->rank ? fabs(p->A[(p->rank - 1) * n + p->rank - 1]) : 1.0;
+}
+
+/* v = L^-T Q y, in place. */
+static void to_velocity(const passage *g, const frame *p, double *y) {
+    int n = g->size.nv, k;
+    for (k = p->rank - 1; k >= 0; k--)
+        dense_reflect(p->A + k * n + k, p->weight[k], n - k, y + k);
+    lower_transposed(p->M, n, y);
+}
+
+/* The first elements of y such that J v = c for v = L^-T Q y. */
+static void along_rows(const passage *g, const frame *p, const double *c, double *y) {
+    int n = g->size.nv, i, k;
+    for (k = 0; k < p->rank; k++) {
+        double sum = c[p->order[k]];
+        for (i = 0; i < k; i++) sum -= p->A[k * n + i] * y[i];
+        y[k] = sum / p->A[k * n + k];
+    }
+}
+
+static int factor(passage *g, frame *p) {
+    int n = g->size.nv, j;
+    if (factor_mass(g, p)) return 1;
+    factor_rows(g, p);
+    for (j = 0; j < n - p->rank; j++) {
+        double *T = p->T + j * n;
+        memset(T, 0, sizeof(double) * (size_t)n);
+        T[p->rank + j] = 1.0;
+        to_velocity(g, p, T);
+    }
+    return !isfinite(p->sigma);
+}
+
+/* The shortest velocity v with J v = b. */
+static void particular(const passage *g, const frame *p, double *v) {
+    memset(v, 0, sizeof(double) * (size_t)g->size.nv);
+    along_rows(g, p, p->rows.b, v);
+    to_velocity(g, p, v);
+}
+
+/* y = C N v */
+static void coordinates(const passage *g, const frame *p, const double *v, double *y) {
+    int nq = g->size.nq, nv = g->size.nv, i, j, k;
+    for (k = 0; k < g->d; k++) y[k] = 0.0;
+    for (i = 0; i < nq; i++) {
+        double rate = 0.0;
+        for (j = 0; j < nv; j++) rate += p->rows.N[j * nq + i] * v[j];
+        for (k = 0; k < g->d; k++) y[k] += g->C[i * g->d + k] * rate;
+    }
+}
+
+/* Gaussian elimination with row exchanges, A (n, n) and b (n, count) replaced; 1 if singular. */
+static int solve(double *A, int n, double *b, int count) {
+    int i, j, k;
+    for (k = 0; k < n; k++) {
+        int pivot = k;
+        for (i = k + 1; i < n; i++)
+            if (fabs(A[k * n + i]) > fabs(A[k * n + pivot])) pivot = i;
+        if (!(fabs(A[k * n + pivot]) > 0.0)) return 1;
+        for (j = 0; j < n + count && pivot != k; j++) {
+            double *column = j < n ? A + j * n : b + (j - n) * n, kept = column[k];
+            column[k] = column[pivot];
+            column[pivot] = kept;
+        }
+        for (i = k + 1; i < n; i++) {
+            double part = A[k * n + i] / A[k * n + k];
+            for (j = k; j < n; j++) A[j * n + i] -= part * A[j * n + k];
+            for (j = 0; j < count; j++) b[j * n + i] -= part * b[j * n + k];
+        }
+    }
+    for (j = 0; j < count; j++)
+        for (k = n - 1; k >= 0; k--) {
+            for (i = k + 1; i < n; i++) b[j * n + k] -= A[i * n + k] * b[j * n + i];
+            b[j * n + k] /= A[k * n + k];
+        }
+    return 0;
+}
+
+/* C = T' M N^+ at the base. */
+static int coordinates_of_base(passage *g) {
+    frame *p = &g->base;
+    int nq = g->size.nq, nv = g->size.nv, i, j, k, d = nv - p->rank;
+    double *S = g->G, *B = g->K; /* (nv, nv), (nv, d) */
+    g->d = d;
+    for (k = 0; k < d; k++)
+        for (i = 0; i < nv; i++) {
+            double sum = 0.0; /* M T = L L' T */
+            B[k * nv + i] = 0.0;
+            for (j = i; j < nv; j++) sum += p->M[i * nv + j] * p->T[k * nv + j];
+            g->y[i] = sum;
+            for (j = 0; j <= i; j++) B[k * nv + i] += p->M[j * nv + i] * g->y[j];
+        }
+    if (nq == nv) {
+        for (k = 0; k < d; k++)
+            for (i = 0; i < nq; i++) g->C[i * d + k] = B[k * nv + i];
+        return 0;
+    }
+    for (i = 0; i < nv; i++)
+        for (j = 0; j < nv; j++) {
+            S[j * nv + i] = 0.0;
+            for (k = 0; k < nq; k++)
+                S[j * nv + i] += p->rows.N[i * nq + k] * p->rows.N[j * nq + k];
+        }
+    if (solve(S, nv, B, d)) return 1;
+    for (k = 0; k < d; k++)
+        for (i = 0; i < nq; i++) {
+            g->C[i * d + k] = 0.0;
+            for (j = 0; j < nv; j++)
+                g->C[i * d + k] += p->rows.N[j * nq + i] * B[k * nv + j];
+        }
+    return 0;
+}
+
+/* Newton steps from q in x onto all rows, xi as given; *moved: how far they went. */
+static int onto_rows(passage *g, double t, const double *xi, double *x, double *moved) {
+    frame *p = &g->here;
+    const double *q0 = g->memory + BASE;
+    int nq = g->size.nq, m = g->size.places, d = g->d, rows = m + d, i, j, k, turn;
+    int first = g->size.speeds - g->size.anchors, after = g->size.speeds;
+    double *K = g->K, *r = g->r, total = 0.0;
+    for (turn = 0; turn < NEWTON; turn++) {
+        double move = 0.0, least = HUGE_VAL, most = 0.0;
+        if (rows_at(g, t, x, &p->rows)) return 1;
+        memcpy(r, p->rows.place, sizeof(double) * (size_t)m);
+        for (i = first; i < after; i++) r[i] -= g->base.rows.place[i];
+        for (j = 0; j < nq; j++)
+            memcpy(K + j * rows, p->rows.slope + j * m, sizeof(double) * (size_t)m);
+        for (k = 0; k < d; k++) { /* rows of about unit length */
+            double size = 0.0, off = -xi[k];
+            for (j = 0; j < nq; j++) size += g->C[j * d + k] * g->C[j * d + k];
+            size = sqrt(size);
+            for (j = 0; j < nq; j++) {
+                K[j * rows + m + k] = g->C[j * d + k] / size;
+                off += g->C[j * d + k] * (x[j] - q0[j]);
+            }
+            r[m + k] = off / size;
+        }
+        if (rows < nq || !stepper_all_finite(r, rows)) return 1;
+        for (k = 0; k < nq; k++) {
+            double weight = dense_reflection(K + k * rows + k, rows - k);
+            for (j = k + 1; j < nq; j++)
+                dense_reflect(K + k * rows + k, weight, rows - k, K + j * rows + k);
+            dense_reflect(K + k * rows + k, weight, rows - k, r + k);
+            least = fmin(least, fabs(K[k * rows + k]));
+            most = fmax(most, fabs(K[k * rows + k]));
+        }
+        if (!(least > 10 * DBL_EPSILON * most)) return 1;
+        for (k = nq - 1; k >= 0; k--) {
+            for (i = k + 1; i < nq; i++) r[k] -= K[i * rows + k] * r[i];
+            r[k] /= K[k * rows + k];
+            x[k] -= r[k];
+            move = fmax(move, fabs(r[k]));
+        }
+        total += move;
+        if (!isfinite(total)) return 1;
+        if (move < LAST_MOVE) {
+            *moved = total;
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Positions by tangent and curvature from the base, which choose the branch; *way: how far. */
+static int predict(passage *g, double t, const double *xi, double *x, double *way) {
+    const double *x0 = g->memory + BASE;
+    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, k;
+    double dt = g->size.moving ? t - g->memory[BASE_TIME] : 1.0, *D = g->y, *bend = g->w;
+    frame *p = &g->here;
+    for (i = 0; i < nv; i++) {
+        D[i] = g->size.moving ? g->drift[i] * dt : 0.0;
+        for (k = 0; k < g->d; k++) D[i] += g->base.T[k * nv + i] * xi[k];
+    }
+    memset(bend, 0, sizeof(double) * (size_t)nv);
+    if (dt != 0.0) {
+        memcpy(x, x0, sizeof(double) * (size_t)n);
+        for (i = 0; i < nv; i++) x[nq + i] = D[i] / dt;
+        if (rows_at(g, g->memory[BASE_TIME], x, &p->rows)) return 1;
+        along_rows(g, &g->base, p->rows.c, bend);
+        to_velocity(g, &g->base, bend);
+    }
+    *way = 0.0;
+    for (j = 0; j < nv; j++) {
+        *way = fmax(*way, fabs(D[j]));
+        D[j] += 0.5 * bend[j] * dt * dt;
+    }
+    for (i = 0; i < nq; i++) {
+        x[i] = x0[i];
+        for (j = 0; j < nv; j++) x[i] += g->base.rows.N[j * nq + i] * D[j];
+    }
+    return 0;
+}
+
+/* The state x at the coordinates y = (xi, u, z), its slope, and that of y. */
+static int lift(passage *g, double t, const double *y, double *x, double *xdot, double *ydot) {
+    frame *p = &g->here;
+    int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
+    const double *u = y + d;
+    double way, moved, size = 0.0, open = 0.0, *v = x + nq, *a = xdot + nq;
+    memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
+    if (predict(g, t, y, x, &way)) return STEPPER_SINGULAR;
+    memset(v, 0, sizeof(double) * (size_t)nv);
+    memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
+    if (onto_rows(g, t, y, x, &moved)) return STEPPER_SINGULAR;
+    if (moved > MISS * way + LAST_MOVE) return STEPPER_CHART_LEFT;
+    if (evaluate(g, p, t, x) || factor(g, p)) return STEPPER_SINGULAR;
+    if (p->rank != g->base.rank) return STEPPER_CHART_LEFT;
+    for (i = 0; i < g->size.places; i++) {
+        int held = i >= g->size.speeds - g->size.anchors && i < g->size.speeds;
+        open = fmax(open, fabs(p->rows.place[i] - (held ? g->base.rows.place[i] : 0.0)));
+    }
+    if (!(open < OPEN)) return STEPPER_SINGULAR;
+    /* velocities: v = T (C N T)^-1 (u - C N v_p) + v_p */
+    memset(v, 0, sizeof(double) * (size_t)nv);
+    memcpy(g->w, u, sizeof(double) * (size_t)d);
+    if (g->size.moving) {
+        particular(g, p, v);
+        coordinates(g, p, v, g->r);
+        for (k = 0; k < d; k++) g->w[k] -= g->r[k];
+    }
+    for (k = 0; k < d; k++) coordinates(g, p, p->T + k * nv, g->G + k * d);
+    memset(g->K, 0, sizeof(double) * (size_t)(d * (d + 1)));
+    for (k = 0; k < d; k++) g->K[k * d + k] = 1.0;
+    memcpy(g->K + d * d, g->w, sizeof(double) * (size_t)d);
+    if (solve(g->G, d, g->K, d + 1)) return STEPPER_CHART_LEFT;
+    for (k = 0; k < d * d; k++) size += g->K[k] * g->K[k];
+    if (!(TURNED * sqrt(size) < sqrt((double)(d ? d : 1)))) return STEPPER_CHART_LEFT;
+    for (k = 0; k < d; k++)
+        for (i = 0; i < nv; i++) v[i] += p->T[k * nv + i] * g->K[d * d + k];
+    /* accelerations: a = L^-T (f, what acts along the rows as they ask) */
+    if (rows_at(g, t, x, &p->rows) ||
+        g->model.forces(g->s->user, t, x, g->G, p->f, p->rate))
+        return STEPPER_SINGULAR;
+    for (i = 0; i < nv; i++) {
+        double sum = p->f[i];
+        for (j = 0; j < g->size.speeds && p->more > 0.0; j++)
+            sum += p->more * p->rows.J[i * g->size.speeds + j] * p->rows.c[j];
+        a[i] = sum;
+    }
+    lower(p->M, nv, a);
+    for (k = 0; k < p->rank; k++)
+        dense_reflect(p->A + k * nv + k, p->weight[k], nv - k, a + k);
+    along_rows(g, p, p->rows.c, a);
+    to_velocity(g, p, a);
+    for (i = 0; i < nq; i++) {
+        double rate = 0.0;
+        for (j = 0; j < nv; j++) rate += p->rows.N[j * nq + i] * v[j];
+        xdot[i] = rate;
+    }
+    memcpy(xdot + nq + nv, p->rate, sizeof(double) * (size_t)nz);
+    memcpy(ydot, u, sizeof(double) * (size_t)d);
+    coordinates(g, p, a, ydot + d);
+    for (i = 0; i < nq; i++)
+        for (k = 0; k < d; k++) ydot[d + k] += g->C[i * d + k] * p->rows.bend[i];
+    memcpy(ydot + 2 * d, p->rate, sizeof(double) * (size_t)nz);
+    return stepper_all_finite(xdot, g->s->n) ? STEPPER_OK : STEPPER_SINGULAR;
+}
+
+/* Values beside y along the motion, three on either side; 1 where one of them is not regular. */
+static int mean_of(passage *g, double t, const double *y, double apart, const double *along,
+                   double shift, double *x, double *xdot, double *ydot) {
+    int n = g->s->n, d = g->d, ny = 2 * d + g->size.nz, i, j, side;
+    double *at = g->sum, *slope = at + n, *rate = slope + n, *beside = rate + ny;
+    memset(x, 0, sizeof(double) * (size_t)n);
+    memset(xdot, 0, sizeof(double) * (size_t)n);
+    memset(ydot, 0, sizeof(double) * (size_t)ny);
+    for (j = 1; j <= 3; j++)
+        for (side = -1; side <= 1; side += 2) {
+            memcpy(beside, y, sizeof(double) * (size_t)ny);
+            for (i = 0; i < d; i++) beside[i] += side * j * apart * along[i];
+            if (lift(g, t + side * j * shift, beside, at, slope, rate)) return 1;
+            if (g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]) return 1;
+            for (i = 0; i < n; i++) x[i] += MEAN[j - 1] * at[i];
+            for (i = 0; i < n; i++) xdot[i] += MEAN[j - 1] * slope[i];
+            for (i = 0; i < ny; i++) ydot[i] += MEAN[j - 1] * rate[i];
+        }
+    memcpy(ydot, y + d, sizeof(double) * (size_t)d);
+    return 0;
+}
+
+static int slope(passage *g, double t, const double *y, double *x, double *xdot, double *ydot) {
+    int d = g->d, i, status = lift(g, t, y, x, xdot, ydot);
+    double largest = g->memory[SIGMA], dt = t - g->memory[BASE_TIME], rho;
+    double far = 0.0, speed = 0.0, apart, shift = 0.0, *along = g->side;
+    g->singular = 0;
+    if (!status && g->here.sigma >= FLOOR * largest) {
+        g->memory[SIGMA] = fmax(largest, g->here.sigma);
+        g->sigma = fmin(g->sigma, g->here.sigma / g->memory[SIGMA]);
+        return STEPPER_OK;
+    }
+    if (status == STEPPER_CHART_LEFT) return status;
+    g->singular = 1;
+    rho = g->base.sigma / largest;
+    for (i = 0; i < d; i++) far += y[i] * y[i], speed += y[d + i] * y[d + i];
+    memcpy(along, y + d, sizeof(double) * (size_t)d);
+    if (g->size.moving) {
+        apart = shift = BESIDE * FLOOR * fabs(dt) / rho;
+    } else {
+        if (!(speed > 0.0)) return STEPPER_SINGULAR;
+        apart = BESIDE * FLOOR * sqrt(far) / (rho * sqrt(speed));
+    }
+    for (i = 0; i < WIDENINGS && apart > 0.0; i++, apart *= WIDEN, shift *= WIDEN) {
+        if (mean_of(g, t, y, apart, along, shift, x, xdot, ydot)) continue;
+        memcpy(x + g->size.nq + g->size.nv, y + 2 * d, sizeof(double) * (size_t)g->size.nz);
+        g->sigma = fmin(g->sigma, FLOOR);
+        return STEPPER_OK;
+    }
+    return STEPPER_SINGULAR;
+}
+
+static double regularity_at(passage *g, double t, const double *x) {
+    double value = 0.0;
+    if (g->model.regularity(g->s->user, t, x, &value) || !isfinite(value)) value = 0.0;
+    g->memory[LARGEST] = fmax(g->memory[LARGEST], value);
+    return value;
+}
+
+/* A regular state behind a singular one, along its velocity; 1 where no branch has this velocity. */
+static int base_behind(passage *g, double t, const double *x) {
+    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, back, turn;
+    double *q = g->at, *v = g->w, speed = 0.0, part, *y = g->y;
+    for (i = 0; i < nv; i++) speed = fmax(speed, fabs(x[nq + i]));
+    if (!(speed > 0.0)) return 1;
+    for (back = 0; back < BACKS; back++) {
+        double s = ldexp(BACK, -back), total = 0.0, behind = t - (g->size.moving ? s / speed : 0.0);
+        memcpy(q, x, sizeof(double) * (size_t)n);
+        if (evaluate(g, &g->here, t, x)) return 1;
+        for (i = 0; i < nv; i++) v[i] = -x[nq + i] * s / speed;
+        for (i = 0; i < nq; i++)
+            for (j = 0; j < nv; j++) q[i] += g->here.rows.N[j * nq + i] * v[j];
+        for (turn = 0; turn < NEWTON; turn++) {
+            double move = 0.0;
+            if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) break;
+            memset(y, 0, sizeof(double) * (size_t)nv);
+            along_rows(g, &g->base, g->base.rows.place, y);
+            to_velocity(g, &g->base, y);
+            for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
+            for (i = 0; i < nq; i++)
+                for (j = 0; j < nv; j++) q[i] -= g->base.rows.N[j * nq + i] * y[j];
+            total += move;
+            if (move < LAST_MOVE) break;
+        }
+        if (turn == NEWTON || !(total < MISS * s)) continue;
+        if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) continue;
+        part = regularity_at(g, behind, q) / g->memory[LARGEST];
+        if (!(part > AWAY * FLOOR)) continue;
+        g->memory[SIGMA] = g->base.sigma / fmin(part, 1.0);
+        g->memory[BASED] = 1.0;
+        g->memory[BASE_TIME] = behind;
+        memcpy(g->memory + BASE, q, sizeof(double) * (size_t)n);
+        return 0;
+    }
+    return 1;
+}
+
+/* The chart at a state where it is regular, else at the last one that was; and the state in it. */
+static int prepare(passage *g, double t, const double *x) {
+    double *m = g->memory, part;
+    int nq = g->size.nq, n = g->s->n, i, k, d;
+    if (g->ready && t == g->ready_time && !memcmp(x, g->ready_x, sizeof(double) * (size_t)n))
+        return STEPPER_OK;
+    g->ready = 0;
+    if (evaluate(g, &g->base, t, x) || factor(g, &g->base)) return STEPPER_SINGULAR;
+    part = regularity_at(g, t, x) / m[LARGEST];
+    if (m[SIGMA] == 0.0 && part > AWAY * FLOOR) m[SIGMA] = g->base.sigma / fmin(part, 1.0);
+    if (m[SIGMA] > 0.0 && g->base.sigma >= AWAY * FLOOR * m[SIGMA]) {
+        m[SIGMA] = fmax(m[SIGMA], g->base.sigma);
+        m[BASED] = 1.0;
+        m[BASE_TIME] = t;
+        memcpy(m + BASE, x, sizeof(double) * (size_t)n);
+    } else if (!(m[BASED] > 0.0)) {
+        if (base_behind(g, t, x)) return STEPPER_UNDETERMINED;
+    } else if (evaluate(g, &g->base, m[BASE_TIME], m + BASE) || factor(g, &g->base)) {
+        return STEPPER_SINGULAR;
+    }
+    if (coordinates_of_base(g)) return STEPPER_SINGULAR;
+    if (g->size.moving) particular(g, &g->base, g->drift);
+    d = g->d;
+    if (rows_at(g, t, x, &g->here.rows)) return STEPPER_SINGULAR;
+    for (k = 0; k < d; k++) {
+        g->own[k] = 0.0;
+        for (i = 0; i < nq; i++) g->own[k] += g->C[i * d + k] * (x[i] - m[BASE + i]);
+    }
+    coordinates(g, &g->here, x + nq, g->own + d);
+    memcpy(g->own + 2 * d, x + nq + g->size.nv, sizeof(double) * (size_t)g->size.nz);
+    memcpy(g->ready_x, x, sizeof(double) * (size_t)n);
+    g->ready_time = t;
+    g->ready = 1;
+    return STEPPER_OK;
+}
+
+/* 1 where a state has left the branch of another one at the same time: by what its velocities are,
+ * or a step of this length makes of them. */
+static int left_branch(const passage *g, const double *x, const double *along, double h, double a) {
+    int nq = g->size.nq, nv = g->size.nv, i;
+    double v = h * a, move = 0.0, turn = 0.0, zero = SLOW * g->s->atol;
+    for (i = 0; i < nv; i++) {
+        v = fmax(v, fmax(fabs(x[nq + i]), fabs(along[nq + i])));
+        turn = fmax(turn, fabs(x[nq + i] - along[nq + i]));
+    }
+    for (i = 0; i < nq; i++) move = fmax(move, fabs(x[i] - along[i]));
+    return turn > BREAK * v + zero || move > BREAK * h * v + zero;
+}
+
+/* The error of a step in the chart, in coordinates of the tree. */
+static void error_of(const passage *g, double h, double *error) {
+    int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
+    const double *T = g->base.T, *N = g->base.rows.N;
+    double *e = g->w;
+    for (i = 0; i < 2 * d + nz; i++) {
+        double sum = 0.0;
+        for (j = 0; j < 7; j++) sum += DOPRI5_E[j] * g->slopes[j][i];
+        e[i] = h * sum;
+    }
+    memset(error, 0, sizeof(double) * (size_t)(nq + nv));
+    for (i = 0; i < nv; i++) {
+        double move = 0.0;
+        for (k = 0; k < d; k++) {
+            move += T[k * nv + i] * e[k];
+            error[nq + i] += T[k * nv + i] * e[d + k];
+        }
+        for (j = 0; j < nq; j++) error[j] += N[i * nq + j] * move;
+    }
+    memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
+}
+
+static int chart_attempt(passage *g, const double *x, double h) {
+    stepper *s = g->s;
+    double t = stepper_time(s), a = 0.0, *candidate = stepper_candidate(s);
+    int nq = g->size.nq, nv = g->size.nv, ny, i, j, k, status = prepare(g, t, x);
+    if (status) return status;
+    ny = 2 * g->d + g->size.nz;
+    g->sigma = HUGE_VAL;
+    for (k = 0; k < 7; k++) {
+        double *to = k == 6 ? candidate : g->at;
+        for (i = 0; i < ny; i++) {
+            double sum = 0.0;
+            for (j = 0; j < k; j++) sum += DOPRI5_A[k][j] * g->slopes[j][i];
+            g->trial[i] = g->own[i] + h * sum;
+        }
+        status = slope(g, t + DOPRI5_C[k] * h, g->trial, to, g->full[k], g->slopes[k]);
+        if (status) return status;
+        for (i = 0; i < nv; i++) a = fmax(a, fabs(g->full[k][nq + i]));
+    }
+    if (!s->cut && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
+        return STEPPER_ENDS_SINGULAR;
+    for (i = 0; i < s->n; i++) { /* where the stages lead, without the rows */
+        double sum = 0.0;
+        for (j = 0; j < 6; j++) sum += DOPRI5_A[6][j] * g->full[j][i];
+        g->at[i] = x[i] + h * sum;
+    }
+    if (left_branch(g, candidate, g->at, h, a)) return STEPPER_CHART_LEFT;
+    error_of(g, h, stepper_trial(s));
+    s->noise = NOISE * h * a / (g->sigma * g->sigma);
+    s->kept_closed = 1;
+    return STEPPER_OK;
+}
+
+void passage_look(passage *g, double t, const double *x) {
+    if (g->watch) g->least = fmin(g->least, regularity_at(g, t, x));
+}
+
+/* The least regularity that the next step of this length is thought to meet. */
+static double foreseen(passage *g, double t, const double *x, double h) {
+    double *m = g->memory;
+    if (!(m[SEEN] > 0.0) || t != m[SEEN_TIME]) {
+        m[REGULARITY] = regularity_at(g, t, x);
+        m[SEEN_TIME] = t;
+        m[SEEN] = 1.0;
+    }
+    return fmin(m[REGULARITY], m[REGULARITY] + AHEAD * h * m[RISE]);
+}
+
+static int attempt(stepper *s, const double *x, double h) {
+    passage *g = s->passage;
+    double t = stepper_time(s), ahead = foreseen(g, t, x, h), on = ON * g->memory[LARGEST];
+    int status;
+    g->charted = s->kept_closed = 0;
+    s->noise = 0.0;
+    if (ahead >= on) {
+        g->least = ahead;
+        g->watch = ahead < WATCHED * on;
+        status = g->inner->attempt(s, x, h);
+        g->watch = 0;
+        if (!status) g->least = fmin(g->least, regularity_at(g, t + h, stepper_candidate(s)));
+        if (g->least >= on) return status;
+    }
+    g->charted = 1;
+    return chart_attempt(g, x, h);
+}
+
+static void keep(stepper *s, const double *x, double h) {
+    passage *g = s->passage;
+    double *m = g->memory, t = stepper_time(s) + h, *y = stepper_candidate(s), value;
+    int n = s->n, i, j;
+    value = regularity_at(g, t, y);
+    m[RISE] = (value - m[REGULARITY]) / h;
+    m[REGULARITY] = value;
+    m[SEEN_TIME] = t;
+    g->kept = g->charted;
+    if (!g->charted) {
+        g->inner->keep(s, x, h);
+        return;
+    }
+    for (i = 0; i < n; i++) {
+        double rise = y[i] - x[i], bend = h * g->full[0][i] - rise, sum = 0.0;
+        for (j = 0; j < 7; j++) sum += DOPRI5_D[j] * g->full[j][i];
+        g->dense[i] = x[i];
+        g->dense[n + i] = rise;
+        g->dense[2 * n + i] = bend;
+        g->dense[3 * n + i] = rise - h * g->full[6][i] - bend;
+        g->dense[4 * n + i] = h * sum;
+    }
+}
+
+static int close(stepper *s, double t) {
+    passage *g = s->passage;
+    if (!g->charted) return g->inner->close(s, t);
+    stepper_close(s, g->full[6]);
+    return STEPPER_OK;
+}
+
+static void interpolate(const stepper *s, double a, double *row) {
+    const passage *g = s->passage;
+    if (g->kept)
+        dopri5_interpolate(g->dense, s->n, a, row);
+    else
+        g->inner->interpolate(s, a, row);
+}
+
+static int open(stepper *s, const double *x) {
+    passage *g = s->passage;
+    return g->inner->open ? g->inner->open(s, x) : STEPPER_OK;
+}
+
+/* The slope that opens a step: where the rows are nearly dependent, that of the chart. */
+static int opening(stepper *s, const double *x) {
+    passage *g = s->passage;
+    double t = stepper_time(s);
+    int status;
+    if (foreseen(g, t, x, 0.0) >= ON * g->memory[LARGEST])
+        return stepper_evaluate(s, t, x, stepper_slope(s));
+    status = prepare(g, t, x);
+    g->sigma = HUGE_VAL;
+    return status ? status : slope(g, t, g->own, g->at, stepper_slope(s), g->slopes[0]);
+}
+
+int passage_project(passage *g, double t, double *x) {
+    int nq = g->size.nq, d = g->d, i, k;
+    double *y = g->trial, h;
+    if (!g->kept || !g->ready) return 1;
+    if (rows_at(g, t, x, &g->here.rows)) return 0;
+    for (k = 0; k < d; k++) {
+        y[k] = 0.0;
+        for (i = 0; i < nq; i++) y[k] += g->C[i * d + k] * (x[i] - g->memory[BASE + i]);
+    }
+    coordinates(g, &g->here, x + nq, y + d);
+    memcpy(y + 2 * d, x + nq + g->size.nv, sizeof(double) * (size_t)g->size.nz);
+    h = stepper_last_step(g->s);
+    if (!slope(g, t, y, g->at, g->full[1], g->slopes[1]) && !left_branch(g, g->at, x, h, 0.0))
+        memcpy(x, g->at, sizeof(double) * (size_t)g->s->n);
+    return 0;
+}
+
+void passage_start(passage *g) {
+    memset(g->memory, 0, sizeof(double) * (size_t)PASSAGE_MEMORY(g->s->n));
+    g->memory[LARGEST] = g->model.typical;
+    passage_forget(g);
+}
+
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = 0; }
+
+/* The next count doubles of a block, or only how many there are so far. */
+static double *take(double *block, size_t *used, size_t count) {
+    double *found = block ? block + *used : NULL;
+    *used += count + 1;
+    return found;
+}
+
+static void lay_frame(frame *p, const passage_size *z, double *block, size_t *used) {
+    size_t nq = (size_t)z->nq, nv = (size_t)z->nv, m = (size_t)z->speeds, l = (size_t)z->places;
+    p->rows.place = take(block, used, l);
+    p->rows.slope = take(block, used, l * nq);
+    p->rows.J = take(block, used, m * nv);
+    p->rows.b = take(block, used, m);
+    p->rows.c = take(block, used, m);
+    p->rows.N = take(block, used, nq * nv);
+    p->rows.bend = take(block, used, nq);
+    p->rows.rank = take(block, used, 1);
+    p->M = take(block, used, nv * nv);
+    p->f = take(block, used, nv);
+    p->rate = take(block, used, (size_t)z->nz);
+    p->A = take(block, used, nv * m);
+    p->weight = take(block, used, nv);
+    p->T = take(block, used, nv * nv);
+}
+
+static size_t lay(passage *g, double *block) {
+    const passage_size *z = &g->size;
+    size_t nq = (size_t)z->nq, nv = (size_t)z->nv, n = (size_t)g->s->n, ny = 2 * nv + (size_t)z->nz;
+    size_t rows = (size_t)z->places + nv, used = 0;
+    int k;
+    lay_frame(&g->base, z, block, &used);
+    lay_frame(&g->here, z, block, &used);
+    g->C = take(block, &used, nv * nq);
+    g->drift = take(block, &used, nv);
+    g->own = take(block, &used, ny);
+    g->trial = take(block, &used, ny);
+    for (k = 0; k < 7; k++) {
+        g->slopes[k] = take(block, &used, ny);
+        g->full[k] = take(block, &used, n);
+    }
+    g->dense = take(block, &used, 5 * n);
+    g->at = take(block, &used, n);
+    g->side = take(block, &used, nv);
+    g->sum = take(block, &used, 2 * n + 2 * ny);
+    g->K = take(block, &used, rows * nq + nv * (nv + 1));
+    g->r = take(block, &used, rows + nv);
+    g->y = take(block, &used, ny);
+    g->w = take(block, &used, ny);
+    g->G = take(block, &used, nv * nv);
+    g->ready_x = take(block, &used, n);
+    return used;
+}
+
+passage *passage_new(stepper *s, const passage_size *size, const passage_model *model,
+                     double *memory) {
+    static const stepper_method hybrid = {open, attempt, keep, close, interpolate, opening};
+    passage *g = calloc(1, sizeof *g);
+    if (!g) return NULL;
+    g->s = s;
+    g->size = *size;
+    g->model = *model;
+    g->memory = memory;
+    g->block = calloc(lay(g, NULL), sizeof *g->block);
+    g->orders = calloc(2 * (size_t)size->speeds + 1, sizeof *g->orders);
+    if (!g->block || !g->orders) {
+        passage_free(g);
+        return NULL;
+    }
+    lay(g, g->block);
+    g->base.order = g->orders;
+    g->here.order = g->orders + size->speeds;
+    g->inner = s->method;
+    s->method = &hybrid;
+    s->passage = g;
+    passage_start(g);
+    return g;
+}
+
+void passage_free(passage *g) {
+    if (!g) return;
+    free(g->block);
+    free(g->orders);
+    free(g);
+}

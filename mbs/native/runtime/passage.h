@@ -1,0 +1,75 @@
+/* Through singular configurations of closed loops, by steps in local tangent coordinates.
+ *
+ * Where the rows of the loops become dependent, branches of motion meet. With s the distance from
+ * there along a branch, an error w across it obeys (s w)'' = 0: it grows as 1/s, whatever the step,
+ * so a state of all coordinates does not come through, though the motion along the branch is as
+ * smooth as anywhere. Near such a configuration a step is therefore made in coordinates xi along the
+ * branch and their rates u, of which positions, velocities and accelerations of the tree follow by
+ * Newton steps onto all rows; the error across is removed at every stage. At the singular
+ * configuration itself, where they do not follow, they are means of values on both sides.
+ *
+ * The chart is orthogonal in the metric of the inertia matrix: the direction that the rows lose does
+ * not reach u'. It is made anew at each step, where the step begins. Elsewhere the method of the
+ * stepper runs unchanged.
+ *
+ * Source: Hairer, Lubich and Wanner 2006, IV.5.3, for local tangent coordinates; Golub and Van Loan
+ * 2013, algorithm 5.4.1, for the orthogonal factors of the rows, cut at the rank that assembling
+ * found.
+ */
+#ifndef MBS_PASSAGE_H
+#define MBS_PASSAGE_H
+
+#include "stepper.h"
+
+typedef struct {
+    int nq, nv, nz; /* positions, velocities and other states of x */
+    int places;     /* rows of positions: the first ones belong to those of velocities, the last
+                       ones keep quaternions at unit length */
+    int anchors;    /* those of velocities that hold the coordinate which the last anchors rows of
+                       positions before the norms give, wherever it is */
+    int speeds;     /* rows of velocities */
+    int moving;     /* 1 where rows depend on time */
+} passage_size;
+
+/* place (places,) and its slopes by q (places, nq); J (speeds, nv), b and c with J v = b and
+ * J a = c; N (nq, nv) and bend (nq,) with q' = N v and q'' = N a + bend; the rank of J. Where nq is
+ * nv the model leaves out J, which are the slopes, N, the unit matrix, and bend, which is zero. */
+typedef struct {
+    double *place, *slope, *J, *b, *c, *N, *bend, *rank;
+} passage_rows;
+
+typedef struct {
+    int (*rows)(void *user, double t, const double *x, const passage_rows *rows);
+    /* Inertia matrix M (nv, nv), forces f (nv,) so that M a = f + J' y, and rates of the other
+     * states. */
+    int (*forces)(void *user, double t, const double *x, double *M, double *f, double *rate);
+    /* How independent the rows of the full step are: near zero, and linear in the distance, where
+     * they become dependent. */
+    int (*regularity)(void *user, double t, const double *x, double *value);
+    double typical; /* regularity at a common configuration */
+} passage_model;
+
+/* What one step hands to the next: scalars, then the last regular state. */
+#define PASSAGE_MEMORY(n) (8 + (n))
+
+typedef struct passage passage;
+
+/* NULL: no memory is left. After the init of the method, which it wraps. */
+passage *passage_new(stepper *s, const passage_size *size, const passage_model *model,
+                     double *memory);
+void passage_free(passage *g);
+
+/* Before stepper_start. */
+void passage_start(passage *g);
+
+/* The memory was replaced: what stands beside it belongs to it no more. */
+void passage_forget(passage *g);
+
+/* Positions and velocities moved onto the rows in the chart of the last step; 1 where there is no
+ * such chart, and the projection of the full step is to be used. */
+int passage_project(passage *g, double t, double *x);
+
+/* The full step evaluates its right-hand side at x. */
+void passage_look(passage *g, double t, const double *x);
+
+#endif

@@ -1,0 +1,179 @@
+"""Motions through configurations in which the rows of loops become dependent."""
+
+import numpy as np
+import pytest
+
+import mbs
+from mbs.components import Body, CoulombFriction, Prismatic, Revolute, RigidStop
+from mbs.errors import SolverError
+
+GRAVITY = (0, -9.81, 0)
+
+
+def rod(name, length):
+    inertia = length**3 / 12
+    return Body(name, mass=length, com=(length / 2, 0, 0), inertia=(0, inertia, inertia))
+
+
+def linkage(lengths, guess, more=()):
+    """Crank, coupler, rocker and ground of a four-bar linkage in the vertical plane."""
+    crank, coupler, rocker, ground = lengths
+    m = mbs.Mechanism("linkage", gravity=GRAVITY)
+    a, b, c = (m.add(rod(n, x)) for n, x in zip("abc", (crank, coupler, rocker), strict=True))
+    m.connect(m.world, Revolute("j1", actuated=True), a)
+    m.connect(a.at(crank), Revolute("j2"), b)
+    m.connect(m.world.at(ground), Revolute("j4"), c)
+    m.connect(b.at(coupler), closing := Revolute("j3"), c.at(rocker))
+    m.cut(closing)
+    for element in more:
+        m.add(element)
+    return m.assemble(guess=dict(zip(("j1", "j2", "j4"), guess, strict=True)))
+
+
+def coupling_rod():
+    m = mbs.Mechanism("coupling_rod", gravity=GRAVITY)
+    bar = m.add(rod("bar", 2.0))
+    for k in range(3):
+        crank, pin = m.add(rod(f"crank{k}", 0.4)), Revolute(f"p{k}")
+        m.connect(m.world.at(float(k)), Revolute(f"j{k}", actuated=k == 0), crank)
+        m.connect(crank.at(0.4), pin, bar.at(float(k)))
+        if k:
+            m.cut(pin)
+    return m.assemble(guess={"j0": 1.0, "j1": 1.0, "j2": 1.0, "p0": -1.0})
+
+
+def piston():
+    m = mbs.Mechanism("piston", gravity=GRAVITY)
+    crank, bar, head = m.add(rod("crank", 0.3)), m.add(rod("bar", 0.8)), m.add(Body("h", mass=1))
+    m.connect(m.world, Revolute("j1"), crank)
+    m.connect(crank.at(0.3), Revolute("j2"), bar)
+    m.connect(m.world, Prismatic("slide", axis="x", actuated=True), head)
+    m.connect(bar.at(0.8), pin := Revolute("pin"), head)
+    m.cut(pin)
+    return m.assemble(active=["slide"], guess={"j1": 1.0, "j2": -1.3, "slide": 0.9})
+
+
+MECHANISMS = {
+    "parallelogram": lambda: mbs.robots.n_four_bar().assemble(active=["a0"]),
+    "a+g=b+c": lambda: linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5)),
+    "kite": lambda: linkage((0.5, 1.1, 1.1, 0.5), (1.0, 0.5, 2.0)),
+    "antiparallelogram": lambda: linkage((0.4, 1.0, 0.4, 1.0), (1.0, -1.8, -1.5)),
+    "coupling rod": coupling_rod,
+    "piston": piston,
+    "sr400": lambda: mbs.robots.sr400().assemble(),
+    "five_bar": lambda: mbs.robots.five_bar().assemble(),
+}
+SPEED = {"piston": ("slide", 1.5), "parallelogram": ("a0", -4.0), "coupling rod": ("j0", 5.0)}
+FALLS = ("sr400", "five_bar")
+
+
+@pytest.fixture(scope="module")
+def systems():
+    return {name: build() for name, build in MECHANISMS.items()}
+
+
+def energy_error(result):
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    return np.ptp(energy) / result["kinetic_energy"].max()
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_energy_falls_with_the_tolerance_through_singular_configurations(systems, name):
+    joint, speed = SPEED.get(name, ("j1", 6.0))
+    v0 = None if name in FALLS else {joint: speed}
+    for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
+        result = mbs.simulate.run(
+            systems[name], 3.0, v0=v0, tolerance=tolerance, step=0.05, quiet=True
+        )
+        assert energy_error(result) < 5 * tolerance
+        assert result["closure_residual"].max() < 1e-11
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_starts_of_change_point_linkages(systems, seed):
+    rng = np.random.default_rng(seed)
+    for name in ("parallelogram", "a+g=b+c", "kite", "antiparallelogram", "coupling rod"):
+        joint, _ = SPEED.get(name, ("j1", 0.0))
+        v0, tolerance = {joint: rng.uniform(-6, 6)}, 10 ** rng.uniform(-10, -3)
+        result = mbs.simulate.run(
+            systems[name], 3.0, v0=v0, tolerance=tolerance, step=0.05, quiet=True
+        )
+        assert energy_error(result) < 30 * tolerance, (name, v0, tolerance)
+
+
+def test_a_parallelogram_stays_one(systems):
+    result = mbs.simulate.run(systems["parallelogram"], 5.0, v0={"a0": -3.0}, quiet=True)
+    assert np.ptp(result["a0.q"]) > 4 * np.pi
+    assert np.abs(result["a0.q"] - result["a1.q"]).max() < 1e-9
+
+
+def test_an_antiparallelogram_stays_one(systems):
+    system = systems["antiparallelogram"]
+    result = mbs.simulate.run(system, 5.0, v0={"j1": 9.0}, quiet=True)
+    turned = result["j4.q"] - result["j1.q"]
+    assert np.ptp(result["j1.q"]) > 4 * np.pi
+    assert np.ptp(turned) > 6.0  # cranks of a parallelogram would turn alike
+
+
+def test_output_times_do_not_change_the_motion(systems):
+    """Rows within a step that passes are on the branch that the steps are on."""
+    system, v0 = systems["a+g=b+c"], {"j1": -4.005538012884346}
+    q0 = {"j1": 0.739239379217}
+    result = mbs.simulate.run(
+        system, 1.0, q0=q0, v0=v0, tolerance=1.934421171055293e-05, step=0.05, quiet=True
+    )
+    assert energy_error(result) < 1e-4
+
+
+def test_a_prescribed_crank_passes_flat(systems):
+    result = mbs.simulate.run(
+        systems["parallelogram"],
+        4.0,
+        q0={"a0": 1.0},
+        motion={"a0.q": lambda t: 1.0 + 2.0 * t},
+        quiet=True,
+    )
+    assert result["a1.q"] == pytest.approx(1.0 + 2.0 * result.time, abs=1e-8)
+
+
+def test_a_start_in_a_singular_configuration_with_velocities_of_one_branch(systems):
+    system = systems["parallelogram"]
+    result = mbs.simulate.run(
+        system, 2.0, q0=[0.0, 0.0, 0.0], v0=[3.0, -3.0, 3.0], tolerance=1e-8, quiet=True
+    )
+    assert energy_error(result) < 1e-7
+    assert np.ptp(result["a0.q"]) > 1.0
+    assert np.abs(result["a0.q"] - result["a1.q"]).max() < 1e-8
+
+
+@pytest.mark.parametrize("v0", [None, [1.0, -1.5, 0.5]], ids=["rest", "between branches"])
+def test_a_start_that_chooses_no_branch_is_refused(systems, v0):
+    """The error names the configuration, the joint, and what would decide."""
+    with pytest.raises(SolverError, match=r"velocities of one branch.*a0 = 0, b0 = 0.*hold b0"):
+        mbs.simulate.run(systems["parallelogram"], 1.0, q0=[0.0, 0.0, 0.0], v0=v0, quiet=True)
+
+
+def test_a_crank_bounces_between_passages():
+    """An elastic stop keeps the energy, and comes a moment after the linkage has been flat."""
+    stop = RigidStop("stop", joint="j1", lower=-20.0, upper=7.5, restitution=1.0)
+    system = linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5), (stop,))
+    for tolerance in (1e-5, 1e-8):
+        result = mbs.simulate.run(
+            system, 3.0, v0={"j1": 9.0}, tolerance=tolerance, step=0.02, quiet=True
+        )
+        assert len(result.events) == 2
+        assert energy_error(result) < 10 * tolerance
+
+
+def test_coulomb_friction_acts_through_passages():
+    dry = CoulombFriction("dry", joint="j1", sliding=0.3, sticking=0.4)
+    system = linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5), (dry,))
+    rough, fine = (
+        mbs.simulate.run(system, 3.0, v0={"j1": 9.0}, tolerance=tolerance, step=0.01, quiet=True)
+        for tolerance in (1e-5, 1e-9)
+    )
+    assert np.ptp(fine["j1.q"]) > 4 * np.pi
+    assert rough["j1.q"] == pytest.approx(fine["j1.q"], abs=1e-3)
+    energy = fine["kinetic_energy"] + fine["potential_energy"]
+    work = np.trapezoid(fine["dry.effort"] * fine["j1.v"], fine.time)
+    assert energy[-1] - energy[0] == pytest.approx(work, abs=1e-3)

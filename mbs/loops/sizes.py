@@ -37,7 +37,7 @@ def mechanism_size(system: System) -> SX:
         rows = closure_rows(system, q)[places]
         turns = [k for k, c in enumerate(system.coordinates) if not c.unit.startswith("m")]
         levers = casadi.jacobian(rows, q)[:, turns]
-        lengths = casadi.vertcat(rows, levers.nz[:]) if levers.nnz() else rows
+        lengths = casadi.vertcat(rows, casadi.vec(levers.nz[:])) if levers.nnz() else rows
         found = Function("lengths", [q, system.p], [lengths])
         every = casadi.vertcat(*(found(posture, system.p) for posture in _postures(system)))
         size = SX(casadi.mmax(casadi.fabs(every)))

@@ -76,7 +76,7 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
     rows = square_closure(system, q, passive)
     if system.closure is not None and not system.closure.varies:
         own = row_sizes(system)[list(system.closure.rows)]
-        rows = casadi.vertcat(rows[: own.numel()] / own, rows[own.numel() :])
+        rows = casadi.vertcat(rows[: own.numel(), 0] / own, rows[own.numel() :, 0])
     residual = casadi.substitute(rows, q, merged)
     equations = Function("phi", [z, q_a, system.p], [residual])
     options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}

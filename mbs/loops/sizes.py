@@ -15,6 +15,8 @@ from mbs.assembly.rates import norm_rows, quaternion_slices
 from mbs.loops.closure import closure_rows, row_labels
 from mbs.loops.rolling import SLIPS, rolling_discs
 
+_ROUNDING = 1e-9
+"""Length [m] below which levers are rounding, which is 1e-13 of a mechanism of 1 km."""
 _SAMPLES, _SEED = 3, 20260201
 """Postures at which levers are measured, the zero posture among them."""
 
@@ -37,11 +39,12 @@ def mechanism_size(system: System) -> SX:
         rows = closure_rows(system, q)[places]
         turns = [k for k, c in enumerate(system.coordinates) if not c.unit.startswith("m")]
         levers = casadi.jacobian(rows, q)[:, turns]
-        lengths = casadi.vertcat(rows, levers.nz[:]) if levers.nnz() else rows
+        lengths = casadi.vertcat(rows, casadi.vec(levers.nz[:])) if levers.nnz() else rows
         found = Function("lengths", [q, system.p], [lengths])
         every = casadi.vertcat(*(found(posture, system.p) for posture in _postures(system)))
         size = SX(casadi.mmax(casadi.fabs(every)))
-        return SX(1) if size.is_constant() and not float(size) > 0 else size
+        # around the centre of a sphere levers are rounding
+        return SX(casadi.if_else(size > _ROUNDING, size, 1))
 
     size: SX = system.cached("mechanism size", build)
     return size

@@ -88,7 +88,7 @@ def projected(
     )
     step_q, _ = _shortest(J_q, r, place_off, first[: loops.numel()], places_of)
     step_v, awake = _shortest(J, speed, slide_off, first, speeds_of)
-    relative = casadi.vertcat(speed[: measures.numel()] / measures, speed[measures.numel() :])
+    relative = casadi.vertcat(speed[: measures.numel(), 0] / measures, speed[measures.numel() :, 0])
     rows = casadi.vertcat(relative_rows(system, symbols), *places, distance, relative)
     residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
     values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])

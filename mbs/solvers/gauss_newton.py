@@ -15,6 +15,10 @@ Residual = Callable[[Vector], tuple[Vector, Vector]]
 """x -> residual (m,), Jacobian (m, n)."""
 
 _STALLED = 1e-14
+"""Length of a step [rad or m] that changes no digit of positions of size one that could matter."""
+
+_LAST_DIGITS = 1e-2
+"""Part of the tolerance above which one step more is taken: it takes the error to its square."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +65,12 @@ def gauss_newton(
     if not _finite(r, J):
         return Root(x, np.inf, False)
     for _ in range(iterations):
-        if np.all(np.abs(r) <= tolerance):
+        reached = bool(np.all(np.abs(r) <= tolerance))
+        if reached and np.all(np.abs(r) <= _LAST_DIGITS * np.asarray(tolerance)):
             break
         step = smallest_solution(J, -r, rank_tolerance)
         length = 1.0
-        while length > 1e-6:
+        while length > (0.5 if reached else 1e-6):  # beyond the tolerance one step, if it helps
             trial = x + length * step
             r_trial, J_trial = function(trial)
             lower = _norm(r_trial) < _norm(r)
@@ -76,7 +81,7 @@ def gauss_newton(
             break
         stalled = length * _norm(step) < _STALLED
         x, r, J = trial, r_trial, J_trial
-        if stalled:
+        if stalled or reached:
             break
     return Root(x, _norm(r), bool(np.all(np.abs(r) <= tolerance)))
 

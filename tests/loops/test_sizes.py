@@ -136,6 +136,18 @@ def test_a_loop_without_levers_is_measured_by_its_gap():
         assert float(mechanism_size(m.assemble())) == pytest.approx(expected, rel=0.5)
 
 
+def test_levers_of_rounding_are_none():
+    """Four axes through one point: the rows of positions are zero wherever the links are."""
+    m = mbs.Mechanism("sphere", gravity=(0, 0, 0))
+    bodies, before = [m.add(Body(f"b{k}", mass=1)) for k in range(3)], m.world.at(0.3, 0.1, 0.2)
+    for k, body in enumerate(bodies):
+        centre = body.at(0.1, 0.7, 0.3 * k)
+        m.connect(before, Revolute(f"j{k}", axis="z"), centre)
+        before = body.at(0.1, 0.7, 0.3 * k, rotation=("x", 1.0 + 0.2 * k))
+    m.connect(before, Revolute("j3", axis="z"), m.world.at(0.3, 0.1, 0.2, rotation=("x", 0.8)))
+    assert float(mechanism_size(m.assemble())) == 1.0
+
+
 @pytest.mark.parametrize("size", SCALES)
 def test_a_spatial_loop_of_any_size_has_its_mobility(size):
     """Two revolute and two spherical joints: the coupler spins, so that two motions are free."""

@@ -134,6 +134,8 @@ def _regularity(system: System, q: SX, drives: SX) -> SX:
     J = casadi.vertcat(
         DM(found.rows[kept_rows(system)]) * independent_constraint_rows(system, q), drives
     )
+    if J.shape[0] == 0:  # the loops hold nothing
+        return SX(1)
     B = casadi.mtimes(J, casadi.diag(columns))
     squares = casadi.fmax(casadi.sum2(B * B), 1)  # a row may also vanish by itself
     D, _, order = casadi.ldl(casadi.sparsify(casadi.mtimes(B, B.T)))

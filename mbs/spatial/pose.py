@@ -116,6 +116,8 @@ def _inverse(step: AxisTurn | Pose) -> AxisTurn | Pose:
 
 def _with_lone_ones(R: SX) -> SX:
     """The rotation, its elements that stand alone in a row or a column exactly 1 or -1."""
+    if R.is_constant() and not _has_alone(DM(R).nonzeros()):
+        return R
     entries = elements(R)
     for place, entry in enumerate(entries):
         if not entry.is_constant() or abs(float(entry)) in (0.0, 1.0):
@@ -126,3 +128,9 @@ def _with_lone_ones(R: SX) -> SX:
         if all(e.is_zero() for e in in_row) or all(e.is_zero() for e in in_column):
             R[place] = 1.0 if float(entry) > 0 else -1.0
     return R
+
+
+def _has_alone(elements: list[float]) -> bool:
+    """Whether an element alone in its row or column, of nine, is not yet 1 or -1."""
+    lines = (*(elements[k : k + 3] for k in (0, 3, 6)), *(elements[k::3] for k in range(3)))
+    return any(line.count(0.0) == 2 and max(map(abs, line)) != 1.0 for line in lines)

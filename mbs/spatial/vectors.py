@@ -4,11 +4,15 @@ from collections.abc import Iterable
 from typing import cast
 
 import casadi
-from casadi import SX
+from casadi import DM, SX
 
 _ROUNDING = 2e-15
 """Part of its terms that a sum may have left from their rounding: some ten units of their last
 digit, far above what two or three roundings leave and far below any tilt that was meant."""
+
+
+_SMALL = 1e-9
+"""What is larger in numbers is no rounding of anything smaller than 1000 km, and needs no look."""
 
 
 def vector(elements: Iterable[SX | float]) -> SX:
@@ -67,6 +71,8 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
     """
     product = casadi.mtimes(A, B) if C is None else C + casadi.mtimes(A, B)
     dense = casadi.densify(product)
+    if dense.is_constant() and not any(0 < abs(x) < _SMALL for x in DM(dense).nonzeros()):
+        return dense
     largest = _largest_number(B) if C is None else max(_largest_number(B), _largest_number(C))
     rows = dense.shape[0]
     for place, element in enumerate(elements(dense)):

@@ -79,7 +79,10 @@ def test_idas_follows_the_simulation(name, form):
     make, start, tau = STARTS[name]
     system = make()
     d = dae(system, form, tau0=tau, **start)
-    q, v, alg, invariants = moved(d, 0.4, "idas", abstol=1e-11, reltol=1e-11)
+    # below 1e-9 the algebraic unknowns of index 1, some 100, are held by their rounding alone, and
+    # the last bits of the start decide between 2,000 steps and 90,000
+    tolerance = 1e-9 if form == "index1" else 1e-11
+    q, v, alg, invariants = moved(d, 0.4, "idas", abstol=tolerance, reltol=tolerance)
     expected_q, expected_v = simulated(system, 0.4, tau=tau, **start)
     np.testing.assert_allclose(unwound(system, q, expected_q), 0, atol=1e-6)
     np.testing.assert_allclose(v, expected_v, atol=1e-5)

@@ -93,13 +93,18 @@ def test_nested_mechanism_moves_in_the_gravity_of_the_outer_one():
     assert float(mbs.models.gravity_effort(system)([0])) == pytest.approx(2 * 9.81)
 
 
-def test_axis_that_a_symbol_makes_parallel_is_refused():
-    m = Mechanism("tilt", parameters={"A": 0.0})
-    a, b = (m.add(Body(n, mass=1, inertia=(1, 1, 1))) for n in "ab")
-    m.connect(m.world, Revolute("j1"), a)
-    m.connect(a.at(0.2, 0.1, 0, rotation=("x", "A")), Revolute("j2"), b)
-    with pytest.raises(AssemblyError, match=r"j2: at A = 0 its axis is parallel .* another value"):
-        m.assemble()
+@pytest.mark.parametrize("A", [0.0, 1e-9, -0.4])
+def test_axis_that_a_symbol_may_make_parallel(A):
+    def tilted(angle, **parameters):
+        m = Mechanism("tilt", parameters=parameters)
+        a, b = (m.add(Body(n, mass=1, com=(0.1, 0, 0), inertia=(1, 1, 1))) for n in "ab")
+        m.connect(m.world, Revolute("j1"), a)
+        m.connect(a.at(0.2, 0.1, 0, rotation=("x", angle)), Revolute("j2"), b)
+        return mbs.models.inverse_dynamics(m.assemble())
+
+    given = [0.3, 0.4], [1.0, -2.0], [0.5, 0.6]
+    efforts = np.array(tilted("A", A=0.0)(*given, [A]))
+    np.testing.assert_allclose(efforts, np.array(tilted(A)(*given)), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize(

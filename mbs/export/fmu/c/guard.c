@@ -14,6 +14,10 @@
  * make; where branches cross under an angle, velocities change by about their own size. */
 #define KINK 0.25
 
+/* Part of their nominal values below which velocities are at rest, as on a stop: what changes there is
+ * the rounding of the equations of closure, some 1e-13. A motion as slow takes a year for a turn. */
+#define REST 1e-8
+
 /* The signs of the determinants of the diagonal blocks, by elimination with row exchanges. */
 static int signs(core *c, const double *x, const double *z, double *sign) {
     double J[NZ * NZ], A[NZ * NZ];
@@ -93,7 +97,7 @@ static int kinked(const core_watched *a, const core_watched *b) {
         most = fmax(most, fabs(b->v[i] - a->v[i] - 0.5 * h * (a->a[i] + b->a[i])) / unit);
         size = fmax(size, fmax(half, fmax(fabs(a->v[i]), fabs(b->v[i]))) / unit);
     }
-    return most > KINK * size;
+    return most > fmax(KINK * size, REST);
 }
 
 core_status guard_pass(core *c) {

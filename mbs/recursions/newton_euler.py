@@ -18,7 +18,7 @@ from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
 from mbs.recursions.rotation_rate import moment_of_rotation
 from mbs.recursions.rotors import rotor_efforts, rotor_moments
-from mbs.recursions.sliding import slid
+from mbs.recursions.sliding import heights_first, slid
 from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero
 
 
@@ -63,6 +63,7 @@ def newton_euler(
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
     if not external:
         poses, bodies = slid(tree, poses, bodies, base_rests=is_zero(base.w))
+        poses = heights_first(poses)
     bodies = regrouped(tree, poses, bodies)
     motions = link_accelerations(tree, poses, v, a, base)
     runs = runs_behind(tree, poses)

@@ -21,7 +21,7 @@ from mbs.recursions.joint_lines import Line
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
 from mbs.recursions.rotors import rotor_efforts, rotor_moments, spin_momenta
-from mbs.recursions.sliding import slid
+from mbs.recursions.sliding import heights_first, slid
 from mbs.recursions.subtree_motion import SubtreeMotion, subtree_motions
 from mbs.spatial import PseudoInertia, is_zero, zeros
 
@@ -69,6 +69,7 @@ def newton_euler_derivatives(
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
     poses, bodies = slid(tree, poses, bodies, base_rests=is_zero(base.w))
+    poses = heights_first(poses)
     bodies = regrouped(tree, poses, bodies)
     motions = link_accelerations(tree, poses, v, a, base)
     axes = joint_axes(tree, poses, v, motions, base)

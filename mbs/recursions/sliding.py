@@ -3,7 +3,8 @@
 The origin of the frame of a revolute link may stand anywhere on its axis. Three places save
 operations: the foot of the axis when it is at rest, because no force on it does any work and
 gravity alone accelerates it; the foot of the axis of a last link; the height of the link behind
-it when that one turns about a parallel axis.
+it when that one turns about a parallel axis and the frame stands beside its foot already: a
+distance that is passed on to a joint without one saves nothing.
 """
 
 from __future__ import annotations
@@ -30,8 +31,27 @@ def slid(
         base_rests: whether the base has no motion.
     """
     rise = _rises(tree, poses, base_rests)
+    if all(up.is_zero() for up in rise):
+        return poses, bodies
     moved = [_between(tree, poses, rise, j) for j in range(len(poses))]
     return moved, [body.slid(2, -rise[j]) for j, body in enumerate(bodies)]
+
+
+def heights_first(poses: list[LinkPose]) -> list[LinkPose]:
+    """Links that turn about an axis parallel to that before: their height before their turn.
+
+    The wrenches and accelerations of a run of parallel axes then meet one height alone; inertias
+    are carried past a height at less cost behind the turn.
+    """
+    return [_height_first(pose) if len(pose.run) > 1 else pose for pose in poses]
+
+
+def _height_first(pose: LinkPose) -> LinkPose:
+    screw = pose.motion[0]
+    if not isinstance(screw, Screw) or screw.t.is_zero():
+        return pose
+    height = Screw.about("z", SX(0), screw.t)
+    return replace(pose, seat=(height, *pose.seat), motion=(replace(screw, t=SX(0)),))
 
 
 def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
@@ -44,7 +64,7 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
         behind = [k for k, link in enumerate(tree.links) if link.antecedent == j]
         if not behind or (len(behind) == 1 and j in resting):
             rise[j] = -poses[j].height
-        elif len(behind) == 1 and len(poses[behind[0]].run) > 1:
+        elif len(behind) == 1 and len(poses[behind[0]].run) > 1 and not poses[j].height.is_zero():
             k = behind[0]
             rise[j] = poses[k].foot[2] + poses[k].height + rise[k]
     return rise
@@ -72,7 +92,7 @@ def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkP
     screw = pose.motion[0]
     if isinstance(screw, Screw):
         r = screw.t + rise[j]
-        if len(pose.run) > 1:
+        if len(pose.run) > 1 and not b.is_zero():  # the seat has a height in any case
             b, r = b + r, SX(0)
         pose = replace(pose, motion=(replace(screw, t=r),))
     if b.is_zero():

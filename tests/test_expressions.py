@@ -98,8 +98,9 @@ def number_of_sx(value, values=VALUES):
     return float(f(*values.values()))
 
 
+# Numbers of the size of rounding are left out: functions near -1, 0 and 1 are put exactly there.
 leaves = st.one_of(
-    st.floats(-1e3, 1e3, allow_subnormal=False).map(Number),
+    st.floats(-1e3, 1e3).filter(lambda x: x == 0 or abs(x) > 1e-9).map(Number),
     st.sampled_from(list(VALUES)).map(Parameter),
 )
 
@@ -111,6 +112,12 @@ def grown(inner):
     right = st.sampled_from([Parameter("A"), Parameter("L2")])  # where no sign of a zero matters
     arcs = st.tuples(st.just("atan2"), st.tuples(inner, right))
     return (binary | power | unary | arcs).map(lambda parts: Operation(*parts))
+
+
+def test_a_negative_zero_keeps_its_brackets():
+    power = Operation("^", (Number(-0.0), Number(0.0)))
+    assert str(power) == "(-0)^0"
+    assert to_float(str(power)) == to_float(power) == 1.0
 
 
 def read_or_refused(text, where="value"):

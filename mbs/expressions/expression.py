@@ -183,7 +183,8 @@ def _text(value: Expression, outer: int = 0) -> str:
     if isinstance(value, Number):
         text = repr(value.value)
         text = text.removesuffix(".0")
-        return f"({text})" if value.value < 0 and outer else text
+        # The sign, since -0 is less than nothing only in its text: a minus binds weaker than ^.
+        return f"({text})" if math.copysign(1.0, value.value) < 0 and outer else text
     if isinstance(value, Parameter):
         return value.name
     assert isinstance(value, Operation)

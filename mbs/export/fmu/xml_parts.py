@@ -9,7 +9,6 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
 from mbs.export.fmu.description import Entry, FmuModel, State
 from mbs.export.fmu.linearity import DependencyKind
-from mbs.messages import DISTRIBUTION
 from mbs.units import UNITS
 from mbs.version import __version__
 
@@ -29,7 +28,7 @@ _PART = r"([A-Za-z_]\w*|'[^'\\]+')(\[\d+(,\d+)*\])?"
 _PATH = rf"{_PART}(\.{_PART})*"
 _STRUCTURED = re.compile(rf"{_PATH}|der\({_PATH}(,\d+)?\)", re.ASCII)
 _NOTHING: Known = {}
-TOOL = f"{DISTRIBUTION} {__version__}"
+TOOL = f"mbs {__version__}"
 CATEGORIES = {
     "logAll": "all messages",
     "logStatusDiscard": "a step or an evaluation without an answer",

@@ -14,7 +14,7 @@ ifeq ($(strip $(NATIVE_CC)),)
 CROSS := ,cross
 endif
 
-OTHER_KERNELS := tests/solvers/test_least_squares.py tests/solvers/test_partial_ldl.py \
+OTHER_KERNELS := tests/solvers/test_shortest_steps.py tests/solvers/test_partial_ldl.py \
     tests/loops/test_posture.py tests/robots/test_benchmarks_pendulum.py \
     tests/simulate/test_over_constrained.py \
     tests/bridges/test_opti.py::test_four_bar_finds_its_optimum \

@@ -21,7 +21,7 @@ def shown() -> list[tuple[str, str]]:
 
 def narrowed(line: str) -> str:
     """The line with at most two blanks in a row: versions of rich pad columns differently."""
-    return re.sub(" {2,}", "  ", line.rstrip())
+    return re.sub("─{2,}", "──", re.sub(" {2,}", "  ", line.strip()))
 
 
 def pattern(output: str) -> str:

@@ -13,6 +13,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.rates import position_rate
+from mbs.loops.scales import scales
 from mbs.models.composition import dense_function, outputs_of
 from mbs.models.contacts import contacts_of
 from mbs.models.devices import device_equations, state_count
@@ -37,16 +38,24 @@ class TreeState:
         project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
         start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
         passage: of rows, forces and regularity.
+        rate: `rate(X) -> q'`, the rates of the positions in X.
         states: numbers in X of the states x.
         dependents: numbers in X of the dependents z.
+        passive: numbers in X of the velocities of the dependent joints.
+        held: numbers in v of the independent velocities.
+        units: (nv,) typical velocities, of one size for all joints.
     """
 
     rhs: Function
     project: Function
     start: Function
     passage: Passage
+    rate: Function
     states: tuple[int, ...]
     dependents: tuple[int, ...]
+    passive: tuple[int, ...]
+    held: tuple[int, ...]
+    units: tuple[float, ...]
 
 
 def tree_state(
@@ -117,5 +126,9 @@ def tree_state(
             *(nq + k for k in layout.velocities),
             *range(n, n + state_count(system)),
         ),
+        rate=Function("tree_rate", [X], [casadi.densify(position_rate(system.tree, q, v))]),
         dependents=layout.dependents,
+        passive=tuple(nq + k for k in layout.passive),
+        held=layout.velocities,
+        units=tuple(scales(system).columns([speed.unit for speed in system.speeds])),
     )

@@ -7,13 +7,16 @@ from typing import Literal
 
 import casadi
 
+from mbs.assembly.tables import ACCELERATION_UNIT, RATE_UNIT
 from mbs.export.fmu.about import About
 from mbs.export.fmu.description_checks import check
 from mbs.models.tree_state import TreeState
 
+_RATE = {**RATE_UNIT, **ACCELERATION_UNIT}
 Solver = Literal["dopri5", "rodas", "rk4"]
 Kind = Literal[
-    "state", "derivative", "input", "output", "parameter", "mode", "dependent", "indicator"
+    "state", "derivative", "input", "output", "parameter", "mode", "dependent", "indicator", "rate",
+    "chart"
 ]
 
 
@@ -147,8 +150,9 @@ class FmuModel:
             z is. None when nothing watches them.
         passive: the first output that is a velocity of a dependent joint, the first that is an
             acceleration of one, and how many of each there are.
-        tree: the same motion in all coordinates, which "dopri5" integrates in co-simulation: it
-            passes configurations in which the states determine nothing. None where there is none.
+        tree: the same motion in all coordinates, which "dopri5" and integrators outside integrate:
+            it passes configurations in which the states determine nothing. None where there is
+            none.
         jumps: events; None when the motion is smooth.
         stop_time: default end of a simulation, s.
         tolerance: default relative tolerance of the integration.
@@ -189,9 +193,13 @@ class FmuModel:
         check(self)
 
     @property
-    def integrated(self) -> TreeState | None:
-        """The tree, where co-simulation integrates it."""
-        return self.tree if self.solver == "dopri5" else None
+    def followed(self) -> range:
+        """Outputs that are states where the integrator is outside: positions and velocities of
+        dependent joints, which tell the branch of motion where the states do not."""
+        if self.tree is None:
+            return range(0)
+        first = self.passive[0]
+        return range(first - len(self.dependents), first + self.passive[2])
 
     @property
     def identifier(self) -> str:
@@ -208,6 +216,13 @@ class FmuModel:
     def modes(self) -> tuple[Variable, ...]:
         """The modes of its events."""
         return self.jumps.modes if self.jumps else ()
+
+    @property
+    def derived(self) -> dict[int, int]:
+        """Value references of the derivatives of states to those of the states."""
+        n, output, rate = len(self.states), self.first("output"), self.first("rate")
+        own = {n + k: k for k in range(n)}
+        return own | {rate + k: output + state for k, state in enumerate(self.followed)}
 
     def first(self, kind: Kind) -> int:
         """Value reference of the first variable of a kind.
@@ -227,6 +242,8 @@ class FmuModel:
             ("mode", len(self.modes)),
             ("dependent", len(self.dependents)),
             ("indicator", len(self.jumps.names) if self.jumps else 0),
+            ("rate", len(self.followed)),
+            ("chart", int(self.tree is not None)),
         )
         place = 0
         for name, count in order:
@@ -263,3 +280,10 @@ def _entries(model: FmuModel) -> Iterator[Entry]:
     for name in model.jumps.names if model.jumps else ():
         text = f"positive between events: {name}"
         yield Entry("indicator", Variable(name=f"indicator.{name}", description=text))
+    for k in model.followed:
+        v = model.outputs[k]
+        text = f"derivative of {v.name}"
+        yield Entry("rate", Variable(name=f"der({v.name})", unit=_RATE[v.unit], description=text))
+    if model.tree is not None:
+        text = "positive while the coordinates serve in which the states are read"
+        yield Entry("chart", Variable(name="indicator.coordinates", description=text))

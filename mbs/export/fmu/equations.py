@@ -43,7 +43,7 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
         if model.slopes is not None:
             J = casadi.densify(model.slopes.call(loop)[0])
             answers.append(casadi.Function("mbs_slopes", whole, [J]))
-    if (tree := model.integrated) is not None:
+    if (tree := model.tree) is not None:
         answers.extend(_tree(tree, [t, casadi.MX.sym("X", tree.start.numel_out(0)), x, z, u, p]))
     if model.jumps is not None:
         answers.extend(_events(model.jumps, point))
@@ -56,7 +56,8 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
 
 
 def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
-    """`mbs_tree_..(t, X, z, u, p)` of the tree, z ignored, and `mbs_tree_start(t, x, z, u, p)`."""
+    """`mbs_tree_..(t, X, z, u, p)` of the tree, z ignored, `mbs_tree_start(t, x, z, u, p)`, and
+    `mbs_tree_rate(X, dX) -> (q', how it changes)`."""
     t, X, x, z, u, p = symbols
     through = tree.passage
     named = {
@@ -72,7 +73,9 @@ def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
         for name, function in named.items()
     ]
     start = casadi.Function("mbs_tree_start", first, _dense(tree.start.call(first)))
-    return [*functions, start]
+    dX = casadi.MX.sym("dX", X.numel())
+    moved = [tree.rate(X), *_forward(tree.rate, [X], [dX])]
+    return [*functions, start, casadi.Function("mbs_tree_rate", [X, dX], _dense(moved))]
 
 
 def watched(model: FmuModel) -> tuple[str, ...]:

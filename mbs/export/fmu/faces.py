@@ -17,13 +17,14 @@ _CORE = (
     "derivatives.c",
     "closure.c",
     "guard.c",
+    "charts.c",
     "solver.c",
     "switching.c",
     "exchange.c",
     "cosimulation.c",
     "saved.c",
 )
-_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "guard.h", "solver.h")
+_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "guard.h", "charts.h", "solver.h")
 _RUNTIME = ("stepper", "events", "dense", "passage")
 _TABLEAU = "dopri5"
 """What steps through singular configurations take, whichever the solver is."""

@@ -53,11 +53,11 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
     _interface(root, "CoSimulation", model, files)
     add_units(root, model)
     add_categories_and_experiment(root, model)
-    variables = SubElement(root, "ModelVariables")
+    variables, derived = SubElement(root, "ModelVariables"), model.derived
     for reference, entry in enumerate(model.entries):
         real = real_attributes(entry)
-        if entry.kind == "derivative":
-            real["derivative"] = str(reference - len(model.states) + 1)
+        if reference in derived:
+            real["derivative"] = str(derived[reference] + 1)
         if reference in found.reset:
             real["reinit"] = "true"
         scalar = SubElement(variables, "ScalarVariable", variable_attributes(reference, entry))

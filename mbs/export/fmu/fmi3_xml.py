@@ -29,7 +29,7 @@ _STEPPING = {
     "hasEventMode": "true",
 }
 
-_SEEN_WITHIN_STEPS = ("state", "derivative", "output")
+_SEEN_WITHIN_STEPS = ("state", "derivative", "output", "rate")
 
 
 def model_description(model: FmuModel, token: str) -> str:
@@ -98,11 +98,11 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
 
 
 def _variables(root: Element, model: FmuModel, found: Structure) -> None:
-    variables = SubElement(root, "ModelVariables")
+    variables, derived = SubElement(root, "ModelVariables"), model.derived
     for reference, entry in enumerate(model.entries):
         attributes = variable_attributes(reference, entry) | real_attributes(entry)
-        if entry.kind == "derivative":
-            attributes["derivative"] = str(reference - len(model.states))
+        if reference in derived:
+            attributes["derivative"] = str(derived[reference])
         if reference in found.reset:
             attributes["reinit"] = "true"
         if entry.kind in _SEEN_WITHIN_STEPS:

@@ -18,7 +18,8 @@ from mbs.solvers.block_triangular import Block, block_triangular
 _OPEN = ("mbs_rhs", "mbs_tangent", "mbs_adjoint")
 _LOOPS = ("mbs_closure", "mbs_sensitivity")
 _TREE = tuple(
-    f"mbs_tree_{name}" for name in ("rhs", "project", "rows", "forces", "regularity", "start")
+    f"mbs_tree_{name}"
+    for name in ("rhs", "project", "rows", "forces", "regularity", "start", "rate")
 )
 _EVENTS = ("mbs_first", "mbs_indicators", "mbs_rates", "mbs_jump")
 
@@ -40,6 +41,9 @@ _HEADER = """\
 #define PASSIVE_V {passive_v}
 #define PASSIVE_A {passive_a}
 #define N_PASSIVE {n_passive}
+#define NF {nf}
+#define NC {nc}
+#define FOLLOWED {followed}
 {solver}
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
@@ -70,7 +74,7 @@ def header(model: FmuModel, guid: str) -> str:
     solver = ""
     if model.closure is not None:
         names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
-    if (tree := model.integrated) is not None:
+    if (tree := model.tree) is not None:
         names = (*names, *_TREE)
     if model.jumps is not None:
         names = (*names, *_EVENTS)
@@ -92,7 +96,10 @@ def header(model: FmuModel, guid: str) -> str:
         passive_v=model.passive[0],
         passive_a=model.passive[1],
         n_passive=model.passive[2],
-        solver=solver + ("" if tree is None else _tree_sizes(tree)),
+        nf=len(model.followed),
+        nc=int(model.tree is not None),
+        followed=model.first("output") + model.passive[0] - len(model.dependents),
+        solver=solver + ("" if tree is None else _tree_sizes(tree, model.solver == "dopri5")),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
@@ -134,23 +141,31 @@ def source(model: FmuModel) -> str:
     )
 
 
-def _tree_sizes(tree: TreeState) -> str:
+def _tree_sizes(tree: TreeState, inside: bool) -> str:
     sizes = ", ".join(map(str, tree.passage.size))
     return (
         f"#define MODEL_TREE {tree.start.numel_out(0)} /* its states */\n"
+        f"#define MODEL_TREE_INSIDE {int(inside)} /* co-simulation integrates them */\n"
         f"#define MODEL_PASSAGE {{{sizes}}}\n"
         f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
-        "extern const int MODEL_TREE_STATES[], MODEL_TREE_DEPENDENTS[];\n"
+        "/* where states, dependents and followed states stand in it, and the independent joints\n"
+        " * among its velocities; typical sizes of these */\n"
+        "extern const int MODEL_TREE_STATES[], MODEL_TREE_DEPENDENTS[], MODEL_TREE_FOLLOWED[];\n"
+        "extern const int MODEL_TREE_HELD[];\n"
+        "extern const double MODEL_TREE_UNITS[];\n"
     )
 
 
 def _tree_tables(model: FmuModel) -> list[str]:
     """Where the states, and the dependents, of the FMU stand among the states of its tree."""
-    if (tree := model.integrated) is None:
+    if (tree := model.tree) is None:
         return []
     return [
         _table("const int MODEL_TREE_STATES", map(str, tree.states)),
         _table("const int MODEL_TREE_DEPENDENTS", map(str, tree.dependents)),
+        _table("const int MODEL_TREE_FOLLOWED", map(str, (*tree.dependents, *tree.passive))),
+        _table("const int MODEL_TREE_HELD", map(str, tree.held)),
+        _numbers("MODEL_TREE_UNITS", (1 / unit for unit in tree.units)),
     ]
 
 

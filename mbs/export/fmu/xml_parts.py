@@ -2,13 +2,13 @@
 
 import math
 import re
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
 from mbs.export.fmu.description import Entry, FmuModel, State
-from mbs.export.fmu.linearity import DependencyKind
+from mbs.export.fmu.linearity import KINDS, DependencyKind
 from mbs.units import UNITS
 from mbs.version import __version__
 
@@ -22,6 +22,8 @@ _INITIAL = {
     "mode": "calculated",
     "dependent": "approx",
     "indicator": "calculated",
+    "rate": "calculated",
+    "chart": "calculated",
 }
 _STARTS = ("state", "input", "parameter", "dependent")
 _PART = r"([A-Za-z_]\w*|'[^'\\]+')(\[\d+(,\d+)*\])?"
@@ -64,7 +66,7 @@ class Structure:
 
 def structure(model: FmuModel) -> Structure:
     """The structure of a model."""
-    n, found = len(model.states), dependencies(model)
+    found = dependencies(model)
     modes = range(model.first("mode"), model.first("dependent"))
     places = enumerate(model.parameters, start=model.first("parameter"))
     frozen = {*modes, *(ref for ref, parameter in places if parameter.fixed)}
@@ -73,18 +75,33 @@ def structure(model: FmuModel) -> Structure:
     }
     shown = [k for k, state in enumerate(model.states) if state.output]
     running |= dict.fromkeys(modes, _NOTHING)
-    running.update({k: {k: "constant"} for k in shown})
+    reset = [k for k, known in found.jumping.items() if dict(known) != {k: "constant"}]
+    if model.followed:
+        reset = list(model.derived.values())
+        running = {ref: _through_all(known, reset) for ref, known in running.items()}
+        moving = [*reset, *(ref for ref in range(model.first("parameter"), modes.start) if ref not in frozen)]
+        running[model.first("chart")] = dict.fromkeys(sorted(moving), KINDS[-1])
+    running.update({k: {k: "constant"} for k in (*shown, *model.derived.values())})
     calculated = [*range(model.first("output"), model.first("parameter")), *modes]
-    derivatives = list(range(n, 2 * n))
+    derivatives = list(model.derived)
     return Structure(
         outputs=shown + calculated,
         derivatives=derivatives,
-        indicators=list(range(model.first("indicator"), len(model.entries))),
+        indicators=[
+            *range(model.first("indicator"), model.first("rate")),
+            *range(model.first("chart"), len(model.entries)),
+        ],
         initial=derivatives + calculated,
         running=running,
         starting={ref: _starting(ref, found, modes) for ref in derivatives + calculated},
-        reset=[k for k, known in found.jumping.items() if dict(known) != {k: "constant"}],
+        reset=reset,
     )
+
+
+def _through_all(known: Known, states: Iterable[int]) -> Known:
+    """Where branches of motion meet, what a state moves is moved by all states."""
+    every = dict.fromkeys(states, KINDS[-1])
+    return dict(sorted({**known, **every}.items())) if every.keys() & known.keys() else known
 
 
 def _without(references: Container[int], known: Known) -> dict[int, DependencyKind]:

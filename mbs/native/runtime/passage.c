@@ -42,6 +42,12 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define SLOW 10.0 /* tolerances that velocities may differ by in any case */
 /* Rounding of u' for accelerations of size one and sigma one: it is added to the tolerance. */
 #define NOISE 3e-16
+/* Where a guide chooses the branch: the largest move from it onto the rows [rad or m], part of its
+ * velocities by which others may differ, and the least velocity of which that is a part. On another
+ * branch velocities differ by about their own size. */
+#define REACH 0.1
+#define ASTRAY 0.1
+#define IDLE 1e-3
 /* A start in a singular configuration is seen from this far back along its velocity [rad or m], or
  * from half of it, and so on. */
 #define BACK 0.05
@@ -72,6 +78,8 @@ struct passage {
     int *orders;
     frame base, here;
     double *C;            /* (d, nq) coordinates of positions */
+    const double *guide;  /* a state near the one that is looked for, or NULL; */
+    double *guided, ahead; /* how fast its positions move, and for how long */
     double *drift;        /* (nv,) velocity of the base where rows move and u is zero */
     double *own, *trial;  /* 2 d + nz coordinates of the state and of a stage */
     double *slopes[7];    /* of them */
@@ -81,7 +89,8 @@ struct passage {
     double *K, *r, *y, *w, *G;     /* scratch */
     double *ready_x;
     double ready_time, least, sigma, most;
-    int d, ready, charted, kept, watch, singular;
+    double turned; /* how far the tangents have turned from the chart: 1 at its origin, 0 across */
+    int d, ready, charted, kept, watch, singular, lasting;
 };
 
 /* Solve L y = b, or L' y = b, in place; L (n, n) by columns. */
@@ -352,12 +361,18 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
     return 1;
 }
 
-/* Positions by tangent and curvature from the base, which choose the branch; *way: how far. */
+/* Positions by the guide, or by tangent and curvature from the base, which choose the branch; *way:
+ * how far. */
 static int predict(passage *g, double t, const double *xi, double *x, double *way) {
     const double *x0 = g->memory + BASE;
     int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, k;
     double dt = g->size.moving ? t - g->memory[BASE_TIME] : 1.0, *D = g->y, *bend = g->w;
     frame *p = &g->here;
+    if (g->guide) {
+        for (i = 0; i < nq; i++) x[i] = g->guide[i] + g->ahead * g->guided[i];
+        *way = REACH / MISS;
+        return 0;
+    }
     for (i = 0; i < nv; i++) {
         D[i] = g->size.moving ? g->drift[i] * dt : 0.0;
         for (k = 0; k < g->d; k++) D[i] += g->base.T[k * nv + i] * xi[k];
@@ -380,6 +395,18 @@ static int predict(passage *g, double t, const double *xi, double *x, double *wa
         for (j = 0; j < nv; j++) x[i] += g->base.rows.N[j * nq + i] * D[j];
     }
     return 0;
+}
+
+/* 1 where velocities are other ones than those of the guide. */
+static int astray(const passage *g, const double *v) {
+    const double *guide = g->guide + g->size.nq;
+    double speed = IDLE, miss = 0.0;
+    int i;
+    for (i = 0; i < g->size.nv; i++) {
+        speed = fmax(speed, fabs(guide[i]));
+        miss = fmax(miss, fabs(v[i] - guide[i]));
+    }
+    return !(miss < ASTRAY * speed);
 }
 
 /* The state x at the coordinates y = (xi, u, z), its slope, and that of y. */
@@ -415,9 +442,11 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     memcpy(g->K + d * d, g->w, sizeof(double) * (size_t)d);
     if (solve(g->G, d, g->K, d + 1)) return STEPPER_CHART_LEFT;
     for (k = 0; k < d * d; k++) size += g->K[k] * g->K[k];
-    if (!(TURNED * sqrt(size) < sqrt((double)(d ? d : 1)))) return STEPPER_CHART_LEFT;
+    g->turned = sqrt((double)(d ? d : 1) / size);
+    if (!(g->turned > TURNED)) return STEPPER_CHART_LEFT;
     for (k = 0; k < d; k++)
         for (i = 0; i < nv; i++) v[i] += p->T[k * nv + i] * g->K[d * d + k];
+    if (g->guide && astray(g, v)) return STEPPER_SINGULAR;
     /* accelerations: a = L^-T (f, what acts along the rows as they ask) */
     if (rows_at(g, t, x, &p->rows) ||
         g->model.forces(g->s->user, t, x, g->G, p->f, p->rate))
@@ -450,7 +479,7 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
 /* Values beside y along the motion, three on either side; 1 where one of them is not regular. */
 static int mean_of(passage *g, double t, const double *y, double apart, const double *along,
                    double shift, double *x, double *xdot, double *ydot) {
-    int n = g->s->n, d = g->d, ny = 2 * d + g->size.nz, i, j, side;
+    int n = g->s->n, d = g->d, ny = 2 * d + g->size.nz, i, j, side, status;
     double *at = g->sum, *slope = at + n, *rate = slope + n, *beside = rate + ny;
     memset(x, 0, sizeof(double) * (size_t)n);
     memset(xdot, 0, sizeof(double) * (size_t)n);
@@ -459,7 +488,10 @@ static int mean_of(passage *g, double t, const double *y, double apart, const do
         for (side = -1; side <= 1; side += 2) {
             memcpy(beside, y, sizeof(double) * (size_t)ny);
             for (i = 0; i < d; i++) beside[i] += side * j * apart * along[i];
-            if (lift(g, t + side * j * shift, beside, at, slope, rate)) return 1;
+            g->ahead = side * j * apart;
+            status = lift(g, t + side * j * shift, beside, at, slope, rate);
+            g->ahead = 0.0;
+            if (status) return 1;
             if (g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]) return 1;
             for (i = 0; i < n; i++) x[i] += MEAN[j - 1] * at[i];
             for (i = 0; i < n; i++) xdot[i] += MEAN[j - 1] * slope[i];
@@ -544,10 +576,23 @@ static int base_behind(passage *g, double t, const double *x) {
     return 1;
 }
 
+/* y = (xi, u, z) of x */
+static int coordinates_of(passage *g, double t, const double *x, double *y) {
+    int nq = g->size.nq, d = g->d, i, k;
+    if (rows_at(g, t, x, &g->here.rows)) return 1;
+    for (k = 0; k < d; k++) {
+        y[k] = 0.0;
+        for (i = 0; i < nq; i++) y[k] += g->C[i * d + k] * (x[i] - g->memory[BASE + i]);
+    }
+    coordinates(g, &g->here, x + nq, y + d);
+    memcpy(y + 2 * d, x + nq + g->size.nv, sizeof(double) * (size_t)g->size.nz);
+    return 0;
+}
+
 /* The chart at a state where it is regular, else at the last one that was; and the state in it. */
 static int prepare(passage *g, double t, const double *x) {
     double *m = g->memory, part;
-    int nq = g->size.nq, n = g->s->n, i, k, d;
+    int n = g->s->n;
     if (g->ready && t == g->ready_time && !memcmp(x, g->ready_x, sizeof(double) * (size_t)n))
         return STEPPER_OK;
     g->ready = 0;
@@ -566,14 +611,7 @@ static int prepare(passage *g, double t, const double *x) {
     }
     if (coordinates_of_base(g)) return STEPPER_SINGULAR;
     if (g->size.moving) particular(g, &g->base, g->drift);
-    d = g->d;
-    if (rows_at(g, t, x, &g->here.rows)) return STEPPER_SINGULAR;
-    for (k = 0; k < d; k++) {
-        g->own[k] = 0.0;
-        for (i = 0; i < nq; i++) g->own[k] += g->C[i * d + k] * (x[i] - m[BASE + i]);
-    }
-    coordinates(g, &g->here, x + nq, g->own + d);
-    memcpy(g->own + 2 * d, x + nq + g->size.nv, sizeof(double) * (size_t)g->size.nz);
+    if (coordinates_of(g, t, x, g->own)) return STEPPER_SINGULAR;
     memcpy(g->ready_x, x, sizeof(double) * (size_t)n);
     g->ready_time = t;
     g->ready = 1;
@@ -737,16 +775,9 @@ static int opening(stepper *s, const double *x) {
 }
 
 int passage_project(passage *g, double t, double *x) {
-    int nq = g->size.nq, d = g->d, i, k;
     double *y = g->trial, h;
     if (!g->kept || !g->ready) return 1;
-    if (rows_at(g, t, x, &g->here.rows)) return 0;
-    for (k = 0; k < d; k++) {
-        y[k] = 0.0;
-        for (i = 0; i < nq; i++) y[k] += g->C[i * d + k] * (x[i] - g->memory[BASE + i]);
-    }
-    coordinates(g, &g->here, x + nq, y + d);
-    memcpy(y + 2 * d, x + nq + g->size.nv, sizeof(double) * (size_t)g->size.nz);
+    if (coordinates_of(g, t, x, y)) return 0;
     h = stepper_last_step(g->s);
     if (!slope(g, t, y, g->at, g->full[1], g->slopes[1]) && !left_branch(g, g->at, x, h, 0.0))
         memcpy(x, g->at, sizeof(double) * (size_t)g->s->n);
@@ -759,7 +790,65 @@ void passage_start(passage *g) {
     passage_forget(g);
 }
 
-void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = 0; }
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = g->lasting = 0; }
+
+/* The chart as memory tells it. */
+static int restored(passage *g) {
+    const double *m = g->memory;
+    if (g->lasting) return 0;
+    if (evaluate(g, &g->base, m[BASE_TIME], m + BASE) || factor(g, &g->base)) return 1;
+    if (coordinates_of_base(g)) return 1;
+    g->lasting = 1;
+    return 0;
+}
+
+int passage_chart(passage *g, double t, const double *x) {
+    int status;
+    g->ready = 0;
+    status = prepare(g, t, x);
+    g->ready = 0;
+    g->lasting = !status;
+    return status;
+}
+
+int passage_state(passage *g, double t, const double *x, double *on, double *slope_there,
+                  double *turned) {
+    double largest = g->memory[SIGMA];
+    int nq = g->size.nq, nv = g->size.nv, i, j, status;
+    if (restored(g) || coordinates_of(g, t, x, g->trial)) return STEPPER_SINGULAR;
+    for (i = 0; i < nq; i++) {
+        g->guided[i] = 0.0;
+        for (j = 0; j < nv; j++) g->guided[i] += g->here.rows.N[j * nq + i] * x[nq + j];
+    }
+    g->guide = x;
+    g->sigma = HUGE_VAL;
+    status = slope(g, t, g->trial, on, slope_there, g->slopes[0]);
+    g->guide = NULL;
+    g->memory[SIGMA] = largest;
+    *turned = g->turned;
+    return status;
+}
+
+int passage_grip(passage *g, double t, const double *x, const int *held, const double *unit,
+                 double *grip) {
+    double *S = g->G, *B = g->K, most = 1.0;
+    int nv = g->size.nv, d, i, j, k;
+    if (evaluate(g, &g->here, t, x) || factor(g, &g->here)) return 1;
+    d = nv - g->here.rank;
+    for (k = 0; k < d; k++) { /* v = T S^-1 v[held], transposed */
+        for (i = 0; i < d; i++) S[i * d + k] = g->here.T[k * nv + held[i]] * unit[held[i]];
+        for (j = 0; j < nv; j++) B[j * d + k] = g->here.T[k * nv + j] * unit[j];
+    }
+    *grip = 0.0;
+    if (solve(S, d, B, nv)) return 0;
+    for (j = 0; j < nv * d; j++) most = fmax(most, fabs(B[j]));
+    *grip = isfinite(most) ? 1.0 / most : 0.0;
+    return 0;
+}
+
+double passage_regularity(passage *g, double t, const double *x) {
+    return regularity_at(g, t, x) / g->memory[LARGEST];
+}
 
 /* The next count doubles of a block, or only how many there are so far. */
 static double *take(double *block, size_t *used, size_t count) {
@@ -794,6 +883,7 @@ static size_t lay(passage *g, double *block) {
     lay_frame(&g->base, z, block, &used);
     lay_frame(&g->here, z, block, &used);
     g->C = take(block, &used, nv * nq);
+    g->guided = take(block, &used, nq);
     g->drift = take(block, &used, nv);
     g->own = take(block, &used, ny);
     g->trial = take(block, &used, ny);

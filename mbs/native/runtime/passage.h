@@ -69,6 +69,24 @@ void passage_forget(passage *g);
  * such chart, and the projection of the full step is to be used. */
 int passage_project(passage *g, double t, double *x);
 
+/* Where the steps are made by somebody else, a chart lasts from one call of passage_chart to the
+ * next; all return a status of the stepper. */
+
+/* The chart begins here. */
+int passage_chart(passage *g, double t, const double *x);
+
+/* on: the state on the rows, near x, with the coordinates that x has in the chart; its slope;
+ * *turned: how far the tangents are from those at the origin, 1 there and 0 across. */
+int passage_state(passage *g, double t, const double *x, double *on, double *slope, double *turned);
+
+/* The inverse of how fast velocities, in their units (nv,), are at most where the held ones, as
+ * many as the motion is free, have size one: zero where those determine nothing. 1: no answer. */
+int passage_grip(passage *g, double t, const double *x, const int *held, const double *unit,
+                 double *grip);
+
+/* How independent the rows are, part of the largest value so far. */
+double passage_regularity(passage *g, double t, const double *x);
+
 /* The full step evaluates its right-hand side at x. */
 void passage_look(passage *g, double t, const double *x);
 

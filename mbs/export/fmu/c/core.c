@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "charts.h"
 #include "closure.h"
 #include "guard.h"
 
@@ -134,11 +135,20 @@ core_status core_refresh(core *c) {
     int status;
     if (!c->m.stale) return CORE_OK;
 #ifdef MODEL_TREE
-    if (c->m.cosimulation && !(c->m.mode & (INSTANTIATED | INITIALIZATION))) {
+    if (ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION))) {
+        double slope[NT];
+        int i;
+        if (!c->m.cosimulation) {
+            core_status found = charts_refresh(c);
+            return found ? found : core_show(c);
+        }
         core_show_tree(c);
-        if (core_call_tree(c, v + DERIVATIVES, v + OUTPUTS))
+        memcpy(c->m.on, c->m.tree, sizeof c->m.on);
+        if (core_call_tree(c, c->m.tree, slope, v + OUTPUTS))
             return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
                                   c->m.time);
+        for (i = 0; i < NX; i++) v[DERIVATIVES + i] = slope[MODEL_TREE_STATES[i]];
+        for (i = 0; i < NF; i++) v[RATES + i] = slope[MODEL_TREE_FOLLOWED[i]];
         return core_show(c);
     }
 #endif
@@ -149,6 +159,9 @@ core_status core_refresh(core *c) {
         return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
                               c->m.time);
     memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
+#ifdef MODEL_TREE
+    charts_show_rates(c);
+#endif
     return core_show(c);
 }
 
@@ -167,7 +180,7 @@ static int allocate(core *c) {
 #endif
 #ifdef MODEL_TREE
         mbs_tree_rhs_work, mbs_tree_project_work, mbs_tree_rows_work, mbs_tree_forces_work,
-        mbs_tree_regularity_work, mbs_tree_start_work,
+        mbs_tree_regularity_work, mbs_tree_start_work, mbs_tree_rate_work,
 #endif
 #if NK > 0
         mbs_first_work, mbs_indicators_work, mbs_rates_work, mbs_jump_work,
@@ -261,9 +274,11 @@ core_status core_exit_initialization(core *c) {
     stepper_start(&c->solver, c->m.time);
     status = core_start_events(c);
 #ifdef MODEL_TREE
-    if (!status && c->m.cosimulation) status = core_start_tree(c);
-#endif
+    if (!status && ON_TREE(c)) status = c->m.cosimulation ? core_start_tree(c) : charts_start(c);
+    if (!status && !ON_TREE(c)) status = guard_restart(c);
+#else
     if (!status) status = guard_restart(c);
+#endif
     if (status) return status;
     if (!c->m.cosimulation || c->event_mode) {
         c->m.mode = EVENT;

@@ -21,13 +21,16 @@ enum {
     MODES = PARAMETERS + NP,
     DEPENDENTS = MODES + NM,
     INDICATORS = DEPENDENTS + NZ,
-    N_VALUES = INDICATORS + NK,
+    RATES = INDICATORS + NK, /* of the outputs that are states where the integrator is outside */
+    CHART = RATES + NF, /* the indicator of other coordinates */
+    N_VALUES = CHART + NC,
     TIME_REFERENCE = N_VALUES /* the independent variable, where the face has it as a variable */
 };
 
 /* What co-simulation integrates: all coordinates of the tree where they are known, else the states. */
 #ifdef MODEL_TREE
 #define NT MODEL_TREE
+#define ON_TREE(c) (MODEL_TREE_INSIDE || !(c)->m.cosimulation) /* they are what moves */
 #else
 #define NT NX
 #endif
@@ -66,6 +69,14 @@ typedef struct {
     double v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
 } core_watched;
 
+/* Which coordinates the states are read in: charts.h. */
+typedef struct {
+    int tangent; /* local tangent coordinates, of which the present tangents have turned */
+    int loose;   /* the dependent joints do not follow yet */
+    int settled; /* the coordinates of the next steps are chosen */
+    double turned, time; /* of the last accepted states */
+} core_charts;
+
 typedef struct {
     int mode, cosimulation;
     int stale;   /* the calculated values do not belong to the others any more */
@@ -84,6 +95,8 @@ typedef struct {
 #ifdef MODEL_TREE
     int loose; /* the tree is to be moved onto its rows first */
     double tree[NT], passage[PASSAGE_MEMORY(NT)];
+    core_charts charts;
+    double on[NT]; /* the states put onto the loops */
 #endif
     double solver[STEPPER_MEMORY(MOST(NX, NT))];
 } core_memory;
@@ -102,7 +115,7 @@ typedef struct {
 #ifdef MODEL_TREE
     passage *passage;
 #endif
-    double work[SOLVER_WORK(MOST(NX, NT)) + 1], event_work[EVENTS_WORK(NX, NK) + 1];
+    double work[MOST(SOLVER_WORK(NX), DOPRI5_WORK(NT)) + 1], event_work[EVENTS_WORK(NX, NK) + 1];
     double z[NZ + 1], u[NU + 1];
     const double **arg;
     double **res;
@@ -141,7 +154,7 @@ core_status core_update_discrete_states(core *c, int *changed);
 
 /* model exchange */
 core_status core_enter_continuous_mode(core *c);
-core_status core_completed_step(core *c);
+core_status core_completed_step(core *c, int *event); /* 1: event mode is to follow */
 core_status core_set_time(core *c, double time);
 core_status core_set_states(core *c, const double *x, size_t n);
 core_status core_get_states(core *c, double *x, size_t n);

@@ -1,20 +1,27 @@
 /* Directional and adjoint derivatives and those by time, exact through closed loops. */
 #include "internal.h"
 
+#include "charts.h"
+
 #include <math.h>
 #include <string.h>
 
 /* Numbers that belong to states, inputs, parameters and to what is calculated from them. */
 typedef struct {
     double dt, dx[NX + 1], du[NU + 1], dp[NP + 1];
+    double df[NF + 1], drate[NF + 1]; /* states that follow, and the rates of these */
     double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
+
+/* 1 where the integrator is outside and carries the states of dependent joints too. */
+static int followed(const core *c) { return NF && !c->m.cosimulation && (c->m.mode & RUNNING); }
 
 static double *known_of(const core *c, tangents *d, unsigned ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref >= INPUTS && ref < OUTPUTS) return d->du + (ref - INPUTS);
     if (ref >= PARAMETERS && ref < MODES) return d->dp + (ref - PARAMETERS);
     if (ref == TIME_REFERENCE && c->timed) return &d->dt;
+    if (followed(c) && ref >= FOLLOWED && ref < FOLLOWED + NF) return d->df + (ref - FOLLOWED);
     return NULL;
 }
 
@@ -24,7 +31,8 @@ static double *unknown_of(tangents *d, unsigned ref) {
     if (ref >= OUTPUTS && ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
     if (ref >= MODES && ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
     if (ref >= DEPENDENTS && ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
-    if (ref >= INDICATORS && ref < N_VALUES) return d->dg + (ref - INDICATORS);
+    if (ref >= INDICATORS && ref < RATES) return d->dg + (ref - INDICATORS);
+    if (ref >= RATES && ref < CHART) return d->drate + (ref - RATES);
     return NULL;
 }
 
@@ -59,8 +67,53 @@ static core_status finite_answer(core *c, unsigned ref, double value) {
                           ref < N_VALUES ? MODEL_NAMES[ref] : "time", c->m.time);
 }
 
+#ifdef MODEL_TREE
+
+/* By differences, where the states are read in local tangent coordinates. */
+static core_status difference(core *c, tangents *d) {
+    charts_tangent along;
+    core_status status;
+    int i;
+    memset(&along, 0, sizeof along);
+    along.dt = d->dt;
+    memcpy(along.dx, d->dx, NX * sizeof(double));
+    memcpy(along.dx + NX, d->df, NF * sizeof(double));
+    memcpy(along.du, d->du, NU * sizeof(double));
+    memcpy(along.dp, d->dp, NP * sizeof(double));
+    status = charts_difference(c, &along);
+    memcpy(d->dxdot, along.dxdot, NX * sizeof(double));
+    memcpy(d->drate, along.dxdot + NX, NF * sizeof(double));
+    memcpy(d->dy, along.dy, NY * sizeof(double));
+    for (i = 0; i < NZ; i++) d->dz[i] = along.dy[FOLLOWED - OUTPUTS + i];
+    return status;
+}
+
+/* Rates of the dependent joints, by how these move. */
+static int follow(core *c, tangents *d) {
+    double dX[NT], rate[NT], moved[NT];
+    int i;
+    memset(dX, 0, sizeof dX);
+    for (i = 0; i < NX; i++) dX[MODEL_TREE_STATES[i]] = d->dx[i];
+    for (i = 0; i < NZ; i++) dX[MODEL_TREE_FOLLOWED[i]] = d->dz[i];
+    for (i = NZ; i < NF; i++) dX[MODEL_TREE_FOLLOWED[i]] = d->dy[PASSIVE_V + i - NZ];
+    c->arg[0] = c->m.on;
+    c->arg[1] = dX;
+    c->res[0] = rate;
+    c->res[1] = moved;
+    if (mbs_tree_rate(c->arg, c->res, c->iw, c->w, 0)) return 1;
+    for (i = 0; i < NZ; i++) d->drate[i] = moved[MODEL_TREE_FOLLOWED[i]];
+    for (i = NZ; i < NF; i++) d->drate[i] = d->dy[PASSIVE_A + i - NZ];
+    if (followed(c)) memcpy(d->dy + (FOLLOWED - OUTPUTS), d->df, NF * sizeof(double));
+    return 0;
+}
+
+#endif
+
 /* What moves when the seeds are moved. */
 static core_status move(core *c, tangents *d) {
+#ifdef MODEL_TREE
+    if (followed(c) && c->m.charts.tangent) return difference(c, d);
+#endif
     point(c);
     c->arg[5] = &d->dt;
     c->arg[6] = d->dx;
@@ -72,6 +125,10 @@ static core_status move(core *c, tangents *d) {
     c->res[3] = d->dg;
     if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0))
         return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+#ifdef MODEL_TREE
+    if (follow(c, d))
+        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+#endif
     return CORE_OK;
 }
 
@@ -92,6 +149,29 @@ core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
     return status;
 }
 
+#ifdef MODEL_TREE
+
+/* The seeds times what each known moves. */
+static core_status transposed(core *c, const unsigned *unknown, size_t n_unknown,
+                              const unsigned *known, size_t n_known, const double *seed,
+                              double *answer) {
+    core_status status = CORE_OK;
+    tangents d;
+    size_t i, k;
+    for (i = 0; i < n_known && !status; i++) {
+        memset(&d, 0, sizeof d);
+        *known_of(c, &d, known[i]) = 1.0;
+        status = move(c, &d);
+        answer[i] = 0.0;
+        for (k = 0; k < n_unknown && !status; k++)
+            answer[i] += seed[k] * *unknown_of(&d, unknown[k]);
+        if (!status) status = finite_answer(c, known[i], answer[i]);
+    }
+    return status;
+}
+
+#endif
+
 core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
                          const unsigned *known, size_t n_known, const double *seed,
                          double *answer) {
@@ -99,6 +179,10 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
     size_t i;
     core_status status = ready(c, unknown, n_unknown, known, n_known, seed, n_unknown);
     if (status) return status;
+#ifdef MODEL_TREE
+    (void)w, (void)g;
+    return transposed(c, unknown, n_unknown, known, n_known, seed, answer);
+#else
     memset(&w, 0, sizeof w);
     for (i = 0; i < n_unknown; i++) *unknown_of(&w, unknown[i]) += seed[i];
     point(c);
@@ -118,6 +202,7 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
         status = finite_answer(c, known[i], answer[i]);
     }
     return status;
+#endif
 }
 
 /* Inputs follow what was given of their derivatives, else they are held. */

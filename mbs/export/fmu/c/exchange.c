@@ -1,6 +1,7 @@
 /* Model exchange, where the integrator is outside; and event mode, which co-simulation has too. */
 #include "internal.h"
 
+#include "charts.h"
 #include "guard.h"
 
 #include <math.h>
@@ -12,12 +13,16 @@ core_status core_enter_event_mode(core *c) {
         return core_refuse(c, "%s: the instance was made without event mode; its events are "
                            "handled inside", c->name);
     if (!core_allowed(c, from, "entering event mode")) return CORE_ERROR;
+#ifndef MODEL_TREE
     if (!c->m.cosimulation) {
         core_status status = core_refresh(c);
         if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
         if (!status) status = guard_pass(c);
         if (status) return status;
     }
+#else
+    c->m.charts.settled = 0;
+#endif
     c->m.mode = EVENT;
     return CORE_OK;
 }
@@ -25,6 +30,9 @@ core_status core_enter_event_mode(core *c) {
 core_status core_update_discrete_states(core *c, int *changed) {
     *changed = 0;
     if (!core_allowed(c, EVENT, "updating discrete states")) return CORE_ERROR;
+#ifdef MODEL_TREE
+    if (!c->m.cosimulation) return charts_update(c, changed);
+#endif
     return core_settle(c, changed);
 }
 
@@ -32,16 +40,24 @@ core_status core_enter_continuous_mode(core *c) {
     if (!core_allowed(c, c->m.cosimulation ? 0 : EVENT, "entering continuous-time mode"))
         return CORE_ERROR;
     c->m.mode = CONTINUOUS;
+#ifdef MODEL_TREE
+    return CORE_OK;
+#else
     return guard_restart(c);
+#endif
 }
 
-core_status core_completed_step(core *c) {
-    core_status status;
+core_status core_completed_step(core *c, int *event) {
+    *event = 0;
     if (!core_allowed(c, CONTINUOUS, "completing a step")) return CORE_ERROR;
     if (!NZ && !NK) return CORE_OK;
-    status = core_arm_indicators(c);
+#ifdef MODEL_TREE
+    return charts_completed(c, event);
+#else
+    core_status status = core_arm_indicators(c);
     if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     return status ? status : guard_pass(c);
+#endif
 }
 
 core_status core_set_time(core *c, double time) {
@@ -63,46 +79,70 @@ static int counted(core *c, const void *array, size_t n, int count, const char *
 
 core_status core_set_states(core *c, const double *x, size_t n) {
     size_t i;
-    if (!core_allowed(c, CONTINUOUS, "setting the states") || !counted(c, x, n, NX, "states"))
+    if (!core_allowed(c, CONTINUOUS, "setting the states") ||
+        !counted(c, x, n, NX + NF, "states"))
         return CORE_ERROR;
     for (i = 0; i < n; i++)
         if (!isfinite(x[i]))
-            return core_refuse(c, "%s: %s = %g is not finite", c->name, MODEL_NAMES[i], x[i]);
-    if (memcmp(c->m.values + STATES, x, n * sizeof *x)) c->m.stale = 1;
-    memcpy(c->m.values + STATES, x, n * sizeof *x);
+            return core_refuse(c, "%s: %s = %g is not finite", c->name,
+                               MODEL_NAMES[i < NX ? i : FOLLOWED + i - NX], x[i]);
+    if (memcmp(c->m.values + STATES, x, NX * sizeof *x)) c->m.stale = 1;
+    memcpy(c->m.values + STATES, x, NX * sizeof *x);
+#ifdef MODEL_TREE
+    for (i = 0; i < NF; i++) {
+        double *at = c->m.tree + MODEL_TREE_FOLLOWED[i];
+        if (*at != x[NX + i]) c->m.stale = 1;
+        *at = x[NX + i];
+    }
+#endif
     return CORE_OK;
 }
 
 core_status core_get_states(core *c, double *x, size_t n) {
     if (!core_allowed(c, NOT_STEPPING, "getting the states") ||
-        !counted(c, x, n, NX, "states"))
+        !counted(c, x, n, NX + NF, "states"))
         return CORE_ERROR;
-    memcpy(x, c->m.values + STATES, n * sizeof *x);
+    memcpy(x, c->m.values + STATES, NX * sizeof *x);
+#ifdef MODEL_TREE
+    if (c->m.mode == INITIALIZATION) {
+        core_status status = core_refresh(c);
+        memcpy(x + NX, c->m.values + FOLLOWED, NF * sizeof *x);
+        return status;
+    }
+    for (n = 0; n < NF; n++) x[NX + n] = c->m.tree[MODEL_TREE_FOLLOWED[n]];
+#endif
     return CORE_OK;
 }
 
 core_status core_get_derivatives(core *c, double *xdot, size_t n) {
     core_status status;
     if (!core_allowed(c, NOT_STEPPING, "getting derivatives") ||
-        !counted(c, xdot, n, NX, "states"))
+        !counted(c, xdot, n, NX + NF, "states"))
         return CORE_ERROR;
     status = core_refresh(c);
-    memcpy(xdot, c->m.values + DERIVATIVES, n * sizeof *xdot);
+    memcpy(xdot, c->m.values + DERIVATIVES, NX * sizeof *xdot);
+    memcpy(xdot + NX, c->m.values + RATES, NF * sizeof *xdot);
     return status;
 }
 
 core_status core_get_nominals(core *c, double *nominal, size_t n) {
-    if (!counted(c, nominal, n, NX, "states")) return CORE_ERROR;
-    memcpy(nominal, MODEL_NOMINAL + STATES, n * sizeof *nominal);
+    if (!counted(c, nominal, n, NX + NF, "states")) return CORE_ERROR;
+    memcpy(nominal, MODEL_NOMINAL + STATES, NX * sizeof *nominal);
+    memcpy(nominal + NX, MODEL_NOMINAL + FOLLOWED, NF * sizeof *nominal);
     return CORE_OK;
 }
 
 core_status core_get_indicators(core *c, double *indicators, size_t n) {
     core_status status;
     if (!core_allowed(c, NOT_STEPPING, "getting event indicators") ||
-        !counted(c, indicators, n, NK, "event indicators"))
+        !counted(c, indicators, n, NK + NC, "event indicators"))
         return CORE_ERROR;
+#ifdef MODEL_TREE
+    status = charts_show_indicator(c);
+    indicators[NK] = c->m.values[CHART];
+#else
     status = core_show_indicators(c);
-    memcpy(indicators, c->m.values + INDICATORS, n * sizeof *indicators);
+#endif
+    memcpy(indicators, c->m.values + INDICATORS, NK * sizeof *indicators);
     return status;
 }

@@ -195,12 +195,16 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_before,
                                        fmi2Boolean *enter_event_mode, fmi2Boolean *terminate) {
+    core_status status;
+    int event;
     NEED(c);
     (void)no_set_before;
     if (!enter_event_mode || !terminate)
         return refused(c, "a flag of the completed step is NULL");
     *enter_event_mode = *terminate = fmi2False;
-    return as_fmi(core_completed_step(MODEL(c)));
+    status = core_completed_step(MODEL(c), &event);
+    *enter_event_mode = event != 0;
+    return as_fmi(status);
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {

@@ -78,11 +78,15 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set_before,
                                        fmi3Boolean *enter_event_mode, fmi3Boolean *terminate) {
+    core_status status;
+    int event;
     NEED(c);
     (void)no_set_before;
     if (!enter_event_mode || !terminate) return refused(c, "a flag of the step is NULL");
     *enter_event_mode = *terminate = fmi3False;
-    return as_fmi(core_completed_step(MODEL(c)));
+    status = core_completed_step(MODEL(c), &event);
+    *enter_event_mode = event != 0;
+    return as_fmi(status);
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {

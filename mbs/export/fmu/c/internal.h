@@ -40,7 +40,7 @@ void core_prepare_solver(core *c);
  * outputs there. */
 core_status core_start_tree(core *c);
 void core_show_tree(core *c);
-int core_call_tree(core *c, double *xdot, double *y);
+int core_call_tree(core *c, const double *X, double *Xdot, double *y);
 #endif
 
 /* Events: once for an instance; the modes at the start; the first look. */

@@ -113,22 +113,18 @@ void core_show_tree(core *c) {
     memcpy(c->m.posture_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
 }
 
-int core_call_tree(core *c, double *xdot, double *y) {
-    double every[NT];
-    int i;
-    core_point(c, &c->m.time, c->m.tree, c->z);
-    c->res[0] = every;
+int core_call_tree(core *c, const double *X, double *Xdot, double *y) {
+    core_point(c, &c->m.time, X, c->z);
+    c->res[0] = Xdot;
     c->res[1] = y;
-    if (mbs_tree_rhs(c->arg, c->res, c->iw, c->w, 0)) return 1;
-    for (i = 0; i < NX; i++) xdot[i] = every[MODEL_TREE_STATES[i]];
-    return 0;
+    return mbs_tree_rhs(c->arg, c->res, c->iw, c->w, 0);
 }
 
 #endif
 
 int core_init_solver(core *c) {
 #ifdef MODEL_TREE
-    if (c->m.cosimulation) return init_tree(c);
+    if (ON_TREE(c)) return init_tree(c);
 #endif
 #if defined MODEL_RODAS
     rodas_init(&c->solver, NX, rhs, jacobian, c, c->m.solver, c->work);

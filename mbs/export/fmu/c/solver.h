@@ -2,6 +2,7 @@
 #ifndef MBS_SOLVER_H
 #define MBS_SOLVER_H
 
+#include "dopri5.h"
 #include "events.h"
 #include "passage.h"
 #include "model.h"
@@ -13,7 +14,6 @@
 #include "rk4.h"
 #define SOLVER_WORK RK4_WORK
 #else
-#include "dopri5.h"
 #define SOLVER_WORK DOPRI5_WORK
 #endif
 

@@ -214,8 +214,6 @@ void core_restart(core *c) {
 #endif
 }
 
-#ifndef MODEL_TREE
-
 /* The dependent coordinates are at hand where a step ends with an evaluation at its end. */
 static core_status accept_end(core *c, const double *x) {
 #ifdef MODEL_RODAS
@@ -226,11 +224,9 @@ static core_status accept_end(core *c, const double *x) {
 #endif
 }
 
-#endif
-
 #ifdef MODEL_TREE
 
-core_status core_step(core *c, double limit) {
+static core_status tree_step(core *c, double limit) {
     int status = 0;
     if (c->m.loose) status = c->solver.project(c, c->m.time, c->m.tree);
     if (status) return step_failed(c, STEPPER_PROJECTION_FAILED);
@@ -242,11 +238,15 @@ core_status core_step(core *c, double limit) {
     return status ? step_failed(c, status) : CORE_OK;
 }
 
-#else
+#endif
 
 core_status core_step(core *c, double limit) {
     double *x = c->m.values + STATES;
-    int status = c->m.watched.on ? 0 : guard_restart(c);
+    int status;
+#ifdef MODEL_TREE
+    if (ON_TREE(c)) return tree_step(c, limit);
+#endif
+    status = c->m.watched.on ? 0 : guard_restart(c);
     if (status) return status;
     status = stepper_step(&c->solver, x, limit);
     c->m.time = stepper_time(&c->solver);
@@ -254,8 +254,6 @@ core_status core_step(core *c, double limit) {
     status = status ? (int)step_failed(c, status) : (int)accept_end(c, x);
     return status ? (core_status)status : guard_pass(c);
 }
-
-#endif
 
 int core_pending(const core *c) {
     (void)c;

@@ -1,6 +1,8 @@
 /* Values by their references. */
 #include "internal.h"
 
+#include "charts.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -94,6 +96,9 @@ core_status core_set(core *c, const unsigned *ref, size_t n, const double *value
         } else if (c->m.values[ref[i]] != values[i]) {
             c->m.values[ref[i]] = values[i];
             changed(c);
+#ifdef MODEL_TREE
+            if (ref[i] < INPUTS || ref[i] >= PARAMETERS) charts_set(c);
+#endif
         }
     }
     return CORE_OK;

@@ -1,19 +1,13 @@
 """FMUs whose states lose their hold on the dependent coordinates say so, and never leap."""
 
-from ctypes import POINTER, c_double
-
 import casadi as ca
-import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi2 import FMU2Slave
 from fmu_instances import Fmu
 
-import mbs
-from mbs.errors import SolverError
 from mbs.export.fmu.description import FmuModel, State, Variable
 from mbs.export.fmu.pack import write_fmu
-from mbs.simulate.fmu import fmu
 
 
 def bent(change, rows=None):
@@ -58,30 +52,3 @@ def test_a_kink_of_velocities_stops_the_motion(change, stops, tmp_path):
 
 def test_a_determinant_that_changes_its_sign_stops_the_motion(tmp_path):
     assert 0.5 <= stepped(bent(0.0, lambda x: 0.5 - x), tmp_path) < 0.8
-
-
-@pytest.fixture(scope="module")
-def parallelogram(tmp_path_factory):
-    system = mbs.robots.n_four_bar().assemble(active=["a0"])
-    folder = tmp_path_factory.mktemp("parallelogram")
-    return {
-        fmi: mbs.export.fmu(system, folder / f"{fmi[0]}.fmu", fmi=fmi, outputs=["energy"])
-        for fmi in ("2.0", "3.0")
-    }
-
-
-@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
-@pytest.mark.parametrize("speed", [-3.1, -1.0, 0.7, 4.3])
-def test_a_parallelogram_does_not_leap_where_the_host_integrates(parallelogram, fmi, speed):
-    with pytest.raises(SolverError, match="singular configuration"):
-        fmu(parallelogram[fmi], 3.0, start={"a0.v": speed}, kind="ModelExchange", tolerance=1e-6)
-
-
-def test_a_host_that_steps_over_is_told(parallelogram, tmp_path):
-    made = Fmu(parallelogram["2.0"], tmp_path)
-    instance = made.open(FMU2Model, start={"a0.q": np.pi - 0.2, "a0.v": 1.0})
-    instance.setTime(0.4)
-    instance.setContinuousStates(np.array([np.pi + 0.2, 1.0]).ctypes.data_as(POINTER(c_double)), 2)
-    with pytest.raises(FMICallException):
-        instance.completedIntegratorStep()
-    instance.freeInstance()

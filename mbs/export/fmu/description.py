@@ -15,8 +15,16 @@ from mbs.models.tree_state import TreeState
 _RATE = {**RATE_UNIT, **ACCELERATION_UNIT}
 Solver = Literal["dopri5", "rodas", "rk4"]
 Kind = Literal[
-    "state", "derivative", "input", "output", "parameter", "mode", "dependent", "indicator", "rate",
-    "chart"
+    "state",
+    "derivative",
+    "input",
+    "output",
+    "parameter",
+    "mode",
+    "dependent",
+    "indicator",
+    "rate",
+    "chart",
 ]
 
 
@@ -194,8 +202,11 @@ class FmuModel:
 
     @property
     def followed(self) -> range:
-        """Outputs that are states where the integrator is outside: positions and velocities of
-        dependent joints, which tell the branch of motion where the states do not."""
+        """Outputs that are states too where the integrator is outside.
+
+        Positions and velocities of dependent joints: they tell the branch of motion where those of
+        the independent ones do not.
+        """
         if self.tree is None:
             return range(0)
         first = self.passive[0]

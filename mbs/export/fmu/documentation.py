@@ -58,6 +58,8 @@ _GROUPS: tuple[tuple[Kind, str], ...] = (
     ("dependent", "Positions that the loops determine; the start values choose the branch"),
     ("indicator", "Event indicators"),
     ("derivative", "Derivatives of the states"),
+    ("rate", "Derivatives of the states that follow, in Model Exchange"),
+    ("chart", "Indicator of other coordinates, in Model Exchange"),
 )
 _WITH_START = ("input", "state", "parameter", "dependent")
 _FUNCTIONS = {

@@ -56,8 +56,10 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
 
 
 def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
-    """`mbs_tree_..(t, X, z, u, p)` of the tree, z ignored, `mbs_tree_start(t, x, z, u, p)`, and
-    `mbs_tree_rate(X, dX) -> (q', how it changes)`."""
+    """The functions `mbs_tree_..(t, X, z, u, p)` of the tree, z ignored.
+
+    Beside them `mbs_tree_start(t, x, z, u, p)` and `mbs_tree_rate(X, dX) -> (q', how it changes)`.
+    """
     t, X, x, z, u, p = symbols
     through = tree.passage
     named = {

@@ -79,7 +79,10 @@ def structure(model: FmuModel) -> Structure:
     if model.followed:
         reset = list(model.derived.values())
         running = {ref: _through_all(known, reset) for ref, known in running.items()}
-        moving = [*reset, *(ref for ref in range(model.first("parameter"), modes.start) if ref not in frozen)]
+        moving = [
+            *reset,
+            *(ref for ref in range(model.first("parameter"), modes.start) if ref not in frozen),
+        ]
         running[model.first("chart")] = dict.fromkeys(sorted(moving), KINDS[-1])
     running.update({k: {k: "constant"} for k in (*shown, *model.derived.values())})
     calculated = [*range(model.first("output"), model.first("parameter")), *modes]

@@ -86,11 +86,14 @@ static int put_on(core *c, double *on, double *slope, double *y) {
 
 core_status charts_refresh(core *c) {
     double *v = c->m.values, slope[NT], y[NY + 1];
+    char where[CORE_WHERE];
     int i;
     gather(c);
     if (put_on(c, c->m.on, slope, y))
-        return core_no_answer(c, "%s: the states do not lead to closed loops at time %.9g; start "
-                              "elsewhere or make shorter steps", c->name, c->m.time);
+        return core_no_answer(c, "%s: at time %.9g the states (%s) are too far from closed loops, or "
+                              "in a singular configuration that the motion does not pass; ask for "
+                              "a smaller tolerance or start elsewhere", c->name, c->m.time,
+                              core_where(c, where));
     memcpy(v + OUTPUTS, y, NY * sizeof *v);
     for (i = 0; i < NX; i++) v[DERIVATIVES + i] = slope[MODEL_TREE_STATES[i]];
     for (i = 0; i < NZ; i++) v[DEPENDENTS + i] = c->m.on[MODEL_TREE_DEPENDENTS[i]];
@@ -112,13 +115,14 @@ static double room(core *c, const double *on) {
 /* The coordinates of the next steps, which begin where the states are. */
 static core_status choose(core *c, double least) {
     core_charts *m = &c->m.charts;
+    char where[CORE_WHERE];
     c->m.stale = 1;
     m->time = c->m.time;
     m->tangent = !(room(c, c->m.tree) > least);
     if (!m->tangent || !passage_chart(c->passage, c->m.time, c->m.tree)) return CORE_OK;
-    return core_no_answer(c, "%s: the motion is in a singular configuration at time %.9g, and its "
-                          "velocities choose no branch of motion; start elsewhere", c->name,
-                          c->m.time);
+    return core_no_answer(c, "%s: at time %.9g the motion is in a singular configuration (%s), and "
+                          "its velocities choose no branch; start elsewhere", c->name, c->m.time,
+                          core_where(c, where));
 }
 
 core_status charts_start(core *c) {
@@ -129,9 +133,10 @@ core_status charts_start(core *c) {
 void charts_set(core *c) { c->m.charts.loose = (c->m.mode & EVENT) != 0; }
 
 static core_status left(core *c) {
-    return core_refuse(c, "%s: between time %.9g and %.9g the states leave the branch of the motion "
-                       "near a singular configuration; make shorter steps or ask for a smaller "
-                       "tolerance", c->name, c->m.charts.time, c->m.time);
+    char where[CORE_WHERE];
+    return core_refuse(c, "%s: between time %.9g and %.9g the states (at the end %s) leave the motion "
+                       "that the loops allow; ask for a smaller tolerance or make shorter steps",
+                       c->name, c->m.charts.time, c->m.time, core_where(c, where));
 }
 
 /* How far the states are off the loops. */

@@ -79,6 +79,16 @@ int core_allowed(core *c, int modes, const char *action) {
     return 0;
 }
 
+const char *core_where(const core *c, char *where) {
+    size_t used = 0;
+    int i;
+    where[0] = 0;
+    for (i = 0; i < NX && used < CORE_WHERE; i++)
+        used += (size_t)snprintf(where + used, CORE_WHERE - used, "%s%s = %.6g", used ? ", " : "",
+                                 MODEL_NAMES[STATES + i], c->m.values[STATES + i]);
+    return where;
+}
+
 void core_point(core *c, const double *t, const double *x, const double *z) {
     c->arg[0] = t;
     c->arg[1] = x;

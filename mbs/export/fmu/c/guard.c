@@ -1,7 +1,6 @@
 #include "guard.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "closure.h"
@@ -54,17 +53,12 @@ static int signs(core *c, const double *x, const double *z, double *sign) {
 }
 
 static core_status passed(core *c) {
-    char where[512] = "";
-    size_t used = 0;
-    int i;
-    for (i = 0; i < NX && used < sizeof where; i++)
-        used += (size_t)snprintf(where + used, sizeof where - used, "%s%s = %.6g",
-                                 used ? ", " : "", MODEL_NAMES[STATES + i], c->m.values[STATES + i]);
+    char where[CORE_WHERE];
     return core_refuse(
         c, "%s: between time %.9g and %.9g the motion comes to a singular configuration, where the "
            "states do not determine the dependent coordinates (at its end %s); choose other "
            "independent joints (assemble(active=...)), start elsewhere, or end the run before",
-        c->name, c->m.watched.time, c->m.time, where);
+        c->name, c->m.watched.time, c->m.time, core_where(c, where));
 }
 
 /* The signs, velocities and accelerations at the present time. */

@@ -14,6 +14,10 @@ const char *core_mode_name(int mode);
 /* A message, and the status of an evaluation that has no answer. */
 core_status core_no_answer(core *c, const char *format, ...);
 
+/* The states in words, in the array. */
+#define CORE_WHERE 512
+const char *core_where(const core *c, char *where);
+
 /* Make derivatives, outputs and dependents belong to time, states, inputs and parameters. */
 core_status core_refresh(core *c);
 

@@ -44,25 +44,12 @@ def dependencies(model: FmuModel) -> Dependencies:
     """
     through = _through_loops(model)
     running = _rows(model, model.rhs, ("derivative", "output"), through)
-    running |= _of_followed(model, running)
     if model.jumps is None:
         return Dependencies(running, {}, {})
     running |= _rows(model, model.jumps.indicators, ("indicator",), through)
     first = _rows(model, model.jumps.first, ("mode",), through)
     jumping = _rows(model, model.jumps.jump, ("state",), through)
     return Dependencies(running, first, jumping)
-
-
-def _of_followed(model: FmuModel, running: Mapping[int, Known]) -> dict[int, Known]:
-    """Rates of positions and velocities of dependent joints, by velocities and accelerations."""
-    output, rate = model.first("output"), model.first("rate")
-    velocity, acceleration, count = model.passive
-    moved: dict[int, DependencyKind] = {}
-    for k in range(count):
-        moved |= running[output + velocity + k]
-    known = [dict(sorted(moved.items()))] * (len(model.followed) - count)
-    known += [dict(running[output + acceleration + k]) for k in range(count)]
-    return {rate + k: row for k, row in enumerate(known[: len(model.followed)])}
 
 
 def _rows(

@@ -7,12 +7,10 @@ from typing import Literal
 
 import casadi
 
-from mbs.assembly.tables import ACCELERATION_UNIT, RATE_UNIT
 from mbs.export.fmu.about import About
 from mbs.export.fmu.description_checks import check
 from mbs.models.tree_state import TreeState
 
-_RATE = {**RATE_UNIT, **ACCELERATION_UNIT}
 Solver = Literal["dopri5", "rodas", "rk4"]
 Kind = Literal[
     "state",
@@ -23,6 +21,7 @@ Kind = Literal[
     "mode",
     "dependent",
     "indicator",
+    "slot",
     "rate",
     "chart",
 ]
@@ -201,16 +200,24 @@ class FmuModel:
         check(self)
 
     @property
-    def followed(self) -> range:
-        """Outputs that are states too where the integrator is outside.
+    def slots(self) -> tuple[State, ...]:
+        """The states where the integrator is outside and loops are closed.
 
-        Positions and velocities of dependent joints: they tell the branch of motion where those of
-        the independent ones do not.
+        They are the states of the independent joints but near singular configurations, so joints
+        are outputs and no states there; see charts.h.
         """
         if self.tree is None:
-            return range(0)
-        first = self.passive[0]
-        return range(first - len(self.dependents), first + self.passive[2])
+            return ()
+        text = "{}, or near singular configurations a coordinate along the motion"
+        return tuple(
+            State(
+                name=f"state[{k}]",
+                start=state.start,
+                nominal=state.nominal,
+                description=text.format(state.name),
+            )
+            for k, state in enumerate(self.states, start=1)
+        )
 
     @property
     def identifier(self) -> str:
@@ -231,9 +238,10 @@ class FmuModel:
     @property
     def derived(self) -> dict[int, int]:
         """Value references of the derivatives of states to those of the states."""
-        n, output, rate = len(self.states), self.first("output"), self.first("rate")
-        own = {n + k: k for k in range(n)}
-        return own | {rate + k: output + state for k, state in enumerate(self.followed)}
+        state, rate = self.first("state"), self.first("derivative")
+        if self.slots:
+            state, rate = self.first("slot"), self.first("rate")
+        return {rate + k: state + k for k in range(len(self.states))}
 
     def first(self, kind: Kind) -> int:
         """Value reference of the first variable of a kind.
@@ -253,7 +261,8 @@ class FmuModel:
             ("mode", len(self.modes)),
             ("dependent", len(self.dependents)),
             ("indicator", len(self.jumps.names) if self.jumps else 0),
-            ("rate", len(self.followed)),
+            ("slot", len(self.slots)),
+            ("rate", len(self.slots)),
             ("chart", int(self.tree is not None)),
         )
         place = 0
@@ -291,10 +300,8 @@ def _entries(model: FmuModel) -> Iterator[Entry]:
     for name in model.jumps.names if model.jumps else ():
         text = f"positive between events: {name}"
         yield Entry("indicator", Variable(name=f"indicator.{name}", description=text))
-    for k in model.followed:
-        v = model.outputs[k]
-        text = f"derivative of {v.name}"
-        yield Entry("rate", Variable(name=f"der({v.name})", unit=_RATE[v.unit], description=text))
+    yield from (Entry("slot", v) for v in model.slots)
+    yield from (Entry("rate", derivative_of(v)) for v in model.slots)
     if model.tree is not None:
-        text = "positive while the coordinates serve in which the states are read"
+        text = "positive while the present states serve"
         yield Entry("chart", Variable(name="indicator.coordinates", description=text))

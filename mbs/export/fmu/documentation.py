@@ -58,8 +58,9 @@ _GROUPS: tuple[tuple[Kind, str], ...] = (
     ("dependent", "Positions that the loops determine; the start values choose the branch"),
     ("indicator", "Event indicators"),
     ("derivative", "Derivatives of the states"),
-    ("rate", "Derivatives of the states that follow, in Model Exchange"),
-    ("chart", "Indicator of other coordinates, in Model Exchange"),
+    ("slot", "States in Model Exchange"),
+    ("rate", "Their derivatives"),
+    ("chart", "Indicator that asks for other states"),
 )
 _WITH_START = ("input", "state", "parameter", "dependent")
 _FUNCTIONS = {

@@ -41,9 +41,8 @@ _HEADER = """\
 #define PASSIVE_V {passive_v}
 #define PASSIVE_A {passive_a}
 #define N_PASSIVE {n_passive}
-#define NF {nf}
+#define NS {ns}
 #define NC {nc}
-#define FOLLOWED {followed}
 {solver}
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
@@ -96,9 +95,8 @@ def header(model: FmuModel, guid: str) -> str:
         passive_v=model.passive[0],
         passive_a=model.passive[1],
         n_passive=model.passive[2],
-        nf=len(model.followed),
+        ns=len(model.slots),
         nc=int(model.tree is not None),
-        followed=model.first("output") + model.passive[0] - len(model.dependents),
         solver=solver + ("" if tree is None else _tree_sizes(tree, model.solver == "dopri5")),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
@@ -148,9 +146,9 @@ def _tree_sizes(tree: TreeState, inside: bool) -> str:
         f"#define MODEL_TREE_INSIDE {int(inside)} /* co-simulation integrates them */\n"
         f"#define MODEL_PASSAGE {{{sizes}}}\n"
         f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
-        "/* where states, dependents and followed states stand in it, and the independent joints\n"
-        " * among its velocities; typical sizes of these */\n"
-        "extern const int MODEL_TREE_STATES[], MODEL_TREE_DEPENDENTS[], MODEL_TREE_FOLLOWED[];\n"
+        "/* where states, dependents and velocities of dependent joints stand in it, and the\n"
+        " * independent joints among its velocities; typical sizes of these */\n"
+        "extern const int MODEL_TREE_STATES[], MODEL_TREE_DEPENDENTS[], MODEL_TREE_PASSIVE[];\n"
         "extern const int MODEL_TREE_HELD[];\n"
         "extern const double MODEL_TREE_UNITS[];\n"
     )
@@ -163,7 +161,7 @@ def _tree_tables(model: FmuModel) -> list[str]:
     return [
         _table("const int MODEL_TREE_STATES", map(str, tree.states)),
         _table("const int MODEL_TREE_DEPENDENTS", map(str, tree.dependents)),
-        _table("const int MODEL_TREE_FOLLOWED", map(str, (*tree.dependents, *tree.passive))),
+        _table("const int MODEL_TREE_PASSIVE", map(str, tree.passive)),
         _table("const int MODEL_TREE_HELD", map(str, tree.held)),
         _numbers("MODEL_TREE_UNITS", (1 / unit for unit in tree.units)),
     ]

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -22,10 +22,11 @@ _INITIAL = {
     "mode": "calculated",
     "dependent": "approx",
     "indicator": "calculated",
+    "slot": "exact",
     "rate": "calculated",
     "chart": "calculated",
 }
-_STARTS = ("state", "input", "parameter", "dependent")
+_STARTS = ("state", "input", "parameter", "dependent", "slot")
 _PART = r"([A-Za-z_]\w*|'[^'\\]+')(\[\d+(,\d+)*\])?"
 _PATH = rf"{_PART}(\.{_PART})*"
 _STRUCTURED = re.compile(rf"{_PATH}|der\({_PATH}(,\d+)?\)", re.ASCII)
@@ -76,44 +77,55 @@ def structure(model: FmuModel) -> Structure:
     shown = [k for k, state in enumerate(model.states) if state.output]
     running |= dict.fromkeys(modes, _NOTHING)
     reset = [k for k, known in found.jumping.items() if dict(known) != {k: "constant"}]
-    if model.followed:
+    running.update({k: {k: "constant"} for k in shown})
+    starting = dict(found.running)
+    if model.slots:
         reset = list(model.derived.values())
-        running = {ref: _through_all(known, reset) for ref, known in running.items()}
-        moving = [
-            *reset,
-            *(ref for ref in range(model.first("parameter"), modes.start) if ref not in frozen),
-        ]
-        running[model.first("chart")] = dict.fromkeys(sorted(moving), KINDS[-1])
-    running.update({k: {k: "constant"} for k in (*shown, *model.derived.values())})
+        running |= _by_joints(model, running)
+        running = {ref: _through_all(model, known) for ref, known in running.items()}
+        starting |= _by_joints(model, found.running)
     calculated = [*range(model.first("output"), model.first("parameter")), *modes]
     derivatives = list(model.derived)
     return Structure(
         outputs=shown + calculated,
         derivatives=derivatives,
         indicators=[
-            *range(model.first("indicator"), model.first("rate")),
+            *range(model.first("indicator"), model.first("slot")),
             *range(model.first("chart"), len(model.entries)),
         ],
         initial=derivatives + calculated,
         running=running,
-        starting={ref: _starting(ref, found, modes) for ref in derivatives + calculated},
+        starting={
+            ref: _starting(found.first.get(ref) or starting.get(ref, {}), found, modes)
+            for ref in derivatives + calculated
+        },
         reset=reset,
     )
 
 
-def _through_all(known: Known, states: Iterable[int]) -> Known:
-    """Where branches of motion meet, what a state moves is moved by all states."""
-    every = dict.fromkeys(states, KINDS[-1])
-    return dict(sorted({**known, **every}.items())) if every.keys() & known.keys() else known
+def _by_joints(model: FmuModel, running: Mapping[int, Known]) -> dict[int, Known]:
+    """Of derivatives of the states and of their indicator: all that moves derivatives of joints."""
+    n, every = len(model.states), dict[int, DependencyKind]()
+    for known in (running[n + k] for k in range(n)):
+        every |= dict.fromkeys(known, KINDS[-1])
+    return {ref: every for ref in (*model.derived, model.first("chart"))}
+
+
+def _through_all(model: FmuModel, known: Known) -> Known:
+    """Near singular configurations every state moves what one of the joints moves."""
+    states, slots = range(len(model.states)), model.derived.values()
+    if not any(ref in states for ref in known):
+        return known
+    rest = {ref: kind for ref, kind in known.items() if ref not in states}
+    return dict(sorted((rest | dict.fromkeys(slots, KINDS[-1])).items()))
 
 
 def _without(references: Container[int], known: Known) -> dict[int, DependencyKind]:
     return {ref: kind for ref, kind in known.items() if ref not in references}
 
 
-def _starting(reference: int, found: Dependencies, modes: range) -> Known:
+def _starting(known: Known, found: Dependencies, modes: range) -> Known:
     """What a value depends on at the start, where modes stand for what finds them."""
-    known = found.first.get(reference) or found.running.get(reference, {})
     direct: dict[int, DependencyKind] = {
         ref: "constant" if kind == "constant" else "dependent"
         for ref, kind in known.items()

@@ -811,18 +811,22 @@ int passage_chart(passage *g, double t, const double *x) {
     return status;
 }
 
-int passage_state(passage *g, double t, const double *x, double *on, double *slope_there,
-                  double *turned) {
+int passage_coordinates(passage *g, double t, const double *x, double *y) {
+    return restored(g) || coordinates_of(g, t, x, y) ? STEPPER_SINGULAR : STEPPER_OK;
+}
+
+int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
+                  double *slope_x, double *slope_y, double *turned) {
     double largest = g->memory[SIGMA];
     int nq = g->size.nq, nv = g->size.nv, i, j, status;
-    if (restored(g) || coordinates_of(g, t, x, g->trial)) return STEPPER_SINGULAR;
+    if (restored(g) || rows_at(g, t, guide, &g->here.rows)) return STEPPER_SINGULAR;
     for (i = 0; i < nq; i++) {
         g->guided[i] = 0.0;
-        for (j = 0; j < nv; j++) g->guided[i] += g->here.rows.N[j * nq + i] * x[nq + j];
+        for (j = 0; j < nv; j++) g->guided[i] += g->here.rows.N[j * nq + i] * guide[nq + j];
     }
-    g->guide = x;
+    g->guide = guide;
     g->sigma = HUGE_VAL;
-    status = slope(g, t, g->trial, on, slope_there, g->slopes[0]);
+    status = slope(g, t, y, x, slope_x, slope_y);
     g->guide = NULL;
     g->memory[SIGMA] = largest;
     *turned = g->turned;

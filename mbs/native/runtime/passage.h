@@ -75,9 +75,13 @@ int passage_project(passage *g, double t, double *x);
 /* The chart begins here. */
 int passage_chart(passage *g, double t, const double *x);
 
-/* on: the state on the rows, near x, with the coordinates that x has in the chart; its slope;
- * *turned: how far the tangents are from those at the origin, 1 there and 0 across. */
-int passage_state(passage *g, double t, const double *x, double *on, double *slope, double *turned);
+/* y = (xi, u, z), the coordinates of x in the chart. */
+int passage_coordinates(passage *g, double t, const double *x, double *y);
+
+/* The state x on the rows at the coordinates y, on the branch of a state guide near it; the slopes of
+ * x and y; *turned: how far the tangents are from those at the origin, 1 there and 0 across. */
+int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
+                  double *slope_x, double *slope_y, double *turned);
 
 /* The inverse of how fast velocities, in their units (nv,), are at most where the held ones, as
  * many as the motion is free, have size one: zero where those determine nothing. 1: no answer. */

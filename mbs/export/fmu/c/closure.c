@@ -62,8 +62,6 @@ static int newton(core *c, const double *x, double *z, double reach) {
     return CLOSURE_OPEN;
 }
 
-int closure_near(core *c, const double *x, double *z) { return newton(c, x, z, REACH); }
-
 /* From the accepted posture to x in one go, or along a straight line in shorter ones. */
 int closure_solve(core *c, const double *x, double *z) {
     const double *from = c->m.posture_x;
@@ -176,11 +174,6 @@ int closure_singular(core *c, const double *x, const double *z) {
 #else
 
 int closure_solve(core *c, const double *x, double *z) {
-    (void)c, (void)x, (void)z;
-    return CLOSURE_OK;
-}
-
-int closure_near(core *c, const double *x, double *z) {
     (void)c, (void)x, (void)z;
     return CLOSURE_OK;
 }

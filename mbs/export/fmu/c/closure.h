@@ -9,9 +9,6 @@ enum { CLOSURE_OK, CLOSURE_OPEN, CLOSURE_SINGULAR };
 /* z of the posture x, on the branch of the last accepted posture. */
 int closure_solve(core *c, const double *x, double *z);
 
-/* z of the posture x, by Newton steps from z alone. */
-int closure_near(core *c, const double *x, double *z);
-
 /* The first posture of a run: from the guesses, by way of the start values of the states. */
 int closure_start(core *c, const double *x, double *z);
 

@@ -153,12 +153,12 @@ core_status core_refresh(core *c) {
             return found ? found : core_show(c);
         }
         core_show_tree(c);
-        memcpy(c->m.on, c->m.tree, sizeof c->m.on);
         if (core_call_tree(c, c->m.tree, slope, v + OUTPUTS))
             return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
                                   c->m.time);
         for (i = 0; i < NX; i++) v[DERIVATIVES + i] = slope[MODEL_TREE_STATES[i]];
-        for (i = 0; i < NF; i++) v[RATES + i] = slope[MODEL_TREE_FOLLOWED[i]];
+        memcpy(v + SLOTS, v + STATES, NX * sizeof *v);
+        memcpy(v + RATES, v + DERIVATIVES, NX * sizeof *v);
         return core_show(c);
     }
 #endif
@@ -170,7 +170,8 @@ core_status core_refresh(core *c) {
                               c->m.time);
     memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
 #ifdef MODEL_TREE
-    charts_show_rates(c);
+    memcpy(v + SLOTS, v + STATES, NX * sizeof *v);
+    memcpy(v + RATES, v + DERIVATIVES, NX * sizeof *v);
 #endif
     return core_show(c);
 }
@@ -285,7 +286,7 @@ core_status core_exit_initialization(core *c) {
     status = core_start_events(c);
 #ifdef MODEL_TREE
     if (!status && ON_TREE(c)) status = c->m.cosimulation ? core_start_tree(c) : charts_start(c);
-    if (!status && !ON_TREE(c)) status = guard_restart(c);
+    if (!status && (!ON_TREE(c) || !c->m.cosimulation)) status = guard_restart(c);
 #else
     if (!status) status = guard_restart(c);
 #endif

@@ -21,11 +21,19 @@ enum {
     MODES = PARAMETERS + NP,
     DEPENDENTS = MODES + NM,
     INDICATORS = DEPENDENTS + NZ,
-    RATES = INDICATORS + NK, /* of the outputs that are states where the integrator is outside */
-    CHART = RATES + NF, /* the indicator of other coordinates */
+    SLOTS = INDICATORS + NK, /* the states where the integrator is outside and loops are closed, */
+    RATES = SLOTS + NS,      /* their derivatives, */
+    CHART = RATES + NS,      /* and the indicator of other coordinates: charts.h */
     N_VALUES = CHART + NC,
     TIME_REFERENCE = N_VALUES /* the independent variable, where the face has it as a variable */
 };
+
+/* The states, and their derivatives, where the integrator is outside. */
+#ifdef MODEL_TREE
+enum { OUTSIDE = SLOTS, OUTSIDE_RATES = RATES };
+#else
+enum { OUTSIDE = STATES, OUTSIDE_RATES = DERIVATIVES };
+#endif
 
 /* What co-simulation integrates: all coordinates of the tree where they are known, else the states. */
 #ifdef MODEL_TREE
@@ -69,13 +77,16 @@ typedef struct {
     double v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
 } core_watched;
 
+#ifdef MODEL_TREE
 /* Which coordinates the states are read in: charts.h. */
 typedef struct {
-    int tangent; /* local tangent coordinates, of which the present tangents have turned */
-    int loose;   /* the dependent joints do not follow yet */
-    int settled; /* the coordinates of the next steps are chosen */
-    double turned, time; /* of the last accepted states */
+    int tangent;   /* local tangent coordinates */
+    int loose;     /* joints were set: they are to be the states again */
+    int settled;   /* the coordinates of the next steps are chosen */
+    double turned; /* how far the tangents are from those of the chart */
+    double time, X[NT], slope[NT]; /* of the last states that were on the motion */
 } core_charts;
+#endif
 
 typedef struct {
     int mode, cosimulation;
@@ -95,8 +106,8 @@ typedef struct {
 #ifdef MODEL_TREE
     int loose; /* the tree is to be moved onto its rows first */
     double tree[NT], passage[PASSAGE_MEMORY(NT)];
+    double slope[NT]; /* of it, where the integrator is outside */
     core_charts charts;
-    double on[NT]; /* the states put onto the loops */
 #endif
     double solver[STEPPER_MEMORY(MOST(NX, NT))];
 } core_memory;

@@ -9,19 +9,26 @@
 /* Numbers that belong to states, inputs, parameters and to what is calculated from them. */
 typedef struct {
     double dt, dx[NX + 1], du[NU + 1], dp[NP + 1];
-    double df[NF + 1], drate[NF + 1]; /* states that follow, and the rates of these */
+    double dslot[NX + 1], drate[NX + 1]; /* states and their derivatives outside */
     double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
 
-/* 1 where the integrator is outside and carries the states of dependent joints too. */
-static int followed(const core *c) { return NF && !c->m.cosimulation && (c->m.mode & RUNNING); }
+/* 1 where these are local tangent coordinates. */
+static int in_chart(const core *c) {
+#ifdef MODEL_TREE
+    return !c->m.cosimulation && (c->m.mode & RUNNING) && c->m.charts.tangent;
+#else
+    (void)c;
+    return 0;
+#endif
+}
 
 static double *known_of(const core *c, tangents *d, unsigned ref) {
-    if (ref < DERIVATIVES) return d->dx + (ref - STATES);
+    if (ref < DERIVATIVES && !in_chart(c)) return d->dx + (ref - STATES);
+    if (ref >= SLOTS && ref < RATES) return d->dslot + (ref - SLOTS);
     if (ref >= INPUTS && ref < OUTPUTS) return d->du + (ref - INPUTS);
     if (ref >= PARAMETERS && ref < MODES) return d->dp + (ref - PARAMETERS);
     if (ref == TIME_REFERENCE && c->timed) return &d->dt;
-    if (followed(c) && ref >= FOLLOWED && ref < FOLLOWED + NF) return d->df + (ref - FOLLOWED);
     return NULL;
 }
 
@@ -31,7 +38,8 @@ static double *unknown_of(tangents *d, unsigned ref) {
     if (ref >= OUTPUTS && ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
     if (ref >= MODES && ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
     if (ref >= DEPENDENTS && ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
-    if (ref >= INDICATORS && ref < RATES) return d->dg + (ref - INDICATORS);
+    if (ref >= INDICATORS && ref < SLOTS) return d->dg + (ref - INDICATORS);
+    if (ref >= SLOTS && ref < RATES) return d->dslot + (ref - SLOTS);
     if (ref >= RATES && ref < CHART) return d->drate + (ref - RATES);
     return NULL;
 }
@@ -69,51 +77,32 @@ static core_status finite_answer(core *c, unsigned ref, double value) {
 
 #ifdef MODEL_TREE
 
-/* By differences, where the states are read in local tangent coordinates. */
-static core_status difference(core *c, tangents *d) {
+static core_status move_in_chart(core *c, tangents *d) {
     charts_tangent along;
     core_status status;
-    int i;
     memset(&along, 0, sizeof along);
     along.dt = d->dt;
-    memcpy(along.dx, d->dx, NX * sizeof(double));
-    memcpy(along.dx + NX, d->df, NF * sizeof(double));
-    memcpy(along.du, d->du, NU * sizeof(double));
-    memcpy(along.dp, d->dp, NP * sizeof(double));
+    memcpy(along.dx, d->dslot, sizeof d->dslot);
+    memcpy(along.du, d->du, sizeof d->du);
+    memcpy(along.dp, d->dp, sizeof d->dp);
     status = charts_difference(c, &along);
-    memcpy(d->dxdot, along.dxdot, NX * sizeof(double));
-    memcpy(d->drate, along.dxdot + NX, NF * sizeof(double));
-    memcpy(d->dy, along.dy, NY * sizeof(double));
-    for (i = 0; i < NZ; i++) d->dz[i] = along.dy[FOLLOWED - OUTPUTS + i];
+    memcpy(d->drate, along.dxdot, sizeof d->drate);
+    memcpy(d->dx, along.djoints, sizeof d->dx);
+    memcpy(d->dxdot, along.dslopes, sizeof d->dxdot);
+    memcpy(d->dy, along.dy, sizeof d->dy);
+    memcpy(d->dz, along.dz, sizeof d->dz);
     return status;
-}
-
-/* Rates of the dependent joints, by how these move. */
-static int follow(core *c, tangents *d) {
-    double dX[NT], rate[NT], moved[NT];
-    int i;
-    memset(dX, 0, sizeof dX);
-    for (i = 0; i < NX; i++) dX[MODEL_TREE_STATES[i]] = d->dx[i];
-    for (i = 0; i < NZ; i++) dX[MODEL_TREE_FOLLOWED[i]] = d->dz[i];
-    for (i = NZ; i < NF; i++) dX[MODEL_TREE_FOLLOWED[i]] = d->dy[PASSIVE_V + i - NZ];
-    c->arg[0] = c->m.on;
-    c->arg[1] = dX;
-    c->res[0] = rate;
-    c->res[1] = moved;
-    if (mbs_tree_rate(c->arg, c->res, c->iw, c->w, 0)) return 1;
-    for (i = 0; i < NZ; i++) d->drate[i] = moved[MODEL_TREE_FOLLOWED[i]];
-    for (i = NZ; i < NF; i++) d->drate[i] = d->dy[PASSIVE_A + i - NZ];
-    if (followed(c)) memcpy(d->dy + (FOLLOWED - OUTPUTS), d->df, NF * sizeof(double));
-    return 0;
 }
 
 #endif
 
 /* What moves when the seeds are moved. */
 static core_status move(core *c, tangents *d) {
+    int i;
 #ifdef MODEL_TREE
-    if (followed(c) && c->m.charts.tangent) return difference(c, d);
+    if (in_chart(c)) return move_in_chart(c, d);
 #endif
+    for (i = 0; i < NX; i++) d->dx[i] += d->dslot[i];
     point(c);
     c->arg[5] = &d->dt;
     c->arg[6] = d->dx;
@@ -125,10 +114,7 @@ static core_status move(core *c, tangents *d) {
     c->res[3] = d->dg;
     if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0))
         return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
-#ifdef MODEL_TREE
-    if (follow(c, d))
-        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
-#endif
+    memcpy(d->drate, d->dxdot, sizeof d->drate);
     return CORE_OK;
 }
 
@@ -149,8 +135,6 @@ core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
     return status;
 }
 
-#ifdef MODEL_TREE
-
 /* The seeds times what each known moves. */
 static core_status transposed(core *c, const unsigned *unknown, size_t n_unknown,
                               const unsigned *known, size_t n_known, const double *seed,
@@ -170,8 +154,6 @@ static core_status transposed(core *c, const unsigned *unknown, size_t n_unknown
     return status;
 }
 
-#endif
-
 core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
                          const unsigned *known, size_t n_known, const double *seed,
                          double *answer) {
@@ -179,12 +161,13 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
     size_t i;
     core_status status = ready(c, unknown, n_unknown, known, n_known, seed, n_unknown);
     if (status) return status;
-#ifdef MODEL_TREE
-    (void)w, (void)g;
-    return transposed(c, unknown, n_unknown, known, n_known, seed, answer);
-#else
+    if (in_chart(c)) return transposed(c, unknown, n_unknown, known, n_known, seed, answer);
     memset(&w, 0, sizeof w);
     for (i = 0; i < n_unknown; i++) *unknown_of(&w, unknown[i]) += seed[i];
+    for (i = 0; i < NX; i++) {
+        w.dx[i] += w.dslot[i];
+        w.dxdot[i] += w.drate[i];
+    }
     point(c);
     c->arg[5] = w.dxdot;
     c->arg[6] = w.dy;
@@ -197,12 +180,12 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
     if (mbs_adjoint(c->arg, c->res, c->iw, c->w, 0))
         return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
     for (i = 0; i < NX; i++) g.dx[i] += w.dx[i]; /* a state may be an output */
+    memcpy(g.dslot, g.dx, sizeof g.dslot);
     for (i = 0; i < n_known && !status; i++) {
         answer[i] = *known_of(c, &g, known[i]);
         status = finite_answer(c, known[i], answer[i]);
     }
     return status;
-#endif
 }
 
 /* Inputs follow what was given of their derivatives, else they are held. */

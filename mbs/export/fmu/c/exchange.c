@@ -13,16 +13,16 @@ core_status core_enter_event_mode(core *c) {
         return core_refuse(c, "%s: the instance was made without event mode; its events are "
                            "handled inside", c->name);
     if (!core_allowed(c, from, "entering event mode")) return CORE_ERROR;
-#ifndef MODEL_TREE
     if (!c->m.cosimulation) {
         core_status status = core_refresh(c);
+#ifdef MODEL_TREE
+        if (!status) status = charts_pause(c);
+#else
         if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
         if (!status) status = guard_pass(c);
+#endif
         if (status) return status;
     }
-#else
-    c->m.charts.settled = 0;
-#endif
     c->m.mode = EVENT;
     return CORE_OK;
 }
@@ -41,23 +41,24 @@ core_status core_enter_continuous_mode(core *c) {
         return CORE_ERROR;
     c->m.mode = CONTINUOUS;
 #ifdef MODEL_TREE
-    return CORE_OK;
-#else
-    return guard_restart(c);
+    if (c->m.charts.tangent) return CORE_OK;
 #endif
+    return guard_restart(c);
 }
 
 core_status core_completed_step(core *c, int *event) {
+    core_status status;
     *event = 0;
     if (!core_allowed(c, CONTINUOUS, "completing a step")) return CORE_ERROR;
     if (!NZ && !NK) return CORE_OK;
 #ifdef MODEL_TREE
-    return charts_completed(c, event);
+    status = charts_completed(c, event);
 #else
-    core_status status = core_arm_indicators(c);
+    status = core_arm_indicators(c);
     if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
-    return status ? status : guard_pass(c);
+    if (!status) status = guard_pass(c);
 #endif
+    return status;
 }
 
 core_status core_set_time(core *c, double time) {
@@ -79,56 +80,39 @@ static int counted(core *c, const void *array, size_t n, int count, const char *
 
 core_status core_set_states(core *c, const double *x, size_t n) {
     size_t i;
-    if (!core_allowed(c, CONTINUOUS, "setting the states") ||
-        !counted(c, x, n, NX + NF, "states"))
+    if (!core_allowed(c, CONTINUOUS, "setting the states") || !counted(c, x, n, NX, "states"))
         return CORE_ERROR;
     for (i = 0; i < n; i++)
         if (!isfinite(x[i]))
-            return core_refuse(c, "%s: %s = %g is not finite", c->name,
-                               MODEL_NAMES[i < NX ? i : FOLLOWED + i - NX], x[i]);
-    if (memcmp(c->m.values + STATES, x, NX * sizeof *x)) c->m.stale = 1;
-    memcpy(c->m.values + STATES, x, NX * sizeof *x);
-#ifdef MODEL_TREE
-    for (i = 0; i < NF; i++) {
-        double *at = c->m.tree + MODEL_TREE_FOLLOWED[i];
-        if (*at != x[NX + i]) c->m.stale = 1;
-        *at = x[NX + i];
-    }
-#endif
+            return core_refuse(c, "%s: %s = %g is not finite", c->name, MODEL_NAMES[OUTSIDE + i],
+                               x[i]);
+    if (memcmp(c->m.values + OUTSIDE, x, n * sizeof *x)) c->m.stale = 1;
+    memcpy(c->m.values + OUTSIDE, x, n * sizeof *x);
     return CORE_OK;
 }
 
 core_status core_get_states(core *c, double *x, size_t n) {
     if (!core_allowed(c, NOT_STEPPING, "getting the states") ||
-        !counted(c, x, n, NX + NF, "states"))
+        !counted(c, x, n, NX, "states"))
         return CORE_ERROR;
-    memcpy(x, c->m.values + STATES, NX * sizeof *x);
-#ifdef MODEL_TREE
-    if (c->m.mode == INITIALIZATION) {
-        core_status status = core_refresh(c);
-        memcpy(x + NX, c->m.values + FOLLOWED, NF * sizeof *x);
-        return status;
-    }
-    for (n = 0; n < NF; n++) x[NX + n] = c->m.tree[MODEL_TREE_FOLLOWED[n]];
-#endif
+    memcpy(x, c->m.values + (c->m.mode == INITIALIZATION ? (int)STATES : (int)OUTSIDE),
+           n * sizeof *x);
     return CORE_OK;
 }
 
 core_status core_get_derivatives(core *c, double *xdot, size_t n) {
     core_status status;
     if (!core_allowed(c, NOT_STEPPING, "getting derivatives") ||
-        !counted(c, xdot, n, NX + NF, "states"))
+        !counted(c, xdot, n, NX, "states"))
         return CORE_ERROR;
     status = core_refresh(c);
-    memcpy(xdot, c->m.values + DERIVATIVES, NX * sizeof *xdot);
-    memcpy(xdot + NX, c->m.values + RATES, NF * sizeof *xdot);
+    memcpy(xdot, c->m.values + OUTSIDE_RATES, n * sizeof *xdot);
     return status;
 }
 
 core_status core_get_nominals(core *c, double *nominal, size_t n) {
-    if (!counted(c, nominal, n, NX + NF, "states")) return CORE_ERROR;
-    memcpy(nominal, MODEL_NOMINAL + STATES, NX * sizeof *nominal);
-    memcpy(nominal + NX, MODEL_NOMINAL + FOLLOWED, NF * sizeof *nominal);
+    if (!counted(c, nominal, n, NX, "states")) return CORE_ERROR;
+    memcpy(nominal, MODEL_NOMINAL + STATES, n * sizeof *nominal);
     return CORE_OK;
 }
 

@@ -14,7 +14,9 @@ static core_status known_reference(core *c, unsigned ref) {
 
 /* 1 for what is there without calculation. */
 static int given(const core *c, unsigned ref) {
-    if (ref < DERIVATIVES || (ref >= INPUTS && ref < OUTPUTS)) return 1;
+    if (ref < DERIVATIVES) return !NS || (c->m.mode & (INSTANTIATED | INITIALIZATION)) != 0;
+    if (ref >= INPUTS && ref < OUTPUTS) return 1;
+    if (ref >= SLOTS && ref < RATES) return !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     return ref >= PARAMETERS && ref < (c->m.mode == INITIALIZATION ? MODES : DEPENDENTS);
 }
 
@@ -26,8 +28,12 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     for (i = 0; i < n && !status; i++) status = known_reference(c, ref[i]);
     for (i = 0; i < n && !status; i++) {
         unsigned r = ref[i];
-        if (r >= INDICATORS)
+        if (r >= INDICATORS && r < SLOTS)
             status = core_show_indicators(c);
+#ifdef MODEL_TREE
+        else if (r == CHART)
+            status = c->m.cosimulation ? core_refresh(c) : charts_show_indicator(c);
+#endif
         else if (!given(c, r))
             status = core_refresh(c);
         values[i] = r >= INPUTS && r < OUTPUTS ? core_inputs(c, c->m.time)[r - INPUTS]
@@ -39,7 +45,9 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
 /* Modes in which a variable may be set; 0: it is calculated. */
 static int settable(const core *c, unsigned ref) {
     int before = INSTANTIATED | INITIALIZATION;
-    if (ref < DERIVATIVES) return c->m.cosimulation ? before : before | EVENT | CONTINUOUS;
+    if (ref < DERIVATIVES && NS) return c->m.cosimulation ? before : before | EVENT;
+    if (ref < DERIVATIVES || (ref >= SLOTS && ref < RATES))
+        return c->m.cosimulation ? before : before | EVENT | CONTINUOUS;
     if (ref < INPUTS) return 0;
     if (ref < OUTPUTS) return before | RUNNING;
     if (ref < PARAMETERS) return 0;
@@ -85,20 +93,41 @@ static void set_guess(core *c, unsigned ref, double value) {
     changed(c);
 }
 
+/* States of the independent joints under their other names; before the start, one that is equal to
+ * its value in the model description says nothing. */
+static void set_slot(core *c, unsigned ref, double value) {
+    int before = (c->m.mode & (INSTANTIATED | INITIALIZATION)) != 0;
+    double *at = c->m.values + (before ? ref - SLOTS + STATES : ref);
+    if (*at == value || (before && value == MODEL_START[ref])) return;
+    *at = value;
+    changed(c);
+}
+
+/* Where joints are no states in event mode, they become so before they, or lengths, are set. */
+static core_status joints_set(core *c, unsigned ref) {
+#ifdef MODEL_TREE
+    int ours = ref < DERIVATIVES || ref >= PARAMETERS;
+    if (ours && !c->m.cosimulation && c->m.mode == EVENT) return charts_set(c);
+#endif
+    (void)c, (void)ref;
+    return CORE_OK;
+}
+
 core_status core_set(core *c, const unsigned *ref, size_t n, const double *values) {
     size_t i;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
     for (i = 0; i < n; i++)
         if (settable_value(c, ref[i], values[i])) return CORE_ERROR;
     for (i = 0; i < n; i++) {
-        if (ref[i] >= DEPENDENTS) {
+        if (ref[i] >= SLOTS) {
+            set_slot(c, ref[i], values[i]);
+        } else if (ref[i] >= DEPENDENTS) {
             set_guess(c, ref[i], values[i]);
         } else if (c->m.values[ref[i]] != values[i]) {
+            if (joints_set(c, ref[i])) return CORE_ERROR;
             c->m.values[ref[i]] = values[i];
+            if (ref[i] < DERIVATIVES && NS) c->m.values[SLOTS + ref[i]] = values[i];
             changed(c);
-#ifdef MODEL_TREE
-            if (ref[i] < INPUTS || ref[i] >= PARAMETERS) charts_set(c);
-#endif
         }
     }
     return CORE_OK;

@@ -4,6 +4,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from fmu_instances import Fmu
 
 import mbs
 from mbs.components import Body, Free, Revolute, RigidStop, Rod, Spherical
@@ -180,3 +181,28 @@ def test_reference_results_have_the_spin(system, tmp_path):
     ran = mbs.simulate.run(system, 0.2, tolerance=1e-10, quiet=True)
     for name in ("knee.q", "ball.wx.v", "ball.qx.q"):
         assert last[name] == pytest.approx(ran[name][-1], abs=1e-5)
+
+
+def test_directional_derivatives_are_those_of_the_whole_quaternion(system, tmp_path):
+    from fmpy.fmi2 import FMU2Model
+
+    path = mbs.export.fmu(system, tmp_path / "leg.fmu")
+    fmu = Fmu(path, tmp_path / "leg")
+    states = [v.derivative.name for v in fmu.description.modelVariables if v.derivative is not None]
+    rates = [v.name for v in fmu.description.modelVariables if v.derivative is not None]
+    _, start = started(system, SPEEDS, 0.01)
+    instance = fmu.open(FMU2Model, start={name: start[name] for name in states})
+    at = fmu.get(instance, *states)
+    columns = [fmu.references[name] for name in states]
+    rows = [fmu.references[name] for name in rates]
+    h = 1e-6
+    for k, name in enumerate(states):
+        moved = []
+        for sign in (1, -1):
+            fmu.set(instance, {name: at[k] + sign * h})
+            moved.append(np.array(fmu.get(instance, *rates)))
+        fmu.set(instance, {name: at[k]})
+        fmu.get(instance, *rates)
+        found = instance.getDirectionalDerivative(rows, [columns[k]], [1.0])
+        np.testing.assert_allclose(found, (moved[0] - moved[1]) / (2 * h), atol=1e-4, rtol=1e-5)
+    instance.freeInstance()

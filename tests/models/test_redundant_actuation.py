@@ -254,3 +254,9 @@ def test_identification_does_not_take_a_part_of_the_motors(redundant):
     positions = [f"{c.name}.q" for c in redundant.coordinates]
     with pytest.raises(ModelError, match=r"motors \(.*\) are not its independent joints"):
         Record.from_table(result, positions, ["left.tau", "right.tau"], system=redundant)
+
+
+def test_limits_of_efforts_that_motors_share_are_refused():
+    system = mbs.robots.n_four_bar(1).assemble(active=["a0", "a1"])
+    with pytest.raises(ModelError, match="leave the limits of efforts out"):
+        mbs.identification.excitation(system, position=0.5, velocity=1.0, effort=9.0, quiet=True)

@@ -13,10 +13,9 @@
     ├── CompilerError         no compiler, or the compiler refused the code
     └── ExportError           a file could not be written
 
-    KeyboardInterrupt
-    └── Interrupted           a run was interrupted, by control-C; no error, so no MbsError
-
 A message is one sentence: which component, what value, which rule, what to do.
+
+`Interrupted` stands apart: a KeyboardInterrupt is no error, and `except Exception` lets it by.
 """
 
 from collections.abc import Sequence

@@ -14,9 +14,12 @@
     └── ExportError           a file could not be written
 
 A message is one sentence: which component, what value, which rule, what to do.
+
+`Interrupted` stands apart: a KeyboardInterrupt is no error, and `except Exception` lets it by.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 
 class MbsError(Exception):
@@ -61,13 +64,38 @@ class SolverError(MbsError, RuntimeError):
     Attributes:
         state: the last state that an integration reached; empty where there is none.
         singular: whether it stopped at a singular configuration.
+        time: at which a motion stopped, s; None where there is no motion.
+        result: what a simulation had reached, a `Result`; None where it is not one that stopped.
     """
 
-    def __init__(self, *args: object, state: Sequence[float] = (), singular: bool = False) -> None:
+    def __init__(
+        self,
+        *args: object,
+        state: Sequence[float] = (),
+        singular: bool = False,
+        time: float | None = None,
+    ) -> None:
         """As of every exception, with what is known of where it happened."""
         super().__init__(*args)
         self.state = tuple(state)
         self.singular = singular
+        self.time = time
+        self.result: Any = None
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was interrupted by control-C; it hands over what it has.
+
+    Attributes:
+        time: at which a motion stopped, s; None where it is not a motion.
+        result: what was reached: the `Result` of a simulation, the `Sweep` of a study.
+    """
+
+    def __init__(self, *args: object, time: float | None = None) -> None:
+        """As of every exception, with the time."""
+        super().__init__(*args)
+        self.time = time
+        self.result: Any = None
 
 
 class CompilerError(MbsError, RuntimeError):

@@ -50,6 +50,8 @@ class Result:
         info: facts worth keeping with the numbers, such as the tolerance.
         events: what happened at instants: time, s, the name of what it happened to, and words.
         system: the mechanism whose motion it is, where that is known; not saved, not pickled.
+        stopped: time, s, and sentence of what stopped the motion early, after the last row; None
+            where it is complete.
     """
 
     time: Array
@@ -59,6 +61,7 @@ class Result:
     info: Mapping[str, object] = field(default_factory=dict)
     events: tuple[tuple[float, str, str], ...] = ()
     system: object | None = field(default=None, repr=False)
+    stopped: tuple[float, str] | None = None
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -78,10 +81,11 @@ class Result:
     def __repr__(self) -> str:
         rows, columns = self.values.shape
         span = f", {self.time[0]:g} to {self.time[-1]:g} s" if rows else ""
-        return f"<Result {self.name}: {columns} signals, {rows} rows{span}>"
+        end = "" if self.stopped is None else f", stopped at {self.stopped[0]:g} s"
+        return f"<Result {self.name}: {columns} signals, {rows} rows{span}{end}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        plain = dict(self.units), self.name, dict(self.info), self.events
+        plain = dict(self.units), self.name, dict(self.info), self.events, None, self.stopped
         return type(self), (self.time, self.values, *plain)
 
     @classmethod
@@ -160,7 +164,12 @@ class Result:
         Raises:
             ExportError: the file cannot be written.
         """
-        rest = {"name": self.name, "units": dict(self.units), "events": self.events}
+        rest = {
+            "name": self.name,
+            "units": dict(self.units),
+            "events": self.events,
+            "stopped": self.stopped,
+        }
         with whole_file(path) as scratch, scratch.open("wb") as stream:
             np.savez(stream, time=self.time, values=self.values, rest=json.dumps(rest))
 
@@ -179,28 +188,37 @@ class Result:
                 rest = json.loads(str(archive["rest"]))
                 events = tuple((t, name, words) for t, name, words in rest["events"])
                 time, values = archive["time"], archive["values"]
-                return cls(time, values, rest["units"], rest["name"], events=events)
+                stopped = (float(s[0]), str(s[1])) if (s := rest.get("stopped")) else None
+                return cls(
+                    time, values, rest["units"], rest["name"], events=events, stopped=stopped
+                )
         except (OSError, EOFError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
             raise ModelError(
                 f"{path} is no saved result ({error}); give a file that Result.save wrote"
             ) from error
 
     def to_pandas(self) -> Any:
-        """The signals as a pandas DataFrame indexed by time; units in `.attrs["units"]`."""
+        """The signals as a pandas DataFrame indexed by time.
+
+        Units are in `.attrs["units"]`, what stopped the motion in `.attrs["stopped"]`.
+        """
         pandas = optional_module("pandas", "tables")
         index = pandas.Index(self.time, name="time")
         frame = pandas.DataFrame(self.values.copy(), index=index, columns=list(self.names))
         frame.attrs["units"] = dict(self.units)
+        if self.stopped is not None:
+            frame.attrs["stopped"] = self.stopped
         return frame
 
     def to_xarray(self) -> Any:
         """The signals as an xarray Dataset over time, each with its unit as attribute."""
         xarray = optional_module("xarray", "tables")
         signals = {n: ("time", self[n].copy(), {"units": u}) for n, u in self.units.items()}
+        stop = {} if self.stopped is None else {"stopped": self.stopped[1]}
         return xarray.Dataset(
             signals,
             coords={"time": ("time", self.time.copy(), {"units": "s"})},
-            attrs={"name": self.name, **self.info},
+            attrs={"name": self.name, **self.info, **stop},
         )
 
     def plot(

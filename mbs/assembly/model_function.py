@@ -280,6 +280,7 @@ def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
         every = [(speed.name, unit[speed.unit]) for speed in system.speeds]
         result[name] = every
         result[f"{name}_a"] = [every[k] for k in system.active]
+    result["tau_m"] = [result["tau"][k] for k in system.motors]
     result["z"] = [state for device in system.devices for state in device.states]
     result["u"] = [device.input for device in system.devices]
     result["y"] = [output for device in system.devices for output in device.outputs]

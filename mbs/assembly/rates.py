@@ -35,8 +35,13 @@ def quaternion_slices(tree: Tree) -> list[slice]:
 
 def norm_rows(tree: Tree, q: SX) -> SX:
     """(k, 1) squared length less one of every quaternion in the positions q, (nq, 1)."""
-    rows = [casadi.sumsqr(q[part]) - 1 for part in quaternion_slices(tree)]
+    rows = [norm for _, norm in norms_of(tree, q)]
     return casadi.vertcat(*rows) if rows else SX(0, 1)
+
+
+def norms_of(tree: Tree, q: SX) -> list[tuple[slice, SX]]:
+    """Where each quaternion stands in q, and its squared length less one."""
+    return [(part, casadi.sumsqr(q[part]) - 1) for part in quaternion_slices(tree)]
 
 
 def normalised(tree: Tree, q: SX) -> SX:

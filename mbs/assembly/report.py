@@ -57,6 +57,11 @@ def _loops(system: System) -> list[str]:
         f"Mobility {closure.mobility} (Gruebler-Kutzbach counts {closure.gruebler});"
         f" independent: {active}."
     )
+    if closure.motors != closure.active:
+        motors = ", ".join(system.speeds[k].name for k in closure.motors)
+        lines.append(f"Driven by {_count(len(closure.motors), 'effort')}: {motors}.")
+    if len(closure.motors) > closure.mobility:
+        lines.append("  They are more than the mobility: which of them carries a load is a choice.")
     lines.append(f"The loops close to {closure.residual:.1e} at the assembled posture.")
     return lines
 

@@ -122,6 +122,14 @@ class System:
         return self.closure.free if self.closure else tuple(range(self.nv))
 
     @property
+    def motors(self) -> tuple[int, ...]:
+        """Numbers of the velocities whose efforts direct and inverse dynamics have.
+
+        They are the active ones, but where motors are more than these, or depend on each other.
+        """
+        return self.closure.motors if self.closure else tuple(range(self.nv))
+
+    @property
     def symbol_table(self) -> dict[str, SX]:
         """The symbol of every parameter by its name."""
         return {parameter.name: self.p[k] for k, parameter in enumerate(self.parameters)}

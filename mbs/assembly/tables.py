@@ -141,6 +141,8 @@ class Closure:
         slips: numbers of the independent rows of rolling discs, which bind velocities alone.
         active: numbers of the independent velocities.
         passive: numbers of the velocities that follow from them.
+        motors: numbers of the velocities whose efforts drive the mechanism: the active ones, or
+            where there are more motors than these, or others, the motors.
         free: numbers of the velocities whose positions may be chosen: the active ones, and what
             rolling discs alone hold.
         varies: whether the dropped rows follow from the kept ones in a way that changes with the
@@ -153,6 +155,7 @@ class Closure:
     slips: tuple[int, ...]
     active: tuple[int, ...]
     passive: tuple[int, ...]
+    motors: tuple[int, ...]
     free: tuple[int, ...]
     varies: bool
     gruebler: int

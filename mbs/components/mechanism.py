@@ -167,12 +167,12 @@ class Mechanism:
             guess: approximate joint positions by coordinate name [rad or m], where the loops are
                 to be closed near to; it is laid over the guess of the mechanism itself, and what
                 neither names starts at zero.
-            active: names of velocities that are to be independent in a system with loops, beside
-                those of the motors; the others are proposed by pivoting.
+            active: names of velocities that are to be independent in a system with loops, before
+                those of the motors; the others are proposed by pivoting. Where they are more than
+                the mobility, all of them have motors, and pivoting chooses among them.
 
         Raises:
-            AssemblyError: the components do not form a mechanism, or motors and active velocities
-                do not fit its mobility.
+            AssemblyError: the components do not form a mechanism, or nothing in it can move.
             Unclosable: no posture closes the loops.
         """
         from mbs.loops.assemble import assemble  # the one call upwards, see docs/decisions.md

@@ -14,7 +14,7 @@ import numpy as np
 from casadi import Function
 from numpy.typing import NDArray
 
-from mbs.assembly import Closure, LoopRow, System
+from mbs.assembly import Closure, Coordinate, LoopRow, System
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.closing import Closing, closure_parameters
 from mbs.loops.closure import row_labels
@@ -49,7 +49,7 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
 
     Raises:
         Unclosable: no posture closes the loops.
-        AssemblyError: the motors and chosen velocities do not fit the mobility.
+        AssemblyError: the loops leave no motion.
     """
     p = closure_parameters(system)
     posture = _assembled(system, guess, p)
@@ -66,11 +66,13 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
     positions = sum(len(rows) for rows, _ in labels)
     held = max(_ranks([(m / rows * columns)[:positions] for m in regular])) if positions else 0
     kept = _kept_rows(regular, positions, held, generic - held)
-    active = _independent_velocities(system, chosen, regular, system.nv - generic)
+    drive = _drive(system, chosen, regular, system.nv - generic)
+    active = drive.active
     closure = Closure(
         rows=kept.positions,
         slips=kept.slips,
-        active=tuple(active),
+        active=active,
+        motors=drive.motors,
         passive=tuple(k for k in range(system.nv) if k not in active),
         free=_free_positions(regular, kept, active),
         varies=_varies(regular, positions, kept),
@@ -79,6 +81,8 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
     )
     return replace(
         system,
+        coordinates=_with_motors(system.coordinates, drive.named),
+        speeds=_with_motors(system.speeds, drive.named),
         posture=tuple(float(x) for x in posture),
         closure=closure,
         loops=_with_rows(system.loops, labels, kept),
@@ -183,30 +187,71 @@ def _free_positions(
     return tuple(independent_rows(free, size, tuple(active)))
 
 
-def _independent_velocities(
+@dataclass(frozen=True, slots=True)
+class _Drive:
+    """Numbers of velocities.
+
+    Attributes:
+        active: the independent ones.
+        motors: those whose efforts drive the mechanism.
+        named: names of those that the user named as active beyond the mobility.
+    """
+
+    active: tuple[int, ...]
+    motors: tuple[int, ...]
+    named: tuple[str, ...] = ()
+
+
+def _drive(
     system: System, chosen: tuple[int, ...], jacobians: Sequence[Matrix], mobility: int
-) -> list[int]:
-    """The chosen and the motors, then the velocities that see the remaining mobility best."""
+) -> _Drive:
+    """The chosen and the motors, then the velocities that see the remaining mobility best.
+
+    Where the loops tie these to each other, the independent ones among them are found by the same
+    pivoting; all of them drive the mechanism, and what they leave free its own velocities.
+    """
     if mobility == 0:
         raise AssemblyError(
             f"{system.name}: the loops leave no motion (mobility 0); take a joint's constraint away"
         )
-    motors = [k for k, speed in enumerate(system.speeds) if speed.actuated]
-    first = list(dict.fromkeys([*chosen, *motors]))
-    names = ", ".join(system.speeds[k].name for k in first)
-    what, do = ("actuated or active", "name") if chosen else ("actuated", "actuate")
-    if len(first) > mobility:
-        raise AssemblyError(
-            f"{system.name}: {len(first)} velocities are {what} ({names}) but the mobility is"
-            f" {mobility}; {do} {mobility} at most"
-        )
     free = [null_space_of(J, mobility) for J in jacobians]
-    if first and max(rank(N[first], _GAP) for N in free) < len(first):
-        raise AssemblyError(
-            f"{system.name}: the {what} velocities {names} depend on each other through the"
-            f" loops; {do} joints that can move independently"
-        )
-    return independent_rows(free, mobility, tuple(first))
+    motors = tuple(k for k, speed in enumerate(system.speeds) if speed.actuated)
+    first = tuple(dict.fromkeys([*chosen, *motors]))
+    if len(_independent(free, (), first)) == len(first):
+        active = tuple(independent_rows(free, mobility, first))
+        return _Drive(active, active)
+    own = _independent(free, (), chosen)
+    active = _independent(free, _independent(free, own, motors), range(system.nv))
+    surplus = chosen if len(own) < len(chosen) else ()
+    driving = tuple(sorted({*motors, *surplus}))
+    rest = _independent(free, _independent(free, (), driving), active)
+    names = tuple(system.speeds[k].name for k in surplus)
+    return _Drive(tuple(sorted(active)), tuple(sorted({*driving, *rest})), names)
+
+
+def _independent(
+    free: Sequence[Matrix], taken: Sequence[int], candidates: Sequence[int]
+) -> tuple[int, ...]:
+    """Velocities already taken, and the candidates that are independent of them and each other.
+
+    Args:
+        free: (nv, m) each, a basis of the velocities that the loops allow.
+        taken: numbers of velocities that are independent.
+        candidates: numbers of velocities.
+    """
+    every = tuple(dict.fromkeys([*taken, *candidates]))
+    if not every:
+        return ()
+    rows = [N[list(every)] for N in free]
+    count = max(rank(N, _GAP) for N in rows)
+    return tuple(every[k] for k in independent_rows(rows, count, tuple(range(len(taken)))))
+
+
+def _with_motors(
+    coordinates: tuple[Coordinate, ...], names: Sequence[str]
+) -> tuple[Coordinate, ...]:
+    """The same coordinates, those that are named driven by motors."""
+    return tuple(replace(c, actuated=c.actuated or c.name in names) for c in coordinates)
 
 
 _Labels = list[tuple[list[str], tuple[str, ...]]]

@@ -17,7 +17,7 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import Named, model_function
-from mbs.assembly.rates import norm_rows
+from mbs.assembly.rates import norms_of
 from mbs.components import (
     ConstantVelocity,
     Cylindrical,
@@ -71,7 +71,7 @@ def independent_closure(system: System, q: SX) -> SX:
     return closure_rows(system, q)[list(system.closure.rows)]
 
 
-def square_closure(system: System, q: SX, passive: Sequence[int]) -> SX:
+def square_closure(system: System, q: SX, passive: Sequence[int], ties: SX | None = None) -> SX:
     """As many equations as passive positions that are zero where the loops are closed.
 
     They are the independent rows; where no choice of rows is independent everywhere, the slopes
@@ -81,11 +81,13 @@ def square_closure(system: System, q: SX, passive: Sequence[int]) -> SX:
         system: with closed loops.
         q: (nq, 1) symbols.
         passive: numbers of the positions to be solved for.
+        ties: (k, 1) further equations, where a quaternion is solved for that may turn.
     """
-    norms = norm_rows(system.tree, q)
+    norms = [norm for part, norm in norms_of(system.tree, q) if part.start in passive]
+    more = casadi.vertcat(SX(0, 1), *norms, SX(0, 1) if ties is None else ties)
     if system.closure is None or not system.closure.varies:
-        return casadi.vertcat(independent_closure(system, q), norms)
-    rows = casadi.vertcat(closure_rows(system, q), norms)
+        return casadi.vertcat(independent_closure(system, q), more)
+    rows = casadi.vertcat(closure_rows(system, q), more)
     slopes = casadi.jacobian(rows, q)[:, list(passive)]
     return casadi.densify(casadi.mtimes(slopes.T, rows))
 

@@ -1,6 +1,7 @@
 """Model builders: a System in, a casadi.Function with named inputs and outputs out."""
 
 from mbs.models import catalogue, inverse_geometry
+from mbs.models.actuation import actuation_matrix, actuation_null_space
 from mbs.models.contact_phases import ContactPhases, contact_phases
 from mbs.models.contact_points import ContactPoint
 from mbs.models.dae import Dae, dae
@@ -31,6 +32,8 @@ __all__ = [
     "Dae",
     "Limits",
     "acceleration_closure",
+    "actuation_matrix",
+    "actuation_null_space",
     "bias",
     "catalogue",
     "contact_phases",

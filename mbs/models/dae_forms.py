@@ -23,7 +23,7 @@ from mbs.loops.function import function
 from mbs.loops.reduction import reduction_matrix
 from mbs.models.composition import outputs_of
 from mbs.models.dae_rows import Rows, rows_of
-from mbs.models.direct_dynamics import direct_dynamics
+from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics
 from mbs.models.symbols import ModelSymbols, symbols_of
 
@@ -163,7 +163,8 @@ def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX]:
     """Symbols u, velocities of the tree, and accelerations of the independent joints."""
     u, tau = motor_efforts(system)
     (G,) = outputs_of(system, reduction_matrix(system), q)
-    (a,) = outputs_of(system, direct_dynamics(system), q, v_a, tau[list(system.active)])
+    pushed = casadi.mtimes(G.T, tau) if system.motors != system.active else tau[list(system.active)]
+    (a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
     return u, casadi.mtimes(G, v_a), a
 
 

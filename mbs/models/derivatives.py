@@ -62,7 +62,8 @@ def inverse_dynamics_derivatives(
         method: "ad" for the differentiated recursion, "analytical" for recursions of the
             derivatives themselves, "auto" for the one that takes fewer operations.
         coordinates: of a closed system, "independent" for idm_derivatives(q, v_a, a_a) ->
-            dtau_a_dq_a, dtau_a_dv_a, dtau_a_da_a, tau_a, or "tree".
+            dtau_a_dq_a, dtau_a_dv_a, dtau_a_da_a, tau_a, or "tree"; whatever motors there are,
+            tau_a is at the independent joints, `actuation_matrix` times that of the motors.
         with_respect_to: which derivatives: of "q", "v", "a" and "p", the parameters.
 
     Returns:
@@ -115,7 +116,8 @@ def direct_dynamics_derivatives(
         system: open or closed; q must close the loops.
         method: "implicit" for the formula above, "ad" for the differentiated direct model, "auto"
             for the one that takes fewer operations.
-        coordinates: "independent"; "tree" is the same in an open chain.
+        coordinates: "independent", where tau_a is as for `inverse_dynamics_derivatives`; "tree" is
+            the same in an open chain.
         with_respect_to: which derivatives: of "q", "v", "tau" and "p", the parameters.
 
     Returns:

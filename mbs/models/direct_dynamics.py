@@ -11,6 +11,7 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.rates import normalised
 from mbs.errors import ModelError
 from mbs.messages import quoted
+from mbs.models.actuation import effort_input
 from mbs.models.constrained_accelerations import constrained_accelerations
 from mbs.models.inverse_dynamics import own_efforts, tree_efforts
 from mbs.models.surroundings import Surroundings, exerted, surroundings
@@ -71,7 +72,8 @@ def direct_dynamics(
     the composite-body inertia matrix, factorised without filling the zeros that branches leave.
     Closed systems: the latter in the independent joints, ddm(q, v_a, tau_a) -> a_a, or with
     `coordinates="tree"` ddm(q, v, tau) -> a, lam, where lam are the efforts of the independent
-    closure rows (A a + H = tau + J' lam).
+    closure rows (A a + H = tau + J' lam). Where a closed system has more motors than independent
+    joints, or others, they are ddm(q, v_a, tau_m) -> a_a, of the efforts of all `system.motors`.
 
     Source: Featherstone 1983; Featherstone 2008, section 6.5; Khalil & Creusot 1997, eq. 24 and
     section 5.4.
@@ -88,7 +90,8 @@ def direct_dynamics(
             of the base in the frame in which gravity is given.
 
     Returns:
-        Function of q (nq, 1), v and tau (m, 1), f_ext, v_0, a_0, R_0; a (m, 1) [rad/s^2 or m/s^2].
+        Function of q (nq, 1), v and tau (m, 1), or tau_m (k, 1), f_ext, v_0, a_0, R_0; a (m, 1)
+        [rad/s^2 or m/s^2].
 
     Raises:
         ModelError: some joint moves no inertia, so that its acceleration is not determined; or
@@ -107,6 +110,26 @@ def direct_dynamics(
     key = ("cheapest ddm", coordinates, f_ext, moving_base)
     found: Function = system.cached(key, lambda: cheapest(*map(model, _candidates(system))))
     return found
+
+
+def independent_dynamics(system: System) -> Function:
+    """``ddm(q, v_a, tau_a) -> a_a``: `direct_dynamics` of efforts at the independent joints.
+
+    It is the same but where motors are others than these.
+    """
+    if system.motors == system.active:
+        return direct_dynamics(system)
+    require_inertia(system)
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system)
+        name, tau = s.input("tau")
+        a = _composite(system, s, tau, surroundings(system))
+        return [("q", s.q), ("v" + s.suffix, s.v), (name, tau)], [("a" + s.suffix, a)]
+
+    return model_function(
+        system, ("ddm", "independent"), build, posture_check(system, "independent")
+    )
 
 
 def _check_method(system: System, method: str) -> None:
@@ -143,9 +166,9 @@ def _model(
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
-        name, tau = s.input("tau")
+        name, given, tau = effort_input(system, s)
         around = surroundings(system, f_ext, moving_base)
-        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, tau), *around.inputs]
+        inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, given), *around.inputs]
         if in_tree:
             a, lam, _ = constrained_accelerations(system, s, tau, around)
             return inputs, [("a", a), ("lam", lam)]

@@ -7,6 +7,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
+from mbs.models.actuation import effort_output
 from mbs.models.surroundings import Surroundings, exerted, surroundings
 from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
 from mbs.recursions.accelerations import resting_base
@@ -26,6 +27,9 @@ def inverse_dynamics(
     """``idm(q, v, a) -> tau``: the joint efforts that produce the accelerations a.
 
     Rotors, viscous and dry friction and springs of the joints are included, and force elements.
+    Where a closed system has more motors than independent joints, they are idm(q, v_a, a_a) ->
+    tau_m, the efforts of all `system.motors` with the least sum of squares of the numbers in N m
+    and N; `actuation_null_space` has the other choices.
 
     Source: Khalil & Kleinfinger 1987; Khalil & Creusot 1997, eq. 15-20 and 22.
 
@@ -39,7 +43,8 @@ def inverse_dynamics(
             of the base in the frame in which gravity is given.
 
     Returns:
-        Function of q (nq, 1), v and a (m, 1), f_ext, v_0, a_0, R_0; tau (m, 1) [N m or N].
+        Function of q (nq, 1), v and a (m, 1), f_ext, v_0, a_0, R_0; tau (m, 1), or tau_m (k, 1)
+        [N m or N].
     """
 
     def build() -> tuple[Named, Named, Named]:
@@ -48,7 +53,7 @@ def inverse_dynamics(
         around = surroundings(system, f_ext, moving_base)
         tau, names = _efforts(system, s, s.tree_acceleration(a), around)
         inputs: Named = [("q", s.q), ("v" + s.suffix, s.v), (name, a), *around.inputs]
-        return inputs, [("tau" + s.suffix, tau)], names
+        return inputs, [effort_output(system, s, tau)], names
 
     return model_function(
         system, ("idm", f_ext, moving_base, coordinates), build, posture_check(system, coordinates)

@@ -11,6 +11,7 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import Tree
 from mbs.loops.cut_wrenches import cut_wrenches, on_links
 from mbs.loops.velocity import constraint_jacobian, determining_rows, kept_rows
+from mbs.models.actuation import motors_apart, shared_efforts
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.surroundings import Surroundings, exerted, surroundings
 from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
@@ -97,7 +98,8 @@ def wrenches_of_joints(
         system: open or closed.
         s: its symbols.
         a: (nv, 1) accelerations of the tree.
-        tau: (nv, 1) efforts of the tree; None where the independent joints have all of them.
+        tau: (nv, 1) efforts of the tree; None where they follow from the motion, as those of
+            `inverse_dynamics` do.
         around: what acts from outside.
     """
     cut: dict[str, Wrench] = {}
@@ -133,9 +135,11 @@ def _closure_efforts(
     closure = system.closure
     assert closure is not None
     needed = tree_efforts(system, s, a, around)
+    if tau is None and motors_apart(system, s):
+        tau = shared_efforts(system, s, needed)
     left = needed if tau is None else needed - tau
     rows = determining_rows(system, s.q)
-    if tau is None or closure.varies:
+    if s.reduction is not None or closure.varies:
         shares = solve_square(rows.square.T, left[list(closure.passive)])
         lam = casadi.mtimes(rows.mixed.T, shares)
     else:

@@ -11,7 +11,7 @@ from casadi import SX
 from mbs.assembly import System
 from mbs.models.composition import outputs_of
 from mbs.models.contact_dynamics import ContactEquations, contact_equations
-from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
+from mbs.models.direct_dynamics import independent_dynamics, inertia_matrix
 from mbs.models.hybrid_dynamics import hybrid_dynamics
 from mbs.models.inverse_dynamics import bias
 from mbs.models.minimal_motion import TreeMotion
@@ -61,7 +61,7 @@ def minimal_accelerations(
     contact = contact_equations(system, motion.q, motion.v, tau + load, given)
     if contact is None and not given:
         pushed = motion.reduced_effort(tau + load)
-        (a_a,) = outputs_of(system, direct_dynamics(system), motion.q, motion.v_a, pushed)
+        (a_a,) = outputs_of(system, independent_dynamics(system), motion.q, motion.v_a, pushed)
         return Accelerations(a_a, motion.tree_acceleration(a_a), tau, None)
     if contact is not None:
         a, drives = _held(system, contact, motion), contact.drives

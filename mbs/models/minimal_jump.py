@@ -8,6 +8,7 @@ import casadi
 from casadi import SX
 
 from mbs.assembly import System
+from mbs.assembly.rates import position_rate
 from mbs.models.composition import outputs_of
 from mbs.models.contact_dynamics import ContactEquations
 from mbs.models.contacts import Contacts
@@ -50,7 +51,8 @@ def minimal_jump(
     now = contacts.modes(modes)
     at = casadi.if_else(now.place == 0, wall, now.place)
     at = casadi.if_else(at == 0, contact.modes.place, at)
-    x = _shifted(system, x, to_limits(system, contact, motion, at), states[0])
+    shift = to_limits(system, contact, motion, at)
+    x = _shifted(system, motion.q, x, shift, states[0])
     return _written(contacts, (x, v), (at, now.held), states), modes
 
 
@@ -102,12 +104,13 @@ def _after(
     return v + casadi.mmax(held) * dv, modes
 
 
-def _shifted(system: System, x: SX, shift: SX, positions: Sequence[int]) -> SX:
-    """The state with independent positions of a closed system shifted."""
+def _shifted(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) -> SX:
+    """The state with independent positions of a closed system, which are at q, shifted."""
     after = SX(x)
     if system.is_closed:
-        for number, change in zip(system.active, casadi.vertsplit(shift), strict=True):
-            after[list(system.free).index(number)] += change
+        v = SX.zeros(system.nv)
+        v[list(system.active)] = shift
+        after[: len(positions)] += position_rate(system.tree, q, v)[list(positions)]
     return after
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from mbs.assembly import System
 from mbs.assembly.tree import Frame
-from mbs.errors import ModelError
 from mbs.models.contacts import contacts_of
 from mbs.models.minimal_contacts import ContactEffort, contact_efforts
 from mbs.models.minimal_drive import Drive, InputMotion, frames_of, further_inputs, motions_of
+from mbs.models.minimal_orientation import Orientation, orientations_of
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -18,14 +18,16 @@ class MinimalLayout:
     """The elements of states x, dependent positions z, inputs u and outputs y.
 
     x = [positions; velocities; states of devices]; u = [efforts of motors; inputs of devices;
-    wrenches; motions; w]; y = [accelerations; positions z, velocities and accelerations of the
-    dependent joints; origin (3) and orientation (9, by rows) of the terminal frame; outputs of
-    devices; efforts; efforts of contacts; what is observed].
+    wrenches; motions; w]; y = [accelerations; positions of z that are not in x, velocities and
+    accelerations of the dependent joints; origin (3) and orientation (9, by rows) of the terminal
+    frame; outputs of devices; efforts; efforts of contacts; what is observed].
 
     Attributes:
         positions: numbers in q of the first part of x.
+        orientations: quaternion joints of loops that are among them.
         velocities: numbers in v of the second part of x.
-        dependents: numbers in q of z.
+        dependents: numbers in q of z, some of them in x too: see `minimal_orientation`.
+        shown: those of them that are in y, which are not in x.
         inputs: numbers in v of the efforts of motors.
         devices: numbers of the devices whose inputs are in u.
         wrenches: names of the frames on which wrenches act, six numbers each: force and moment
@@ -40,8 +42,10 @@ class MinimalLayout:
     """
 
     positions: tuple[int, ...]
+    orientations: tuple[Orientation, ...]
     velocities: tuple[int, ...]
     dependents: tuple[int, ...]
+    shown: tuple[int, ...]
     inputs: tuple[int, ...]
     devices: tuple[int, ...]
     wrenches: tuple[str | int, ...]
@@ -76,19 +80,22 @@ def minimal_layout(system: System, drive: Drive) -> MinimalLayout:
         drive: what drives it.
 
     Raises:
-        ModelError: an independent velocity of a loop belongs to a quaternion joint, or a drive
-            does not fit the system.
+        ModelError: a drive does not fit the system.
     """
     motions, extra = motions_of(system, drive), further_inputs(system, drive)
     inputs_q = [motion.position for motion in motions]
     moved = [motion.velocity for motion in motions]
     without_states = [motion.velocity for motion in motions if motion.kind == "q"]
-    free = _free_positions(system)
+    orientations = orientations_of(system) if system.is_closed else ()
+    solved = [k for joint in orientations if not joint.whole for k in joint.positions]
+    free = _free_positions(system, orientations)
     motors = motors_of(system, moved)
     return MinimalLayout(
         positions=tuple(k for k in free if k not in inputs_q),
+        orientations=orientations,
         velocities=tuple(k for k in system.active if k not in without_states),
-        dependents=tuple(k for k in range(system.nq) if k not in free),
+        dependents=tuple(k for k in range(system.nq) if k not in free or k in solved),
+        shown=tuple(k for k in range(system.nq) if k not in free),
         inputs=() if drive.effort else motors,
         devices=() if drive.device else tuple(range(len(system.devices))),
         wrenches=drive.wrenches,
@@ -102,15 +109,11 @@ def minimal_layout(system: System, drive: Drive) -> MinimalLayout:
     )
 
 
-def _free_positions(system: System) -> tuple[int, ...]:
+def _free_positions(system: System, orientations: Sequence[Orientation]) -> tuple[int, ...]:
+    """Numbers in q of the positions that are independent, those of quaternion joints as a whole."""
     if not system.is_closed:
         return tuple(range(system.nq))
-    names = [coordinate.name for coordinate in system.coordinates]
-    missing = [system.speeds[k].name for k in system.free if system.speeds[k].name not in names]
-    if missing:
-        raise ModelError(
-            f"{system.name}: {', '.join(missing)} of a quaternion joint would be independent, which"
-            " has no position of its own; replace a ball joint of a rod that can spin by a"
-            " Universal, or actuate other joints of the loop"
-        )
-    return tuple(names.index(system.speeds[k].name) for k in system.free)
+    numbers = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
+    joints = {k: joint.positions for joint in orientations for k in joint.free}
+    found = (joints.get(k) or (numbers[system.speeds[k].name],) for k in system.free)
+    return tuple(dict.fromkeys(position for part in found for position in part))

@@ -27,7 +27,7 @@ class TreeMotion:
 
     Attributes:
         raw: (nq, 1) positions, quaternions as they are in the state.
-        q: (nq, 1) the same, quaternions of unit length.
+        q: (nq, 1) the same on the loops, quaternions of unit length.
         v_a: (m, 1) independent velocities.
         v: (nv, 1) velocities of the tree.
         G: (nv, m), v = G v_a; None in an open chain, where v is v_a.
@@ -50,12 +50,13 @@ class TreeMotion:
         return tau if self.G is None else casadi.mtimes(self.G.T, tau)
 
 
-def tree_motion(system: System, raw: SX, v_a: SX) -> TreeMotion:
+def tree_motion(system: System, raw: SX, q: SX, v_a: SX) -> TreeMotion:
     """The motion of a tree whose loops the positions close.
 
     Args:
         system: open or closed.
-        raw: (nq, 1) positions.
+        raw: (nq, 1) positions, quaternions as they are in the state.
+        q: (nq, 1) positions on the loops; not used in an open chain.
         v_a: (m, 1) independent velocities.
     """
     if not system.is_closed:
@@ -63,9 +64,9 @@ def tree_motion(system: System, raw: SX, v_a: SX) -> TreeMotion:
     symbols, speeds = SX.sym("q", system.nq), SX.sym("v", v_a.numel())
     reduced = reduction(system, symbols, speeds)
     assert reduced.gamma is not None
-    G, gamma = casadi.substitute([reduced.G, reduced.gamma], [symbols, speeds], [raw, v_a])
+    G, gamma = casadi.substitute([reduced.G, reduced.gamma], [symbols, speeds], [q, v_a])
     v = casadi.densify(casadi.mtimes(G, v_a))
-    return TreeMotion(raw, raw, v_a, v, SX(G), SX(gamma))
+    return TreeMotion(raw, q, v_a, v, SX(G), SX(gamma))
 
 
 def input_motions(motions: Sequence[InputMotion], u: SX) -> list[tuple[SX, SX, SX]]:

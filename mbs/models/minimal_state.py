@@ -33,14 +33,12 @@ from mbs.models.minimal_motion import (
     tree_motion,
     wrenches_of,
 )
+from mbs.models.minimal_orientation import NORM_RATE, state_rates, tied, with_unit_length
 from mbs.recursions.route import relative_pose
 from mbs.solvers.newton_step import newton_step
 from mbs.spatial import Wrench
 
 __all__ = ["Drive", "MinimalState", "Observe", "Seen", "consistent_start", "minimal_state"]
-
-_NORM_RATE = 10.0
-"""How fast a quaternion returns to unit length [1/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,9 +105,8 @@ def minimal_state(
             devices.
 
     Raises:
-        ModelError: an independent velocity of a loop belongs to a quaternion joint, so that no
-            position stands for it; a drive does not fit the system; or the independent rows of
-            the loops change with the posture, which contacts do not follow.
+        ModelError: a drive does not fit the system, or the independent rows of the loops change
+            with the posture, which contacts do not follow.
     """
     require_lasting_rows(system, contacts_of(system))
     drive = Drive() if drive is None else drive
@@ -201,13 +198,23 @@ def motion_of(
     system: System, layout: MinimalLayout, s: Point, laws: Sequence[tuple[SX, SX, SX]]
 ) -> TreeMotion:
     """The motion of the tree, from states, dependent positions and prescribed motions."""
-    q, v = SX.zeros(system.nq), SX.zeros(system.nv)
-    q[list(layout.positions)], q[list(layout.dependents)] = s.q, s.z
+    raw, q = positions_of(system, layout, s)
+    v = SX.zeros(system.nv)
     v[list(layout.velocities)] = s.v
     for motion, law in zip(layout.motions, laws, strict=True):
         if motion.position is not None:
-            q[motion.position], v[motion.velocity] = law[0], law[1]
-    return tree_motion(system, q, v[list(system.active)])
+            raw[motion.position], v[motion.velocity] = law[0], law[1]
+    return tree_motion(system, raw, q, v[list(system.active)])
+
+
+def positions_of(system: System, layout: MinimalLayout, s: Point) -> tuple[SX, SX]:
+    """(nq, 1) positions as in the state, and on the loops."""
+    raw = SX.zeros(system.nq)
+    raw[list(layout.dependents)] = s.z
+    raw[list(layout.positions)] = s.q
+    q = with_unit_length(layout.orientations, raw)
+    q[list(layout.dependents)] = s.z
+    return raw, q
 
 
 def _rate(
@@ -217,10 +224,10 @@ def _rate(
     if system.is_closed:
         v = SX(motion.v)
         v[list(system.active)] += at_limits(system, moved.contact, motion)
-        positions = v[list(system.free)]
+        rate = state_rates(system, layout.orientations, (motion.raw, motion.q, v))
     else:
-        positions = _rows(_steadied_rate(system, motion), layout.positions)
-    return casadi.vertcat(positions, _rows(moved.a, layout.velocities), devices)
+        rate = _steadied_rate(system, motion)
+    return casadi.vertcat(_rows(rate, layout.positions), _rows(moved.a, layout.velocities), devices)
 
 
 def _steadied_rate(system: System, motion: TreeMotion) -> SX:
@@ -228,7 +235,7 @@ def _steadied_rate(system: System, motion: TreeMotion) -> SX:
     rate = position_rate(system.tree, motion.q, motion.v)
     for part in quaternion_slices(system.tree):
         q = motion.raw[part]
-        rate[part] = raw[part] + _NORM_RATE * (1 - casadi.sumsqr(q)) * q
+        rate[part] = raw[part] + NORM_RATE * (1 - casadi.sumsqr(q)) * q
     return rate
 
 
@@ -239,7 +246,7 @@ def outputs_vector(
     efforts = moved.contact.efforts if moved.contact else SX(0, 1)
     return casadi.vertcat(
         _rows(moved.a, layout.accelerations),
-        _rows(motion.q, layout.dependents),
+        _rows(motion.q, layout.shown),
         _rows(motion.v, layout.passive),
         _rows(moved.a, layout.passive),
         _terminal_pose(system, motion.q),
@@ -264,9 +271,10 @@ def _terminal_pose(system: System, q: SX) -> SX:
 def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Function | None]:
     """`closure` and `slopes` of the state equation."""
     dependents, s = list(layout.dependents), point_of(system, layout, ())
-    symbols, q, z = SX.sym("q", system.nq), SX.zeros(system.nq), s.z
-    q[list(layout.positions)], q[dependents] = s.q, z
-    kept = square_closure(system, symbols, dependents)
+    symbols, z = SX.sym("q", system.nq), s.z
+    raw, q = positions_of(system, layout, s)
+    ties = tied(system, layout.orientations, raw, symbols)
+    kept = square_closure(system, symbols, dependents, ties)
     every = relative_rows(system, symbols)
     kept, every = casadi.substitute([kept, every], [symbols], [q])
     cosines = casadi.substitute(facing(system, symbols), symbols, q)

@@ -14,7 +14,7 @@ from casadi import SX
 from mbs.assembly import System
 from mbs.assembly.rates import position_rate
 from mbs.models.composition import outputs_of
-from mbs.models.direct_dynamics import direct_dynamics
+from mbs.models.direct_dynamics import independent_dynamics
 from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.surroundings import surroundings
 from mbs.models.symbols import ModelSymbols, solution_order
@@ -100,7 +100,7 @@ def accelerations_by_ad(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
     """The same by differentiating the direct model."""
-    a = outputs_of(system, direct_dynamics(system), s.q, s.v, tau)[0]
+    a = outputs_of(system, independent_dynamics(system), s.q, s.v, tau)[0]
     blocks = {
         "q": _along_motion(system, s, a),
         "v": casadi.jacobian(a, s.v),

@@ -110,7 +110,7 @@ def tree_state(
     inputs = SX.sym("u", rhs.numel_in(3))
     free = [s.t, X, none, inputs, system.p]
     first = motion_of(system, layout, s, [])
-    start = casadi.vertcat(first.raw, first.v, s.states)
+    start = casadi.vertcat(first.q, first.v, s.states)
     at_start = [s.t, s.x, s.z, inputs, system.p]
     rows, regularity = (
         dense_function(function.name(), free, list(function.call([s.t, X, none, s.u, system.p])))

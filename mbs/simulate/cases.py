@@ -90,18 +90,29 @@ class Folder:
         """The file of a case."""
         return self.path / f"case_{number:06d}.npz"
 
-    def keep(self, number: int, answer: Result | str) -> None:
-        """Write the result of a case, or why it failed.
+    def part(self, number: int) -> Path:
+        """The file of what a case that failed had reached."""
+        return self.path / f"part_{number:06d}.npz"
+
+    def keep(self, number: int, result: Result | None, complaint: str = "") -> None:
+        """Write the result of a case; or why it failed, with what it had reached.
+
+        Args:
+            number: of the case.
+            result: whole, or up to where it stopped; None where nothing was reached.
+            complaint: why it failed; empty where it did not.
 
         Raises:
             ExportError: the folder cannot be written.
         """
-        said = self._complaint(number)
-        if isinstance(answer, str):
-            write_text(answer, said)
+        said, part = self._complaint(number), self.part(number)
+        part.unlink(missing_ok=True)
+        if complaint:
+            write_text(complaint, said)
         else:
-            answer.save(self.file(number))
             said.unlink(missing_ok=True)
+        if result is not None:
+            result.save(part if complaint else self.file(number))
 
     def complained(self, number: int) -> str:
         """Why a case has no result."""

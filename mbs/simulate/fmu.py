@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
 
-from mbs.errors import MbsError, ModelError, SolverError
+from mbs.errors import Interrupted, MbsError, ModelError, SolverError
 from mbs.messages import quoted
 from mbs.progress import progress
 from mbs.result import Result
@@ -18,7 +18,7 @@ from mbs.simulate.co_simulation import Intermediate, co_simulate
 from mbs.simulate.fmu_inputs import Inputs, tracks_of
 from mbs.simulate.fmu_instance import heard, instance
 from mbs.simulate.fmu_plan import Interface, Plan, row_times
-from mbs.simulate.fmu_recording import recording_of
+from mbs.simulate.fmu_recording import Recording, recording_of
 from mbs.simulate.fmu_variables import NUMBERS
 from mbs.simulate.model_exchange import exchange
 from mbs.simulate.signals import check_names, start_values
@@ -81,7 +81,8 @@ def fmu(
 
     Raises:
         ModelError: the FMU is invalid or lacks the interface, or a name or a value does not fit.
-        SolverError: the FMU refused a call; the message is its own.
+        SolverError: the FMU refused a call; the message is its own, `result` has what was reached.
+        Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
     """
     file = _path(path)
     for what, values in (("parameters", parameters), ("start", start)):
@@ -222,6 +223,8 @@ def _simulated(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) ->
             messages.append(message)
 
     name, watch = plan.description.modelName, Intermediate()
+    recording: Recording | None = None
+    stop: SolverError | Interrupted | None = None
     with progress(name, plan.begin, plan.end, quiet=quiet) as reached:
         try:
             with heard(listen), instance(plan.description, folder, plan.kind, watch) as unit:
@@ -230,9 +233,21 @@ def _simulated(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) ->
                     co_simulate(unit, plan, recording, watch)
                 else:
                     exchange(unit, plan, recording)
+        except SolverError as error:
+            stop = error
         except MbsError:
             raise
+        except KeyboardInterrupt as error:
+            stop = Interrupted(f"FMU {name} was interrupted")
+            stop.__cause__ = error
         except Exception as error:
             said = "; ".join(dict.fromkeys(messages)) or str(error)
-            raise SolverError(f"FMU {name} stopped: {said}") from error
+            stop = SolverError(f"FMU {name} stopped: {said}")
+            stop.__cause__ = error
+    if stop is not None:
+        if recording is not None and recording.times:
+            stop.time = recording.times[-1]
+            stop.result = recording.result((stop.time, str(stop)))
+        raise stop
+    assert recording is not None
     return recording.result()

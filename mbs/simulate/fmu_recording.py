@@ -83,11 +83,20 @@ class Recording:
         """The FMU asks for the end."""
         self.events.append((time, self.name, "ends the simulation"))
 
-    def result(self) -> Result:
-        """All of it."""
+    def result(self, stopped: tuple[float, str] | None = None) -> Result:
+        """All of it.
+
+        Args:
+            stopped: time, s, and sentence of what stopped the run early; None where it is complete.
+        """
         values = np.array(self.rows, dtype=float).reshape(len(self.times), len(self.columns))
         return Result(
-            np.array(self.times), values, self.columns, self.name, events=tuple(self.events)
+            np.array(self.times),
+            values,
+            self.columns,
+            self.name,
+            events=tuple(self.events),
+            stopped=stopped,
         )
 
 

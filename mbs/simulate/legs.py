@@ -17,7 +17,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.errors import SolverError
+from mbs.errors import Interrupted, SolverError
 from mbs.loops.analysis import rows_at
 from mbs.loops.examine import row_independence
 from mbs.loops.rolling import least_upright, rolling_discs
@@ -25,7 +25,7 @@ from mbs.loops.scales import scales
 from mbs.loops.velocity import constraint_jacobian
 from mbs.models.full_state import FullState
 from mbs.simulate.contacts import ContactMotion, first_modes
-from mbs.solvers import Events, integrate, integrate_events
+from mbs.solvers import EventMotion, Events, integrate_events
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,9 @@ _REGAINED = 1e-3
 _FLAT = 1e-3
 """Sine of the angle between a rolling disc and its plane at which it counts as flat."""
 
+Stop = SolverError | Interrupted | None
+"""Why a motion ends early; None where it does not."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leg:
@@ -44,7 +47,7 @@ class Leg:
 
     Attributes:
         state: its equations.
-        times: (m,) s.
+        times: (m,) s, that were reached.
         x: (m, nx) states at these times.
         contact: what rigid stops and dry friction do meanwhile, None where there are none.
     """
@@ -61,9 +64,12 @@ class Leg:
 
     def observed(self, p: Sequence[float]) -> list[Array]:
         """What the state equation observes, (m, ..) each."""
-        own = np.repeat(np.array(p, dtype=float).reshape(-1, 1), len(self.times), axis=1)
+        observe, count = self.state.observe, len(self.times)
+        if not count:
+            return [np.empty((0, observe.numel_out(k))) for k in range(observe.n_out())]
+        own = np.repeat(np.array(p, dtype=float).reshape(-1, 1), count, axis=1)
         every = own if self.contact is None else np.vstack([own, self.contact.modes.T])
-        values = self.state.observe.map(len(self.times))(self.times.reshape(1, -1), self.x.T, every)
+        values = observe.map(count)(self.times.reshape(1, -1), self.x.T, every)
         return [np.array(value).T for value in values]
 
 
@@ -74,8 +80,8 @@ def integrated(
     times: Array,
     p: Sequence[float],
     **options: Any,
-) -> list[Leg]:
-    """The motion at given times, in one leg for most systems.
+) -> tuple[list[Leg], Stop]:
+    """The motion at given times, in one leg for most systems, and why it ends before the last.
 
     Args:
         system: open or closed.
@@ -85,20 +91,20 @@ def integrated(
         p: (np,) parameters.
         options: of `integrate`.
 
-    Raises:
-        SolverError: the integration cannot go on; at a singular configuration the message says
-            which one, and the joint that the loops do not hold there.
+    Returns:
+        the legs that were reached, one at least; None where they reach the last time, or else why
+        they do not: at a singular configuration the message says which one, and the joint that the
+        loops do not hold there.
     """
-    try:
-        return _integrated(system, equations, x0, times, p, **options)
-    except SolverError as error:
-        if not error.singular or not error.state or not system.is_closed:
-            raise
-        raise SolverError(
-            f"{system.name}: {error}; {_lost(system, np.array(error.state[: system.nq]), p)}",
-            state=error.state,
+    legs, stop = _integrated(system, equations, x0, times, p, **options)
+    if isinstance(stop, SolverError) and stop.singular and stop.state and system.is_closed:
+        stop = SolverError(
+            f"{system.name}: {stop}; {_lost(system, np.array(stop.state[: system.nq]), p)}",
+            state=stop.state,
             singular=True,
-        ) from error
+            time=stop.time,
+        )
+    return legs, stop
 
 
 def _lost(system: System, q: Array, p: Sequence[float]) -> str:
@@ -124,26 +130,48 @@ def _integrated(
     times: Array,
     p: Sequence[float],
     **options: Any,
-) -> list[Leg]:
+) -> tuple[list[Leg], Stop]:
     if system.closure is not None and system.closure.varies:
         return _with_other_rows(system, equations, x0, times, p, options)
     state = equations(system)
     if state.events is not None:
-        return [_with_contacts(system, state, x0, times, p, options)]
+        return _with_contacts(system, state, x0, times, p, options)
     discs = [disc.name for _, disc in rolling_discs(system)]
     if discs:
         upright = Limit(least_upright(system), 1, _FLAT)
-        leg, end, _ = _leg(system, state, x0, times, p, upright, options)
-        if end is None:
-            return [leg]
-        raise SolverError(
+        leg, motion = _leg(system, state, x0, times, p, upright, options)
+        if not motion.events:
+            return [leg], motion.stop
+        end = motion.events[0].time
+        return [leg], SolverError(
             f"{system.name}: {' or '.join(discs)} lies flat on its plane at t = {end:.6g} s, where"
-            " no single point of a disc touches; end the run before, or keep it upright"
+            " no single point of a disc touches; end the run before, or keep it upright",
+            time=end,
         )
-    x = integrate(
-        state.rhs, x0, times, p=p, project=state.project, passage=state.passage, **options
+    motion = _motion(state, x0, times, None, p, options)
+    return [Leg(state, times[: len(motion.x)], motion.x)], motion.stop
+
+
+def _motion(
+    state: FullState,
+    x0: Array,
+    times: Array,
+    events: Events | None,
+    p: Sequence[float],
+    options: dict[str, Any],
+) -> EventMotion:
+    """The motion as far as it comes."""
+    return integrate_events(
+        state.rhs,
+        x0,
+        times,
+        events,
+        p=p,
+        project=state.project,
+        passage=state.passage,
+        partial=True,
+        **options,
     )
-    return [Leg(state, times, x)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +196,7 @@ def _with_other_rows(
     times: Array,
     p: Sequence[float],
     options: dict[str, Any],
-) -> list[Leg]:
+) -> tuple[list[Leg], Stop]:
     """Legs of an over-constrained system, each with rows that suit its first posture."""
     legs: list[Leg] = []
     left, limit = times, _limit(system, x0[: system.nq], np.array(p, dtype=float))
@@ -179,12 +207,14 @@ def _with_other_rows(
         if rows not in known:
             known[rows] = system, equations(system)
         system, state = known[rows]
-        leg, end, now = _leg(system, state, x0, left, p, limit, options)
+        leg, motion = _leg(system, state, x0, left, p, limit, options)
         legs.append(leg if not legs else leg.without_start)
-        x0 = now
-        left = left[left > end] if end is not None else left[:0]
+        if motion.stop is not None or not motion.events:
+            return legs, motion.stop
+        x0, end = motion.x[-1], motion.events[0].time
+        left = left[left > end]
         if not len(left):
-            return legs
+            return legs, None
         left = np.concatenate([[end], left])
         system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
 
@@ -196,21 +226,12 @@ def _with_contacts(
     times: Array,
     p: Sequence[float],
     options: dict[str, Any],
-) -> Leg:
+) -> tuple[list[Leg], Stop]:
     assert state.events is not None
     first = first_modes(system, x0, p)
-    events = Events(*state.events, first)
-    motion = integrate_events(
-        state.rhs,
-        x0,
-        times,
-        events,
-        p=p,
-        project=state.project,
-        passage=state.passage,
-        **options,
-    )
-    return Leg(state, times, motion.x, ContactMotion(first, motion.modes, motion.events))
+    motion = _motion(state, x0, times, Events(*state.events, first), p, options)
+    contact = ContactMotion(first, motion.modes, motion.events)
+    return [Leg(state, times[: len(motion.x)], motion.x, contact)], motion.stop
 
 
 def _leg(
@@ -221,12 +242,15 @@ def _leg(
     p: Sequence[float],
     limit: Limit,
     options: dict[str, Any],
-) -> tuple[Leg, float | None, Array]:
-    """One leg, the time of its end if it ends early, and the state there."""
+) -> tuple[Leg, EventMotion]:
+    """One leg, and the motion whose first event is its end, if it ends early; it rests then."""
     n, n_p = len(x0), len(p)
     t, x, pm, fired = (SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", 1)))
     parameters, ended = pm[:n_p], pm[n_p]
-    rhs = Function("rhs", [t, x, pm], [(1 - ended) * state.rhs(t, x, parameters)])
+    rate = casadi.if_else(
+        ended, 0, state.rhs(t, x, parameters)
+    )  # what has no value there is let be
+    rhs = Function("rhs", [t, x, pm], [rate])
     assert state.project is not None
     moved, residual = state.project(t, x, parameters)
     kept = [casadi.if_else(ended, x, moved), casadi.if_else(ended, 0, residual)]
@@ -237,12 +261,10 @@ def _leg(
         Function("end", [t, x, pm, fired], [x, SX(1)]),
         [0.0],
     )
-    motion = integrate_events(rhs, x0, times, events, p=p, project=project, **options)
-    if not motion.events:
-        return Leg(state, times, motion.x), None, motion.x[-1]
-    end = motion.events[0].time
-    before = times <= end
-    return Leg(state, times[before], motion.x[before]), end, motion.x[-1]
+    motion = integrate_events(rhs, x0, times, events, p=p, project=project, partial=True, **options)
+    reached = times[: len(motion.x)]
+    before = reached <= (motion.events[0].time if motion.events else np.inf)
+    return Leg(state, reached[before], motion.x[before]), motion
 
 
 def _next(system: System, q: Array, p: Array) -> tuple[System, Limit]:

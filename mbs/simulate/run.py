@@ -18,7 +18,7 @@ from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.contacts import contact_columns, every_effort, require_contacts_possible, told
 from mbs.simulate.inputs import device_columns, device_states, input_function
-from mbs.simulate.legs import Leg, integrated
+from mbs.simulate.legs import Leg, Stop, integrated
 from mbs.simulate.motion import Motion, prescribed_motions, started
 from mbs.simulate.sensor_columns import sensor_columns
 
@@ -48,6 +48,9 @@ def run(
     A one-step method with error control. After every step positions and velocities are
     projected onto the independent closure rows, so that loops do not drift; the step is accepted
     when all closure rows hold.
+
+    What stops a motion, an error or control-C, is raised with what was reached as its `result`: a
+    `Result` of the rows before the stop, whose `stopped` has the time and the sentence.
 
     Args:
         system: open or closed.
@@ -85,7 +88,9 @@ def run(
             wrong type or size.
         CompilerError: the compiler that CC names does not start.
         Unclosable: the loops cannot be closed at these positions.
-        SolverError: the integration cannot go on; the message says when and why.
+        SolverError: the integration cannot go on; the message says when and why, `result` has
+            what was reached.
+        Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` has what was reached.
     """
     require_system(system)
     duration = positive(duration, "duration [s]", system.name)
@@ -100,7 +105,7 @@ def run(
     times = np.linspace(0.0, duration, steps + 1)
     rtol, atol = step_tolerances(tolerance)
     with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
-        legs = integrated(
+        legs, stop = integrated(
             system,
             lambda like: full_state(like, effort, inputs, motions),
             x0,
@@ -111,7 +116,11 @@ def run(
             atol=atol,
             progress=reached,
         )
-    return _result(system, legs, p)
+    result = _result(system, legs, p, stop)
+    if stop is not None:
+        stop.result = result
+        raise stop
+    return result
 
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:
@@ -119,7 +128,7 @@ def step_tolerances(tolerance: float) -> tuple[float, float]:
     return max(1e-3 * tolerance, 1e-14), max(0.04 * tolerance, 1e-13)
 
 
-def _result(system: System, legs: Sequence[Leg], p: Sequence[float]) -> Result:
+def _result(system: System, legs: Sequence[Leg], p: Sequence[float], stop: Stop) -> Result:
     times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     every = np.repeat(np.array(p, dtype=float).reshape(-1, 1), len(times), axis=1)
     parts = [leg.observed(p) for leg in legs]
@@ -151,4 +160,7 @@ def _result(system: System, legs: Sequence[Leg], p: Sequence[float]) -> Result:
         column(name, unit, values)
     values = np.column_stack(columns)
     events = told(system, contact)
-    return Result(times, values, units, name=system.name, events=events, system=system)
+    stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
+    return Result(
+        times, values, units, name=system.name, events=events, system=system, stopped=stopped
+    )

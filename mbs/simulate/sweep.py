@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from mbs.assembly import System
-from mbs.errors import MbsError, ModelError, SolverError
+from mbs.errors import Interrupted, MbsError, ModelError, SolverError
 from mbs.messages import did_you_mean, quoted
 from mbs.progress import progress
 from mbs.result import Result
@@ -37,9 +37,18 @@ _OPTIONS = {
     for function in (run, fmu)
 }
 
-Answer = tuple[Any, ...] | str
-"""What a case comes to: the parts of a `Result`, which can be sent between processes, or what
-went wrong."""
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a case comes to; it can be sent between processes.
+
+    Attributes:
+        result: of the simulation, up to where it stopped; None where nothing was reached.
+        complaint: what went wrong; empty where nothing did.
+    """
+
+    result: Result | None
+    complaint: str = ""
 
 
 def sweep(
@@ -74,14 +83,17 @@ def sweep(
         **options: further arguments of `run` or `fmu`, the same for all cases.
 
     Returns:
-        the cases and their results. A case that fails, for whatever reason, does not end the study.
+        the cases and their results. A case that fails, for whatever reason, does not end the study;
+        what it had reached is kept too, as `Sweep.reached` gives it.
 
     Raises:
         ModelError: the grid is empty, a name in it is unknown to the model, there is no such
             option, the folder holds another study, there is no such FMU, a system has no duration,
             or the model or an option cannot be sent to other processes.
         ExportError: the folder cannot be written.
-        SolverError: a process of the executor ended.
+        SolverError: a process of the executor ended; `result` is the `Sweep` of what was done.
+        Interrupted: control-C was pressed; a KeyboardInterrupt whose `result` is the `Sweep` of
+            what was done, the case under way as far as it had come.
     """
     cases = cases_of(grid)
     if duration is not None:
@@ -97,16 +109,21 @@ def sweep(
         weakref.finalize(place, shutil.rmtree, kept, ignore_errors=True)
     tasks = {k: _Task(simulate, cases[k], options) for k in place.missing(len(cases))}
     label = f"{len(tasks)} simulations of {study['model']}"
-    failures: dict[int, str] = {}
-    with progress(label, 0.0, len(tasks), quiet=quiet) as reached:
-        answers = _in_turn(tasks) if executor is None else _spread(tasks, executor)
-        for done, (number, answer) in enumerate(answers, start=1):
-            place.keep(number, answer if isinstance(answer, str) else Result(*answer))
-            if isinstance(answer, str):
-                failures[number] = answer
-            reached(float(done))
-    numbers = tuple(range(len(cases)))
-    return Sweep(str(study["model"]), cases, place, dict(sorted(failures.items())), numbers)
+    whole = Sweep(str(study["model"]), cases, place, {}, tuple(range(len(cases))))
+    try:
+        with progress(label, 0.0, len(tasks), quiet=quiet) as reached:
+            answers = _in_turn(tasks) if executor is None else _spread(tasks, executor)
+            for done, (number, answer) in enumerate(answers, start=1):
+                place.keep(number, answer.result, answer.complaint)
+                reached(float(done))
+    except SolverError as error:
+        error.result = whole.as_found()
+        raise
+    except KeyboardInterrupt as error:
+        stop = Interrupted(f"sweep of {study['model']} was interrupted")
+        stop.result = whole.as_found()
+        raise stop from error
+    return whole.as_found()
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +137,13 @@ class _Task:
     def __call__(self) -> Answer:
         """Simulate; what went wrong is an answer too, so that the other cases go on."""
         try:
-            r = self.simulate(self.case, self.options)
+            return Answer(self.simulate(self.case, self.options))
+        except SolverError as error:
+            return Answer(error.result, str(error))
         except MbsError as error:
-            return str(error)
+            return Answer(None, str(error))
         except Exception as error:
-            return _said(error)
-        return r.time, r.values, dict(r.units), r.name, dict(r.info), r.events
+            return Answer(None, _said(error))
 
 
 def _said(error: BaseException) -> str:
@@ -262,7 +280,13 @@ def _merged(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, A
 
 
 def _in_turn(tasks: Mapping[int, _Task]) -> Iterator[tuple[int, Answer]]:
-    return ((number, task()) for number, task in tasks.items())
+    for number, task in tasks.items():
+        try:
+            answer = task()
+        except Interrupted as stop:
+            yield number, Answer(stop.result, str(stop))
+            raise
+        yield number, answer
 
 
 def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[int, Answer]]:
@@ -288,4 +312,4 @@ def _answered(future: Future[Answer]) -> Answer:
     except BrokenExecutor:
         raise
     except Exception as error:  # lost on the way, such as a worker of a cluster
-        return _said(error)
+        return Answer(None, _said(error))

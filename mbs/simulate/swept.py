@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, overload
 
 import numpy as np
@@ -60,8 +60,12 @@ class Sweep:
         """
         place = Folder(path_of(folder))
         name, cases = place.known()
-        failures = {k: place.complained(k) for k in place.missing(len(cases))}
-        return cls(name, cases, place, failures, tuple(range(len(cases))))
+        return cls(name, cases, place, {}, tuple(range(len(cases)))).as_found()
+
+    def as_found(self) -> Sweep:
+        """The same study, with the failures that its folder tells of now."""
+        missing = self.folder.missing(len(self.cases))
+        return replace(self, failures={k: self.folder.complained(k) for k in missing})
 
     def __repr__(self) -> str:
         return (
@@ -108,6 +112,23 @@ class Sweep:
         if place in self.failures:
             raise ModelError(f"sweep: case {place} failed: {self.failures[place]}")
         return Result.load(self.folder.file(self.numbers[place]))
+
+    def reached(self, number: int) -> Result:
+        """What a case came to, up to where it stopped if it failed; its `stopped` says so.
+
+        Args:
+            number: of the case, counted from the end where negative.
+
+        Raises:
+            ModelError: it failed before it had a row, or there is no such case.
+        """
+        place = _index(number, len(self.cases))
+        if place not in self.failures:
+            return self[place]
+        file = self.folder.part(self.numbers[place])
+        if not file.is_file():
+            raise ModelError(f"sweep: case {place} reached nothing: {self.failures[place]}")
+        return Result.load(file)
 
     def _part(self, chosen: range) -> Sweep:
         failures = {new: self.failures[k] for new, k in enumerate(chosen) if k in self.failures}

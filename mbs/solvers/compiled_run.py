@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mbs.errors import SolverError
+from mbs.errors import Interrupted, SolverError
 from mbs.native import cached_library
 from mbs.native.compiled import calls_machine_code, generated, unwritten
 from mbs.native.compiler import flags_for
-from mbs.solvers.events import Event, fired_of
-from mbs.solvers.failures import failed
+from mbs.solvers.events import Event, EventMotion, fired_of
+from mbs.solvers.failures import failed, interrupted
 from mbs.solvers.problem import Equations, Problem
 
 Array = npt.NDArray[np.float64]
@@ -70,52 +70,53 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     return _load(library, equations.indicators is not None, equations.passage is not None)
 
 
-def run_compiled(
-    library: ctypes.CDLL, problem: Problem, progress: Progress | None
-) -> tuple[Array, list[Event]]:
-    """States at the times of a problem, and its events.
+def run_compiled(library: ctypes.CDLL, problem: Problem, progress: Progress | None) -> EventMotion:
+    """The motion at the times of a problem, as far as it comes.
+
+    Control-C is heard between two chunks of steps: the compiled code runs to the end of its own.
 
     Args:
         library: what `library_of` gave for its equations.
         problem: what to integrate.
         progress: called now and then with the time reached, s.
 
-    Returns:
-        (m, nx) a row for each time; the events in the order of time.
-
     Raises:
-        SolverError: the integration cannot go on.
+        SolverError: there is no memory for it.
     """
     x, times = problem.x0.copy(), problem.times
     table = np.empty((len(times), len(x)))
     done = ctypes.c_longlong(0)
     log: list[Event] = []
+    stop: SolverError | Interrupted | None = None
     with _opened(library, problem) as driver:
         status = library.mbs_begin(driver, _pointer(x))
-        while status <= _MORE and done.value < len(times):
-            status = library.mbs_table(
-                driver,
-                _pointer(x),
-                _pointer(times),
-                len(times),
-                _pointer(table),
-                ctypes.byref(done),
-                _CHUNK,
-            )
-            if status == _FIRED:
-                log.append(_event(library, driver, problem))
-            if progress is not None:
-                progress(library.mbs_time(driver))
-        if status > _MORE:
+        try:
+            while status <= _MORE and done.value < len(times):
+                status = library.mbs_table(
+                    driver,
+                    _pointer(x),
+                    _pointer(times),
+                    len(times),
+                    _pointer(table),
+                    ctypes.byref(done),
+                    _CHUNK,
+                )
+                if status == _FIRED:
+                    log.append(_event(library, driver, problem))
+                if progress is not None:
+                    progress(library.mbs_time(driver))
+        except KeyboardInterrupt:
+            stop = interrupted(library.mbs_time(driver))
+        if stop is None and status > _MORE:
             blamed = _event(library, driver, problem).fired if status in _CROWDED else ()
-            raise failed(
+            stop = failed(
                 library.mbs_time(driver),
                 library.mbs_step(driver),
                 _REASONS[status],
                 blamed,
                 x.tolist(),
             )
-    return table, log
+    return problem.motion(table[: done.value], log, stop)
 
 
 def _event(library: ctypes.CDLL, driver: ctypes.c_void_p, problem: Problem) -> Event:

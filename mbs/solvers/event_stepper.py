@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from mbs.solvers.events import fired_of
 from mbs.solvers.failures import Failure, failed
-from mbs.solvers.stepper import EPSILON, Array, Stepper
+from mbs.solvers.stepper import EPSILON, Array, Stepper, Table
 
 Flags = npt.NDArray[np.bool_]
 Values = Callable[[float, Array], Array]
@@ -65,39 +65,38 @@ class EventStepper:
         except Failure as failure:
             raise failed(self.solver.t, self.solver.h, str(failure)) from failure
 
-    def table(self, times: Array, row: int, rows: Array, budget: int) -> tuple[int, bool]:
-        """Fill rows from `row` on, in about `budget` steps, at most to the next event.
+    def fill(self, table: Table, budget: int) -> bool:
+        """Fill the next rows of a table, in about `budget` steps, at most to the next event.
 
         Args:
-            times: (m,) s, increasing.
-            row: first row to fill.
-            rows: (m, n) table that is filled; a row at the time of an event is after it.
+            table: with the rows that are left; a row at the time of an event is after it.
             budget: number of steps after which to return.
 
         Returns:
-            the first row not filled yet; whether an event has just happened.
+            whether an event has just happened.
 
         Raises:
             SolverError: the integration cannot go on.
         """
-        solver, limit = self.solver, float(times[-1])
+        solver, limit = self.solver, float(table.times[-1])
         try:
             with np.errstate(all="ignore"):
-                while row < len(times):
-                    t = float(times[row])
+                while not table.full:
+                    t = table.next
                     if t < solver.t or (t == solver.t and not self.due.any()):
-                        rows[row] = solver.output(t)
-                        row += 1
+                        table.fill(solver.output(t))
                     elif self.due.any():
                         self._settle(limit)
-                        return row, True
+                        return True
                     elif budget <= 0:
                         break
                     else:
                         budget -= self._step(limit)
         except Failure as failure:
-            raise failed(solver.t, solver.h, str(failure), self._blamed(failure)) from failure
-        return row, False
+            raise failed(
+                solver.t, solver.h, str(failure), self._blamed(failure), solver.x.tolist()
+            ) from failure
+        return False
 
     def _blamed(self, failure: Failure) -> tuple[int, ...]:
         return fired_of(self.fired) if str(failure) in ("settle", "standstill") else ()

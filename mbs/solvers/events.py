@@ -6,6 +6,8 @@ import casadi
 import numpy as np
 import numpy.typing as npt
 
+from mbs.errors import Interrupted, SolverError
+
 Array = npt.NDArray[np.float64]
 
 
@@ -50,14 +52,17 @@ class EventMotion:
     """A motion with events.
 
     Attributes:
-        x: (m, nx) states at the times asked for; at the time of an event, after it.
+        x: (m, nx) states at the times asked for, those that were reached; at the time of an event,
+            after it.
         modes: (m, nm) modes at these times.
         events: in the order of time.
+        stop: why not all the times were reached; None where they were.
     """
 
     x: Array
     modes: Array
     events: tuple[Event, ...]
+    stop: SolverError | Interrupted | None = None
 
 
 def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:

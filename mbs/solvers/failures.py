@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from mbs.errors import SolverError
+from mbs.errors import Interrupted, SolverError
 
 MAX_STEPS = 100_000
 REASONS = {
@@ -56,4 +56,14 @@ def failed(
         f"integration stopped at t = {t:.9g} s{step}: {REASONS[reason]}{who}",
         state=state,
         singular=reason in _SINGULAR,
+        time=t,
     )
+
+
+def interrupted(t: float) -> Interrupted:
+    """What says when an integration was interrupted.
+
+    Args:
+        t: time of the last accepted state, s.
+    """
+    return Interrupted(f"integration interrupted at t = {t:.9g} s", time=t)

@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from mbs.native import compiler_found
 from mbs.solvers.compiled_run import library_of, run_compiled
-from mbs.solvers.events import Event, EventMotion, Events, modes_at
+from mbs.solvers.events import EventMotion, Events
 from mbs.solvers.interpreted_run import run_interpreted
 from mbs.solvers.passage import Passage
-from mbs.solvers.problem import Problem, equations, numbers, problem
+from mbs.solvers.problem import Problem, equations, problem
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -62,17 +62,32 @@ def integrate(
     Raises:
         ModelError: an argument does not fit the functions.
         SolverError: the integration cannot go on; the message says when and why.
+        Interrupted: control-C was pressed.
         CompilerError: the compiler that CC names does not start.
     """
-    functions = equations(rhs, project, method, None, passage)
-    return _run(problem(functions, x0, times, p, (), (rtol, atol), max_step), progress, compiled)[0]
+    motion = integrate_events(
+        rhs,
+        x0,
+        times,
+        None,
+        p=p,
+        project=project,
+        passage=passage,
+        method=method,
+        rtol=rtol,
+        atol=atol,
+        max_step=max_step,
+        progress=progress,
+        compiled=compiled,
+    )
+    return motion.x
 
 
 def integrate_events(
     rhs: casadi.Function,
     x0: npt.ArrayLike,
     times: npt.ArrayLike,
-    events: Events,
+    events: Events | None,
     *,
     p: npt.ArrayLike | None = None,
     project: casadi.Function | None = None,
@@ -83,6 +98,7 @@ def integrate_events(
     max_step: float = math.inf,
     progress: Progress | None = None,
     compiled: bool = True,
+    partial: bool = False,
 ) -> EventMotion:
     """States and modes at given times of a system whose state or equations jump at events.
 
@@ -99,7 +115,7 @@ def integrate_events(
         rhs: `rhs(t, x, p) -> xdot`; p ends with the modes, here and in all functions.
         x0: (nx,) state at the first time.
         times: (m,) s, increasing; a row at the time of an event is after it.
-        events: indicators, jump and the first modes.
+        events: indicators, jump and the first modes; None where there are none.
         p: (np,) parameters, without the modes.
         project: as in `integrate`, likewise the arguments below.
         passage: as in `integrate`; it has the modes of the present too.
@@ -109,6 +125,8 @@ def integrate_events(
         max_step: the longest step, s; only the error limits it by default.
         progress: called now and then with the time reached, s.
         compiled: False for the same algorithm in Python.
+        partial: True for what was reached, with its `stop`, where the integration cannot go on or
+            is interrupted by control-C; nothing is raised for that then.
 
     Returns:
         states, modes and the list of events.
@@ -117,16 +135,19 @@ def integrate_events(
         ModelError: an argument does not fit the functions.
         SolverError: the integration cannot go on: as in `integrate`, or the jumps at one time do
             not come to an end, or events crowd until time stands still.
+        Interrupted: control-C was pressed.
         CompilerError: the compiler that CC names does not start.
     """
     functions = equations(rhs, project, method, events, passage)
-    given = problem(functions, x0, times, p, events.modes, (rtol, atol), max_step)
-    table, log = _run(given, progress, compiled)
-    happened = tuple(log)
-    return EventMotion(table, modes_at(given.times, numbers(events.modes), happened), happened)
+    modes = () if events is None else events.modes
+    given = problem(functions, x0, times, p, modes, (rtol, atol), max_step)
+    motion = _run(given, progress, compiled)
+    if motion.stop is not None and not partial:
+        raise motion.stop
+    return motion
 
 
-def _run(given: Problem, progress: Progress | None, compiled: bool) -> tuple[Array, list[Event]]:
+def _run(given: Problem, progress: Progress | None, compiled: bool) -> EventMotion:
     library = library_of(given.equations) if compiled and compiler_found() else None
     if library is None:
         return run_interpreted(given, progress)

@@ -6,13 +6,14 @@ import casadi
 import numpy as np
 import numpy.typing as npt
 
+from mbs.errors import Interrupted, SolverError
 from mbs.solvers.dopri5 import Dopri5
 from mbs.solvers.event_stepper import EventStepper, Flags
-from mbs.solvers.events import Event, fired_of
-from mbs.solvers.failures import Failure, failed
+from mbs.solvers.events import Event, EventMotion, fired_of
+from mbs.solvers.failures import Failure, failed, interrupted
 from mbs.solvers.problem import Problem
 from mbs.solvers.rodas import Rodas
-from mbs.solvers.stepper import Projection, Stepper
+from mbs.solvers.stepper import Projection, Stepper, Table
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -22,50 +23,44 @@ ITERATIONS = 10
 _CHUNK = 50  # steps between two calls of progress
 
 
-def run_interpreted(problem: Problem, progress: Progress | None) -> tuple[Array, list[Event]]:
-    """States at the times of a problem, and its events.
+def run_interpreted(problem: Problem, progress: Progress | None) -> EventMotion:
+    """The motion at the times of a problem, as far as it comes.
 
     Args:
         problem: what to integrate.
         progress: called now and then with the time reached, s.
-
-    Returns:
-        (m, nx) a row for each time; the events in the order of time.
-
-    Raises:
-        SolverError: the integration cannot go on.
     """
-    p, times = problem.p.copy(), problem.times
-    project = _projection(problem, p)
-    start = float(times[0])
-    try:
-        state = problem.x0 if project is None else project(start, problem.x0)
-    except Failure as failure:
-        raise failed(start, 0.0, str(failure)) from failure
-    solver = _stepper(problem, p, project, state)
-    table = np.empty((len(times), len(state)))
+    p = problem.p.copy()
+    solver = _stepper(problem, p)
+    table = Table(problem.times, np.empty((len(problem.times), len(problem.x0))))
     log: list[Event] = []
-    watched = _watched(problem, p, project, solver)
-    row = 0
-    while row < len(times):
-        if watched is None:
-            row = solver.table(times, row, table, _CHUNK)
-        else:
-            row, happened = watched.table(times, row, table, _CHUNK)
-            if happened:
-                fired = fired_of(watched.fired)
-                log.append(Event(solver.t, fired, p[len(p) - problem.modes :].copy()))
-        if progress is not None:
-            progress(solver.t)
-    return table, log
+    stop: SolverError | Interrupted | None = None
+    try:
+        if solver.project is not None:
+            solver.x = _begun(solver)
+        watched = _watched(problem, p, solver)
+        while not table.full:
+            if watched is None:
+                solver.fill(table, _CHUNK)
+            elif watched.fill(table, _CHUNK):
+                modes = p[len(p) - problem.modes :].copy()
+                log.append(Event(solver.t, fired_of(watched.fired), modes))
+            if progress is not None:
+                progress(solver.t)
+    except SolverError as error:
+        stop = error
+    except KeyboardInterrupt:
+        stop = interrupted(solver.t)
+    return problem.motion(table.rows[: table.done], log, stop)
 
 
 def _vector(value: casadi.DM) -> Array:
     return np.asarray(value.full()[:, 0])
 
 
-def _stepper(problem: Problem, p: Array, project: Projection | None, state: Array) -> Stepper:
-    functions, start = problem.equations, float(problem.times[0])
+def _stepper(problem: Problem, p: Array) -> Stepper:
+    functions, start, state = problem.equations, float(problem.times[0]), problem.x0
+    project = _projection(problem, p)
     control = problem.rtol, problem.atol, problem.max_step
 
     def slope(t: float, x: Array) -> Array:
@@ -79,6 +74,15 @@ def _stepper(problem: Problem, p: Array, project: Projection | None, state: Arra
     if functions.jacobian is None:
         return Dopri5(slope, project, start, state, *control)
     return Rodas(slope, project, start, state, *control, jacobian=jacobian)
+
+
+def _begun(solver: Stepper) -> Array:
+    """The first state, on the constraints."""
+    assert solver.project is not None
+    try:
+        return solver.project(solver.t, solver.x)
+    except Failure as failure:
+        raise failed(solver.t, 0.0, str(failure)) from failure
 
 
 def _projection(problem: Problem, p: Array) -> Projection | None:
@@ -103,11 +107,9 @@ def _projection(problem: Problem, p: Array) -> Projection | None:
     return onto
 
 
-def _watched(
-    problem: Problem, p: Array, project: Projection | None, solver: Stepper
-) -> EventStepper | None:
+def _watched(problem: Problem, p: Array, solver: Stepper) -> EventStepper | None:
     """The integration with its events, which has looked at the first state."""
-    functions = problem.equations
+    functions, project = problem.equations, solver.project
     indicators, rates, jump = functions.indicators, functions.rates, functions.jump
     if indicators is None or rates is None or jump is None:
         return None

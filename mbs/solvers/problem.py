@@ -1,14 +1,15 @@
 """An integration, its functions brought into one form and its arguments checked."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi
 import numpy as np
 import numpy.typing as npt
 
-from mbs.errors import ModelError
+from mbs.errors import Interrupted, ModelError, SolverError
 from mbs.messages import quoted
-from mbs.solvers.events import Events
+from mbs.solvers.events import Event, EventMotion, Events, modes_at
 from mbs.solvers.passage import Passage
 
 Array = npt.NDArray[np.float64]
@@ -79,6 +80,19 @@ class Problem:
     rtol: float
     atol: float
     max_step: float
+
+    def motion(
+        self, x: Array, log: Sequence[Event], stop: SolverError | Interrupted | None
+    ) -> EventMotion:
+        """What an integration came to.
+
+        Args:
+            x: (k, nx) states at the first k times.
+            log: events in the order of time.
+            stop: why it came to no more of them.
+        """
+        first, events = self.p[len(self.p) - self.modes :], tuple(log)
+        return EventMotion(x, modes_at(self.times[: len(x)], first, events), events, stop)
 
 
 def equations(

@@ -27,6 +27,36 @@ UNMOVED = 0.01
 
 
 @dataclass(slots=True)
+class Table:
+    """States at given times, as far as they are reached.
+
+    Attributes:
+        times: (m,) s, increasing.
+        rows: (m, n) of which the first are filled.
+        done: how many.
+    """
+
+    times: Array
+    rows: Array
+    done: int = 0
+
+    @property
+    def next(self) -> float:
+        """Time of the first row that is not filled."""
+        return float(self.times[self.done])
+
+    @property
+    def full(self) -> bool:
+        """Whether all rows are filled."""
+        return self.done == len(self.times)
+
+    def fill(self, x: Array) -> None:
+        """The state at the next time."""
+        self.rows[self.done] = x
+        self.done += 1
+
+
+@dataclass(slots=True)
 class Stepper(ABC):
     """One integration under way, by a method whose error estimate is of order 4.
 
@@ -79,34 +109,27 @@ class Stepper(ABC):
     def _interpolate(self, a: float) -> Array:
         """State at a part a of the last step."""
 
-    def table(self, times: Array, row: int, rows: Array, budget: int) -> int:
-        """Fill rows from `row` on with the states at times, in about `budget` steps.
+    def fill(self, table: Table, budget: int) -> None:
+        """Fill the next rows of a table, in about `budget` steps.
 
         Args:
-            times: (m,) s, increasing.
-            row: first row to fill.
-            rows: (m, n) table that is filled.
+            table: with the rows that are left.
             budget: number of steps after which to return.
-
-        Returns:
-            the first row not filled yet.
 
         Raises:
             SolverError: the integration cannot go on.
         """
         try:
             with np.errstate(all="ignore"):  # what overflows is rejected as not finite
-                while row < len(times):
-                    if times[row] <= self.t:
-                        rows[row] = self.output(float(times[row]))
-                        row += 1
+                while not table.full:
+                    if table.next <= self.t:
+                        table.fill(self.output(table.next))
                     elif budget <= 0:
                         break
                     else:
-                        budget -= self.step(float(times[-1]))
+                        budget -= self.step(float(table.times[-1]))
         except Failure as failure:
-            raise failed(self.t, self.h, str(failure)) from failure
-        return row
+            raise failed(self.t, self.h, str(failure), state=self.x.tolist()) from failure
 
     def output(self, t: float) -> Array:
         """The state at a time within the last step, for a row of the table."""

@@ -8,6 +8,7 @@ import pytest
 from mbs.errors import CompilerError, ModelError, SolverError
 from mbs.solvers import integrate
 from mbs.solvers.dopri5 import Dopri5
+from mbs.solvers.stepper import Table
 
 T, X, P = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("p")
 OSCILLATOR = ca.Function("oscillator", [T, X, P], [ca.vertcat(X[1], -(P**2) * X[0])])
@@ -68,14 +69,15 @@ def test_order_five_in_the_number_of_steps():
         start = np.array([1.0, 0.0])
         solver = Dopri5(slope, None, 0.0, start, tolerance, tolerance)
         times = np.linspace(0, 20, 2001)
-        table = np.empty((len(times), 2))
         while solver.t < 20.0:
-            solver.table(np.array([20.0]), 0, np.empty((1, 2)), 1)
+            solver.fill(Table(np.array([20.0]), np.empty((1, 2))), 1)
         steps_error.append(abs(solver.x[0] - np.cos(20.0)))
         work.append(calls[0])
         solver = Dopri5(slope, None, 0.0, start, tolerance, tolerance)
-        assert solver.table(times, 0, table, 10**6) == len(times)
-        dense_error.append(np.max(np.abs(table[:, 0] - np.cos(times))))
+        table = Table(times, np.empty((len(times), 2)))
+        solver.fill(table, 10**6)
+        assert table.full
+        dense_error.append(np.max(np.abs(table.rows[:, 0] - np.cos(times))))
     order = -np.polyfit(np.log(work), np.log(steps_error), 1)[0]
     dense_order = -np.polyfit(np.log(work), np.log(dense_error), 1)[0]
     assert 4.5 < order < 6.0

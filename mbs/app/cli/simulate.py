@@ -12,6 +12,7 @@ from mbs.app.cli.arguments import Json, Parameters, Robot, examples
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import Table, note, number, print_json, print_tables
+from mbs.errors import Interrupted, SolverError
 
 if TYPE_CHECKING:
     from mbs.assembly import System
@@ -126,7 +127,7 @@ def simulate(
     signal: Signal = None,
     json: Json = False,
 ) -> None:
-    """Simulate a robot; loops stay closed.
+    """Simulate a robot; loops stay closed. Of a motion that stops early, what it has is written.
 
     The columns are NAME.q, NAME.v, NAME.a and NAME.tau of every coordinate, the energies and the
     residual of the loops, devices and sensors.
@@ -141,7 +142,13 @@ def simulate(
     settings = task.SimulationSettings(
         duration=duration, step=step, tolerance=tolerance, method=method, **laws
     )
-    result = task.simulate(assembled, settings)
+    stop = None
+    try:
+        result = task.simulate(assembled, settings)
+    except (SolverError, Interrupted) as error:
+        if error.result is None:
+            raise
+        result, stop = error.result, error  # what was reached is written all the same
     _write(result, file)
     _draw(result, assembled, plot, film, signal)
     if json:
@@ -150,6 +157,8 @@ def simulate(
         typer.echo(task.csv_bytes(result).decode("utf-8").replace("\r\n", "\n"), nl=False)
     else:
         _show(result)
+    if stop is not None:
+        raise stop
 
 
 def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
@@ -197,6 +206,7 @@ def data_of(result: Result) -> dict[str, Any]:
         "units": dict(result.units),
         "columns": {name: result[name] for name in result.names},
         "events": [{"time": t, "name": name, "what": what} for t, name, what in result.events],
+        "stopped": result.stopped,
     }
 
 

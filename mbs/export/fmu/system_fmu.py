@@ -191,5 +191,5 @@ def fmu_model(
 
 def _passive(state: MinimalState) -> tuple[int, int, int]:
     """Where velocities and accelerations of dependent joints stand in y, and their number."""
-    first, count = len(state.accelerations) + len(state.dependents), len(state.passive)
+    first, count = len(state.accelerations) + len(state.shown), len(state.passive)
     return first, first + count, count

@@ -116,7 +116,7 @@ def outputs(system: System, state: MinimalState) -> Iterator[Variable]:
     """The elements of y but those that are observed."""
     speeds = system.speeds
     yield from (_acceleration(speeds[k]) for k in state.accelerations)
-    for k in state.dependents:
+    for k in state.shown:
         yield _position(system.coordinates[k], f"{system.coordinates[k].name}.q")
     yield from (_velocity(speeds[k]) for k in state.passive)
     yield from (_acceleration(speeds[k]) for k in state.passive)

@@ -8,6 +8,7 @@ import casadi
 from casadi import DM, MX, Function
 
 from mbs.assembly import System
+from mbs.errors import ModelError
 from mbs.identification.exciting.limits import Limits
 from mbs.identification.leading import signed_leads
 from mbs.identification.postures import is_explicit, posture_of
@@ -54,5 +55,10 @@ def instant(system: System, columns: Sequence[Column], limits: Limits) -> Functi
 def _efforts(system: System, limits: Limits, q: MX, v_a: MX, a_a: MX) -> list[MX]:
     if not any(limit.is_finite for limit in limits.effort):
         return [MX(0) for _ in limits.effort]
+    if system.motors != system.active:
+        raise ModelError(
+            f"{system.name}: limits of efforts are given and its motors are not its independent"
+            " joints, so that they share efforts in many ways; leave the limits of efforts out"
+        )
     tau = inverse_dynamics(system)(q, v_a, a_a)
     return [tau[k] for k in range(len(limits.effort))]

@@ -98,7 +98,8 @@ class Record:
             time: (n,) [s].
             q: (n, nq) positions, or (n, m) those of the independent joints of a closed system,
                 which the others follow.
-            tau: (n, m) efforts of the independent joints.
+            tau: (n, m) efforts of the independent joints; where motors are others than these, what
+                `mbs.models.actuation_matrix` makes of theirs.
             v: velocities of the same joints, or None.
             **options: other attributes of the record.
 
@@ -151,6 +152,7 @@ class Record:
         v_ = None if v is None else columns(table, "v", v)
         system = options.pop("system", None)
         if system is not None:
+            _check_motors(system)
             record = cls.of(system, stamps, q_, tau_, v_, **options)
             for what, names, joints in (
                 ("q", q, record.names),
@@ -262,6 +264,15 @@ def _check_joints(system: System, joints: Sequence[Coordinate], width: int) -> N
         raise ModelError(
             f"{system.name}: q has {width} columns, the system has {len(joints)} joints: {names};"
             " give one column for each, in this order"
+        )
+
+
+def _check_motors(system: System) -> None:
+    if system.motors != system.active:
+        motors = ", ".join(system.speeds[k].name for k in system.motors)
+        raise ModelError(
+            f"{system.name}: its motors ({motors}) are not its independent joints; give Record.of"
+            " the efforts that mbs.models.actuation_matrix makes of theirs"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbs.models.actuation import actuation_matrix, actuation_null_space
 from mbs.models.catalogue.entry import Entry
 from mbs.models.catalogue.options import COORDINATES, F_EXT, METHODS, MOVING_BASE, choice
 from mbs.models.derivatives import direct_dynamics_derivatives, inverse_dynamics_derivatives
@@ -60,6 +61,22 @@ DYNAMIC: tuple[Entry, ...] = (
         "jfj, jmj",
         (COORDINATES, F_EXT, MOVING_BASE),
         joint_wrenches,
+    ),
+    Entry(
+        "actuation",
+        "Dynamic",
+        "Actuation matrix",
+        "tau_a = B(q) tau_m",
+        (),
+        actuation_matrix,
+    ),
+    Entry(
+        "actuation_null_space",
+        "Dynamic",
+        "Efforts of motors that move nothing",
+        "B N(q) = 0",
+        (),
+        actuation_null_space,
     ),
     Entry("energy", "Dynamic", "Energy", "E(q, v), U(q)", (COORDINATES,), energy),
     Entry(

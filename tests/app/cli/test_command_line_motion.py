@@ -133,3 +133,13 @@ def test_a_redundant_arm_needs_a_joint_that_stays(command) -> None:
     answer = command(*pose, "--method", "pieper")
     assert answer.code == 1
     assert answer.err.startswith("mbs: ")
+
+
+def test_of_a_motion_that_stops_what_it_has_is_written(command, tmp_path: Path) -> None:
+    words = ("--tau", "q1=sqrt(0.255 - t)", "--output", str(tmp_path / "part.csv"))
+    said = command("simulate", "planar_2r", *words)
+    assert said.code == 1
+    assert "integration stopped at t = 0.255 s" in said.err
+    assert "stopped" not in said.out
+    table = read_csv((tmp_path / "part.csv").read_text(encoding="utf-8"))
+    np.testing.assert_allclose(table["time"], np.arange(26) / 100)

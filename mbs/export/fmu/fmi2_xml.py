@@ -11,12 +11,10 @@ from mbs.export.fmu.xml_parts import (
     add_categories_and_experiment,
     add_units,
     naming_convention,
-    needs_accepted_steps,
     real_attributes,
     structure,
     text_of,
     variable_attributes,
-    yes_or_no,
 )
 
 _STEPPING = {
@@ -76,8 +74,8 @@ def _interface(root: Element, tag: str, model: FmuModel, files: list[str]) -> No
     }
     if tag == "CoSimulation":
         attributes |= _STEPPING
-    else:
-        attributes["completedIntegratorStepNotNeeded"] = yes_or_no(not needs_accepted_steps(model))
+    else:  # loops and events remember accepted steps, and none may pass the stop time
+        attributes["completedIntegratorStepNotNeeded"] = "false"
     listed = SubElement(SubElement(root, tag, attributes), "SourceFiles")
     for name in files:
         SubElement(listed, "File", name=name)

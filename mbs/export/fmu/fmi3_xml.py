@@ -12,12 +12,10 @@ from mbs.export.fmu.xml_parts import (
     add_categories_and_experiment,
     add_units,
     naming_convention,
-    needs_accepted_steps,
     real_attributes,
     structure,
     text_of,
     variable_attributes,
-    yes_or_no,
 )
 
 _STEPPING = {
@@ -92,8 +90,8 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
         attributes |= _STEPPING
         if model.solver == "rk4":
             attributes["fixedInternalStepSize"] = repr(float(model.internal_step))
-    else:
-        attributes["needsCompletedIntegratorStep"] = yes_or_no(needs_accepted_steps(model))
+    else:  # loops and events remember accepted steps, and none may pass the stop time
+        attributes["needsCompletedIntegratorStep"] = "true"
     SubElement(root, tag, attributes)
 
 

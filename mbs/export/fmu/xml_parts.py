@@ -110,16 +110,6 @@ def naming_convention(model: FmuModel) -> str:
     return "structured" if fits else "flat"
 
 
-def yes_or_no(holds: object) -> str:
-    """A truth value of XML."""
-    return "true" if holds else "false"
-
-
-def needs_accepted_steps(model: FmuModel) -> bool:
-    """Whether it must hear of every step that an importer accepts: loops and events remember."""
-    return bool(model.dependents) or model.jumps is not None
-
-
 def variable_attributes(reference: int, entry: Entry) -> dict[str, str]:
     """Name, reference, causality, variability, description and initial of a variable."""
     v = entry.variable

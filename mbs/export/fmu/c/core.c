@@ -78,6 +78,12 @@ int core_allowed(core *c, int modes, const char *action) {
     return 0;
 }
 
+core_status core_before_stop(core *c, double time) {
+    if (time <= c->m.stop + SAME_TIME * fmax(1.0, fabs(c->m.stop))) return CORE_OK;
+    return core_refuse(c, "%s: time %.12g lies past the stop time %.12g of the experiment; end there "
+                       "or set up a later one", c->name, time, c->m.stop);
+}
+
 void core_point(core *c, const double *t, const double *x, const double *z) {
     c->arg[0] = t;
     c->arg[1] = x;
@@ -195,6 +201,7 @@ static void to_start(core *c) {
     c->m.mode = INSTANTIATED;
     c->m.stale = 1;
     c->m.tolerance = MODEL_TOLERANCE;
+    c->m.stop = HUGE_VAL;
     memcpy(c->m.values, MODEL_START, N_VALUES * sizeof *c->m.values);
     memcpy(c->m.guess, MODEL_START + DEPENDENTS, NZ * sizeof *c->m.guess);
 }
@@ -233,13 +240,17 @@ void core_free(core *c) {
     free(c);
 }
 
-core_status core_setup(core *c, double tolerance, double start) {
+core_status core_setup(core *c, double tolerance, double start, double stop) {
     if (!core_allowed(c, INSTANTIATED, "setting up the experiment")) return CORE_ERROR;
     if (!isfinite(start)) return core_refuse(c, "%s: start time %g is not finite", c->name, start);
+    if (!(stop >= start))
+        return core_refuse(c, "%s: stop time %.12g lies before the start at %.12g; give a later one",
+                           c->name, stop, start);
     if (!(tolerance > 0.0) || !isfinite(tolerance))
         return core_refuse(c, "%s: tolerance %g must be positive", c->name, tolerance);
     c->m.time = start;
     c->m.tolerance = tolerance;
+    c->m.stop = stop;
     c->m.stale = 1;
     return CORE_OK;
 }

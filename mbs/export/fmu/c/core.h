@@ -72,7 +72,7 @@ typedef struct {
     int closed;  /* a posture that closes the loops is known */
     int guessed; /* the host gave guesses of the dependent coordinates, other than the start */
     int inputs;  /* a core_input_motion */
-    double time, tolerance;
+    double time, tolerance, stop; /* stop: the end of the experiment, HUGE_VAL where none is given */
     double values[N_VALUES + 1];
     double guess[NZ + 1];
     double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
@@ -118,7 +118,7 @@ core_status core_set_logging(core *c, int on, const char *const *categories, siz
 const char *core_category(core_status status);
 core_status core_refuse(core *c, const char *format, ...);
 
-core_status core_setup(core *c, double tolerance, double start);
+core_status core_setup(core *c, double tolerance, double start, double stop);
 core_status core_enter_initialization(core *c);
 core_status core_exit_initialization(core *c);
 core_status core_terminate(core *c);

@@ -111,6 +111,7 @@ static int sane(const core_memory *m) {
     if (!possible_mode(m) || !is_flag(m->stale) || !is_flag(m->closed) || !is_flag(m->guessed))
         return 0;
     if (!isfinite(m->time) || !isfinite(m->tolerance) || !(m->tolerance > 0.0)) return 0;
+    if (isnan(m->stop)) return 0;
     if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU)) return 0;
     if (!all_finite(v + PARAMETERS, NP + NM)) return 0;
     if (!parameters_in_bounds(v)) return 0;

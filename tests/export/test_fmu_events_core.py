@@ -197,7 +197,7 @@ def test_indicators_have_hysteresis_and_are_never_zero(fmu_of):
 def test_indicators_have_derivatives(fmu_of):
     fmu = fmu_of("stopped_crank", "3.0")
     instance = fmu.running(FMU3Model)
-    watched, angle = (fmu.references[n] for n in ("indicator.slider stop", "crank.q"))
+    watched, angle = (fmu.references[n] for n in ("indicator.slider_stop", "crank.q"))
     place = fmu.references["place"]
     slope = instance.getDirectionalDerivative([watched], [angle, place], [1.0, 0.0], 1)[0]
     q, rod = 0.3, np.arcsin(0.1 / 0.3 * np.sin(0.3))

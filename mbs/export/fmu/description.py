@@ -9,6 +9,7 @@ import casadi
 
 from mbs.export.fmu.about import About
 from mbs.export.fmu.description_checks import check
+from mbs.export.fmu.names import structured
 from mbs.models.tree_state import TreeState
 
 Solver = Literal["dopri5", "rodas", "rk4"]
@@ -22,7 +23,8 @@ class Variable:
     """An input, an output, a parameter or a dependent coordinate of an FMU.
 
     Attributes:
-        name: as other tools show it.
+        name: as other tools show it; a part that is no identifier gets quotes, as
+            `mbs.export.fmu.names.structured` has it.
         unit: a name of `mbs.units.UNITS`.
         start: value at the start; of a dependent coordinate, a guess that chooses the posture.
         nominal: typical size, positive.
@@ -40,6 +42,9 @@ class Variable:
     max: float | None = None
     description: str = ""
     fixed: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", structured(self.name))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,6 +102,9 @@ class Member:
     variable: str
     kind: Literal["signal", "inflow", "outflow"] = "signal"
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "variable", structured(self.variable))
+
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
@@ -115,6 +123,9 @@ class Terminal:
     members: tuple[Member, ...]
     matching: Literal["plug", "bus", "sequence"] = "bus"
     description: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", structured(self.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,4 +273,5 @@ def _entries(model: FmuModel) -> Iterator[Entry]:
     yield from (Entry("dependent", v) for v in model.dependents)
     for name in model.jumps.names if model.jumps else ():
         text = f"positive between events: {name}"
-        yield Entry("indicator", Variable(name=f"indicator.{name}", description=text))
+        words = f"indicator.{name.replace(' ', '_')}"
+        yield Entry("indicator", Variable(name=words, description=text))

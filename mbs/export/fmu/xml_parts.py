@@ -1,7 +1,6 @@
 """What the model descriptions of FMI 2.0 and 3.0 have in common."""
 
 import math
-import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -9,6 +8,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
 from mbs.export.fmu.description import Entry, FmuModel, State
 from mbs.export.fmu.linearity import DependencyKind
+from mbs.export.fmu.names import is_structured
 from mbs.units import UNITS
 from mbs.version import __version__
 
@@ -24,9 +24,6 @@ _INITIAL = {
     "indicator": "calculated",
 }
 _STARTS = ("state", "input", "parameter", "dependent")
-_PART = r"([A-Za-z_]\w*|'[^'\\]+')(\[\d+(,\d+)*\])?"
-_PATH = rf"{_PART}(\.{_PART})*"
-_STRUCTURED = re.compile(rf"{_PATH}|der\({_PATH}(,\d+)?\)", re.ASCII)
 _NOTHING: Known = {}
 TOOL = f"mbs {__version__}"
 CATEGORIES = {
@@ -106,7 +103,7 @@ def _starting(reference: int, found: Dependencies, modes: range) -> Known:
 
 def naming_convention(model: FmuModel) -> str:
     """Whether names are paths such as `j1.q`, which tools show as a tree, or flat."""
-    fits = all(_STRUCTURED.fullmatch(entry.variable.name) for entry in model.entries)
+    fits = all(is_structured(entry.variable.name) for entry in model.entries)
     return "structured" if fits else "flat"
 
 

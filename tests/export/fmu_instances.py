@@ -1,6 +1,8 @@
 """Unpacked FMUs and what tests do with their instances."""
 
 import ctypes
+import struct
+import zlib
 
 import fmpy
 import numpy as np
@@ -117,6 +119,12 @@ class Fmu3:
 def refused(call, *arguments):
     with pytest.raises(FMICallException):
         call(*arguments)
+
+
+def sign(state):
+    """Bytes of a state with the checksum that belongs to them."""
+    struct.pack_into("=I", state, 0, zlib.crc32(state[4:]))
+    return bytes(state)
 
 
 def slave(fmu, events=True, early=True, update=None):

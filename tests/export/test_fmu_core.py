@@ -42,9 +42,9 @@ def test_code_and_description_are_generated_once(tmp_path, monkeypatch):
     for home, name in ((write_fmu.__globals__, "source"), (vars(fmi2_xml), "model_description")):
         original = home[name]
 
-        def counted(*arguments, name=name, original=original):
+        def counted(*arguments, name=name, original=original, **options):
             calls.append(name)
-            return original(*arguments)
+            return original(*arguments, **options)
 
         monkeypatch.setitem(home, name, counted)
     write_fmu(pendulum(), tmp_path / "once.fmu")

@@ -205,6 +205,13 @@ def test_every_source_and_every_header_is_there(written):
     assert included - others <= set(sources)
 
 
+def test_only_what_the_version_can_call_is_generated(written):
+    fmi, _, files = written
+    for name in ("sources/model.c", "sources/model.h"):
+        assert (b"mbs_adjoint" in files[name]) == (fmi == "3.0")
+        assert b"mbs_tangent" in files[name]
+
+
 def test_other_descriptions_are_valid(written):
     """By the schemas of the standard, which fmpy has with it."""
     xml = pytest.importorskip("lxml.etree")

@@ -15,7 +15,7 @@ from mbs.native.compiled import generated, unwritten
 from mbs.native.plain_source import plain_source
 from mbs.solvers.block_triangular import Block, block_triangular
 
-_OPEN = ("mbs_rhs", "mbs_tangent", "mbs_adjoint")
+_OPEN = ("mbs_rhs", "mbs_tangent")
 _LOOPS = ("mbs_closure", "mbs_sensitivity")
 _TREE = tuple(
     f"mbs_tree_{name}" for name in ("rhs", "project", "rows", "forces", "regularity", "start")
@@ -40,7 +40,7 @@ _HEADER = """\
 #define PASSIVE_V {passive_v}
 #define PASSIVE_A {passive_a}
 #define N_PASSIVE {n_passive}
-{solver}
+{options}
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
@@ -56,18 +56,21 @@ int {name}_work(long long *arg, long long *res, long long *iw, long long *w);
 """
 
 
-def header(model: FmuModel, guid: str) -> str:
+def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
     """The file model.h.
 
     Args:
         model: what the FMU is.
         guid: identity that the library asks for.
+        adjoint: the version of FMI calls adjoint derivatives.
 
     Returns:
         its text.
     """
     names: tuple[str, ...] = _OPEN
-    solver = ""
+    options = ""
+    if adjoint:
+        names, options = (*names, "mbs_adjoint"), "#define MODEL_ADJOINT\n"
     if model.closure is not None:
         names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
     if (tree := model.integrated) is not None:
@@ -75,9 +78,10 @@ def header(model: FmuModel, guid: str) -> str:
     if model.jumps is not None:
         names = (*names, *_EVENTS)
     if model.solver == "rodas":
-        names, solver = (*names, "mbs_jacobian"), "#define MODEL_RODAS\n"
+        names = (*names, "mbs_jacobian")
+        options += "#define MODEL_RODAS\n"
     elif model.solver == "rk4":
-        solver = f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
+        options += f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
     return _HEADER.format(
         guid=_quoted(guid),
         tolerance=repr(float(model.tolerance)),
@@ -92,16 +96,17 @@ def header(model: FmuModel, guid: str) -> str:
         passive_v=model.passive[0],
         passive_a=model.passive[1],
         n_passive=model.passive[2],
-        solver=solver + ("" if tree is None else _tree_sizes(tree)),
+        options=options + ("" if tree is None else _tree_sizes(tree)),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
 
-def source(model: FmuModel) -> str:
+def source(model: FmuModel, *, adjoint: bool) -> str:
     """The file model.c.
 
     Args:
         model: what the FMU is.
+        adjoint: the version of FMI calls adjoint derivatives.
 
     Returns:
         its text.
@@ -109,7 +114,7 @@ def source(model: FmuModel) -> str:
     Raises:
         ExportError: a function holds a node that CasADi cannot write as C.
     """
-    code = _code(functions(model))
+    code = _code(functions(model, adjoint=adjoint))
     if problem := unwritten(code):
         raise ExportError(f"FMU {model.name}: {problem}")
     variables = [entry.variable for entry in model.entries]

@@ -164,7 +164,10 @@ static int allocate(core *c) {
     long long size[4] = {9, 8, 0, 0}, other[4];
     int i, f;
     static int (*const work[])(long long *, long long *, long long *, long long *) = {
-        mbs_rhs_work, mbs_tangent_work, mbs_adjoint_work,
+        mbs_rhs_work, mbs_tangent_work,
+#ifdef MODEL_ADJOINT
+        mbs_adjoint_work,
+#endif
 #if NZ > 0
         mbs_closure_work, mbs_sensitivity_work,
 #endif

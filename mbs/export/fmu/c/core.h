@@ -131,9 +131,11 @@ core_status core_set(core *c, const unsigned *ref, size_t n, const double *value
 core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
                              const unsigned *known, size_t n_known, const double *seed,
                              double *answer);
+#ifdef MODEL_ADJOINT
 core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
                          const unsigned *known, size_t n_known, const double *seed,
                          double *answer);
+#endif
 
 /* events; changed: 1 where the states have jumped */
 core_status core_enter_event_mode(core *c);

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
 
+from mbs.archives import check_archive
 from mbs.errors import MbsError, ModelError, SolverError
 from mbs.messages import quoted
 from mbs.progress import progress
@@ -129,6 +130,7 @@ def _extract(path: Path, folder: str) -> None:
     if not path.is_file():
         raise ModelError(f"{path} is not a file; give the path of an FMU")
     try:
+        check_archive(path)
         fmpy.extract(str(path), folder, include=lambda name: not name.startswith(_UNUSED))
     except Exception as error:
         raise ModelError(f"{path} is not an FMU: {error}") from error

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mbs.archives import check_archive
 from mbs.assembly import System
 from mbs.errors import MbsError, ModelError, SolverError
 from mbs.messages import did_you_mean, quoted
@@ -175,6 +176,7 @@ def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
     import fmpy
 
     try:
+        check_archive(path)
         description = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:
         raise ModelError(f"sweep: {path} is not an FMU: {' '.join(str(error).split())}") from error

@@ -121,7 +121,7 @@ def refused(call, *arguments):
         call(*arguments)
 
 
-def sign(state):
+def signed(state):
     """Bytes of a state with the checksum that belongs to them."""
     struct.pack_into("=I", state, 0, zlib.crc32(state[4:]))
     return bytes(state)

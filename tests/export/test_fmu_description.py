@@ -187,7 +187,9 @@ def test_two_names_that_are_quoted_alike_are_refused():
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_a_mechanism_with_odd_names(fmi, tmp_path):
     m = mbs.Mechanism("odd", gravity=(0, -9.81, 0))
-    rod = m.add(Body("rod-1", mass=1.0, com=(0.3, 0, 0), inertia=((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1))))
+    rod = m.add(
+        Body("rod-1", mass=1.0, com=(0.3, 0, 0), inertia=((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1)))
+    )
     m.connect(m.world, Revolute("2nd/joint", axis="z", actuated=True), rod)
     m.add(RigidStop("stop-1", "2nd/joint", lower=-1.0))
     system = m.assemble()

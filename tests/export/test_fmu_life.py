@@ -9,7 +9,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
-from fmu_instances import refused, sign
+from fmu_instances import refused, signed
 
 
 def test_saved_states_continue_bit_for_bit(fmu):
@@ -57,7 +57,7 @@ def test_bytes_that_are_no_state_are_refused(fmu):
     for place, form, value in wrong:
         torn = bytearray(blob)
         struct.pack_into(form, torn, place, value)
-        sign(torn)
+        signed(torn)
         with pytest.raises(FMICallException):
             instance.deSerializeFMUstate(bytes(torn))
     instance.freeFMUstate(instance.deSerializeFMUstate(blob))
@@ -70,7 +70,7 @@ def test_a_changed_byte_of_a_state_is_refused_and_changes_nothing(fmu):
     fmu.step(instance, 3)
     state = instance.getFMUstate()
     blob = instance.serializeFMUstate(state)
-    assert sign(bytearray(blob)) == blob
+    assert signed(bytearray(blob)) == blob
     rng = np.random.default_rng(8)
     for place in (*range(120), len(blob) - 1, *rng.integers(120, len(blob), 80)):
         torn = bytearray(blob)

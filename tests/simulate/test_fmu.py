@@ -367,7 +367,7 @@ def test_an_fmu_that_would_fill_the_disk_is_refused_before_it_is_unpacked(tmp_pa
     bomb = packed(tmp_path / "bomb.fmu", **{f"resources/{k}": zeros for k in range(7)})
     assert bomb.stat().st_size < 1_100_000
     monkeypatch.setattr(zipfile.ZipFile, "extractall", lambda *_: pytest.fail("unpacked"))
-    refuse(bomb, r"it would unpack to 1\.1 GB, 1\d\d\d times its size of 1 MB, and 100 times is the")
+    refuse(bomb, r"it would unpack to 1\.1 GB, 1\d\d\d times its size of 1 MB, and 100 times")
 
 
 @pytest.mark.parametrize(

@@ -128,6 +128,23 @@ class Terminal:
         object.__setattr__(self, "name", structured(self.name))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Whose a model is, each in words of its own; empty where nothing is said.
+
+    Attributes:
+        author: person or organisation.
+        version: of the model.
+        copyright: such as "(c) 2026 Example Ltd.".
+        license: its name, text or address.
+    """
+
+    author: str = ""
+    version: str = ""
+    copyright: str = ""
+    license: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
     """A variable at its place: the value reference is the index in the table of entries."""
@@ -145,6 +162,7 @@ class FmuModel:
     Attributes:
         name: of the model; letters, digits and underscores of it make the file names inside.
         description: one line for people.
+        origin: whose it is.
         states: x.
         inputs: u.
         outputs: y, those that are not states.
@@ -176,6 +194,7 @@ class FmuModel:
     name: str
     rhs: casadi.Function
     description: str = ""
+    origin: Origin = Origin()
     states: tuple[State, ...] = ()
     inputs: tuple[Variable, ...] = ()
     outputs: tuple[Variable, ...] = ()

@@ -14,6 +14,7 @@ from mbs.export.fmu.xml_parts import (
     real_attributes,
     structure,
     text_of,
+    texts,
     variable_attributes,
 )
 
@@ -36,16 +37,16 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
         its text.
     """
     found = structure(model)
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=model.name,
-        guid=guid,
-        description=model.description,
-        generationTool=TOOL,
-        variableNamingConvention=naming_convention(model),
-        numberOfEventIndicators=str(len(found.indicators)),
-    )
+    attributes = {
+        "fmiVersion": "2.0",
+        "modelName": model.name,
+        "guid": guid,
+        **texts(model),
+        "generationTool": TOOL,
+        "variableNamingConvention": naming_convention(model),
+        "numberOfEventIndicators": str(len(found.indicators)),
+    }
+    root = Element("fmiModelDescription", attributes)
     files = list(sources)
     _interface(root, "ModelExchange", model, files)
     _interface(root, "CoSimulation", model, files)

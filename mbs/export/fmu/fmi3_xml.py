@@ -15,6 +15,7 @@ from mbs.export.fmu.xml_parts import (
     real_attributes,
     structure,
     text_of,
+    texts,
     variable_attributes,
 )
 
@@ -40,15 +41,15 @@ def model_description(model: FmuModel, token: str) -> str:
     Returns:
         its text.
     """
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=model.name,
-        instantiationToken=token,
-        description=model.description,
-        generationTool=TOOL,
-        variableNamingConvention=naming_convention(model),
-    )
+    attributes = {
+        "fmiVersion": "3.0",
+        "modelName": model.name,
+        "instantiationToken": token,
+        **texts(model),
+        "generationTool": TOOL,
+        "variableNamingConvention": naming_convention(model),
+    }
+    root = Element("fmiModelDescription", attributes)
     _interface(root, "ModelExchange", model)
     _interface(root, "CoSimulation", model)
     add_units(root, model)

@@ -11,7 +11,7 @@ from mbs.assembly import System, symbolic
 from mbs.assembly.model_function import require_system
 from mbs.export.fmu.c_law import read_sources
 from mbs.export.fmu.controller import Law, controller_of
-from mbs.export.fmu.description import FmuModel, Solver
+from mbs.export.fmu.description import FmuModel, Origin, Solver
 from mbs.export.fmu.events import jumps
 from mbs.export.fmu.faces import require_version
 from mbs.export.fmu.interface import interface_of, terminals
@@ -43,6 +43,11 @@ def fmu(
     solver: Solver = "dopri5",
     internal_step: float = 0.001,
     reference: bool = False,
+    description: str = "",
+    author: str = "",
+    version: str = "",
+    copyright: str = "",
+    license: str = "",
 ) -> Path:
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
@@ -88,13 +93,18 @@ def fmu(
             linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real time.
         internal_step: length of the steps of "rk4" [s].
         reference: whether to put in the results of the default experiment.
+        description: one line about the model; by default what the report of the system begins with.
+        author: person or organisation, as the model description is to name it.
+        version: of the model.
+        copyright: such as "(c) 2026 Example Ltd.".
+        license: its name, text or address.
 
     Returns:
         The path written.
 
     Raises:
-        ExportError: the file cannot be written, another FMI version was asked for, or the
-            controller does not fit the system.
+        ExportError: the file cannot be written, another FMI version was asked for, the controller
+            does not fit the system, or a text is no line of printable characters.
         ModelError: a parameter has no value, an input, output, parameter or frame is unknown or
             named twice, or the system has no minimal state.
         CompilerError: there is no C compiler, it refused the sources, or there is no such
@@ -105,7 +115,8 @@ def fmu(
     require_writable(path_of(path))
     wished = Contents(inputs, outputs, parameters, fixed, flanges, controller, sources)
     settings = Settings(stop_time, step_size, tolerance, solver, internal_step)
-    model = fmu_model(system, wished, settings)
+    origin = Origin(author=author, version=version, copyright=copyright, license=license)
+    model = fmu_model(system, wished, settings, (description, origin))
     return write_fmu(model, path, fmi=fmi, platforms=platforms, reference=reference)
 
 
@@ -134,7 +145,10 @@ class Settings:
 
 
 def fmu_model(
-    system: System, wished: Contents | None = None, settings: Settings | None = None
+    system: System,
+    wished: Contents | None = None,
+    settings: Settings | None = None,
+    words: tuple[str, Origin] = ("", Origin()),
 ) -> FmuModel:
     """The description of a mechanism's FMU.
 
@@ -142,6 +156,7 @@ def fmu_model(
         system: open or closed.
         wished: what it holds.
         settings: how it is simulated.
+        words: a description in place of that of the report, and whose the model is.
 
     Raises:
         ExportError, ModelError, CompilerError: as for `fmu`.
@@ -169,7 +184,8 @@ def fmu_model(
     y_variables = (*outputs(system, state), *observed_variables(system, request))
     return FmuModel(
         name=system.name,
-        description=system.report().splitlines()[0],
+        description=words[0] or system.report().splitlines()[0],
+        origin=words[1],
         states=x_variables,
         inputs=u_variables,
         outputs=y_variables,

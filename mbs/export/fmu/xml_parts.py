@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
@@ -99,6 +99,12 @@ def _starting(reference: int, found: Dependencies, modes: range) -> Known:
     for mode in (ref for ref in known if ref in modes):
         direct |= dict.fromkeys((ref for ref in found.first[mode] if ref not in modes), "dependent")
     return dict(sorted(direct.items()))
+
+
+def texts(model: FmuModel) -> dict[str, str]:
+    """What people read of a model: description, author, version, copyright and license."""
+    said = {"description": model.description, **asdict(model.origin)}
+    return {name: text for name, text in said.items() if text}
 
 
 def naming_convention(model: FmuModel) -> str:

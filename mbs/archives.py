@@ -60,7 +60,7 @@ def check_archive(path: Path) -> None:
 
 
 def _leads_outside(name: str) -> bool:
-    """A name with `..`, a drive, a leading slash, or the slashes of Windows, which may hide them."""
+    """A name with `..`, a drive, a leading slash, or slashes of Windows, which hide them."""
     parts = PurePosixPath(name).parts
     return ".." in parts or name.startswith("/") or any(sign in name for sign in "\\:\0")
 

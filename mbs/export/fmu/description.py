@@ -28,7 +28,8 @@ class Variable:
         unit: a name of `mbs.units.UNITS`.
         start: value at the start; of a dependent coordinate, a guess that chooses the posture.
         nominal: typical size, positive.
-        min: least value; a parameter below it is refused.
+        min: least value; a parameter below it is refused. The smallest normal number stands for
+            more than zero.
         max: greatest value; a parameter above it is refused.
         description: one line for people.
         fixed: a parameter that keeps its value once the motion has begun.

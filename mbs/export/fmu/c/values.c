@@ -1,6 +1,7 @@
 /* Values by their references. */
 #include "internal.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -45,6 +46,21 @@ static int settable(const core *c, unsigned ref) {
     return ref >= DEPENDENTS && ref < INDICATORS ? before : 0;
 }
 
+/* The smallest normal number as a bound means more than zero. */
+static core_status within_bounds(core *c, unsigned ref, double value) {
+    double low = MODEL_MIN[ref], high = MODEL_MAX[ref];
+    const char *name = MODEL_NAMES[ref];
+    if (value >= low && value <= high) return CORE_OK;
+    if (isfinite(low) && isfinite(high))
+        return core_refuse(c, "%s: parameter %s is %g; give a number from %g to %g", c->name, name,
+                           value, low, high);
+    if (value > high)
+        return core_refuse(c, "%s: parameter %s is %g; give %g or less", c->name, name, value, high);
+    if (low == DBL_MIN)
+        return core_refuse(c, "%s: parameter %s is %g; give more than zero", c->name, name, value);
+    return core_refuse(c, "%s: parameter %s is %g; give %g or more", c->name, name, value, low);
+}
+
 static core_status settable_value(core *c, unsigned ref, double value) {
     const char *name;
     int modes;
@@ -56,11 +72,7 @@ static core_status settable_value(core *c, unsigned ref, double value) {
         return core_refuse(c, "%s: %s cannot be set %s", c->name, name, core_mode_name(c->m.mode));
     if (!isfinite(value))
         return core_refuse(c, "%s: %s = %g is not finite", c->name, name, value);
-    if (ref >= PARAMETERS && ref < MODES &&
-        (value < MODEL_MIN[ref] || value > MODEL_MAX[ref]))
-        return core_refuse(c, "%s: parameter %s = %g is outside %g to %g", c->name, name, value,
-                           MODEL_MIN[ref], MODEL_MAX[ref]);
-    return CORE_OK;
+    return ref >= PARAMETERS && ref < MODES ? within_bounds(c, ref, value) : CORE_OK;
 }
 
 /* Something that the slopes depend on changed. */

@@ -169,7 +169,7 @@ def test_what_is_no_parameter_cannot_be_fixed(fixed, message) -> None:
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_an_fmu_refuses_what_the_description_of_a_mechanism_refuses(fmi, tmp_path):
-    """A mass below zero, a length of zero: by the FMU itself, which says which, what and the rule."""
+    """A mass below zero, a length of zero: by the FMU itself, which says which, what and why."""
     m = mbs.Mechanism("arm", gravity=(0, -9.81, 0))
     box = Box("box", length=mbs.Parameter("l", 0.4), width=0.1, mass=mbs.Parameter("m", 2.0))
     m.connect(m.world, Revolute("j1", axis="z", actuated=True), m.add(box))

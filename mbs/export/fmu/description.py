@@ -72,7 +72,7 @@ class Jumps:
     All functions take the parameters with the modes behind them as p, as `FmuModel.rhs` does then.
 
     Attributes:
-        modes: numbers that are constant between events.
+        modes: integers that are constant between events.
         first: `first(t, x, z, u, p) -> (modes, beyond)` before the first event, of the modes in p
             nothing; beyond (k, 1) is positive where x is outside what the model allows.
         indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events. An event is

@@ -10,6 +10,7 @@ from mbs.export.fmu.xml_parts import (
     Structure,
     add_categories_and_experiment,
     add_units,
+    integer_attributes,
     naming_convention,
     real_attributes,
     structure,
@@ -54,12 +55,15 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
     add_categories_and_experiment(root, model)
     variables = SubElement(root, "ModelVariables")
     for reference, entry in enumerate(model.entries):
+        scalar = SubElement(variables, "ScalarVariable", variable_attributes(reference, entry))
+        if entry.kind == "mode":
+            SubElement(scalar, "Integer", integer_attributes(entry))
+            continue
         real = real_attributes(entry)
         if entry.kind == "derivative":
             real["derivative"] = str(reference - len(model.states) + 1)
         if reference in found.reset:
             real["reinit"] = "true"
-        scalar = SubElement(variables, "ScalarVariable", variable_attributes(reference, entry))
         SubElement(scalar, "Real", real)
     _structure(root, model, found)
     return text_of(root)

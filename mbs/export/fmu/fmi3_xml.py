@@ -11,6 +11,7 @@ from mbs.export.fmu.xml_parts import (
     Structure,
     add_categories_and_experiment,
     add_units,
+    integer_attributes,
     naming_convention,
     real_attributes,
     structure,
@@ -99,7 +100,11 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
 def _variables(root: Element, model: FmuModel, found: Structure) -> None:
     variables = SubElement(root, "ModelVariables")
     for reference, entry in enumerate(model.entries):
-        attributes = variable_attributes(reference, entry) | real_attributes(entry)
+        attributes = variable_attributes(reference, entry)
+        if entry.kind == "mode":
+            SubElement(variables, "Int32", attributes | integer_attributes(entry))
+            continue
+        attributes |= real_attributes(entry)
         if entry.kind == "derivative":
             attributes["derivative"] = str(reference - len(model.states))
         if reference in found.reset:

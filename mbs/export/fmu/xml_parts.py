@@ -89,10 +89,13 @@ def _without(references: Container[int], known: Known) -> dict[int, DependencyKi
 
 
 def _starting(reference: int, found: Dependencies, modes: range) -> Known:
-    """What a value depends on at the start, where modes stand for what finds them."""
+    """What a value depends on at the start, where modes stand for what finds them.
+
+    Integers, such as modes, are never said to be linear in something.
+    """
     known = found.first.get(reference) or found.running.get(reference, {})
     direct: dict[int, DependencyKind] = {
-        ref: "constant" if kind == "constant" else "dependent"
+        ref: "constant" if kind == "constant" and reference not in modes else "dependent"
         for ref, kind in known.items()
         if ref not in modes
     }
@@ -145,6 +148,12 @@ def real_attributes(entry: Entry) -> dict[str, str]:
     if entry.kind in _STARTS:
         real["start"] = repr(float(v.start))
     return real
+
+
+def integer_attributes(entry: Entry) -> dict[str, str]:
+    """Bounds of a mode, which is an integer."""
+    bounds = (("min", entry.variable.min), ("max", entry.variable.max))
+    return {name: str(int(bound)) for name, bound in bounds if bound is not None}
 
 
 def add_units(root: Element, model: FmuModel) -> None:

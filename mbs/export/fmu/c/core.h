@@ -125,6 +125,7 @@ core_status core_terminate(core *c);
 core_status core_reset(core *c);
 
 core_status core_get(core *c, const unsigned *ref, size_t n, double *values);
+core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values);
 core_status core_set(core *c, const unsigned *ref, size_t n, const double *values);
 
 /* derivatives of unknowns by knowns, along a direction or against it */

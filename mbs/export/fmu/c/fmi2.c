@@ -110,7 +110,20 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     return as_fmi(core_set(MODEL(c), vr, n, value));
 }
 
-/* All variables are real: no value reference of another type exists. */
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                          fmi2Integer value[]) {
+    NEED(c);
+    return as_fmi(core_get_modes(MODEL(c), vr, n, value));
+}
+
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                          const fmi2Integer value[]) {
+    NEED(c);
+    (void)vr, (void)value;
+    return n ? refused(c, "integer variables are modes, which events set") : fmi2OK;
+}
+
+/* No value reference of another type exists. */
 static fmi2Status none(fmi2Component c, size_t n, const char *message) {
     NEED(c);
     return n ? refused(c, message) : fmi2OK;
@@ -128,7 +141,6 @@ static fmi2Status none(fmi2Component c, size_t n, const char *message) {
         return none(c, n, "the model has no " text " variables");                        \
     }
 
-NO_VARIABLES(Integer, "integer")
 NO_VARIABLES(Boolean, "boolean")
 NO_VARIABLES(String, "string")
 

@@ -148,7 +148,20 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     return as_fmi(core_set(MODEL(c), vr, n, value));
 }
 
-/* All variables are 64-bit floats: no value reference of another type exists. */
+fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                        fmi3Int32 value[], size_t n_values) {
+    NEED(c);
+    if (n != n_values) return refused(c, WRONG_COUNT);
+    return as_fmi(core_get_modes(MODEL(c), vr, n, value));
+}
+
+fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                        const fmi3Int32 value[], size_t n_values) {
+    (void)vr, (void)value, (void)n_values;
+    return none(c, n, "32-bit integers are modes, which events set");
+}
+
+/* No value reference of another type exists. */
 #define NO_VARIABLES(type, text)                                                                \
     fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
                              fmi3##type value[], size_t n_values) {                             \
@@ -162,14 +175,13 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     }
 
 NO_VARIABLES(Float32, "32-bit float")
-NO_VARIABLES(Int8, "integer")
-NO_VARIABLES(UInt8, "integer")
-NO_VARIABLES(Int16, "integer")
-NO_VARIABLES(UInt16, "integer")
-NO_VARIABLES(Int32, "integer")
-NO_VARIABLES(UInt32, "integer")
-NO_VARIABLES(Int64, "integer")
-NO_VARIABLES(UInt64, "integer")
+NO_VARIABLES(Int8, "8-bit integer")
+NO_VARIABLES(UInt8, "unsigned 8-bit integer")
+NO_VARIABLES(Int16, "16-bit integer")
+NO_VARIABLES(UInt16, "unsigned 16-bit integer")
+NO_VARIABLES(UInt32, "unsigned 32-bit integer")
+NO_VARIABLES(Int64, "64-bit integer")
+NO_VARIABLES(UInt64, "unsigned 64-bit integer")
 NO_VARIABLES(Boolean, "boolean")
 NO_VARIABLES(String, "string")
 

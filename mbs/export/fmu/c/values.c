@@ -1,7 +1,8 @@
-/* Values by their references. */
+/* Values by their references: modes are integers, all other variables are real. */
 #include "internal.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -10,6 +11,8 @@ static core_status known_reference(core *c, unsigned ref) {
     return core_refuse(c, "%s: value reference %u is unknown; the last one is %d", c->name, ref,
                        (int)N_VALUES - 1);
 }
+
+static int is_mode(unsigned ref) { return ref >= MODES && ref < DEPENDENTS; }
 
 /* 1 for what is there without calculation. */
 static int given(const core *c, unsigned ref) {
@@ -22,7 +25,12 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     size_t i;
     if (!core_allowed(c, READABLE, "getting values")) return CORE_ERROR;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
-    for (i = 0; i < n && !status; i++) status = known_reference(c, ref[i]);
+    for (i = 0; i < n && !status; i++) {
+        status = known_reference(c, ref[i]);
+        if (!status && is_mode(ref[i]))
+            return core_refuse(c, "%s: %s is an integer variable; get it as one", c->name,
+                               MODEL_NAMES[ref[i]]);
+    }
     for (i = 0; i < n && !status; i++) {
         unsigned r = ref[i];
         if (r >= INDICATORS)
@@ -31,6 +39,27 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
             status = core_refresh(c);
         values[i] = r >= INPUTS && r < OUTPUTS ? core_inputs(c, c->m.time)[r - INPUTS]
                                                : c->m.values[r];
+    }
+    return status;
+}
+
+core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values) {
+    core_status status = CORE_OK;
+    size_t i;
+    if (!core_allowed(c, READABLE, "getting values")) return CORE_ERROR;
+    if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
+    for (i = 0; i < n; i++)
+        if (!is_mode(ref[i]))
+            return core_refuse(c, "%s: value reference %u is no integer variable; those are modes",
+                               c->name, ref[i]);
+    for (i = 0; i < n && !status; i++) {
+        double value;
+        if (!given(c, ref[i])) status = core_refresh(c);
+        value = c->m.values[ref[i]];
+        if (value != floor(value) || fabs(value) > INT_MAX)
+            return core_no_answer(c, "%s: the mode %s is %g, which is no integer; let it count or "
+                                  "name", c->name, MODEL_NAMES[ref[i]], value);
+        values[i] = (int)value;
     }
     return status;
 }

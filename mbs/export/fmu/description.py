@@ -129,6 +129,23 @@ class Terminal:
         object.__setattr__(self, "name", structured(self.name))
 
 
+@dataclass(frozen=True, slots=True)
+class Array:
+    """Variables that follow each other and are one array in FMI 3.0.
+
+    Attributes:
+        name: of the array.
+        first: value reference of its first element, and its own.
+        size: number of elements.
+        description: one line for people.
+    """
+
+    name: str
+    first: int
+    size: int
+    description: str = ""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
     """Whose a model is, each in words of its own; empty where nothing is said.
@@ -189,6 +206,7 @@ class FmuModel:
         documentation: text for `documentation/index.html`; a blank line starts a paragraph.
         terminals: variables that belong together.
         sources: name and text of further C files, which are compiled with the FMU.
+        arrays: variables that are listed as one; see `mbs.export.fmu.arrays`.
         about: what people read and see of it; None where only its variables are known.
     """
 
@@ -214,6 +232,7 @@ class FmuModel:
     documentation: str = ""
     terminals: tuple[Terminal, ...] = ()
     sources: tuple[tuple[str, str], ...] = ()
+    arrays: tuple[Array, ...] = ()
     about: About | None = None
 
     def __post_init__(self) -> None:

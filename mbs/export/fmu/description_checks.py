@@ -37,8 +37,8 @@ def _check_names(model: FmuModel) -> None:
     if not model.name:
         raise ExportError("FMU: the model has no name; give it one")
     seen: set[str] = set()
-    for entry in model.entries:
-        name = entry.variable.name
+    names = [entry.variable.name for entry in model.entries]
+    for name in (*names, *(array.name for array in model.arrays)):
         if not name or not name.isprintable():
             raise ExportError(f"FMU {model.name}: {name!r} is no name; use printable characters")
         if name == TIME:

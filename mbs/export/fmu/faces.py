@@ -78,7 +78,7 @@ FACES = {
         adjoint=False,
     ),
     "3.0": Face(
-        ("fmi3.c", "fmi3_run.c", "fmi3_absent.c"),
+        ("fmi3.c", "fmi3_arrays.c", "fmi3_run.c", "fmi3_absent.c"),
         ("fmi3_face.h",),
         ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
         adjoint=True,

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
+from mbs.export.fmu.arrays import dependencies_of_arrays, listed, of_arrays
 from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.description_checks import TIME
@@ -58,10 +59,15 @@ def model_description(model: FmuModel, token: str) -> str:
     found = structure(model)
     _variables(root, model, found)
     parent = SubElement(root, "ModelStructure")
-    _unknowns(parent, "Output", found.outputs, found.running)
-    _unknowns(parent, "ContinuousStateDerivative", found.derivatives, found.running)
-    _unknowns(parent, "InitialUnknown", found.initial, found.starting)
-    _unknowns(parent, "EventIndicator", found.indicators, found.running)
+    running = dependencies_of_arrays(model, found.running)
+    starting = dependencies_of_arrays(model, found.starting)
+    for tag, references, depends in (
+        ("Output", found.outputs, running),
+        ("ContinuousStateDerivative", found.derivatives, running),
+        ("InitialUnknown", found.initial, starting),
+        ("EventIndicator", found.indicators, running),
+    ):
+        _unknowns(parent, tag, of_arrays(model, references), depends)
     return text_of(root)
 
 
@@ -99,19 +105,27 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
 
 def _variables(root: Element, model: FmuModel, found: Structure) -> None:
     variables = SubElement(root, "ModelVariables")
-    for reference, entry in enumerate(model.entries):
+    reset = of_arrays(model, found.reset)
+    for shown in listed(model):
+        reference, entry = shown.reference, shown.entry
         attributes = variable_attributes(reference, entry)
         if entry.kind == "mode":
             SubElement(variables, "Int32", attributes | integer_attributes(entry))
             continue
         attributes |= real_attributes(entry)
+        if "start" in attributes:
+            attributes["start"] = shown.start
+        if not shown.united:
+            attributes = {k: v for k, v in attributes.items() if k not in ("unit", "displayUnit")}
         if entry.kind == "derivative":
             attributes["derivative"] = str(reference - len(model.states))
-        if reference in found.reset:
+        if reference in reset:
             attributes["reinit"] = "true"
         if entry.kind in _SEEN_WITHIN_STEPS:
             attributes["intermediateUpdate"] = "true"
-        SubElement(variables, "Float64", attributes)
+        variable = SubElement(variables, "Float64", attributes)
+        if shown.array:
+            SubElement(variable, "Dimension", start=str(len(shown.elements)))
     SubElement(
         variables,
         "Float64",

@@ -44,11 +44,16 @@ _HEADER = """\
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
-/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
+{arrays}/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
 extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
 
 {prototypes}
 #endif
+"""
+_ARRAYS = """\
+#define MODEL_ARRAYS
+/* elements of each variable, none of one that stands within an array */
+extern const int MODEL_SIZES[];
 """
 _PROTOTYPE = """\
 int {name}(const double **arg, double **res, long long *iw, double *w, int mem);
@@ -96,6 +101,7 @@ def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
         passive_v=model.passive[0],
         passive_a=model.passive[1],
         n_passive=model.passive[2],
+        arrays=_ARRAYS if model.arrays else "",
         options=options + ("" if tree is None else _tree_sizes(tree)),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
@@ -128,6 +134,7 @@ def source(model: FmuModel, *, adjoint: bool) -> str:
         _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
         _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
+        *_size_tables(model),
         *_block_tables(_blocks(model)),
         *_tree_tables(model),
     ]
@@ -157,6 +164,16 @@ def _tree_tables(model: FmuModel) -> list[str]:
         _table("const int MODEL_TREE_STATES", map(str, tree.states)),
         _table("const int MODEL_TREE_DEPENDENTS", map(str, tree.dependents)),
     ]
+
+
+def _size_tables(model: FmuModel) -> list[str]:
+    """How many elements a variable has, where some are arrays."""
+    if not model.arrays:
+        return []
+    sizes = [1] * len(model.entries)
+    for array in model.arrays:
+        sizes[array.first : array.first + array.size] = [array.size] + [0] * (array.size - 1)
+    return [_table("const int MODEL_SIZES", map(str, sizes))]
 
 
 def _blocks(model: FmuModel) -> tuple[Block, ...]:

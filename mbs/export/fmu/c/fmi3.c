@@ -5,8 +5,6 @@
 
 #include "fmi3_face.h"
 
-#define WRONG_COUNT "an array is NULL or too short; give one value for each reference"
-
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
     (void)name;
@@ -124,34 +122,40 @@ FORWARD(fmi3EnterEventMode, core_enter_event_mode)
 FORWARD(fmi3EnterContinuousTimeMode, core_enter_continuous_mode)
 FORWARD(fmi3EnterStepMode, core_enter_step_mode)
 
-/* Every variable has one element: as many values as references. */
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                           fmi3Float64 value[], size_t n_values) {
     size_t first = 0, i;
     fmi3Status status = fmi3OK;
+    elements e;
     NEED(c);
-    if (n != n_values || (n && (!vr || !value))) return refused(c, WRONG_COUNT);
+    if (n && !value) return refused(c, "the array of the values is NULL");
+    if (!elements_begin(c, &e, vr, n, NULL, n_values)) return fmi3Error;
     if (!n) return as_fmi(core_get(MODEL(c), NULL, 0, NULL));
-    for (i = 0; i <= n && !status; i++) {
-        if (i < n && vr[i] != TIME_REFERENCE) continue;
-        status = as_fmi(core_get(MODEL(c), vr + first, i - first, value + first));
-        if (i < n && !status) value[i] = MODEL(c)->m.time;
+    for (i = 0; i <= e.n && !status; i++) {
+        if (i < e.n && e.ref[i] != TIME_REFERENCE) continue;
+        status = as_fmi(core_get(MODEL(c), e.ref + first, i - first, value + first));
+        if (i < e.n && !status) value[i] = MODEL(c)->m.time;
         first = i + 1;
     }
+    elements_end(&e);
     return status;
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                           const fmi3Float64 value[], size_t n_values) {
+    core_status status;
+    elements e;
     NEED(c);
-    if (n != n_values) return refused(c, WRONG_COUNT);
-    return as_fmi(core_set(MODEL(c), vr, n, value));
+    if (!elements_begin(c, &e, vr, n, NULL, n_values)) return fmi3Error;
+    status = core_set(MODEL(c), e.ref, e.n, value);
+    elements_end(&e);
+    return as_fmi(status);
 }
 
 fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                         fmi3Int32 value[], size_t n_values) {
     NEED(c);
-    if (n != n_values) return refused(c, WRONG_COUNT);
+    if (n != n_values) return refused(c, "give one place for each integer variable");
     return as_fmi(core_get_modes(MODEL(c), vr, n, value));
 }
 
@@ -199,7 +203,8 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
     (void)vr, (void)n;
-    return refused(c, "dependencies of elements are not listed; every variable has one element");
+    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
+                      "model description");
 }
 
 fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
@@ -208,5 +213,6 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
                                        size_t n) {
     (void)dependent, (void)elements, (void)independents, (void)independent_elements;
     (void)kinds, (void)n;
-    return refused(c, "dependencies of elements are not listed; every variable has one element");
+    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
+                      "model description");
 }

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mbs.assembly import System, symbolic
 from mbs.assembly.model_function import require_system
+from mbs.errors import ExportError
 from mbs.export.fmu.arrays import Group, in_arrays
 from mbs.export.fmu.c_law import read_sources
 from mbs.export.fmu.controller import Law, controller_of

@@ -45,13 +45,12 @@ def scalars(fmu):
     """Names of the scalar variables behind each array, in its order."""
     suffixes = {"q": ".q", "v": ".v", "a": ".a", "tau": ".tau"}
     described = {v.name: v.description for v in fmu.description.modelVariables if v.shape}
-    return {
-        name: [
-            owner + suffixes[name.partition("_")[0]] for owner in text.split(" of ")[-1].split(", ")
-        ]
-        for name, text in described.items()
-        if name.partition("_")[0] in suffixes and not name.endswith("_solved")
-    }
+    found = {}
+    for name, text in described.items():
+        suffix = suffixes.get(name.partition("_")[0])
+        if suffix and not name.endswith("_solved"):
+            found[name] = [f"{joint}{suffix}" for joint in text.split(" of ")[-1].split(", ")]
+    return found
 
 
 def test_the_description_is_valid_and_lists_arrays(pair):
@@ -71,7 +70,7 @@ def test_the_description_is_valid_and_lists_arrays(pair):
 
 @INTERFACES
 def test_fmpy_gets_what_it_gets_without_arrays(pair, kind):
-    fmu, plain = pair
+    fmu, _ = pair
     found, expected = (fmpy.simulate_fmu(str(f.path), fmi_type=kind, **OPTIONS) for f in pair)
     for name, columns in scalars(fmu).items():
         if name in found.dtype.names:
@@ -186,9 +185,7 @@ def test_elements_are_named_in_the_pages_and_results(tmp_path):
 
 def test_fmi_2_has_no_arrays(tmp_path):
     system = mbs.load("four_bar").assemble()
-    with pytest.raises(
-        ExportError, match="four_bar: arrays are variables of FMI 3.0, and fmi is '2"
-    ):
+    with pytest.raises(ExportError, match=r"four_bar: arrays are variables of FMI 3\.0, and fmi"):
         mbs.export.fmu(system, tmp_path / "x.fmu", arrays=True)
 
 

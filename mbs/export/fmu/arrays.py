@@ -107,9 +107,14 @@ def listed(model: FmuModel) -> list[Listed]:
         size = array.size if array else 1
         elements = tuple(e.variable for e in entries[place : place + size])
         if array is not None:
-            nominal = max(v.nominal for v in elements)
-            words = {"name": array.name, "description": array.description}
-            shared = replace(entry.variable, nominal=nominal, min=None, max=None, **words)
+            shared = replace(
+                entry.variable,
+                name=array.name,
+                description=array.description,
+                nominal=max(v.nominal for v in elements),
+                min=None,
+                max=None,
+            )
             entry = Entry(entry.kind, shared)
         found.append(Listed(place, entry, elements, array is not None))
         place += size

@@ -7,7 +7,7 @@
 /* Numbers that belong to states, inputs, parameters and to what is calculated from them. */
 typedef struct {
     double dt, dx[NX + 1], du[NU + 1], dp[NP + 1];
-    double dxdot[NX + 1], dy[NY + 1], dz[NZ + 1], dg[NK + 1];
+    double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
 
 static double *known_of(const core *c, tangents *d, unsigned ref) {
@@ -22,6 +22,7 @@ static double *unknown_of(tangents *d, unsigned ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref < INPUTS) return d->dxdot + (ref - DERIVATIVES);
     if (ref >= OUTPUTS && ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
+    if (ref >= MODES && ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
     if (ref >= DEPENDENTS && ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
     if (ref >= INDICATORS && ref < N_VALUES) return d->dg + (ref - INDICATORS);
     return NULL;

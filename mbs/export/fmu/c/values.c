@@ -1,4 +1,5 @@
-/* Values by their references: modes are integers, all other variables are real. */
+/* Values by their references: modes are integers, all other variables are real. Hosts that know real
+ * numbers alone, such as CasADi, read modes as such too. */
 #include "internal.h"
 
 #include <float.h>
@@ -25,12 +26,7 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     size_t i;
     if (!core_allowed(c, READABLE, "getting values")) return CORE_ERROR;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
-    for (i = 0; i < n && !status; i++) {
-        status = known_reference(c, ref[i]);
-        if (!status && is_mode(ref[i]))
-            return core_refuse(c, "%s: %s is an integer variable; get it as one", c->name,
-                               MODEL_NAMES[ref[i]]);
-    }
+    for (i = 0; i < n && !status; i++) status = known_reference(c, ref[i]);
     for (i = 0; i < n && !status; i++) {
         unsigned r = ref[i];
         if (r >= INDICATORS)

@@ -96,12 +96,13 @@ def fmu(
         where = f"FMU {description.modelName}"
         _check_kind(description, kind)
         begin, span = _span(description, duration, where)
+        starts = start_values(description, parameters or {}, start or {})
         plan = Plan(
             description=description,
             kind=kind,
             times=row_times(begin, span, _interval(description, span, step, where), where),
-            tracks=tracks_of(description, inputs or {}),
-            starts=start_values(description, parameters or {}, start or {}),
+            tracks=tracks_of(description, inputs or {}, starts),
+            starts=starts,
             tolerance=positive(tolerance, "tolerance", where),
             solver=_one_of(solver, _SOLVERS, "solver", where),
             rows=_one_of(rows, _ROWS, "rows", where),

@@ -28,6 +28,7 @@ from mbs.progress import progress
 from mbs.result import Result
 from mbs.simulate.cases import Case, Folder, Grid, cases_of
 from mbs.simulate.fmu import fmu
+from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import run
 from mbs.simulate.study import study_of
 from mbs.simulate.swept import Sweep
@@ -180,7 +181,7 @@ def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
         description = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:
         raise ModelError(f"sweep: {path} is not an FMU: {' '.join(str(error).split())}") from error
-    known = {v.name: v.causality for v in description.modelVariables}
+    known = {name: v.causality for name, v in numbers_of(description).items()}
     _require_names(str(description.modelName), cases, set(known))
     return _Fmu(path, frozenset(name for name, kind in known.items() if kind == "parameter"))
 

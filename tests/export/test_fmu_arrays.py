@@ -12,7 +12,7 @@ from fmpy.validation import validate_fmu
 from fmu_instances import Fmu3, refused
 
 import mbs
-from mbs.errors import ExportError
+from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.system_fmu import fmu_model
 
 NAMES = ("puma560", "four_bar", "scara")
@@ -195,3 +195,37 @@ def test_a_parameter_that_is_called_as_an_array_is_refused(tmp_path):
     m.connect(m.world, mbs.components.Revolute("j", axis="z", actuated=True), box)
     with pytest.raises(ExportError, match="FMU m: two variables are called 'a'; rename one"):
         mbs.export.fmu(m.assemble(), tmp_path / "x.fmu", fmi="3.0", arrays=True)
+
+
+@INTERFACES
+def test_our_own_reader_names_elements(pairs, kind):
+    """What is not given of an array keeps its start value, of the description or of `start`."""
+    fmu, plain = pairs["puma560"]
+    q, tau = scalars(fmu)["q"], scalars(fmu)["tau"]
+    wave = (np.linspace(0, 0.5, 6), np.sin(np.arange(6.0)))
+    options = {"kind": kind, "step": 0.1, "tolerance": 1e-9, "quiet": True}
+    found = mbs.simulate.fmu(
+        fmu.path,
+        0.5,
+        start={"q[2]": 0.3, "tau[3]": 1.5},
+        inputs={"tau[1]": 2.0, "tau[6]": wave},
+        **options,
+    )
+    expected = mbs.simulate.fmu(
+        plain.path,
+        0.5,
+        start={q[1]: 0.3, tau[2]: 1.5},
+        inputs={tau[0]: 2.0, tau[5]: wave},
+        **options,
+    )
+    for k in range(6):
+        assert np.allclose(found[f"q[{k + 1}]"], expected[q[k]], rtol=0, atol=1e-8)
+        assert np.array_equal(found[f"tau[{k + 1}]"], expected[tau[k]])
+    assert found["tau[3]"][-1] == 1.5
+
+
+def test_our_own_reader_refuses_a_whole_array(pairs):
+    fmu, _ = pairs["puma560"]
+    for arguments in ({"start": {"q": 0.3}}, {"inputs": {"tau": 1.0}}):
+        with pytest.raises(ModelError, match=r"variable '(q|tau)' cannot be set here; .*\[1\]"):
+            mbs.simulate.fmu(fmu.path, 0.1, quiet=True, **arguments)

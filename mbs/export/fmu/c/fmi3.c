@@ -129,8 +129,8 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     elements e;
     NEED(c);
     if (n && !value) return refused(c, "the array of the values is NULL");
+    if (!n && !n_values) return as_fmi(core_get(MODEL(c), NULL, 0, NULL));
     if (!elements_begin(c, &e, vr, n, NULL, n_values)) return fmi3Error;
-    if (!n) return as_fmi(core_get(MODEL(c), NULL, 0, NULL));
     for (i = 0; i <= e.n && !status; i++) {
         if (i < e.n && e.ref[i] != TIME_REFERENCE) continue;
         status = as_fmi(core_get(MODEL(c), e.ref + first, i - first, value + first));

@@ -25,6 +25,9 @@ GROUPS = {
 }
 """Kinds of numbers by the name of their group."""
 
+MAGNITUDES = ("M", "XX", "YY", "ZZ", "Ia", "Jm", "Fv", "Fs")
+"""Kinds that are never negative, of bodies and joints as of links."""
+
 PLACEMENT = ("gamma", "b", "alpha", "d", "theta", "r")
 """Kinds that place the frame of a link."""
 

@@ -14,6 +14,7 @@ from mbs.assembly.drive_tables import attached_devices, shaft_rows
 from mbs.assembly.graph import Graph, connection_graph
 from mbs.assembly.joint_rows import joint_rows
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
+from mbs.assembly.parameter_bounds import parameter_bounds
 from mbs.assembly.proof import prove
 from mbs.assembly.rates import zero_position
 from mbs.assembly.sensors import attached_sensors
@@ -48,6 +49,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     known = {p.name: p.default for p in parameters if p.default is not None}
     for component in mechanism.components.values():
         component.check_values(known)
+    bounds = parameter_bounds(mechanism.components.values(), parameters)
     line = drive_line(mechanism)
     mechanism = line.mechanism
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
@@ -84,6 +86,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         cuts=framed.cuts,
         couplings=_couplings(mechanism, coordinates, symbols),
         parameters=parameters,
+        bounds=bounds,
         p=casadi.vertcat(*symbols.values()) if symbols else SX(0, 1),
         coordinates=coordinates,
         speeds=speeds,

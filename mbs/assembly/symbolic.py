@@ -9,7 +9,7 @@ from typing import Any
 import casadi
 from casadi import SX
 
-from mbs.assembly.adjustable import GROUPS, PLACEMENT, Adjustable, adjustables
+from mbs.assembly.adjustable import GROUPS, MAGNITUDES, PLACEMENT, Adjustable, adjustables
 from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import require_system
@@ -180,6 +180,7 @@ def _with(
             for sensor in system.sensors
         ),
         parameters=(*system.parameters, *parameters),
+        bounds={**system.bounds, **{r.name: (0.0, None) for r in rows if r.kind in MAGNITUDES}},
         p=casadi.vertcat(system.p, *symbols.values()),
         _cache={},
     )

@@ -17,6 +17,7 @@ from mbs.assembly.coordinate_coupling import CoordinateCoupling
 from mbs.assembly.drive_tables import AttachedDevice, ShaftRow
 from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.parameter_bounds import Bounds
 from mbs.assembly.rates import position_rate
 from mbs.assembly.report import report
 from mbs.assembly.sensors import AttachedSensor
@@ -61,6 +62,7 @@ class System:
         sensors: what reads the motion and changes nothing.
         shafts: inertias and rigid gears of drive lines, and the coordinates that they turn with.
         devices: motors and torques that drive shafts, with states and inputs of their own.
+        bounds: least and greatest value of the parameters that have one, by name.
     """
 
     name: str
@@ -84,6 +86,7 @@ class System:
     sensors: tuple[AttachedSensor, ...] = ()
     shafts: tuple[ShaftRow, ...] = ()
     devices: tuple[AttachedDevice, ...] = ()
+    bounds: Mapping[str, Bounds] = field(default_factory=dict)
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:

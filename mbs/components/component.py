@@ -16,7 +16,7 @@ from mbs.components.placement import (
     displacement,
 )
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, renamed, with_values
+from mbs.expressions import Expression, Scalar, expression, renamed, with_values, without_defaults
 
 _NAME = re.compile(r"[^\s.'\"]+(?:\.[^\s.'\"]+)*")
 
@@ -101,6 +101,10 @@ class Component:
     def scoped(self: C, prefix: str) -> C:
         """The same component inside a mechanism that is placed in another one."""
         return self._changed(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
+
+    def without_defaults(self: C) -> C:
+        """The same component, which knows no values of its parameters."""
+        return self._changed(without_defaults, self.name)
 
     def check_values(self, values: Mapping[str, float]) -> None:
         """Refuse values of parameters that the component itself would refuse as numbers.

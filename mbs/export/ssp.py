@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from mbs.archives import check_archive
 from mbs.errors import ExportError
 from mbs.export.ssp_xml import (
     Connection,
@@ -117,6 +118,7 @@ def _described(part: str, file: Path) -> Any:
     import fmpy
 
     try:
+        check_archive(file)
         description = fmpy.read_model_description(str(file), validate=False)
     except Exception as error:
         problem = " ".join(str(error).split())

@@ -10,7 +10,14 @@ grammar of numbers, symbols, `+ - * / ^`, sin, cos, tan, sqrt, atan2 and pi; the
     atom     := number | symbol | function "(" sum ("," sum)* ")" | "(" sum ")"
 """
 
-from mbs.expressions.evaluate import parameters_of, renamed, to_float, to_sx, with_values
+from mbs.expressions.evaluate import (
+    parameters_of,
+    renamed,
+    to_float,
+    to_sx,
+    with_values,
+    without_defaults,
+)
 from mbs.expressions.expression import (
     Expression,
     Number,
@@ -32,4 +39,5 @@ __all__ = [
     "to_float",
     "to_sx",
     "with_values",
+    "without_defaults",
 ]

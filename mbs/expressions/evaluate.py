@@ -42,6 +42,15 @@ def renamed(value: Expression, prefix: str) -> Expression:
     return value
 
 
+def without_defaults(value: Expression) -> Expression:
+    """The expression whose parameters have no value of their own."""
+    if isinstance(value, Parameter):
+        return replace(value, default=None)
+    if isinstance(value, Operation):
+        return replace(value, arguments=tuple(map(without_defaults, value.arguments)))
+    return value
+
+
 def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
     """The expression with numbers in the place of parameters whose values are known.
 

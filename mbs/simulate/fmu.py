@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
 
+from mbs.archives import check_archive
 from mbs.errors import Interrupted, MbsError, ModelError, SolverError
 from mbs.messages import quoted
 from mbs.progress import progress
@@ -96,12 +97,13 @@ def fmu(
         where = f"FMU {description.modelName}"
         _check_kind(description, kind)
         begin, span = _span(description, duration, where)
+        starts = start_values(description, parameters or {}, start or {})
         plan = Plan(
             description=description,
             kind=kind,
             times=row_times(begin, span, _interval(description, span, step, where), where),
-            tracks=tracks_of(description, inputs or {}),
-            starts=start_values(description, parameters or {}, start or {}),
+            tracks=tracks_of(description, inputs or {}, starts),
+            starts=starts,
             tolerance=positive(tolerance, "tolerance", where),
             solver=_one_of(solver, _SOLVERS, "solver", where),
             rows=_one_of(rows, _ROWS, "rows", where),
@@ -130,6 +132,7 @@ def _extract(path: Path, folder: str) -> None:
     if not path.is_file():
         raise ModelError(f"{path} is not a file; give the path of an FMU")
     try:
+        check_archive(path)
         fmpy.extract(str(path), folder, include=lambda name: not name.startswith(_UNUSED))
     except Exception as error:
         raise ModelError(f"{path} is not an FMU: {error}") from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mbs.errors import ModelError
 from mbs.messages import did_you_mean
 from mbs.result import Result
-from mbs.simulate.fmu_variables import CONTINUOUS, NUMBERS, writer
+from mbs.simulate.fmu_variables import CONTINUOUS, NOTHING, numbers_of, writer
 from mbs.simulate.signals import Signal, check_names, finite_number, pair
 
 Array = NDArray[np.float64]
@@ -41,10 +41,12 @@ class Tracks:
     Attributes:
         variables: of the model description.
         tracks: one for each.
+        starts: values at the start, of elements of arrays that have no track.
     """
 
     variables: tuple[Any, ...]
     tracks: tuple[Track, ...]
+    starts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def corners(self) -> list[float]:
@@ -59,9 +61,8 @@ class Tracks:
     def continuous(self) -> Tracks:
         """Those that are continuous in time."""
         chosen = [k for k, variable in enumerate(self.variables) if _continuous(variable)]
-        return Tracks(
-            tuple(self.variables[k] for k in chosen), tuple(self.tracks[k] for k in chosen)
-        )
+        variables = tuple(self.variables[k] for k in chosen)
+        return Tracks(variables, tuple(self.tracks[k] for k in chosen), self.starts)
 
     def at(self, time: float, after: bool) -> list[float]:
         """The value of each input at a time, right after a jump or right before it."""
@@ -69,7 +70,7 @@ class Tracks:
 
     def setter(self, instance: Any) -> Callable[[float, bool], None]:
         """A function of (time, after) that sets the inputs of an instance."""
-        write = writer(instance, self.variables)
+        write = writer(instance, self.variables, self.starts)
 
         def apply(time: float, after: bool) -> None:
             if self.variables:
@@ -88,27 +89,27 @@ class Tracks:
         return [r for r, _ in given], [rise / (end - begin) for rise in rises]
 
 
-def tracks_of(description: Any, inputs: Inputs) -> Tracks:
+def tracks_of(description: Any, inputs: Inputs, starts: Mapping[str, float] = NOTHING) -> Tracks:
     """Inputs as functions of time.
 
     Args:
         description: of the FMU.
         inputs: name of an input to a number, a function of time or (times, values); or a Result,
-            whose columns feed the inputs of the same name.
+            whose columns feed the inputs of the same name; of an array its elements, `tau[2]`.
+        starts: values at the start, by name.
 
     Raises:
         ModelError: a name is unknown or no input, or a value does not fit.
     """
-    known = {
-        v.name: v
-        for v in description.modelVariables
-        if v.causality == "input" and v.type in NUMBERS and not v.dimensions
-    }
+    numbers = numbers_of(description)
+    known = {name: v for name, v in numbers.items() if v.causality == "input"}
     if isinstance(inputs, Result):
         inputs = _from_result(inputs, known)
-    check_names("inputs", inputs, set(known), (v.name for v in description.modelVariables))
+    every = (*numbers, *(v.name for v in description.modelVariables))
+    check_names("inputs", inputs, set(known), every)
     variables = tuple(known[name] for name in inputs)
-    return Tracks(variables, tuple(_track(known[n], signal) for n, signal in inputs.items()))
+    tracks = tuple(_track(known[name], signal) for name, signal in inputs.items())
+    return Tracks(variables, tracks, starts)
 
 
 def _continuous(variable: Any) -> bool:

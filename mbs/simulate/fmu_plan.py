@@ -107,10 +107,9 @@ def set_up(instance: Any, plan: Plan) -> None:
         instance: of the FMU, an object of fmpy.
         plan: the run.
     """
-    variables = plan.description.modelVariables
     if not plan.newer:
         instance.setupExperiment(tolerance=plan.tolerance, startTime=plan.begin, stopTime=plan.end)
-    set_values(instance, plan.starts, variables)
+    set_values(instance, plan.starts, plan.description)
     if plan.newer:
         instance.enterInitializationMode(
             tolerance=plan.tolerance, startTime=plan.begin, stopTime=plan.end

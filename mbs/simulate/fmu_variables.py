@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 INTEGERS = frozenset(
@@ -12,6 +14,47 @@ INTEGERS = frozenset(
 )
 CONTINUOUS = frozenset(("Real", "Float64", "Float32"))
 NUMBERS = CONTINUOUS | INTEGERS | {"Boolean", "Enumeration"}
+NOTHING: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """One number of an array, which has what fmpy tells of a variable.
+
+    Attributes:
+        array: the variable.
+        place: in the array, row by row from 0.
+        name: such as `q[2]` or `R[1,3]`.
+    """
+
+    array: Any
+    place: int
+    name: str
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.array, name)
+
+    @property
+    def start(self) -> float:
+        """The start value in the description, 0 where there is none."""
+        values = str(self.array.start or "0").split()
+        return _number(values[self.place if len(values) > 1 else 0])
+
+
+def elements_of(variable: Any) -> list[Element]:
+    """The elements of an array; none of a scalar."""
+    names = columns_of([variable]) if variable.shape else ()
+    return [Element(variable, place, name) for place, name in enumerate(names)]
+
+
+def numbers_of(description: Any) -> dict[str, Any]:
+    """Every scalar variable that is a number, and every element of an array of them, by name."""
+    return {
+        v.name: v
+        for variable in description.modelVariables
+        if variable.type in NUMBERS
+        for v in (elements_of(variable) if variable.dimensions else [variable])
+    }
 
 
 def size_of(variable: Any) -> int:
@@ -56,30 +99,80 @@ def reader(instance: Any, variables: Sequence[Any]) -> Callable[[], list[float]]
     return read
 
 
-def writer(instance: Any, variables: Sequence[Any]) -> Callable[[Sequence[float]], None]:
-    """A function that sets scalar variables, in their order.
+def writer(
+    instance: Any, variables: Sequence[Any], starts: Mapping[str, float] = NOTHING
+) -> Callable[[Sequence[float]], None]:
+    """A function that sets scalar variables and elements of arrays, in their order.
+
+    An array is set as a whole: elements that are not named keep their start value.
 
     Args:
         instance: of an FMU, an object of fmpy.
-        variables: of its model description.
+        variables: of its model description, or `Element`.
+        starts: start values other than those of the description, by name.
     """
-    groups = [
-        (getattr(instance, f"set{kind}"), [v.valueReference for v in members], cast, places)
-        for kind, members, _, places in _by_type(instance, variables)
-        for cast in (_cast(members[0].type),)
-    ]
+    newer = hasattr(instance, "getFloat64")
+    found: dict[str, _Target] = {}
+    for number, variable in enumerate(variables):
+        kind = _call(variable.type, newer)
+        if kind not in found:
+            found[kind] = _Target(getattr(instance, f"set{kind}"), _cast(variable.type))
+        found[kind].add(number, variable, starts)
 
     def write(values: Sequence[float]) -> None:
-        for put, references, cast, places in groups:
-            put(references, [cast(values[place]) for place in places])
+        for target in found.values():
+            for number, place in target.places:
+                target.values[place] = target.cast(values[number])
+            target.put(list(target.first), target.values)
 
     return write
 
 
-def set_values(instance: Any, values: Mapping[str, float], variables: Iterable[Any]) -> None:
-    """Give those of the variables that are named their values."""
-    named = [v for v in variables if v.name in values]
-    writer(instance, named)([values[v.name] for v in named])
+@dataclass(slots=True)
+class _Target:
+    """What one call sets.
+
+    Attributes:
+        put: the call.
+        cast: makes a number one of its type.
+        first: place of the first value of each variable, by its value reference.
+        values: of all variables.
+        places: number of each given value, and its place.
+    """
+
+    put: Callable[[list[int], list[Any]], None]
+    cast: Callable[[float], float | int | bool]
+    first: dict[int, int] = field(default_factory=dict)
+    values: list[Any] = field(default_factory=list)
+    places: list[tuple[int, int]] = field(default_factory=list)
+
+    def add(self, number: int, variable: Any, starts: Mapping[str, float]) -> None:
+        """Another given value."""
+        whole, offset = variable, 0
+        if isinstance(variable, Element):
+            whole, offset = variable.array, variable.place
+        if whole.valueReference not in self.first:
+            self.first[whole.valueReference] = len(self.values)
+            begin = [starts.get(e.name, e.start) for e in elements_of(whole)] or [0.0]
+            self.values += [self.cast(value) for value in begin]
+        self.places.append((number, self.first[whole.valueReference] + offset))
+
+
+def set_values(instance: Any, values: Mapping[str, float], description: Any) -> None:
+    """Give the variables and elements of arrays that are named their values."""
+    named = [v for name, v in numbers_of(description).items() if name in values]
+    writer(instance, named, values)([values[v.name] for v in named])
+
+
+def _number(text: str) -> float:
+    return float(text == "true") if text in ("true", "false") else float(text)
+
+
+def _call(kind: str, newer: bool) -> str:
+    """The type of the call that reads or sets variables of a type."""
+    if kind != "Enumeration":
+        return kind
+    return "Int64" if newer else "Integer"
 
 
 def _cast(kind: str) -> Callable[[float], float | int | bool]:
@@ -96,9 +189,7 @@ def _by_type(
     found: dict[str, tuple[list[Any], list[int]]] = {}
     first = 0
     for variable in variables:
-        kind = variable.type
-        if kind == "Enumeration":
-            kind = "Int64" if newer else "Integer"
+        kind = _call(variable.type, newer)
         members, places = found.setdefault(kind, ([], []))
         members.append(variable)
         places.extend(range(first, first + size_of(variable)))

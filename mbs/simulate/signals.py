@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from mbs.errors import ModelError
 from mbs.messages import did_you_mean, quoted
-from mbs.simulate.fmu_variables import NUMBERS
+from mbs.simulate.fmu_variables import numbers_of
 
 Array = npt.NDArray[np.float64]
 Signal = float | Callable[[float], float] | tuple[npt.ArrayLike, npt.ArrayLike]
@@ -20,18 +20,17 @@ def start_values(
     description: Any, parameters: Mapping[str, float], start: Mapping[str, float]
 ) -> dict[str, float]:
     """Values of parameters, states and inputs before the run, their names and numbers checked."""
-    known = {v.name: v for v in description.modelVariables}
+    known = numbers_of(description)
+    every = (*known, *(v.name for v in description.modelVariables))
     fixed = {n for n, v in known.items() if v.causality == "parameter"}
-    check_names("parameters", parameters, fixed, known)
-    check_names("start", start, {n for n, v in known.items() if _settable(v)} - fixed, known)
+    check_names("parameters", parameters, fixed, every)
+    check_names("start", start, {n for n, v in known.items() if _settable(v)} - fixed, every)
     return {name: finite_number(name, value) for name, value in {**start, **parameters}.items()}
 
 
 def _settable(variable: Any) -> bool:
     """Whether the standard allows to set it before the run."""
     if variable.variability == "constant" or variable.causality == "independent":
-        return False
-    if variable.type not in NUMBERS or variable.dimensions:
         return False
     return variable.causality == "input" or variable.initial in ("exact", "approx")
 

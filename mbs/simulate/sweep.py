@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mbs.archives import check_archive
 from mbs.assembly import System
 from mbs.errors import Interrupted, MbsError, ModelError, SolverError
 from mbs.messages import did_you_mean, quoted
@@ -27,6 +28,7 @@ from mbs.progress import progress
 from mbs.result import Result
 from mbs.simulate.cases import Case, Folder, Grid, cases_of
 from mbs.simulate.fmu import fmu
+from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import run
 from mbs.simulate.study import study_of
 from mbs.simulate.swept import Sweep
@@ -193,10 +195,11 @@ def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
     import fmpy
 
     try:
+        check_archive(path)
         description = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:
         raise ModelError(f"sweep: {path} is not an FMU: {' '.join(str(error).split())}") from error
-    known = {v.name: v.causality for v in description.modelVariables}
+    known = {name: v.causality for name, v in numbers_of(description).items()}
     _require_names(str(description.modelName), cases, set(known))
     return _Fmu(path, frozenset(name for name, kind in known.items() if kind == "parameter"))
 

@@ -1,6 +1,8 @@
 """Unpacked FMUs and what tests do with their instances."""
 
 import ctypes
+import struct
+import zlib
 
 import fmpy
 import numpy as np
@@ -10,6 +12,8 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.logging import addLoggerProxy
+
+from mbs.simulate.fmu_variables import reader
 
 SOLVERS = pytest.mark.parametrize("solver", ["dopri5", "rodas", "rk4"])
 TIGHT = 1e-11
@@ -27,6 +31,12 @@ def _kept_callbacks():
     )
     addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
+
+
+def values(instance, description, names):
+    """Values of variables of any type, in the order of the names."""
+    variables = {v.name: v for v in description.modelVariables}
+    return np.array(reader(instance, [variables[name] for name in names])())
 
 
 class Fmu:
@@ -63,7 +73,7 @@ class Fmu:
             instance.enterContinuousTimeMode()
 
     def get(self, instance, *names):
-        return np.array(instance.getReal([self.references[n] for n in names]))
+        return values(instance, self.description, names)
 
     def set(self, instance, values):
         instance.setReal([self.references[n] for n in values], list(values.values()))
@@ -111,12 +121,18 @@ class Fmu3:
         return [u.variable.name for u in unknowns]
 
     def get(self, instance, names):
-        return np.array(instance.getFloat64([self.references[name] for name in names]))
+        return values(instance, self.description, names)
 
 
 def refused(call, *arguments):
     with pytest.raises(FMICallException):
         call(*arguments)
+
+
+def signed(state):
+    """Bytes of a state with the checksum that belongs to them."""
+    struct.pack_into("=I", state, 0, zlib.crc32(state[4:]))
+    return bytes(state)
 
 
 def slave(fmu, events=True, early=True, update=None):

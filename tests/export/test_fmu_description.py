@@ -1,5 +1,6 @@
 """modelDescription.xml: what depends on what and how, events, units and names."""
 
+import dataclasses
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -7,11 +8,16 @@ import casadi as ca
 import fmpy
 import numpy as np
 import pytest
-from fmu_models import pendulum, slider_crank
+from fmpy.validation import validate_fmu
+from fmu_models import clapper, pendulum, slider_crank
 from fmu_structures import ball, two_cranks
 
+import mbs
+from mbs.components import Body, Revolute, RigidStop
+from mbs.errors import ExportError
 from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel, Member, Terminal, Variable
+from mbs.export.fmu.system_fmu import fmu_model
 from mbs.export.fmu.terminals import terminals_and_icons
 
 
@@ -134,14 +140,77 @@ def test_units_are_defined_by_base_units_and_angles_shown_in_degrees():
     assert first["displayUnit"] == "deg"
 
 
-def test_paths_are_announced_as_such_and_other_names_as_flat():
-    assert 'variableNamingConvention="structured"' in texts(pendulum())["2"]
-    model = FmuModel(
+def named(name):
+    """A model of one parameter."""
+    return FmuModel(
         name="odd",
-        parameters=(Variable(name="a b"),),
+        parameters=(Variable(name=name),),
         rhs=ca.Function("rhs", [ca.SX.sym("a", k) for k in (1, 0, 0, 0, 1)], [ca.SX(0, 1)] * 2),
     )
-    assert 'variableNamingConvention="flat"' in texts(model)["3"]
+
+
+@pytest.mark.parametrize(
+    ("given", "written"),
+    [
+        ("j1.q", "j1.q"),
+        ("q_ref[1]", "q_ref[1]"),
+        ("M[2,3].x", "M[2,3].x"),
+        ("left-arm.q", "'left-arm'.q"),
+        ("ur5/joint_1.tau", "'ur5/joint_1'.tau"),
+        ("1st.2nd.q", "'1st'.'2nd'.q"),
+        ("q ref[3]", "'q ref'[3]"),
+        ("'left arm'.q", "'left arm'.q"),
+        ("it's", r"'it\'s'"),
+        ('say "a"\\b', r"'say \"a\"\\b'"),
+        ("a..b", "'a..b'"),
+    ],
+)
+def test_names_are_paths_whose_odd_parts_are_quoted(given, written, tmp_path):
+    for text in texts(named(given)).values():
+        assert 'variableNamingConvention="structured"' in text
+        (tmp_path / "modelDescription.xml").write_text(text)
+        read = fmpy.read_model_description(str(tmp_path), validate_variable_names=True)
+        assert read.modelVariables[0].name == written
+
+
+def test_names_beyond_ascii_stay_and_are_announced_as_flat():
+    for text in texts(named("größe.q")).values():
+        assert 'variableNamingConvention="flat"' in text
+        assert 'name="größe.q"' in text
+
+
+def test_two_names_that_are_quoted_alike_are_refused():
+    with pytest.raises(ExportError, match="two variables are called \"'a b'\"; rename one"):
+        dataclasses.replace(named("a b"), inputs=(Variable(name="'a b'"),))
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_mechanism_with_odd_names(fmi, tmp_path):
+    m = mbs.Mechanism("odd", gravity=(0, -9.81, 0))
+    rod = m.add(
+        Body("rod-1", mass=1.0, com=(0.3, 0, 0), inertia=((0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1)))
+    )
+    m.connect(m.world, Revolute("2nd/joint", axis="z", actuated=True), rod)
+    m.add(RigidStop("stop-1", "2nd/joint", lower=-1.0))
+    system = m.assemble()
+    path = mbs.export.fmu(system, tmp_path / "odd.fmu", fmi=fmi, outputs=["pose:rod-1"])
+    read = fmpy.read_model_description(str(path), validate_variable_names=True)
+    names = {v.name for v in read.modelVariables}
+    wanted = {"'2nd/joint'.q", "der('2nd/joint'.v)", "'2nd/joint'.tau", "'rod-1'.x"}
+    assert wanted | {"'stop-1'.mode", "indicator.'stop-1_lower'"} <= names
+    assert validate_fmu(str(path)) == []
+    (drive,) = fmu_model(system).terminals
+    assert drive.name == "'2nd/joint'"
+    assert {member.variable for member in drive.members} <= names
+    end = mbs.simulate.fmu(path, 0.1, inputs={"'2nd/joint'.tau": 1.0}, quiet=True)
+    own = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: [1.0], quiet=True)
+    assert end["'2nd/joint'.q"][-1] == pytest.approx(own["2nd/joint.q"][-1], abs=1e-7)
+
+
+def test_events_leave_the_description_structured():
+    assert 'variableNamingConvention="structured"' in texts(clapper())["3"]
+    names = [e.variable.name for e in clapper().entries if e.kind == "indicator"]
+    assert names == ["indicator.low_stop", "indicator.high_stop"]
 
 
 def test_time_is_a_dependency_where_it_is_a_variable():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
-from fmu_instances import SOLVERS, Fmu, refused, slave, slopes
+from fmu_instances import SOLVERS, Fmu, refused, signed, slave, slopes
 from fmu_models import block
 
 from mbs.export.fmu.pack import write_fmu
@@ -97,6 +97,7 @@ def test_bytes_with_impossible_events_are_refused(fmu_of):
     for place in (events, events + 16, events + 32, events - 16):
         torn = bytearray(blob)
         torn[place : place + 8] = np.float64(np.nan).tobytes()
+        signed(torn)
         refused(instance.deSerializeFMUstate, bytes(torn))
     instance.freeInstance()
 

@@ -1,15 +1,21 @@
 """Where an FMU finds events and what they do, in co-simulation and model exchange."""
 
 import ctypes
+import dataclasses
 
+import casadi as ca
 import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model, FMU2Slave
-from fmpy.fmi3 import FMU3Model
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.validation import validate_fmu
-from fmu_instances import SOLVERS, TIGHT, refused
-from fmu_models import fall, impact_times
+from fmu_instances import SOLVERS, TIGHT, Fmu, refused
+from fmu_models import block, fall, impact_times
+
+import mbs
+from mbs.components import Body, CoulombFriction, Revolute, RigidStop
+from mbs.export.fmu.pack import write_fmu
 
 MODELS = ("ball", "block", "clapper", "stopped_crank")
 
@@ -197,7 +203,7 @@ def test_indicators_have_hysteresis_and_are_never_zero(fmu_of):
 def test_indicators_have_derivatives(fmu_of):
     fmu = fmu_of("stopped_crank", "3.0")
     instance = fmu.running(FMU3Model)
-    watched, angle = (fmu.references[n] for n in ("indicator.slider stop", "crank.q"))
+    watched, angle = (fmu.references[n] for n in ("indicator.slider_stop", "crank.q"))
     place = fmu.references["place"]
     slope = instance.getDirectionalDerivative([watched], [angle, place], [1.0, 0.0], 1)[0]
     q, rod = 0.3, np.arcsin(0.1 / 0.3 * np.sin(0.3))
@@ -222,3 +228,69 @@ def test_an_indicator_that_had_no_value_has_one_again(fmu_of):
         instance.getDerivatives(found, 1)
         assert found[0] == -1.0
     instance.freeInstance()
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_modes_are_integers(fmu_of, fmi):
+    fmu = fmu_of("block", fmi)
+    (mode,) = (v for v in fmu.description.modelVariables if v.name == "mode")
+    assert (mode.type, mode.variability) == ("Integer" if fmi == "2.0" else "Int32", "discrete")
+    assert validate_fmu(str(fmu.path)) == []
+    instance = fmu.open(FMU2Slave) if fmi == "2.0" else fmu.running(FMU3Slave)
+    get = instance.getInteger if fmi == "2.0" else instance.getInt32
+    put = instance.setInteger if fmi == "2.0" else instance.setInt32
+    real = instance.getReal if fmi == "2.0" else instance.getFloat64
+    reference = [mode.valueReference]
+    assert get(reference) == [1]
+    instance.doStep(0.0, 1.0)
+    assert get(reference) == [0]
+    refused(instance.getBoolean, reference)
+    refused(get, [fmu.references["v"]])
+    refused(put, reference, [1])
+    assert real(reference) == [0.0]  # to hosts that know real numbers alone, as CasADi
+    instance.freeInstance()
+
+
+def test_modes_that_are_no_integers_are_refused(tmp_path):
+    model = block()
+    point = [ca.SX.sym(n, model.rhs.size1_in(k)) for k, n in enumerate("txzup")]
+    half = ca.Function("first", point, [0.5, ca.SX(2, 1)])
+    model = dataclasses.replace(model, jumps=dataclasses.replace(model.jumps, first=half))
+    fmu = Fmu(write_fmu(model, tmp_path / "half.fmu"), tmp_path / "half")
+    instance = fmu.open(FMU2Slave, upto="initialization")
+    refused(instance.getInteger, [fmu.references["mode"]])
+    instance.freeInstance()
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), [("2.0", "ModelExchange"), ("3.0", "CoSimulation")], ids=["2", "3"]
+)
+def test_the_modes_of_stops_and_friction_have_bounds(kind, words, tmp_path):
+    m = mbs.Mechanism("hit", gravity=(0, -9.81, 0))
+    rod = m.add(Body("rod", mass=1.0, com=(0.3, 0, 0), inertia=(0.1, 0.1, 0.1)))
+    m.connect(m.world, Revolute("j1", axis="z", actuated=True), rod)
+    m.add(RigidStop("stop", "j1", lower=-1.0))
+    m.add(CoulombFriction("dry", "j1", sliding=0.1))
+    path = mbs.export.fmu(m.assemble(), tmp_path / "hit.fmu", fmi=kind)
+    assert validate_fmu(str(path)) == []
+    variables = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+    for name in ("stop.mode", "dry.mode"):
+        v = variables[name]
+        assert (v.type[:3], v.min, v.max) == ("Int", "-1", "1")
+    found = mbs.simulate.fmu(path, 2.0, kind=words, quiet=True)
+    assert set(found["stop.mode"]) <= {-1.0, 0.0}
+    assert -1.0 in found["stop.mode"]
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_casadi_reads_modes_as_real_numbers_and_their_slopes_as_zero(fmu_of, fmi):
+    """Its importer asks for all outputs as such."""
+    fmu = fmu_of("block", fmi)
+    built = ca.DaeBuilder("block", str(fmu.folder))
+    f = built.create("f", ["x", "u"], ["ode", "y"])
+    names, y = list(built.y()), f([0.0, 1.0], [0.0])[1].full().ravel()
+    assert y[names.index("mode")] == 1.0
+    J = f.jacobian()([0.0, 1.0], [0.0], [], [])
+    rows = [ca.DM(block).full() for block in J[2:]]  # of y by x and by u
+    assert not np.any([row[names.index("mode")] for row in rows[:1]])
+    assert rows[1][names.index("a")] == pytest.approx(0.5)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmu_instances import refused
+from fmpy.fmi3 import FMU3Slave
+from fmu_instances import refused, signed
 
 
 def test_saved_states_continue_bit_for_bit(fmu):
@@ -41,7 +42,7 @@ def test_bytes_that_are_no_state_are_refused(fmu):
     blob = instance.serializeFMUstate(state)
     values = fmu.get(instance, *[v.name for v in fmu.description.modelVariables][:2])
     at = len(blob.split(values.tobytes())[0])  # after the flags, time and tolerance come the values
-    flags, time, tolerance = at - 40, at - 16, at - 8
+    flags, time, tolerance = at - 48, at - 24, at - 16
     assert struct.unpack_from("=5i", blob, flags) == (16, 1, 0, 1, 0)
     assert struct.unpack_from("=2d", blob, time)[0] == pytest.approx(0.03)
     parameter = at + 8 * next(
@@ -56,10 +57,52 @@ def test_bytes_that_are_no_state_are_refused(fmu):
     for place, form, value in wrong:
         torn = bytearray(blob)
         struct.pack_into(form, torn, place, value)
+        signed(torn)
         with pytest.raises(FMICallException):
             instance.deSerializeFMUstate(bytes(torn))
     instance.freeFMUstate(instance.deSerializeFMUstate(blob))
     instance.freeFMUstate(state)
+    instance.freeInstance()
+
+
+def test_a_changed_byte_of_a_state_is_refused_and_changes_nothing(fmu):
+    instance = fmu.open(FMU2Slave)
+    fmu.step(instance, 3)
+    state = instance.getFMUstate()
+    blob = instance.serializeFMUstate(state)
+    assert signed(bytearray(blob)) == blob
+    rng = np.random.default_rng(8)
+    for place in (*range(120), len(blob) - 1, *rng.integers(120, len(blob), 80)):
+        torn = bytearray(blob)
+        torn[place] ^= 1 << int(rng.integers(8))
+        with pytest.raises(FMICallException):
+            instance.deSerializeFMUstate(bytes(torn))
+    for wrong in (blob[:-1], blob + b"x", b""):
+        with pytest.raises(FMICallException):
+            instance.deSerializeFMUstate(wrong)
+    expected = fmu.step(instance, 5, begin=0.03)
+    instance.setFMUstate(state)
+    assert np.array_equal(fmu.step(instance, 5, begin=0.03), expected)
+    instance.freeFMUstate(state)
+    instance.freeInstance()
+
+
+@pytest.mark.parametrize(
+    ("place", "count", "reason"),
+    [
+        (300, None, "do not fit their checksum: they were changed after they were written"),
+        (None, -1, "bytes are no state of this model, which has"),
+    ],
+)
+def test_the_sentence_that_refuses_a_state(fmu_of, place, count, reason):
+    fmu, said = fmu_of("pendulum", "3.0"), []
+    instance = fmu.unborn(FMU3Slave)
+    instance.instantiate(logMessage=lambda *words: said.append(words[3].decode()))
+    torn = bytearray(instance.serializeFMUState(instance.getFMUState()))[:count]
+    if place:
+        torn[place] ^= 1
+    refused(instance.deserializeFMUState, bytes(torn))
+    assert reason in said[-1]
     instance.freeInstance()
 
 

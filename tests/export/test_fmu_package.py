@@ -14,9 +14,11 @@ import casadi as ca
 import fmpy
 import numpy as np
 import pytest
+from fmpy.validation import validate_fmu
 from fmu_models import pendulum, slider_crank
 from fmu_structures import ball
 
+import mbs
 from mbs.errors import ExportError
 from mbs.export.fmu.about import About
 from mbs.export.fmu.description import FmuModel, State, Variable
@@ -203,6 +205,47 @@ def test_every_source_and_every_header_is_there(written):
     others = {"rodas.h", "rk4.h"}  # of solvers that this one was not exported with
     assert "dopri5.h" in included
     assert included - others <= set(sources)
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_the_description_says_whose_the_model_is(fmi, tmp_path):
+    said = {
+        "description": 'A <pendulum> & "more"',
+        "author": "Ada Lovelace, 'Example' & Sons",
+        "version": "1.2",
+        "copyright": "(c) 2026 Müller",
+        "license": "https://example.org/l?a=1&b=2",
+    }
+    system = mbs.load("simple_pendulum").assemble()
+    path = mbs.export.fmu(system, tmp_path / "x.fmu", fmi=fmi, **said)
+    assert validate_fmu(str(path)) == []
+    with zipfile.ZipFile(path) as archive:
+        root = ET.fromstring(archive.read("modelDescription.xml"))
+    assert {name: root.get(name) for name in said} == said
+    assert root.get("guid" if fmi == "2.0" else "instantiationToken").startswith("{")
+    plain = mbs.export.fmu(system, tmp_path / "plain.fmu", fmi=fmi)
+    with zipfile.ZipFile(plain) as archive:
+        root = ET.fromstring(archive.read("modelDescription.xml"))
+    assert root.get("description") == system.report().splitlines()[0]
+    assert not {"author", "version", "copyright", "license"} & set(root.attrib)
+
+
+@pytest.mark.parametrize("wrong", ["two\nlines", "bell\a", 3, None, "\ud800"])
+@pytest.mark.parametrize("what", ["author", "description"])
+def test_texts_that_no_description_can_hold(what, wrong, tmp_path):
+    system = mbs.load("four_bar").assemble()
+    if what == "description" and not wrong:
+        pytest.skip("then it is that of the report")
+    with pytest.raises(ExportError, match=f"four_bar: {what} is .*; give a line of printable char"):
+        mbs.export.fmu(system, tmp_path / "x.fmu", **{what: wrong})
+    assert not list(tmp_path.iterdir())
+
+
+def test_only_what_the_version_can_call_is_generated(written):
+    fmi, _, files = written
+    for name in ("sources/model.c", "sources/model.h"):
+        assert (b"mbs_adjoint" in files[name]) == (fmi == "3.0")
+        assert b"mbs_tangent" in files[name]
 
 
 def test_other_descriptions_are_valid(written):

@@ -3,10 +3,12 @@
 import fmpy
 import numpy as np
 import pytest
+from fmpy.validation import validate_fmu
 
 import mbs
-from mbs.components import Body, CoulombFriction, Revolute, RigidStop
-from mbs.errors import ExportError, ModelError
+from mbs.assembly.parameter_bounds import MORE_THAN_ZERO
+from mbs.components import Body, Box, CoulombFriction, Revolute, RigidStop
+from mbs.errors import ExportError, ModelError, SolverError
 from mbs.export.fmu.system_fmu import Contents, Settings, fmu_model
 
 TENSOR = ((0.02, 0.001, 0), (0.001, 0.03, 0.002), (0, 0.002, 0.04))
@@ -94,7 +96,7 @@ def test_bounds_of_contacts() -> None:
     model = fmu_model(m.assemble(), Contents(parameters=["masses"]))
     by_name = {variable.name: variable for variable in model.parameters}
     assert (by_name["e"].min, by_name["e"].max) == (0.0, 1.0)
-    assert (by_name["mu"].min, by_name["mu"].max) == (0.0, None)
+    assert (by_name["mu"].min, by_name["mu"].max) == (MORE_THAN_ZERO, None)
     assert by_name["M1"].min == 0.0
     assert {"stop.effort", "dry.effort"} <= {y.name for y in model.outputs}
 
@@ -163,3 +165,24 @@ def test_a_fixed_parameter_keeps_its_value_once_the_motion_has_begun(tmp_path) -
 def test_what_is_no_parameter_cannot_be_fixed(fixed, message) -> None:
     with pytest.raises(ModelError, match=f"arm: {message}"):
         fmu_model(arm(), Contents(parameters=["M2"], fixed=fixed))
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_an_fmu_refuses_what_the_description_of_a_mechanism_refuses(fmi, tmp_path):
+    """A mass below zero, a length of zero: by the FMU itself, which says which, what and why."""
+    m = mbs.Mechanism("arm", gravity=(0, -9.81, 0))
+    box = Box("box", length=mbs.Parameter("l", 0.4), width=0.1, mass=mbs.Parameter("m", 2.0))
+    m.connect(m.world, Revolute("j1", axis="z", actuated=True), m.add(box))
+    path = mbs.export.fmu(m.assemble(), tmp_path / "arm.fmu", fmi=fmi, parameters=["friction"])
+    assert validate_fmu(str(path)) == []
+    read = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+    assert (float(read["m"].min), float(read["l"].min)) == (0.0, MORE_THAN_ZERO)
+    for name, value, rule in (
+        ("m", -1.0, "parameter m is -1; give 0 or more"),
+        ("l", 0.0, "parameter l is 0; give more than zero"),
+        ("l", -0.4, "parameter l is -0.4; give more than zero"),
+    ):
+        with pytest.raises(SolverError, match=rule):
+            mbs.simulate.fmu(path, 0.1, parameters={name: value}, quiet=True)
+    with pytest.raises(SolverError, match="singular posture or a zero mass"):
+        mbs.simulate.fmu(path, 0.1, parameters={"m": 0.0}, quiet=True)  # here it moves nothing else

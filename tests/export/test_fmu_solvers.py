@@ -1,6 +1,7 @@
 """The solvers of co-simulation inside an FMU."""
 
 import dataclasses
+import xml.etree.ElementTree as ET
 
 import casadi as ca
 import fmpy
@@ -9,6 +10,7 @@ import pytest
 from fmu_models import pendulum, slider_crank
 
 from mbs.errors import ExportError
+from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel, State, Variable
 from mbs.export.fmu.pack import write_fmu
 
@@ -73,3 +75,13 @@ def test_a_solver_that_is_not_there():
         dataclasses.replace(pendulum(), solver="euler")
     with pytest.raises(ExportError, match="internal step 0 must be positive"):
         dataclasses.replace(pendulum(), internal_step=0)
+
+
+@pytest.mark.parametrize("solver", ["dopri5", "rodas", "rk4"])
+def test_the_fixed_step_is_stated_where_there_is_one(solver):
+    """In FMI 3.0; the schema of 2.0 has no attribute for it."""
+    model = dataclasses.replace(pendulum(), solver=solver, internal_step=0.002)
+    root = ET.fromstring(fmi3_xml.model_description(model, "{token}"))
+    stated = root.find("CoSimulation").get("fixedInternalStepSize")
+    assert stated == ("0.002" if solver == "rk4" else None)
+    assert "fixedInternalStepSize" not in fmi2_xml.model_description(model, "{guid}", [])

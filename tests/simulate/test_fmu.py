@@ -1,4 +1,5 @@
 import dataclasses
+import re
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
@@ -283,7 +284,7 @@ def test_what_does_not_fit_is_refused(path, arguments, message):
 
 @KINDS
 def test_what_the_fmu_says_is_passed_on(path, kind):
-    with pytest.raises(SolverError, match=r"parameter mass = -1 is outside 1e-09 to inf"):
+    with pytest.raises(SolverError, match=r"parameter mass is -1; give 1e-09 or more"):
         fmu(path, parameters={"mass": -1.0}, kind=kind)
 
 
@@ -340,6 +341,57 @@ def test_files_that_are_no_fmu(tmp_path):
     bad.write_text("nothing")
     with pytest.raises(ModelError, match="is not an FMU"):
         fmu(bad)
+
+
+def packed(path, **entries):
+    """A zip file with these contents, by their names."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    return path
+
+
+def refuse(path, reason):
+    """Every reader of FMUs says why, and writes nothing."""
+    for read, error in (
+        (lambda: fmu(path), ModelError),
+        (lambda: mbs.simulate.sweep(path, {"k": [1.0, 2.0]}, duration=1.0), ModelError),
+        (lambda: mbs.export.ssp(path.with_suffix(".ssp"), [path], []), mbs.errors.ExportError),
+    ):
+        with pytest.raises(error, match=f"is not an FMU: {reason}"):
+            read()
+
+
+def test_an_fmu_that_would_fill_the_disk_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
+    zeros = bytes(150_000_000)
+    bomb = packed(tmp_path / "bomb.fmu", **{f"resources/{k}": zeros for k in range(7)})
+    assert bomb.stat().st_size < 1_100_000
+    monkeypatch.setattr(zipfile.ZipFile, "extractall", lambda *_: pytest.fail("unpacked"))
+    refuse(bomb, r"it would unpack to 1\.1 GB, 1\d\d\d times its size of 1 MB, and 100 times")
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "reason"),
+    [
+        ("MOST_ENTRIES", 2, "it has 3 entries, and 2 are the most that are unpacked; pack it"),
+        ("MOST_BYTES", 2_000_000, "it would unpack to 3 MB, and 2 MB are the most; pack it again"),
+        ("HARMLESS_BYTES", 1_000_000, r"it would unpack to 3 MB, \d\d\d times its size of .* MB"),
+    ],
+)
+def test_what_is_unpacked_has_limits(limit, value, reason, tmp_path, monkeypatch):
+    file = packed(tmp_path / "x.fmu", **{f"resources/{k}": bytes(1_000_000) for k in range(3)})
+    with pytest.raises(ModelError, match="is not a valid FMU"):  # only that no description is there
+        fmu(file)
+    monkeypatch.setattr(mbs.archives, limit, value)
+    refuse(file, reason)
+
+
+@pytest.mark.parametrize(
+    "name", ["../out.txt", "a/../../out.txt", "/tmp/out.txt", "C:/out.txt", "a\\..\\..\\out.txt"]
+)
+def test_an_entry_that_leads_out_of_the_folder_is_refused(name, tmp_path):
+    file = packed(tmp_path / "x.fmu", **{name: "out"})
+    refuse(file, f"its entry {re.escape(repr(name))} leads out of the folder in which it")
 
 
 FALL = np.sqrt(2 / 9.81)

@@ -9,6 +9,7 @@ import casadi
 
 from mbs.export.fmu.about import About
 from mbs.export.fmu.description_checks import check
+from mbs.export.fmu.names import structured
 from mbs.models.tree_state import TreeState
 
 Solver = Literal["dopri5", "rodas", "rk4"]
@@ -32,11 +33,13 @@ class Variable:
     """An input, an output, a parameter or a dependent coordinate of an FMU.
 
     Attributes:
-        name: as other tools show it.
+        name: as other tools show it; a part that is no identifier gets quotes, as
+            `mbs.export.fmu.names.structured` has it.
         unit: a name of `mbs.units.UNITS`.
         start: value at the start; of a dependent coordinate, a guess that chooses the posture.
         nominal: typical size, positive.
-        min: least value; a parameter below it is refused.
+        min: least value; a parameter below it is refused. The smallest normal number stands for
+            more than zero.
         max: greatest value; a parameter above it is refused.
         description: one line for people.
         fixed: a parameter that keeps its value once the motion has begun.
@@ -50,6 +53,9 @@ class Variable:
     max: float | None = None
     description: str = ""
     fixed: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", structured(self.name))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +82,7 @@ class Jumps:
     All functions take the parameters with the modes behind them as p, as `FmuModel.rhs` does then.
 
     Attributes:
-        modes: numbers that are constant between events.
+        modes: integers that are constant between events.
         first: `first(t, x, z, u, p) -> (modes, beyond)` before the first event, of the modes in p
             nothing; beyond (k, 1) is positive where x is outside what the model allows.
         indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events. An event is
@@ -107,6 +113,9 @@ class Member:
     variable: str
     kind: Literal["signal", "inflow", "outflow"] = "signal"
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "variable", structured(self.variable))
+
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
@@ -126,6 +135,43 @@ class Terminal:
     matching: Literal["plug", "bus", "sequence"] = "bus"
     description: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", structured(self.name))
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """Variables that follow each other and are one array in FMI 3.0.
+
+    Attributes:
+        name: of the array.
+        first: value reference of its first element, and its own.
+        size: number of elements.
+        description: one line for people.
+    """
+
+    name: str
+    first: int
+    size: int
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Whose a model is, each in words of its own; empty where nothing is said.
+
+    Attributes:
+        author: person or organisation.
+        version: of the model.
+        copyright: such as "(c) 2026 Example Ltd.".
+        license: its name, text or address.
+    """
+
+    author: str = ""
+    version: str = ""
+    copyright: str = ""
+    license: str = ""
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -144,6 +190,7 @@ class FmuModel:
     Attributes:
         name: of the model; letters, digits and underscores of it make the file names inside.
         description: one line for people.
+        origin: whose it is.
         states: x.
         inputs: u.
         outputs: y, those that are not states.
@@ -170,12 +217,14 @@ class FmuModel:
         documentation: text for `documentation/index.html`; a blank line starts a paragraph.
         terminals: variables that belong together.
         sources: name and text of further C files, which are compiled with the FMU.
+        arrays: variables that are listed as one; see `mbs.export.fmu.arrays`.
         about: what people read and see of it; None where only its variables are known.
     """
 
     name: str
     rhs: casadi.Function
     description: str = ""
+    origin: Origin = Origin()
     states: tuple[State, ...] = ()
     inputs: tuple[Variable, ...] = ()
     outputs: tuple[Variable, ...] = ()
@@ -194,6 +243,7 @@ class FmuModel:
     documentation: str = ""
     terminals: tuple[Terminal, ...] = ()
     sources: tuple[tuple[str, str], ...] = ()
+    arrays: tuple[Array, ...] = ()
     about: About | None = None
 
     def __post_init__(self) -> None:
@@ -299,7 +349,8 @@ def _entries(model: FmuModel) -> Iterator[Entry]:
     yield from (Entry("dependent", v) for v in model.dependents)
     for name in model.jumps.names if model.jumps else ():
         text = f"positive between events: {name}"
-        yield Entry("indicator", Variable(name=f"indicator.{name}", description=text))
+        words = f"indicator.{name.replace(' ', '_')}"
+        yield Entry("indicator", Variable(name=words, description=text))
     yield from (Entry("slot", v) for v in model.slots)
     yield from (Entry("rate", derivative_of(v)) for v in model.slots)
     if model.tree is not None:

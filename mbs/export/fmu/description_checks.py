@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import casadi
@@ -27,6 +28,7 @@ def check(model: FmuModel) -> None:
         ExportError: a name, a number or the size of a function is wrong.
     """
     _check_names(model)
+    _check_texts(model)
     _check_numbers(model)
     _check_functions(model)
 
@@ -35,8 +37,8 @@ def _check_names(model: FmuModel) -> None:
     if not model.name:
         raise ExportError("FMU: the model has no name; give it one")
     seen: set[str] = set()
-    for entry in model.entries:
-        name = entry.variable.name
+    names = [entry.variable.name for entry in model.entries]
+    for name in (*names, *(array.name for array in model.arrays)):
         if not name or not name.isprintable():
             raise ExportError(f"FMU {model.name}: {name!r} is no name; use printable characters")
         if name == TIME:
@@ -44,6 +46,15 @@ def _check_names(model: FmuModel) -> None:
         if name in seen:
             raise ExportError(f"FMU {model.name}: two variables are called {name!r}; rename one")
         seen.add(name)
+
+
+def _check_texts(model: FmuModel) -> None:
+    """What people read in the description, where other characters are lost or invalid."""
+    for what, text in {"description": model.description, **asdict(model.origin)}.items():
+        if not isinstance(text, str) or not text.isprintable():
+            raise ExportError(
+                f"FMU {model.name}: {what} is {quoted(text)}; give a line of printable characters"
+            )
 
 
 def _check_numbers(model: FmuModel) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable
 
+from mbs.assembly.parameter_bounds import MORE_THAN_ZERO
 from mbs.export.fmu.about import Table
 from mbs.export.fmu.description import FmuModel, Kind, Variable
 from mbs.export.fmu.svg import svg
@@ -152,7 +153,7 @@ def _start(v: Variable, shown: bool) -> tuple[str, ...]:
 def _words(v: Variable) -> str:
     bounds = ""
     if v.min is not None or v.max is not None:
-        low = "" if v.min is None else f"{v.min:g}"
+        low = "" if v.min is None else "more than 0" if v.min == MORE_THAN_ZERO else f"{v.min:g}"
         high = "" if v.max is None else f"{v.max:g}"
         bounds = f" ({low} .. {high})"
     return f"{v.description}{bounds}{', fixed' if v.fixed else ''}"

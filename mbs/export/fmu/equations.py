@@ -8,11 +8,12 @@ from mbs.export.fmu.description import FmuModel, Jumps, Variable
 from mbs.models.tree_state import TreeState
 
 
-def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
+def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
     """The functions under the names that core.c calls, every input and output dense.
 
     Args:
         model: what the FMU computes.
+        adjoint: with `mbs_adjoint`, which FMI 2.0 cannot call.
 
     Returns:
         `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, p with the modes at its end;
@@ -34,8 +35,9 @@ def functions(model: FmuModel) -> tuple[casadi.Function, ...]:
     answers = [
         casadi.Function("mbs_rhs", point, _dense(model.rhs.call(point))),
         _tangent(model, point),
-        _adjoint(model, point),
     ]
+    if adjoint:
+        answers.append(_adjoint(model, point))
     if model.closure is not None:
         loop, whole = [x, z, _own(model, p)], [x, z, p]
         answers.append(casadi.Function("mbs_closure", whole, _dense(model.closure.call(loop))))

@@ -24,8 +24,9 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
     for number, name in enumerate(element_names(contacts_of(system))):
         text = "place: -1 at the lower limit, 1 at the upper one, 0 between them"
         if number >= len(stops):
-            text = "direction of sliding, 0 where friction holds"
-        modes.append(Variable(name=f"{name}.mode", description=f"of {name}, {text}"))
+            text = "direction of sliding, -1 or 1, and 0 where friction holds"
+        described = f"of {name}, {text}"
+        modes.append(Variable(name=f"{name}.mode", min=-1, max=1, description=described))
     return Jumps(
         modes=tuple(modes),
         first=events.first,

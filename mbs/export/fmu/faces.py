@@ -38,11 +38,13 @@ class Face:
         sources: C files of the face.
         headers: its own.
         standard: headers of the standard, which fmpy brings with their licence inside.
+        adjoint: it has calls for adjoint derivatives.
     """
 
     sources: tuple[str, ...]
     headers: tuple[str, ...]
     standard: tuple[str, ...]
+    adjoint: bool
 
     def compiled(self, solver: Solver) -> tuple[str, ...]:
         """The C files to compile with a solver, in the folder `sources` of the FMU."""
@@ -70,11 +72,17 @@ def _runtime(solver: Solver) -> tuple[str, ...]:
 
 
 FACES = {
-    "2.0": Face(("fmi2.c",), (), ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")),
+    "2.0": Face(
+        ("fmi2.c",),
+        (),
+        ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+        adjoint=False,
+    ),
     "3.0": Face(
-        ("fmi3.c", "fmi3_run.c", "fmi3_absent.c"),
+        ("fmi3.c", "fmi3_arrays.c", "fmi3_run.c", "fmi3_absent.c"),
         ("fmi3_face.h",),
         ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+        adjoint=True,
     ),
 }
 

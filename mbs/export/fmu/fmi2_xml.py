@@ -10,13 +10,13 @@ from mbs.export.fmu.xml_parts import (
     Structure,
     add_categories_and_experiment,
     add_units,
+    integer_attributes,
     naming_convention,
-    needs_accepted_steps,
     real_attributes,
     structure,
     text_of,
+    texts,
     variable_attributes,
-    yes_or_no,
 )
 
 _STEPPING = {
@@ -38,16 +38,16 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
         its text.
     """
     found = structure(model)
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=model.name,
-        guid=guid,
-        description=model.description,
-        generationTool=TOOL,
-        variableNamingConvention=naming_convention(model),
-        numberOfEventIndicators=str(len(found.indicators)),
-    )
+    attributes = {
+        "fmiVersion": "2.0",
+        "modelName": model.name,
+        "guid": guid,
+        **texts(model),
+        "generationTool": TOOL,
+        "variableNamingConvention": naming_convention(model),
+        "numberOfEventIndicators": str(len(found.indicators)),
+    }
+    root = Element("fmiModelDescription", attributes)
     files = list(sources)
     _interface(root, "ModelExchange", model, files)
     _interface(root, "CoSimulation", model, files)
@@ -55,12 +55,15 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
     add_categories_and_experiment(root, model)
     variables, derived = SubElement(root, "ModelVariables"), model.derived
     for reference, entry in enumerate(model.entries):
+        scalar = SubElement(variables, "ScalarVariable", variable_attributes(reference, entry))
+        if entry.kind == "mode":
+            SubElement(scalar, "Integer", integer_attributes(entry))
+            continue
         real = real_attributes(entry)
         if reference in derived:
             real["derivative"] = str(derived[reference] + 1)
         if reference in found.reset:
             real["reinit"] = "true"
-        scalar = SubElement(variables, "ScalarVariable", variable_attributes(reference, entry))
         SubElement(scalar, "Real", real)
     _structure(root, model, found)
     return text_of(root)
@@ -76,8 +79,8 @@ def _interface(root: Element, tag: str, model: FmuModel, files: list[str]) -> No
     }
     if tag == "CoSimulation":
         attributes |= _STEPPING
-    else:
-        attributes["completedIntegratorStepNotNeeded"] = yes_or_no(not needs_accepted_steps(model))
+    else:  # loops and events remember accepted steps, and none may pass the stop time
+        attributes["completedIntegratorStepNotNeeded"] = "false"
     listed = SubElement(SubElement(root, tag, attributes), "SourceFiles")
     for name in files:
         SubElement(listed, "File", name=name)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
+from mbs.export.fmu.arrays import dependencies_of_arrays, listed, of_arrays
 from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.description_checks import TIME
@@ -11,13 +12,13 @@ from mbs.export.fmu.xml_parts import (
     Structure,
     add_categories_and_experiment,
     add_units,
+    integer_attributes,
     naming_convention,
-    needs_accepted_steps,
     real_attributes,
     structure,
     text_of,
+    texts,
     variable_attributes,
-    yes_or_no,
 )
 
 _STEPPING = {
@@ -42,15 +43,15 @@ def model_description(model: FmuModel, token: str) -> str:
     Returns:
         its text.
     """
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=model.name,
-        instantiationToken=token,
-        description=model.description,
-        generationTool=TOOL,
-        variableNamingConvention=naming_convention(model),
-    )
+    attributes = {
+        "fmiVersion": "3.0",
+        "modelName": model.name,
+        "instantiationToken": token,
+        **texts(model),
+        "generationTool": TOOL,
+        "variableNamingConvention": naming_convention(model),
+    }
+    root = Element("fmiModelDescription", attributes)
     _interface(root, "ModelExchange", model)
     _interface(root, "CoSimulation", model)
     add_units(root, model)
@@ -58,10 +59,15 @@ def model_description(model: FmuModel, token: str) -> str:
     found = structure(model)
     _variables(root, model, found)
     parent = SubElement(root, "ModelStructure")
-    _unknowns(parent, "Output", found.outputs, found.running)
-    _unknowns(parent, "ContinuousStateDerivative", found.derivatives, found.running)
-    _unknowns(parent, "InitialUnknown", found.initial, found.starting)
-    _unknowns(parent, "EventIndicator", found.indicators, found.running)
+    running = dependencies_of_arrays(model, found.running)
+    starting = dependencies_of_arrays(model, found.starting)
+    for tag, references, depends in (
+        ("Output", found.outputs, running),
+        ("ContinuousStateDerivative", found.derivatives, running),
+        ("InitialUnknown", found.initial, starting),
+        ("EventIndicator", found.indicators, running),
+    ):
+        _unknowns(parent, tag, of_arrays(model, references), depends)
     return text_of(root)
 
 
@@ -92,22 +98,34 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
         attributes |= _STEPPING
         if model.solver == "rk4":
             attributes["fixedInternalStepSize"] = repr(float(model.internal_step))
-    else:
-        attributes["needsCompletedIntegratorStep"] = yes_or_no(needs_accepted_steps(model))
+    else:  # loops and events remember accepted steps, and none may pass the stop time
+        attributes["needsCompletedIntegratorStep"] = "true"
     SubElement(root, tag, attributes)
 
 
 def _variables(root: Element, model: FmuModel, found: Structure) -> None:
     variables, derived = SubElement(root, "ModelVariables"), model.derived
-    for reference, entry in enumerate(model.entries):
-        attributes = variable_attributes(reference, entry) | real_attributes(entry)
+    reset = of_arrays(model, found.reset)
+    for shown in listed(model):
+        reference, entry = shown.reference, shown.entry
+        attributes = variable_attributes(reference, entry)
+        if entry.kind == "mode":
+            SubElement(variables, "Int32", attributes | integer_attributes(entry))
+            continue
+        attributes |= real_attributes(entry)
+        if "start" in attributes:
+            attributes["start"] = shown.start
+        if not shown.united:
+            attributes = {k: v for k, v in attributes.items() if k not in ("unit", "displayUnit")}
         if reference in derived:
             attributes["derivative"] = str(derived[reference])
-        if reference in found.reset:
+        if reference in reset:
             attributes["reinit"] = "true"
         if entry.kind in _SEEN_WITHIN_STEPS:
             attributes["intermediateUpdate"] = "true"
-        SubElement(variables, "Float64", attributes)
+        variable = SubElement(variables, "Float64", attributes)
+        if shown.array:
+            SubElement(variable, "Dimension", start=str(len(shown.elements)))
     SubElement(
         variables,
         "Float64",

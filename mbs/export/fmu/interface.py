@@ -10,7 +10,7 @@ from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.export.fmu.controller import Controller
 from mbs.export.fmu.description import Member, Terminal, Variable
-from mbs.export.fmu.names import once
+from mbs.export.fmu.names import once, structured
 from mbs.export.fmu.variables import POSE, WRENCH
 from mbs.messages import did_you_mean, quoted
 from mbs.models.geometry import terminal_frame
@@ -118,7 +118,7 @@ def terminals(
     joints = (
         _joint(speed.name, speed.unit, names)
         for speed in system.speeds
-        if f"{speed.name}.tau" in names and (speed.actuated or speed.name in driven)
+        if structured(f"{speed.name}.tau") in names and (speed.actuated or speed.name in driven)
     )
     return (*joints, *(_flange(label) for label in interface.flanges))
 
@@ -134,7 +134,7 @@ def _joint(name: str, unit: str, names: set[str]) -> Terminal:
     members = tuple(
         Member(member, f"{name}.{suffix}", "inflow" if suffix == "tau" else "signal")
         for member, suffix in suffixes.items()
-        if f"{name}.{suffix}" in names
+        if structured(f"{name}.{suffix}") in names
     )
     kind = "mbs.revolute" if turns else "mbs.prismatic"
     return Terminal(name, kind, members, description=f"drive of {name}")

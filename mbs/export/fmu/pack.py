@@ -56,10 +56,13 @@ def write_fmu(
     target = path_of(path)
     require_writable(target)
     results = reference_files(model) if reference else {}
-    code, compiled = source(model), _compiled(model, fmi)
+    face = FACES[fmi]
+    code, compiled = source(model, adjoint=face.adjoint), _compiled(model, fmi)
     unnamed = description(model, fmi, "", compiled)
-    guid = _guid(unnamed, header(model, ""), code, *(text for _, text in model.sources))
-    texts = {"model.c": code, "model.h": header(model, guid), **FACES[fmi].fixed(model.solver)}
+    tables = header(model, "", adjoint=face.adjoint)
+    guid = _guid(unnamed, tables, code, *(text for _, text in model.sources))
+    named = header(model, guid, adjoint=face.adjoint)
+    texts = {"model.c": code, "model.h": named, **face.fixed(model.solver)}
     texts.update(model.sources)
     files = {
         "modelDescription.xml": _identified(unnamed, guid).encode(),

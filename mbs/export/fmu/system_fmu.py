@@ -9,9 +9,11 @@ from pathlib import Path
 
 from mbs.assembly import System, symbolic
 from mbs.assembly.model_function import require_system
+from mbs.errors import ExportError
+from mbs.export.fmu.arrays import Group, in_arrays
 from mbs.export.fmu.c_law import read_sources
 from mbs.export.fmu.controller import Law, controller_of
-from mbs.export.fmu.description import FmuModel, Solver
+from mbs.export.fmu.description import FmuModel, Origin, Solver
 from mbs.export.fmu.events import jumps
 from mbs.export.fmu.faces import require_version
 from mbs.export.fmu.interface import interface_of, terminals
@@ -43,6 +45,12 @@ def fmu(
     solver: Solver = "dopri5",
     internal_step: float = 0.001,
     reference: bool = False,
+    arrays: bool = False,
+    description: str = "",
+    author: str = "",
+    version: str = "",
+    copyright: str = "",
+    license: str = "",
 ) -> Path:
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
@@ -88,13 +96,20 @@ def fmu(
             linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real time.
         internal_step: length of the steps of "rk4" [s].
         reference: whether to put in the results of the default experiment.
+        arrays: whether positions, velocities, accelerations and efforts of the joints are arrays
+            q, v, a and tau, in FMI 3.0; what loops determine is `q_dependent` and so on.
+        description: one line about the model; by default what the report of the system begins with.
+        author: person or organisation, as the model description is to name it.
+        version: of the model.
+        copyright: such as "(c) 2026 Example Ltd.".
+        license: its name, text or address.
 
     Returns:
         The path written.
 
     Raises:
-        ExportError: the file cannot be written, another FMI version was asked for, or the
-            controller does not fit the system.
+        ExportError: the file cannot be written, another FMI version was asked for, the controller
+            does not fit the system, or a text is no line of printable characters.
         ModelError: a parameter has no value, an input, output, parameter or frame is unknown or
             named twice, or the system has no minimal state.
         CompilerError: there is no C compiler, it refused the sources, or there is no such
@@ -105,7 +120,13 @@ def fmu(
     require_writable(path_of(path))
     wished = Contents(inputs, outputs, parameters, fixed, flanges, controller, sources)
     settings = Settings(stop_time, step_size, tolerance, solver, internal_step)
-    model = fmu_model(system, wished, settings)
+    if arrays and fmi != "3.0":
+        raise ExportError(
+            f"{system.name}: arrays are variables of FMI 3.0, and fmi is {fmi!r}; use fmi='3.0' or"
+            " leave arrays out"
+        )
+    origin = Origin(author=author, version=version, copyright=copyright, license=license)
+    model = fmu_model(system, wished, settings, (description, origin), arrays=arrays)
     return write_fmu(model, path, fmi=fmi, platforms=platforms, reference=reference)
 
 
@@ -134,7 +155,12 @@ class Settings:
 
 
 def fmu_model(
-    system: System, wished: Contents | None = None, settings: Settings | None = None
+    system: System,
+    wished: Contents | None = None,
+    settings: Settings | None = None,
+    words: tuple[str, Origin] = ("", Origin()),
+    *,
+    arrays: bool = False,
 ) -> FmuModel:
     """The description of a mechanism's FMU.
 
@@ -142,6 +168,8 @@ def fmu_model(
         system: open or closed.
         wished: what it holds.
         settings: how it is simulated.
+        words: a description in place of that of the report, and whose the model is.
+        arrays: q, v, a and tau are arrays.
 
     Raises:
         ExportError, ModelError, CompilerError: as for `fmu`.
@@ -167,9 +195,10 @@ def fmu_model(
     x_variables = states(system, state, x)
     u_variables = (*inputs(system, state, interface.wrenches), *controller.inputs)
     y_variables = (*outputs(system, state), *observed_variables(system, request))
-    return FmuModel(
+    model = FmuModel(
         name=system.name,
-        description=system.report().splitlines()[0],
+        description=words[0] or system.report().splitlines()[0],
+        origin=words[1],
         states=x_variables,
         inputs=u_variables,
         outputs=y_variables,
@@ -186,6 +215,22 @@ def fmu_model(
         terminals=terminals(system, interface, (*x_variables, *u_variables, *y_variables)),
         sources=controller.sources,
         about=about(system),
+    )
+    return in_arrays(model, _arrays(state)) if arrays else model
+
+
+def _arrays(state: MinimalState) -> tuple[Group, ...]:
+    """The variables of joints that follow each other, in the order of x, u, y and z."""
+    m, k, n = len(state.accelerations), len(state.dependents), len(state.passive)
+    return (
+        Group("q", "state", 0, len(state.positions), "positions of"),
+        Group("v", "state", len(state.positions), len(state.velocities), "velocities of"),
+        Group("tau", "input", 0, len(state.inputs), "efforts of the motors of"),
+        Group("a", "output", 0, m, "accelerations of"),
+        Group("q_dependent", "output", m, k, "positions, which loops determine, of"),
+        Group("v_dependent", "output", m + k, n, "velocities, which loops determine, of"),
+        Group("a_dependent", "output", m + k + n, n, "accelerations, which loops determine, of"),
+        Group("q_solved", "dependent", 0, k, "positions, whose starts choose the branch, of"),
     )
 
 

@@ -15,7 +15,7 @@ from mbs.native.compiled import generated, unwritten
 from mbs.native.plain_source import plain_source
 from mbs.solvers.block_triangular import Block, block_triangular
 
-_OPEN = ("mbs_rhs", "mbs_tangent", "mbs_adjoint")
+_OPEN = ("mbs_rhs", "mbs_tangent")
 _LOOPS = ("mbs_closure", "mbs_sensitivity")
 _TREE = tuple(
     f"mbs_tree_{name}"
@@ -43,15 +43,20 @@ _HEADER = """\
 #define N_PASSIVE {n_passive}
 #define NS {ns}
 #define NC {nc}
-{solver}
+{options}
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
-/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
+{arrays}/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
 extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
 
 {prototypes}
 #endif
+"""
+_ARRAYS = """\
+#define MODEL_ARRAYS
+/* elements of each variable, none of one that stands within an array */
+extern const int MODEL_SIZES[];
 """
 _PROTOTYPE = """\
 int {name}(const double **arg, double **res, long long *iw, double *w, int mem);
@@ -59,18 +64,21 @@ int {name}_work(long long *arg, long long *res, long long *iw, long long *w);
 """
 
 
-def header(model: FmuModel, guid: str) -> str:
+def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
     """The file model.h.
 
     Args:
         model: what the FMU is.
         guid: identity that the library asks for.
+        adjoint: the version of FMI calls adjoint derivatives.
 
     Returns:
         its text.
     """
     names: tuple[str, ...] = _OPEN
-    solver = ""
+    options = ""
+    if adjoint:
+        names, options = (*names, "mbs_adjoint"), "#define MODEL_ADJOINT\n"
     if model.closure is not None:
         names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
     if (tree := model.tree) is not None:
@@ -78,9 +86,10 @@ def header(model: FmuModel, guid: str) -> str:
     if model.jumps is not None:
         names = (*names, *_EVENTS)
     if model.solver == "rodas":
-        names, solver = (*names, "mbs_jacobian"), "#define MODEL_RODAS\n"
+        names = (*names, "mbs_jacobian")
+        options += "#define MODEL_RODAS\n"
     elif model.solver == "rk4":
-        solver = f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
+        options += f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
     return _HEADER.format(
         guid=_quoted(guid),
         tolerance=repr(float(model.tolerance)),
@@ -97,16 +106,18 @@ def header(model: FmuModel, guid: str) -> str:
         n_passive=model.passive[2],
         ns=len(model.slots),
         nc=int(model.tree is not None),
-        solver=solver + ("" if tree is None else _tree_sizes(tree, model.solver == "dopri5")),
+        arrays=_ARRAYS if model.arrays else "",
+        options=options + ("" if tree is None else _tree_sizes(tree, model.solver == "dopri5")),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
 
-def source(model: FmuModel) -> str:
+def source(model: FmuModel, *, adjoint: bool) -> str:
     """The file model.c.
 
     Args:
         model: what the FMU is.
+        adjoint: the version of FMI calls adjoint derivatives.
 
     Returns:
         its text.
@@ -114,7 +125,7 @@ def source(model: FmuModel) -> str:
     Raises:
         ExportError: a function holds a node that CasADi cannot write as C.
     """
-    code = _code(functions(model))
+    code = _code(functions(model, adjoint=adjoint))
     if problem := unwritten(code):
         raise ExportError(f"FMU {model.name}: {problem}")
     variables = [entry.variable for entry in model.entries]
@@ -128,6 +139,7 @@ def source(model: FmuModel) -> str:
         _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
         _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
+        *_size_tables(model),
         *_block_tables(_blocks(model)),
         *_tree_tables(model),
     ]
@@ -165,6 +177,16 @@ def _tree_tables(model: FmuModel) -> list[str]:
         _table("const int MODEL_TREE_HELD", map(str, tree.held)),
         _numbers("MODEL_TREE_UNITS", (1 / unit for unit in tree.units)),
     ]
+
+
+def _size_tables(model: FmuModel) -> list[str]:
+    """How many elements a variable has, where some are arrays."""
+    if not model.arrays:
+        return []
+    sizes = [1] * len(model.entries)
+    for array in model.arrays:
+        sizes[array.first : array.first + array.size] = [array.size] + [0] * (array.size - 1)
+    return [_table("const int MODEL_SIZES", map(str, sizes))]
 
 
 def _blocks(model: FmuModel) -> tuple[Block, ...]:

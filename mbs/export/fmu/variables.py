@@ -7,25 +7,13 @@ from collections.abc import Iterator, Sequence
 
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
-from mbs.components.contacts_joint import CoulombFriction, JointContact, RigidStop
 from mbs.errors import ModelError
 from mbs.export.fmu.description import State, Variable
 from mbs.export.fmu.names import once
-from mbs.expressions import Parameter
 from mbs.messages import did_you_mean
 from mbs.models.geometry import terminal_frame
 from mbs.models.minimal_drive import InputMotion
 from mbs.models.minimal_state import MinimalState
-
-_NEVER_NEGATIVE = ("kg", "N.s/m", "N.m.s/rad")
-"""Units of numbers that are masses and viscous friction."""
-
-_CONTACT_BOUNDS: tuple[tuple[type[JointContact], str, float | None], ...] = (
-    (RigidStop, "restitution", 1.0),
-    (CoulombFriction, "sliding", None),
-    (CoulombFriction, "sticking", None),
-)
-"""Fields of contacts that are never negative, and their greatest value."""
 
 POSE = ("x", "y", "z", *(f"R{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)))
 """Elements of the pose of a frame in the base."""
@@ -157,12 +145,10 @@ def parameters(system: System, fixed: Sequence[str] = ()) -> Iterator[Variable]:
     Raises:
         ModelError: there is no parameter of such a name, or it is given twice.
     """
-    bounds, kept = _bounds(system), once(system, "fixed", fixed)
+    kept = once(system, "fixed", fixed)
     _check_known(system, kept)
     for parameter, start in zip(system.parameters, system.parameter_values(), strict=True):
-        low, high = bounds.get(parameter.name, (None, None))
-        if low is None and parameter.unit in _NEVER_NEGATIVE:
-            low = 0.0
+        low, high = system.bounds.get(parameter.name, (None, None))
         yield Variable(
             name=parameter.name,
             unit=parameter.unit,
@@ -183,17 +169,6 @@ def _check_known(system: System, fixed: Sequence[str]) -> None:
                 f"{system.name}: fixed names {name!r}, which is no parameter;"
                 f" {did_you_mean(name, known)}"
             )
-
-
-def _bounds(system: System) -> dict[str, tuple[float | None, float | None]]:
-    """Bounds of the symbols that stand alone in an element of a contact."""
-    found: dict[str, tuple[float | None, float | None]] = {}
-    for force in system.forces:
-        for kind, name, high in _CONTACT_BOUNDS:
-            value = getattr(force.element, name) if isinstance(force.element, kind) else None
-            if isinstance(value, Parameter):
-                found[value.name] = (0.0, high)
-    return found
 
 
 def _size(coordinate: Coordinate) -> float:

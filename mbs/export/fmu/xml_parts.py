@@ -1,14 +1,14 @@
 """What the model descriptions of FMI 2.0 and 3.0 have in common."""
 
 import math
-import re
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
 from mbs.export.fmu.description import Entry, FmuModel, State
 from mbs.export.fmu.linearity import KINDS, DependencyKind
+from mbs.export.fmu.names import is_structured
 from mbs.units import UNITS
 from mbs.version import __version__
 
@@ -27,9 +27,6 @@ _INITIAL = {
     "chart": "calculated",
 }
 _STARTS = ("state", "input", "parameter", "dependent", "slot")
-_PART = r"([A-Za-z_]\w*|'[^'\\]+')(\[\d+(,\d+)*\])?"
-_PATH = rf"{_PART}(\.{_PART})*"
-_STRUCTURED = re.compile(rf"{_PATH}|der\({_PATH}(,\d+)?\)", re.ASCII)
 _NOTHING: Known = {}
 TOOL = f"mbs {__version__}"
 CATEGORIES = {
@@ -96,7 +93,9 @@ def structure(model: FmuModel) -> Structure:
         initial=derivatives + calculated,
         running=running,
         starting={
-            ref: _starting(found.first.get(ref) or starting.get(ref, {}), found, modes)
+            ref: _starting(
+                found.first.get(ref) or starting.get(ref, {}), found, modes, ref in modes
+            )
             for ref in derivatives + calculated
         },
         reset=reset,
@@ -124,10 +123,13 @@ def _without(references: Container[int], known: Known) -> dict[int, DependencyKi
     return {ref: kind for ref, kind in known.items() if ref not in references}
 
 
-def _starting(known: Known, found: Dependencies, modes: range) -> Known:
-    """What a value depends on at the start, where modes stand for what finds them."""
+def _starting(known: Known, found: Dependencies, modes: range, whole: bool) -> Known:
+    """What a value depends on at the start, where modes stand for what finds them.
+
+    An integer, such as a mode, is never said to be linear in something.
+    """
     direct: dict[int, DependencyKind] = {
-        ref: "constant" if kind == "constant" else "dependent"
+        ref: "constant" if kind == "constant" and not whole else "dependent"
         for ref, kind in known.items()
         if ref not in modes
     }
@@ -136,20 +138,16 @@ def _starting(known: Known, found: Dependencies, modes: range) -> Known:
     return dict(sorted(direct.items()))
 
 
+def texts(model: FmuModel) -> dict[str, str]:
+    """What people read of a model: description, author, version, copyright and license."""
+    said = {"description": model.description, **asdict(model.origin)}
+    return {name: text for name, text in said.items() if text}
+
+
 def naming_convention(model: FmuModel) -> str:
     """Whether names are paths such as `j1.q`, which tools show as a tree, or flat."""
-    fits = all(_STRUCTURED.fullmatch(entry.variable.name) for entry in model.entries)
+    fits = all(is_structured(entry.variable.name) for entry in model.entries)
     return "structured" if fits else "flat"
-
-
-def yes_or_no(holds: object) -> str:
-    """A truth value of XML."""
-    return "true" if holds else "false"
-
-
-def needs_accepted_steps(model: FmuModel) -> bool:
-    """Whether it must hear of every step that an importer accepts: loops and events remember."""
-    return bool(model.dependents) or model.jumps is not None
 
 
 def variable_attributes(reference: int, entry: Entry) -> dict[str, str]:
@@ -184,6 +182,12 @@ def real_attributes(entry: Entry) -> dict[str, str]:
     if entry.kind in _STARTS:
         real["start"] = repr(float(v.start))
     return real
+
+
+def integer_attributes(entry: Entry) -> dict[str, str]:
+    """Bounds of a mode, which is an integer."""
+    bounds = (("min", entry.variable.min), ("max", entry.variable.max))
+    return {name: str(int(bound)) for name, bound in bounds if bound is not None}
 
 
 def add_units(root: Element, model: FmuModel) -> None:

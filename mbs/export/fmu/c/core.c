@@ -89,6 +89,12 @@ const char *core_where(const core *c, char *where) {
     return where;
 }
 
+core_status core_before_stop(core *c, double time) {
+    if (time <= c->m.stop + SAME_TIME * fmax(1.0, fabs(c->m.stop))) return CORE_OK;
+    return core_refuse(c, "%s: time %.12g lies past the stop time %.12g of the experiment; end there "
+                       "or set up a later one", c->name, time, c->m.stop);
+}
+
 void core_point(core *c, const double *t, const double *x, const double *z) {
     c->arg[0] = t;
     c->arg[1] = x;
@@ -182,7 +188,10 @@ static int allocate(core *c) {
     long long size[4] = {9, 8, 0, 0}, other[4];
     int i, f;
     static int (*const work[])(long long *, long long *, long long *, long long *) = {
-        mbs_rhs_work, mbs_tangent_work, mbs_adjoint_work,
+        mbs_rhs_work, mbs_tangent_work,
+#ifdef MODEL_ADJOINT
+        mbs_adjoint_work,
+#endif
 #if NZ > 0
         mbs_closure_work, mbs_sensitivity_work,
 #endif
@@ -219,6 +228,7 @@ static void to_start(core *c) {
     c->m.mode = INSTANTIATED;
     c->m.stale = 1;
     c->m.tolerance = MODEL_TOLERANCE;
+    c->m.stop = HUGE_VAL;
     memcpy(c->m.values, MODEL_START, N_VALUES * sizeof *c->m.values);
     memcpy(c->m.guess, MODEL_START + DEPENDENTS, NZ * sizeof *c->m.guess);
 }
@@ -257,13 +267,17 @@ void core_free(core *c) {
     free(c);
 }
 
-core_status core_setup(core *c, double tolerance, double start) {
+core_status core_setup(core *c, double tolerance, double start, double stop) {
     if (!core_allowed(c, INSTANTIATED, "setting up the experiment")) return CORE_ERROR;
     if (!isfinite(start)) return core_refuse(c, "%s: start time %g is not finite", c->name, start);
+    if (!(stop >= start))
+        return core_refuse(c, "%s: stop time %.12g lies before the start at %.12g; give a later one",
+                           c->name, stop, start);
     if (!(tolerance > 0.0) || !isfinite(tolerance))
         return core_refuse(c, "%s: tolerance %g must be positive", c->name, tolerance);
     c->m.time = start;
     c->m.tolerance = tolerance;
+    c->m.stop = stop;
     c->m.stale = 1;
     return CORE_OK;
 }

@@ -94,7 +94,7 @@ typedef struct {
     int closed;  /* a posture that closes the loops is known */
     int guessed; /* the host gave guesses of the dependent coordinates, other than the start */
     int inputs;  /* a core_input_motion */
-    double time, tolerance;
+    double time, tolerance, stop; /* stop: the end of the experiment, HUGE_VAL where none is given */
     double values[N_VALUES + 1];
     double guess[NZ + 1];
     double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
@@ -142,22 +142,25 @@ core_status core_set_logging(core *c, int on, const char *const *categories, siz
 const char *core_category(core_status status);
 core_status core_refuse(core *c, const char *format, ...);
 
-core_status core_setup(core *c, double tolerance, double start);
+core_status core_setup(core *c, double tolerance, double start, double stop);
 core_status core_enter_initialization(core *c);
 core_status core_exit_initialization(core *c);
 core_status core_terminate(core *c);
 core_status core_reset(core *c);
 
 core_status core_get(core *c, const unsigned *ref, size_t n, double *values);
+core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values);
 core_status core_set(core *c, const unsigned *ref, size_t n, const double *values);
 
 /* derivatives of unknowns by knowns, along a direction or against it */
 core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
                              const unsigned *known, size_t n_known, const double *seed,
                              double *answer);
+#ifdef MODEL_ADJOINT
 core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
                          const unsigned *known, size_t n_known, const double *seed,
                          double *answer);
+#endif
 
 /* events; changed: 1 where the states have jumped */
 core_status core_enter_event_mode(core *c);

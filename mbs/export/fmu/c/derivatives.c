@@ -135,6 +135,8 @@ core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
     return status;
 }
 
+#ifdef MODEL_ADJOINT
+
 /* The seeds times what each known moves. */
 static core_status transposed(core *c, const unsigned *unknown, size_t n_unknown,
                               const unsigned *known, size_t n_known, const double *seed,
@@ -187,6 +189,8 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
     }
     return status;
 }
+
+#endif
 
 /* Inputs follow what was given of their derivatives, else they are held. */
 core_status core_get_output_slopes(core *c, const unsigned *ref, size_t n, const int *order,

@@ -12,7 +12,8 @@ core_status core_enter_event_mode(core *c) {
     if (c->m.cosimulation && !c->event_mode)
         return core_refuse(c, "%s: the instance was made without event mode; its events are "
                            "handled inside", c->name);
-    if (!core_allowed(c, from, "entering event mode")) return CORE_ERROR;
+    if (!core_allowed(c, from, "entering event mode") || core_before_stop(c, c->m.time))
+        return CORE_ERROR;
     if (!c->m.cosimulation) {
         core_status status = core_refresh(c);
 #ifdef MODEL_TREE
@@ -49,7 +50,8 @@ core_status core_enter_continuous_mode(core *c) {
 core_status core_completed_step(core *c, int *event) {
     core_status status;
     *event = 0;
-    if (!core_allowed(c, CONTINUOUS, "completing a step")) return CORE_ERROR;
+    if (!core_allowed(c, CONTINUOUS, "completing a step") || core_before_stop(c, c->m.time))
+        return CORE_ERROR;
     if (!NZ && !NK) return CORE_OK;
 #ifdef MODEL_TREE
     status = charts_completed(c, event);
@@ -65,6 +67,7 @@ core_status core_set_time(core *c, double time) {
     if (!core_allowed(c, c->m.cosimulation ? 0 : EVENT | CONTINUOUS, "setting the time"))
         return CORE_ERROR;
     if (!isfinite(time)) return core_refuse(c, "%s: time %g is not finite", c->name, time);
+    if (c->m.mode == EVENT && core_before_stop(c, time)) return CORE_ERROR;
     if (time != c->m.time) c->m.stale = 1;
     c->m.time = time;
     return CORE_OK;

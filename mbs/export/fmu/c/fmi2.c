@@ -1,4 +1,5 @@
 /* FMI 2.0, model exchange and co-simulation: a thin face over core.c. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -84,9 +85,8 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop) {
     NEED(c);
-    if (stop_defined && !(stop >= start))
-        return refused(c, "the stop time lies before the start; give a later one");
-    return as_fmi(core_setup(MODEL(c), tolerance_defined ? tolerance : MODEL_TOLERANCE, start));
+    return as_fmi(core_setup(MODEL(c), tolerance_defined ? tolerance : MODEL_TOLERANCE, start,
+                             stop_defined ? stop : HUGE_VAL));
 }
 
 #define FORWARD(name, call) \
@@ -110,7 +110,20 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     return as_fmi(core_set(MODEL(c), vr, n, value));
 }
 
-/* All variables are real: no value reference of another type exists. */
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                          fmi2Integer value[]) {
+    NEED(c);
+    return as_fmi(core_get_modes(MODEL(c), vr, n, value));
+}
+
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                          const fmi2Integer value[]) {
+    NEED(c);
+    (void)vr, (void)value;
+    return n ? refused(c, "integer variables are modes, which events set") : fmi2OK;
+}
+
+/* No value reference of another type exists. */
 static fmi2Status none(fmi2Component c, size_t n, const char *message) {
     NEED(c);
     return n ? refused(c, message) : fmi2OK;
@@ -128,7 +141,6 @@ static fmi2Status none(fmi2Component c, size_t n, const char *message) {
         return none(c, n, "the model has no " text " variables");                        \
     }
 
-NO_VARIABLES(Integer, "integer")
 NO_VARIABLES(Boolean, "boolean")
 NO_VARIABLES(String, "string")
 

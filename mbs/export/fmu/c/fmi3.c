@@ -1,10 +1,9 @@
 /* FMI 3.0, model exchange and co-simulation, a thin face over core.c: instances and values. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "fmi3_face.h"
-
-#define WRONG_COUNT "an array is NULL or too short; give one value for each reference"
 
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
@@ -108,9 +107,8 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
                                        fmi3Boolean stop_defined, fmi3Float64 stop) {
     core_status status;
     NEED(c);
-    if (stop_defined && !(stop >= start))
-        return refused(c, "the stop time lies before the start; give a later one");
-    status = core_setup(MODEL(c), tolerance_defined ? tolerance : MODEL_TOLERANCE, start);
+    status = core_setup(MODEL(c), tolerance_defined ? tolerance : MODEL_TOLERANCE, start,
+                        stop_defined ? stop : HUGE_VAL);
     return as_fmi(status ? status : core_enter_initialization(MODEL(c)));
 }
 
@@ -124,31 +122,50 @@ FORWARD(fmi3EnterEventMode, core_enter_event_mode)
 FORWARD(fmi3EnterContinuousTimeMode, core_enter_continuous_mode)
 FORWARD(fmi3EnterStepMode, core_enter_step_mode)
 
-/* Every variable has one element: as many values as references. */
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                           fmi3Float64 value[], size_t n_values) {
     size_t first = 0, i;
     fmi3Status status = fmi3OK;
+    elements e;
     NEED(c);
-    if (n != n_values || (n && (!vr || !value))) return refused(c, WRONG_COUNT);
-    if (!n) return as_fmi(core_get(MODEL(c), NULL, 0, NULL));
-    for (i = 0; i <= n && !status; i++) {
-        if (i < n && vr[i] != TIME_REFERENCE) continue;
-        status = as_fmi(core_get(MODEL(c), vr + first, i - first, value + first));
-        if (i < n && !status) value[i] = MODEL(c)->m.time;
+    if (n && !value) return refused(c, "the array of the values is NULL");
+    if (!n && !n_values) return as_fmi(core_get(MODEL(c), NULL, 0, NULL));
+    if (!elements_begin(c, &e, vr, n, NULL, n_values)) return fmi3Error;
+    for (i = 0; i <= e.n && !status; i++) {
+        if (i < e.n && e.ref[i] != TIME_REFERENCE) continue;
+        status = as_fmi(core_get(MODEL(c), e.ref + first, i - first, value + first));
+        if (i < e.n && !status) value[i] = MODEL(c)->m.time;
         first = i + 1;
     }
+    elements_end(&e);
     return status;
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                           const fmi3Float64 value[], size_t n_values) {
+    core_status status;
+    elements e;
     NEED(c);
-    if (n != n_values) return refused(c, WRONG_COUNT);
-    return as_fmi(core_set(MODEL(c), vr, n, value));
+    if (!elements_begin(c, &e, vr, n, NULL, n_values)) return fmi3Error;
+    status = core_set(MODEL(c), e.ref, e.n, value);
+    elements_end(&e);
+    return as_fmi(status);
 }
 
-/* All variables are 64-bit floats: no value reference of another type exists. */
+fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                        fmi3Int32 value[], size_t n_values) {
+    NEED(c);
+    if (n != n_values) return refused(c, "give one place for each integer variable");
+    return as_fmi(core_get_modes(MODEL(c), vr, n, value));
+}
+
+fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+                        const fmi3Int32 value[], size_t n_values) {
+    (void)vr, (void)value, (void)n_values;
+    return none(c, n, "32-bit integers are modes, which events set");
+}
+
+/* No value reference of another type exists. */
 #define NO_VARIABLES(type, text)                                                                \
     fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
                              fmi3##type value[], size_t n_values) {                             \
@@ -162,14 +179,13 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     }
 
 NO_VARIABLES(Float32, "32-bit float")
-NO_VARIABLES(Int8, "integer")
-NO_VARIABLES(UInt8, "integer")
-NO_VARIABLES(Int16, "integer")
-NO_VARIABLES(UInt16, "integer")
-NO_VARIABLES(Int32, "integer")
-NO_VARIABLES(UInt32, "integer")
-NO_VARIABLES(Int64, "integer")
-NO_VARIABLES(UInt64, "integer")
+NO_VARIABLES(Int8, "8-bit integer")
+NO_VARIABLES(UInt8, "unsigned 8-bit integer")
+NO_VARIABLES(Int16, "16-bit integer")
+NO_VARIABLES(UInt16, "unsigned 16-bit integer")
+NO_VARIABLES(UInt32, "unsigned 32-bit integer")
+NO_VARIABLES(Int64, "64-bit integer")
+NO_VARIABLES(UInt64, "unsigned 64-bit integer")
 NO_VARIABLES(Boolean, "boolean")
 NO_VARIABLES(String, "string")
 
@@ -187,7 +203,8 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
     (void)vr, (void)n;
-    return refused(c, "dependencies of elements are not listed; every variable has one element");
+    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
+                      "model description");
 }
 
 fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
@@ -196,5 +213,6 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
                                        size_t n) {
     (void)dependent, (void)elements, (void)independents, (void)independent_elements;
     (void)kinds, (void)n;
-    return refused(c, "dependencies of elements are not listed; every variable has one element");
+    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
+                      "model description");
 }

@@ -32,4 +32,17 @@ static inline fmi3Status none(fmi3Instance c, size_t n, const char *message) {
     return n ? refused(c, message) : fmi3OK;
 }
 
+/* What a call is about, element by element: a variable may be an array. */
+typedef struct {
+    const unsigned *ref;
+    const int *order; /* of derivatives, or NULL */
+    size_t n;
+    void *own;
+} elements;
+
+/* 1; or 0 after a message, where the values are not one for each element of the variables. */
+int elements_begin(fmi3Instance c, elements *e, const fmi3ValueReference vr[], size_t n,
+                   const fmi3Int32 order[], size_t n_values);
+void elements_end(elements *e);
+
 #endif

@@ -43,17 +43,24 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
     fmi3Status name(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,       \
                     const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[], \
                     size_t n_seed, fmi3Float64 answer[], size_t n_answer) {                     \
+        core_status status = CORE_ERROR;                                                        \
+        elements of, by;                                                                        \
         NEED(c);                                                                                \
-        if (n_seed != (seeds) || n_answer != (answers))                                         \
-            return refused(c, "the numbers of seeds and of answers do not fit the variables");  \
-        if ((n_unknown && !unknown) || (n_known && !known) || (n_seed && !seed) ||              \
-            (n_answer && !answer))                                                              \
+        if ((n_seed && !seed) || (n_answer && !answer))                                         \
             return refused(c, "an array of the derivative is NULL");                            \
-        return as_fmi(call(MODEL(c), unknown, n_unknown, known, n_known, seed, answer));        \
+        if (!elements_begin(c, &of, unknown, n_unknown, NULL, answers)) return fmi3Error;       \
+        if (elements_begin(c, &by, known, n_known, NULL, seeds)) {                              \
+            status = call(MODEL(c), of.ref, of.n, by.ref, by.n, seed, answer);                  \
+            elements_end(&by);                                                                  \
+        }                                                                                       \
+        elements_end(&of);                                                                      \
+        return as_fmi(status);                                                                  \
     }
 
-DERIVATIVE(fmi3GetDirectionalDerivative, core_directional, n_known, n_unknown)
-DERIVATIVE(fmi3GetAdjointDerivative, core_adjoint, n_unknown, n_known)
+/* Along a direction there is a seed for each known and an answer for each unknown; against it the
+ * other way round. */
+DERIVATIVE(fmi3GetDirectionalDerivative, core_directional, n_seed, n_answer)
+DERIVATIVE(fmi3GetAdjointDerivative, core_adjoint, n_answer, n_seed)
 
 /* ---- model exchange ---- */
 
@@ -141,7 +148,11 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 h, fmi3Boole
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
                                     const fmi3Int32 orders[], fmi3Float64 values[],
                                     size_t n_values) {
+    core_status status;
+    elements e;
     NEED(c);
-    if (n != n_values) return refused(c, "give one place for each derivative");
-    return as_fmi(core_get_output_slopes(MODEL(c), vr, n, orders, values));
+    if (!elements_begin(c, &e, vr, n, orders, n_values)) return fmi3Error;
+    status = core_get_output_slopes(MODEL(c), e.ref, e.n, e.order, values);
+    elements_end(&e);
+    return as_fmi(status);
 }

@@ -11,6 +11,14 @@
 int core_allowed(core *c, int modes, const char *action);
 const char *core_mode_name(int mode);
 
+/* Times closer than this part of them, or of 1 s, are one: hosts add up steps, whose rounding grows
+ * with their number, some 1e-16 each. */
+#define SAME_TIME 1e-9
+
+/* Refuses to arrive at a time past the stop time that the host has given. Times that an integrator
+ * outside only tries may lie there: CVODE, for one, steps over the end and interpolates back. */
+core_status core_before_stop(core *c, double time);
+
 /* A message, and the status of an evaluation that has no answer. */
 core_status core_no_answer(core *c, const char *format, ...);
 

@@ -1,21 +1,43 @@
-/* Saved states: copies of the memory of an instance. */
+/* Saved states: copies of the memory of an instance. As bytes they carry what they are, of which
+ * model, how long, and a checksum, since bytes from outside may have been changed on the way.
+ */
 #include "internal.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* Changes with the meaning of core_memory. */
+#define FORMAT "mbs state 2"
+
 struct core_state {
-    char guid[sizeof MODEL_GUID];
+    unsigned checksum; /* of what follows; 0 where the state is not bytes */
+    char format[sizeof FORMAT], guid[sizeof MODEL_GUID];
     size_t size;
     core_memory m;
 };
+
+/* CRC-32 of IEEE 802.3, as zlib has it: no changed byte leaves it as it was. */
+static unsigned checksum(const char *bytes) {
+    unsigned table[16], sum = 0xffffffffu, i, bit;
+    size_t k;
+    for (i = 0; i < 16; i++)
+        for (table[i] = i, bit = 0; bit < 4; bit++)
+            table[i] = table[i] >> 1 ^ (table[i] & 1 ? 0xedb88320u : 0);
+    for (k = offsetof(core_state, format); k < sizeof(core_state); k++) {
+        sum ^= (unsigned char)bytes[k];
+        sum = sum >> 4 ^ table[sum & 15];
+        sum = sum >> 4 ^ table[sum & 15];
+    }
+    return sum ^ 0xffffffffu;
+}
 
 core_status core_save(core *c, core_state **state) {
     if (!core_allowed(c, ~INTERMEDIATE, "saving the state")) return CORE_ERROR;
     if (!state) return core_refuse(c, "%s: the place of the state is NULL", c->name);
     if (!*state) *state = calloc(1, sizeof **state);
     if (!*state) return core_refuse(c, "%s: no memory is left to save the state", c->name);
+    memcpy((*state)->format, FORMAT, sizeof FORMAT);
     memcpy((*state)->guid, MODEL_GUID, sizeof MODEL_GUID);
     (*state)->size = sizeof **state;
     memcpy(&(*state)->m, &c->m, sizeof c->m);
@@ -28,10 +50,11 @@ static int handled_here(const core *c, const core_memory *m) {
 }
 
 static int ours(core *c, const core_state *s) {
-    if (s && s->size == sizeof *s && !memcmp(s->guid, MODEL_GUID, sizeof MODEL_GUID) &&
-        s->m.cosimulation == c->m.cosimulation && handled_here(c, &s->m))
+    if (s && s->size == sizeof *s && !memcmp(s->format, FORMAT, sizeof FORMAT) &&
+        !memcmp(s->guid, MODEL_GUID, sizeof MODEL_GUID) && s->m.cosimulation == c->m.cosimulation && handled_here(c, &s->m))
         return 1;
-    core_refuse(c, "%s: the state was not saved by this model", c->name);
+    core_refuse(c, "%s: the state was not saved by this model, of this version and in such an "
+                "instance; give one of its own", c->name);
     return 0;
 }
 
@@ -49,10 +72,13 @@ void core_free_state(core_state *state) { free(state); }
 size_t core_state_size(void) { return sizeof(core_state); }
 
 core_status core_serialize(core *c, const core_state *state, char *bytes, size_t size) {
+    unsigned sum;
     if (!ours(c, state)) return CORE_ERROR;
     if (!bytes || size < sizeof *state)
         return core_refuse(c, "%s: a state needs %u bytes", c->name, (unsigned)sizeof *state);
     memcpy(bytes, state, sizeof *state);
+    sum = checksum(bytes);
+    memcpy(bytes + offsetof(core_state, checksum), &sum, sizeof sum);
     return CORE_OK;
 }
 
@@ -119,6 +145,7 @@ static int sane(const core_memory *m) {
     if (!possible_mode(m) || !is_flag(m->stale) || !is_flag(m->closed) || !is_flag(m->guessed))
         return 0;
     if (!isfinite(m->time) || !isfinite(m->tolerance) || !(m->tolerance > 0.0)) return 0;
+    if (isnan(m->stop)) return 0;
     if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU)) return 0;
     if (!all_finite(v + PARAMETERS, NP + NM)) return 0;
     if (!parameters_in_bounds(v)) return 0;
@@ -137,14 +164,29 @@ static int sane(const core_memory *m) {
 }
 
 core_status core_deserialize(core *c, const char *bytes, size_t size, core_state **state) {
-    core_state *s = NULL;
-    if (bytes && state && size == sizeof *s && (s = malloc(sizeof *s)) != NULL) {
-        memcpy(s, bytes, sizeof *s);
-        if (ours(c, s) && sane(&s->m)) {
-            *state = s;
-            return CORE_OK;
-        }
+    core_status status = CORE_OK;
+    core_state *s;
+    if (!bytes || !state)
+        return core_refuse(c, "%s: the bytes or the place of the state are NULL", c->name);
+    if (size != sizeof *s)
+        return core_refuse(c, "%s: %lu bytes are no state of this model, which has %lu; give all "
+                           "that were written", c->name, (unsigned long)size,
+                           (unsigned long)sizeof *s);
+    if (!(s = malloc(sizeof *s)))
+        return core_refuse(c, "%s: no memory is left for the state", c->name);
+    memcpy(s, bytes, sizeof *s);
+    if (s->checksum != checksum(bytes))
+        status = core_refuse(c, "%s: the bytes of the state do not fit their checksum: they were "
+                             "changed after they were written; write the state again", c->name);
+    else if (!ours(c, s))
+        status = CORE_ERROR;
+    else if (!sane(&s->m))
+        status = core_refuse(c, "%s: the bytes hold a state in which no instance of this model can "
+                             "be; write one of its own", c->name);
+    s->checksum = 0;
+    if (status)
         free(s);
-    }
-    return core_refuse(c, "%s: the bytes are not a state of this model", c->name);
+    else
+        *state = s;
+    return status;
 }

@@ -1,8 +1,11 @@
-/* Values by their references. */
+/* Values by their references: modes are integers, all other variables are real. Hosts that know real
+ * numbers alone, such as CasADi, read modes as such too. */
 #include "internal.h"
 
 #include "charts.h"
 
+#include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -11,6 +14,8 @@ static core_status known_reference(core *c, unsigned ref) {
     return core_refuse(c, "%s: value reference %u is unknown; the last one is %d", c->name, ref,
                        (int)N_VALUES - 1);
 }
+
+static int is_mode(unsigned ref) { return ref >= MODES && ref < DEPENDENTS; }
 
 /* 1 for what is there without calculation. */
 static int given(const core *c, unsigned ref) {
@@ -42,6 +47,27 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     return status;
 }
 
+core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values) {
+    core_status status = CORE_OK;
+    size_t i;
+    if (!core_allowed(c, READABLE, "getting values")) return CORE_ERROR;
+    if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
+    for (i = 0; i < n; i++)
+        if (!is_mode(ref[i]))
+            return core_refuse(c, "%s: value reference %u is no integer variable; those are modes",
+                               c->name, ref[i]);
+    for (i = 0; i < n && !status; i++) {
+        double value;
+        if (!given(c, ref[i])) status = core_refresh(c);
+        value = c->m.values[ref[i]];
+        if (value != floor(value) || fabs(value) > INT_MAX)
+            return core_no_answer(c, "%s: the mode %s is %g, which is no integer; let it count or "
+                                  "name", c->name, MODEL_NAMES[ref[i]], value);
+        values[i] = (int)value;
+    }
+    return status;
+}
+
 /* Modes in which a variable may be set; 0: it is calculated. */
 static int settable(const core *c, unsigned ref) {
     int before = INSTANTIATED | INITIALIZATION;
@@ -55,6 +81,21 @@ static int settable(const core *c, unsigned ref) {
     return ref >= DEPENDENTS && ref < INDICATORS ? before : 0;
 }
 
+/* The smallest normal number as a bound means more than zero. */
+static core_status within_bounds(core *c, unsigned ref, double value) {
+    double low = MODEL_MIN[ref], high = MODEL_MAX[ref];
+    const char *name = MODEL_NAMES[ref];
+    if (value >= low && value <= high) return CORE_OK;
+    if (isfinite(low) && isfinite(high))
+        return core_refuse(c, "%s: parameter %s is %g; give a number from %g to %g", c->name, name,
+                           value, low, high);
+    if (value > high)
+        return core_refuse(c, "%s: parameter %s is %g; give %g or less", c->name, name, value, high);
+    if (low == DBL_MIN)
+        return core_refuse(c, "%s: parameter %s is %g; give more than zero", c->name, name, value);
+    return core_refuse(c, "%s: parameter %s is %g; give %g or more", c->name, name, value, low);
+}
+
 static core_status settable_value(core *c, unsigned ref, double value) {
     const char *name;
     int modes;
@@ -66,11 +107,7 @@ static core_status settable_value(core *c, unsigned ref, double value) {
         return core_refuse(c, "%s: %s cannot be set %s", c->name, name, core_mode_name(c->m.mode));
     if (!isfinite(value))
         return core_refuse(c, "%s: %s = %g is not finite", c->name, name, value);
-    if (ref >= PARAMETERS && ref < MODES &&
-        (value < MODEL_MIN[ref] || value > MODEL_MAX[ref]))
-        return core_refuse(c, "%s: parameter %s = %g is outside %g to %g", c->name, name, value,
-                           MODEL_MIN[ref], MODEL_MAX[ref]);
-    return CORE_OK;
+    return ref >= PARAMETERS && ref < MODES ? within_bounds(c, ref, value) : CORE_OK;
 }
 
 /* Something that the slopes depend on changed. */

@@ -124,7 +124,7 @@ static fmi3Status counted(fmi3Instance c, size_t *n, size_t count) {
     return fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) { return counted(c, n, NK); }
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) { return counted(c, n, NK + NC); }
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) { return counted(c, n, NX); }
 
 /* ---- co-simulation ---- */

@@ -50,8 +50,9 @@ print(f"Largest residual on the line: {path.residual.max():.1e}")
 
 # %% Draw the postures and the line
 frames = [mbs.models.transform(system, number) for number in range(len(system.tree.links) + 1)]
-figure = Figure(figsize=(10.5, 6.4), layout="constrained")
-grid = figure.add_gridspec(3, 4, height_ratios=(1, 1, 0.8))
+figure = Figure(figsize=(10.5, 7.2))
+grid = figure.add_gridspec(3, 4, height_ratios=(1, 1, 0.8), hspace=0.25, wspace=0.05)
+figure.subplots_adjust(left=0.07, right=0.9, bottom=0.08, top=0.93)
 for k, solution in enumerate(solutions):
     axes = figure.add_subplot(grid[k // 4, k % 4], projection="3d")
     origins = [np.array(frame(solution.q))[:3, 3] for frame in frames]

@@ -147,11 +147,18 @@ def test_text_round_trip(value):
     assert str(expression(str(back))) == str(back)
 
 
+def finite_throughout(value):
+    found = to_float(value, VALUES)
+    parts = value.arguments if isinstance(value, Operation) else ()
+    return found is not None and np.isfinite(found) and all(map(finite_throughout, parts))
+
+
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.recursive(leaves, grown, max_leaves=10))
 def test_sx_and_float_agree(value):
     wanted = to_float(value, VALUES)
-    if wanted is not None and abs(wanted) < 1e12:
+    # CasADi knows no sign of zero, so that what an infinity becomes may differ
+    if wanted is not None and abs(wanted) < 1e12 and finite_throughout(value):
         assert number_of_sx(value) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
 
 

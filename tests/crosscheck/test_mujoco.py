@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.mujoco_rounding import as_exact_as
 from support.random_trees import ALL_KINDS, KINDS, random_state, random_tree
 
 import mbs.models
@@ -81,12 +82,8 @@ def rotation(quaternion):
     return R.reshape(3, 3)
 
 
-# Before 4.0 MuJoCo finds the principal axes of an inertia to 7e-8 of it; its efforts show that.
-LEAST = 1e-10 if int(mujoco.__version__.split(".")[0]) >= 4 else 1e-6
-
-
 def close(ours, theirs, tolerance=1e-10):
-    tolerance = max(tolerance, LEAST)
+    tolerance = as_exact_as(mujoco, tolerance)
     theirs = np.asarray(theirs)
     scale = max(1.0, np.abs(theirs).max())
     ours = np.array(ours).reshape(theirs.shape)

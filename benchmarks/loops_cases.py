@@ -158,7 +158,7 @@ def run(case: Case, of: Made, tolerance: float, times: Array) -> Callable[[], Ar
     """The integration alone, (m, nq + nv) states at times."""
     functions = equations(of.state.rhs, of.state.project, case.method, None)
     given = problem(functions, of.x0, times, None, (), step_tolerances(tolerance), np.inf)
-    return lambda: run_compiled(of.library, given, None)[0]
+    return lambda: run_compiled(of.library, given, None).x
 
 
 def outputs(case: Case, system: System, states: Array) -> Array:

@@ -2,15 +2,20 @@
 
     python benchmarks/passages.py [--starts 20] [--duration 3] [--only kite,delta] [--seed 1]
     python benchmarks/passages.py --fmu cs [--fmi 2.0] [--tolerances 1e-4,1e-6]
+    python benchmarks/passages.py --falls [--duration 10] [--only delta]
 
 A motion is wrong where its energy changes by more than 300 times the tolerance, in parts of the
 largest kinetic energy; no force is dissipative. Starts have random positions and velocities of the
 independent joints, tolerances are random from 1e-10 to 1e-3 where none are given.
+
+`--falls` lets FMUs fall from rest, in both interfaces of both versions of FMI, and prints for each
+tolerance the energy error in parts of the largest kinetic energy, or when the FMU stopped.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import tempfile
 import time
 from collections.abc import Callable
@@ -25,12 +30,17 @@ from mbs.errors import MbsError
 from mbs.simulate.fmu import fmu
 
 WRONG = 300.0
+KINDS = {"cs": "CoSimulation", "me": "ModelExchange"}
+FALLS = ("sr400", "five_bar", "delta", "stewart_platform")
 GRAVITY = (0, -9.81, 0)
 
 
 def main() -> None:
     """Run and print."""
     arguments = _arguments()
+    if arguments.falls:
+        print(*_falls(arguments), sep="\n")
+        return
     chosen = arguments.only.split(",") if arguments.only else list(MECHANISMS)
     fixed = [float(x) for x in arguments.tolerances.split(",")] if arguments.tolerances else None
     print(f"{'mechanism':18} {'pass':>5} {'stop':>5} {'wrong':>5}  median, largest dE/Ekin/tol   s")
@@ -92,25 +102,50 @@ def _of_run(system, duration, q0, v0, tolerance):
 
 
 def _of_fmu(system: System, arguments: argparse.Namespace) -> Callable:
-    folder = tempfile.mkdtemp()
-    path = mbs.export.fmu(
-        system,
-        Path(folder) / "m.fmu",
-        fmi=arguments.fmi,
-        outputs=["energy"],
-        stop_time=arguments.duration,
-    )
-    kind = {"cs": "CoSimulation", "me": "ModelExchange"}[arguments.fmu]
+    path = _exported(system, arguments.fmi, arguments.duration)
+    kind = KINDS[arguments.fmu]
 
     def run(_, duration, q0, v0, tolerance):
         given = {f"{k}.q": x for k, x in q0.items()} | {f"{k}.v": x for k, x in v0.items()}
-        result = fmu(
-            path, duration, start=given, kind=kind, tolerance=tolerance, step=duration / 60
-        )
-        kinetic = result["energy.kinetic"]
-        return kinetic + result["energy.potential"], kinetic
+        return _energies(path, kind, duration, given, tolerance, duration / 60)
 
     return run
+
+
+def _exported(system: System, fmi: str, duration: float) -> Path:
+    path = Path(tempfile.mkdtemp()) / "m.fmu"
+    return mbs.export.fmu(system, path, fmi=fmi, outputs=["energy"], stop_time=duration)
+
+
+def _energies(path, kind, duration, start, tolerance, step):
+    """All and kinetic energy over a motion of an FMU."""
+    result = fmu(path, duration, start=start, kind=kind, tolerance=tolerance, step=step, quiet=True)
+    kinetic = result["energy.kinetic"]
+    return kinetic + result["energy.potential"], kinetic
+
+
+def _falls(arguments: argparse.Namespace) -> list[str]:
+    """A table of falls from rest."""
+    tolerances = [1e-4, 1e-6, 1e-8, 1e-10]
+    lines = ["| fall | " + " | ".join(f"{x:.0e}" for x in tolerances) + " |"]
+    lines.append("|---" * (len(tolerances) + 1) + "|")
+    for name in arguments.only.split(",") if arguments.only else FALLS:
+        system = MECHANISMS[name]()
+        for fmi in ("2.0", "3.0"):
+            path = _exported(system, fmi, arguments.duration)
+            for kind in KINDS.values():
+                found = [_fall(path, kind, arguments.duration, x) for x in tolerances]
+                lines.append(f"| `{name}`, {kind}, FMI {fmi} | " + " | ".join(found) + " |")
+    return lines
+
+
+def _fall(path: Path, kind: str, duration: float, tolerance: float) -> str:
+    try:
+        energy, kinetic = _energies(path, kind, duration, {}, tolerance, 0.01)
+    except MbsError as error:
+        time = re.search(r"time (?:[-+.\de]+ and )?([-+.\de]+)", str(error))
+        return f"stops at {float(time[1]):.3g} s" if time else str(error)
+    return f"{np.ptp(energy) / kinetic.max():.1e}"
 
 
 def rod(name: str, length: float) -> Body:
@@ -187,14 +222,18 @@ MECHANISMS: dict[str, Callable[[], System]] = {
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--starts", type=int, default=20)
-    parser.add_argument("--duration", type=float, default=3.0)
+    parser.add_argument("--duration", type=float)
     parser.add_argument("--only", default="")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--tolerances", default="")
     parser.add_argument("--fmu", choices=["cs", "me"], default=None)
     parser.add_argument("--fmi", default="2.0")
     parser.add_argument("--told", type=int, default=6)
-    return parser.parse_args()
+    parser.add_argument("--falls", action="store_true")
+    found = parser.parse_args()
+    if found.duration is None:
+        found.duration = 10.0 if found.falls else 3.0
+    return found
 
 
 if __name__ == "__main__":

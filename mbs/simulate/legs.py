@@ -26,6 +26,7 @@ from mbs.loops.velocity import constraint_jacobian
 from mbs.models.full_state import FullState
 from mbs.simulate.contacts import ContactMotion, first_modes
 from mbs.solvers import EventMotion, Events, integrate_events
+from mbs.solvers.failures import failed
 
 Array = NDArray[np.float64]
 
@@ -199,6 +200,9 @@ def _with_other_rows(
 ) -> tuple[list[Leg], Stop]:
     """Legs of an over-constrained system, each with rows that suit its first posture."""
     legs: list[Leg] = []
+    if _rests_between_branches(system, x0, np.array(p, dtype=float)):
+        start = Leg(equations(system), times[:1], x0.reshape(1, -1))
+        return [start], failed(float(times[0]), 0.0, "undetermined", state=x0.tolist())
     left, limit = times, _limit(system, x0[: system.nq], np.array(p, dtype=float))
     known: dict[tuple[int, ...], tuple[System, FullState]] = {}
     while True:
@@ -265,6 +269,12 @@ def _leg(
     reached = times[: len(motion.x)]
     before = reached <= (motion.events[0].time if motion.events else np.inf)
     return Leg(state, reached[before], motion.x[before]), motion
+
+
+def _rests_between_branches(system: System, x: Array, p: Array) -> bool:
+    """Whether branches of motion meet at a state, and it has no velocity that chooses one."""
+    q, v = x[: system.nq], x[system.nq : system.nq + system.nv]
+    return not v.any() and float(row_independence(rows_at(system, q, p))(q, p)) < _SINGULAR
 
 
 def _next(system: System, q: Array, p: Array) -> tuple[System, Limit]:

@@ -5,6 +5,8 @@ import pytest
 from support.bennett import bennett
 
 import mbs
+from mbs.components import Body, Revolute
+from mbs.errors import SolverError
 from mbs.loops import examine, modes
 
 CASES = [((0.9, 1.7), 1, 3), ((0.3, 1.2), 0, 3), ((1.4, 0.5), 2, 0), ((2.5, 0.8), 0, 3)]
@@ -102,3 +104,24 @@ def test_a_motion_that_is_prescribed_goes_all_the_way_round():
     work = np.trapezoid(result["j1.tau"] * result["j1.v"], result.time)
     energy = result["kinetic_energy"] + result["potential_energy"]
     assert work == pytest.approx(energy[-1] - energy[0], abs=5e-3)
+
+
+def sarrus():
+    """Two chains of three hinges, in planes at right angles, lift a plate straight up."""
+    m = mbs.Mechanism("sarrus", gravity=(0, 0, -9.81))
+    top = m.add(Body("top", mass=1, inertia=(0.1, 0.1, 0.1)))
+    for name, axis, end in (("x", "y", (1, 0, 0)), ("y", "x", (0, 1, 0))):
+        back = tuple(-c for c in end)
+        low, up = (m.add(Body(f"{side}_{name}", mass=1)) for side in ("low", "up"))
+        m.connect(m.world, Revolute(f"{name}1", axis=axis, actuated=name == "x"), low)
+        m.connect(low.at(*end), Revolute(f"{name}2", axis=axis), up)
+        m.connect(up.at(*back), closing := Revolute(f"{name}3", axis=axis), top)
+    m.cut(closing)
+    return m.assemble(guess={"x1": -0.5, "x2": 1.0, "x3": -0.5, "y1": 0.5, "y2": -1.0})
+
+
+def test_a_sarrus_linkage_at_rest_where_it_is_flat_is_refused():
+    """Either chain may turn about its hinges there instead of lifting."""
+    message = r"sarrus.*velocities of one branch.*x1 = 0, x2 = 0.*hold \w1 there"
+    with pytest.raises(SolverError, match=message):
+        mbs.simulate.run(sarrus(), 1.0, q0=[0.0] * 5, quiet=True)

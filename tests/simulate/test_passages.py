@@ -125,6 +125,16 @@ def test_output_times_do_not_change_the_motion(systems):
     assert energy_error(result) < 1e-4
 
 
+@pytest.mark.parametrize(("longer", "tolerance"), [(1e-7, 1e-7), (1e-7, 1e-9), (1e-9, 1e-5)])
+def test_near_misses_pass(longer, tolerance):
+    """Lengths that miss a + g = b + c by a little: the branches come near and do not meet."""
+    system = linkage((0.4, 0.9, 0.7 + longer, 1.2), (1.0, -0.5, 1.5))
+    result = mbs.simulate.run(
+        system, 3.0, v0={"j1": 6.0}, tolerance=tolerance, step=0.05, quiet=True
+    )
+    assert energy_error(result) < 5 * tolerance
+
+
 def test_a_prescribed_crank_passes_flat(systems):
     result = mbs.simulate.run(
         systems["parallelogram"],

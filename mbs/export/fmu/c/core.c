@@ -111,13 +111,14 @@ int core_call_rhs(core *c, double t, const double *x, const double *z, double *x
 }
 
 static core_status closure_failed(core *c, int status) {
+    char where[CORE_WHERE];
     if (status == CLOSURE_SINGULAR)
-        return core_no_answer(c, "%s: singular posture at time %.9g: the states do not determine "
+        return core_no_answer(c, "%s: singular posture at time %.9g (%s): the states do not determine "
                               "the dependent coordinates; start elsewhere or choose other states",
-                              c->name, c->m.time);
-    return core_no_answer(c, "%s: unclosable posture at time %.9g: no dependent coordinates near "
+                              c->name, c->m.time, core_where(c, where));
+    return core_no_answer(c, "%s: unclosable posture at time %.9g (%s): no dependent coordinates near "
                           "the last ones close the loops; start elsewhere or move less",
-                          c->name, c->m.time);
+                          c->name, c->m.time, core_where(c, where));
 }
 
 core_status core_accept_posture(core *c, const double *x, const double *z) {

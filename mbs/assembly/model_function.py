@@ -3,25 +3,51 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import casadi
 import numpy as np
 from casadi import DM, MX, SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly.function_table import function_table
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
-from mbs.errors import ModelError
+from mbs.assembly.validity import all_hold, plain_rows, require_plain
+from mbs.errors import MbsError, ModelError
 from mbs.messages import quoted
+from mbs.native import compiled
 from mbs.operations.naming import names_found
 
 Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""
 
-PostureCheck = Callable[[System, Any, Any], None]
-"""Raises an error where positions q (nq, 1) and parameters p (np, 1) are no posture for a model."""
 
+@dataclass(frozen=True, slots=True)
+class PostureCheck:
+    """Which positions and parameters a model takes.
+
+    Attributes:
+        valid: `valid(system)` gives the Function ``valid(q, p)``, 1 where they are taken.
+        refuse: `refuse(system, q, p)` raises the error that says why they are not.
+    """
+
+    valid: Callable[[System], Function]
+    refuse: Callable[[System, Any, Any], None]
+
+
+def _plainly_valid(system: System) -> Function:
+    """``valid(q, p)`` of quaternions and bounds of parameters."""
+    q = SX.sym("q", system.nq)
+    return all_hold(system, "plain", q, plain_rows(system, q))
+
+
+def _refuses_nothing(system: System, q: Any, p: Any) -> None:
+    """What is plainly valid is taken."""
+
+
+_PLAIN = PostureCheck(_plainly_valid, _refuses_nothing)
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
 
@@ -81,8 +107,8 @@ class ModelFunction(Function):
         return outputs
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds the equations; names and defaults stay with the System."""
-        return Function.deserialize, (self.serialize(),)
+        """A pickle holds the System too, so that names, defaults and checks go with it."""
+        return _unpickled, (self.serialize(), self._system, self._check_posture)
 
     def __deepcopy__(self, dummy: Any = None) -> ModelFunction:
         """Itself: a Function never changes."""
@@ -90,12 +116,47 @@ class ModelFunction(Function):
 
     def like(self, function: Function) -> ModelFunction:
         """Another Function with the inputs of this one, checked and completed in the same way."""
-        return ModelFunction(function, self._system)
+        return ModelFunction(function, self._system, check=self._check_posture)
+
+    def valid(self) -> Function | None:
+        """``valid(q)``, or ``valid(q, p)``: 1 at positions and parameters that the model takes.
+
+        Returns:
+            None where it asks for nothing but numbers, or has no such input.
+        """
+        system = self._system
+        asked = plain_rows(system, SX.sym("q", system.nq)) or self._check_posture
+        names = self.name_in()
+        if not asked or "q" not in names or self.size_in("q") != (system.nq, 1):
+            return None
+        return (self._check_posture or _PLAIN).valid(system)
+
+    def guard(self) -> Callable[..., bool] | None:
+        """What tells whether arrays are valid inputs, for calls that go past `__call__`.
+
+        Returns:
+            None where nothing but the inputs' own numbers is asked; else a call with all inputs in
+            their order, false also where it cannot tell.
+        """
+        valid = self.valid()
+        if valid is None:
+            return None
+        places = [self.name_in().index(name) for name in valid.name_in()]
+        made: list[Function] = []
+
+        def holds(*args: Any) -> bool:
+            if not made:
+                made.append(compiled(valid))
+            try:
+                return bool(float(made[0](*(args[k] for k in places))[0]) == 1.0)
+            except (MbsError, RuntimeError, NotImplementedError, TypeError, ValueError):
+                return False
+
+        return holds
 
     def rewritten(self, function: Function) -> ModelFunction:
         """An equal Function of other operations, its intermediate quantities named as here."""
         made = self.like(function)
-        made._check_posture = self._check_posture
         if self._annotate is not None:
             made._annotate = lambda: names_found(Function(function), self.annotated())
         return made
@@ -127,7 +188,13 @@ class ModelFunction(Function):
     def _given(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
         """Every input by name, p completed by its defaults."""
         names = self.name_in()
-        given = dict(zip(names, args, strict=False)) | kwargs
+        given = dict(zip(names, args, strict=False))
+        twice = [name for name in kwargs if name in given]
+        if twice:
+            raise ModelError(
+                f"{self._title}: {twice[0]} is given by its place and by its name; give it once"
+            )
+        given |= kwargs
         if "p" in names and "p" not in given:
             values = DM(self._system.parameter_values())
             given["p"] = casadi.repmat(values, 1, self.size2_in("p"))
@@ -163,15 +230,24 @@ class ModelFunction(Function):
         raise ModelError(f"{self._title}: {name} has {rows} values, it needs {wanted}{known}")
 
     def _require_posture(self, inputs: dict[str, Any]) -> None:
-        """Refuse a posture in numbers at which the model has no sense."""
-        if self._check_posture is None:
+        """Refuse numbers at which the model has no sense."""
+        system = self._system
+        numbers = {
+            name: DM(value) for name, value in inputs.items() if not isinstance(value, (SX, MX))
+        }
+        for name, value in numbers.items():
+            if not value.is_regular():
+                raise ModelError(f"{self._title}: {name} is not finite; give numbers")
+        q, p = (
+            _columns(numbers.get(name), n)
+            for name, n in (("q", system.nq), ("p", len(system.parameters)))
+        )
+        require_plain(system, self._title, q, p)
+        if self._check_posture is None or q is None or ("p" in inputs and p is None):
             return
-        q, p = inputs["q"], inputs.get("p", DM())
-        if any(isinstance(x, (SX, MX)) for x in (q, p)):
-            return
-        position, parameters = DM(q), DM(p)
-        if position.numel() == self._system.nq:
-            self._check_posture(self._system, position, parameters)
+        for k in range(q.shape[1]):
+            at = DM() if p is None else p[:, min(k, p.shape[1] - 1)]
+            self._check_posture.refuse(system, q[:, k], at)
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)
@@ -199,6 +275,22 @@ def _shape(value: Any) -> tuple[int, ...] | None:
     except ValueError:
         return None
     return array.shape if array.dtype.kind in "biuf" else None
+
+
+def _columns(value: DM | None, rows: int) -> NDArray[np.float64] | None:
+    """(rows, n) the configurations in an input; None where it is symbolic or of another size."""
+    if value is None or rows == 0:
+        return None
+    full = value.full()
+    if full.shape == (1, rows):
+        full = full.T
+    if full.shape == (1, 1) and full[0, 0] == 0:  # CasADi's zero for all elements
+        full = np.zeros((rows, 1))
+    return full if full.shape[0] == rows else None
+
+
+def _unpickled(data: str, system: System, check: PostureCheck | None) -> ModelFunction:
+    return ModelFunction(Function.deserialize(data), system, check=check)
 
 
 def _matrix(value: Any) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import casadi
@@ -18,6 +18,7 @@ from mbs.assembly.drive_tables import AttachedDevice, ShaftRow
 from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.parameter_bounds import Bounds
+from mbs.assembly.pickled import packed, unpacked
 from mbs.assembly.rates import position_rate
 from mbs.assembly.report import report
 from mbs.assembly.sensors import AttachedSensor
@@ -88,6 +89,11 @@ class System:
     devices: tuple[AttachedDevice, ...] = ()
     bounds: Mapping[str, Bounds] = field(default_factory=dict)
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds all of it but the models that were built, which are built anew."""
+        kept = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "_cache"}
+        return _unpickled, packed(kept)
 
     def __repr__(self) -> str:
         kind = "closed" if self.is_closed else "open"
@@ -306,3 +312,7 @@ class System:
                 value = self._number(value, f"parameter {name}")
             result.append(math.nan if value is None else value)
         return result
+
+
+def _unpickled(data: bytes, graphs: str) -> System:
+    return System(**unpacked(data, graphs))

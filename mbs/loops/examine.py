@@ -11,7 +11,8 @@ from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.model_function import require_system
+from mbs.assembly.model_function import PostureCheck, require_system
+from mbs.assembly.validity import Row, all_hold, plain_rows
 from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters
 from mbs.loops.closure import closure_rows
@@ -116,6 +117,29 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
             " take another posture, other independent joints (assemble(active=...)), or"
             ' coordinates="tree"'
         )
+
+
+def loop_rows(system: System, q: SX) -> list[Row]:
+    """What a posture of closed loops must fulfil for models in the independent joints.
+
+    Args:
+        system: with closed loops.
+        q: (nq, 1) positions.
+    """
+    _, leads, opening = posture_health(system)(q, system.p)
+    return [
+        Row("opening of the loops", opening, OPEN),
+        Row("hold of the independent joints, negative", -leads, -_LED),
+    ]
+
+
+def _valid(system: System) -> Function:
+    q = SX.sym("q", system.nq)
+    return all_hold(system, "led", q, [*plain_rows(system, q), *loop_rows(system, q)])
+
+
+LED = PostureCheck(_valid, require_led)
+"""Closed loops whose independent joints lead the others."""
 
 
 def posture_health(system: System) -> Function:

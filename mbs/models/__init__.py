@@ -25,6 +25,7 @@ from mbs.models.link_motion import jacobian_dot_velocity, link_accelerations, li
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
 from mbs.models.measurements import measurements
 from mbs.models.singularities import singularities
+from mbs.models.validity import validity, validity_rows
 
 __all__ = [
     "ContactPhases",
@@ -62,6 +63,8 @@ __all__ = [
     "measurements",
     "singularities",
     "transform",
+    "validity",
+    "validity_rows",
     "velocity_closure",
     "with_implicit_jacobian",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 import casadi
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.assembly.pickled import packed, unpacked
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closed_form.plan import plan
 from mbs.loops.closed_form.stage import ways_at
@@ -51,6 +53,10 @@ class Dae(Equations):
     z0: Array
     u0: Array
     p0: Array
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds all of it; its symbols are new ones of the same names."""
+        return _unpickled, packed({f.name: getattr(self, f.name) for f in fields(self)})
 
     def casadi(self) -> dict[str, SX]:
         """What `casadi.integrator` takes: x, z, u, p, ode, alg."""
@@ -216,3 +222,7 @@ def _start_algebraic(system: System, q: Array, v: Array, tau: Array, p: Array, s
         found = casadi.vertcat(*result) if isinstance(result, tuple) else result
         z0[: found.numel()] = np.array(found).ravel()
     return z0
+
+
+def _unpickled(data: bytes, graphs: str) -> Dae:
+    return Dae(**unpacked(data, graphs))

@@ -15,7 +15,7 @@ from mbs.components import Free, Spherical, Universal
 from mbs.components.motion import Motion
 from mbs.errors import ModelError
 from mbs.loops.cut_motion import cut_twist
-from mbs.loops.examine import require_led
+from mbs.loops.examine import LED
 from mbs.loops.reduction import reduction, tree_rows
 from mbs.loops.velocity import (
     acceleration_bias,
@@ -67,7 +67,7 @@ def velocity_closure(system: System) -> Function:
         ]
         return [("q", q)], outputs
 
-    return model_function(system, ("velocity_closure",), build, require_led)
+    return model_function(system, ("velocity_closure",), build, LED)
 
 
 def acceleration_closure(system: System, coordinates: str = "independent") -> Function:
@@ -107,7 +107,7 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
         outputs = [("Psi", values[0][:r]), ("Phi", values[0][r:]), ("G_dot", values[1])]
         return [("q", s.q), (f"v{s.suffix}", s.v)], outputs
 
-    return model_function(system, ("acceleration_closure", coordinates), build, require_led)
+    return model_function(system, ("acceleration_closure", coordinates), build, LED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

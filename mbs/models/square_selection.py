@@ -11,7 +11,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, PostureCheck, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.examine import require_led
+from mbs.loops.examine import LED
 from mbs.loops.reduction import reduction
 from mbs.messages import did_you_mean, quoted
 from mbs.models.symbols import check_coordinates, is_reduced
@@ -44,7 +44,7 @@ class Selection:
     @property
     def check(self) -> PostureCheck | None:
         """What refuses the postures that functions of the matrix cannot take."""
-        return require_led if self.reduced else None
+        return LED if self.reduced else None
 
     def of(self, system: System) -> tuple[SX, SquareJacobian]:
         """Symbols q, (nq, 1), and the matrix at them in blocks; formed once."""

@@ -10,7 +10,7 @@ from casadi import SX
 from mbs.assembly import System
 from mbs.assembly.model_function import PostureCheck, require_system
 from mbs.errors import ModelError
-from mbs.loops.examine import require_led
+from mbs.loops.examine import LED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.tree_factorization import velocity_antecedents
@@ -73,7 +73,7 @@ def posture_check(system: System, coordinates: str) -> PostureCheck | None:
     Those of a reduced model close the loops, and its independent joints lead the others there.
     """
     require_system(system)
-    return require_led if is_reduced(system, coordinates) else None
+    return LED if is_reduced(system, coordinates) else None
 
 
 def check_coordinates(system: System, coordinates: str) -> None:

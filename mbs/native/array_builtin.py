@@ -66,7 +66,7 @@ def array_builtin(function: Function, library: Path, finite: bool) -> ArrayCall 
     Args:
         function: the same function for CasADi.
         library: holds it.
-        finite: answer None too where a result is not a finite number.
+        finite: answer None too where an input or a result is not a finite number.
 
     Returns:
         the builtin; None when the function has sparse inputs, or dozens of them.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ def with_array_calls(function: Function, library: Path | None, like: Any = None)
     result._arrays = call or _declined
     result._last = None if like is None else default_of_last(function, like)
     result._inputs = function.n_in()
+    result._guard = getattr(result, "guard", lambda: None)() if library else None
     return result  # type: ignore[no-any-return]
 
 
@@ -39,6 +41,8 @@ class ArrayCalls:
     _arrays: ArrayCall
     _last: np.ndarray[Any, Any] | None
     _inputs: int
+    _guard: Callable[..., bool] | None
+    _source: tuple[Callable[[Function], Function], tuple[Function]]
 
     def __call__(self, *args: Any, out: Any = None, **kwargs: Any) -> Any:
         """Evaluate it on arrays, numbers or symbols.
@@ -58,7 +62,8 @@ class ArrayCalls:
         """
         if self._last is not None and not kwargs and len(args) == self._inputs - 1:
             args = (*args, self._last)
-        if not kwargs and len(args) == self._inputs:
+        guard = self._guard
+        if not kwargs and len(args) == self._inputs and (guard is None or guard(*args)):
             outputs = () if out is None else out if isinstance(out, tuple) else (out,)
             result = self._arrays(*args, *outputs)
             if result is not None:
@@ -70,8 +75,8 @@ class ArrayCalls:
         return _numpy(result) if arrays else result
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A pickle holds what CasADi stores of the Function."""
-        return Function.deserialize, (self.serialize(),)  # type: ignore[attr-defined]
+        """A pickle holds what it was made of, and is compiled where it is read."""
+        return self._source
 
     def __deepcopy__(self, dummy: Any = None) -> ArrayCalls:
         """Itself: a Function never changes."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -57,6 +58,12 @@ class Batch:
     defaults: dict[str, Array]
     note: str
     _code: _Code | None
+    _functions: tuple[Function, ...]
+    _valid: tuple[Batch, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A pickle holds the Functions, which are compiled where it is read."""
+        return functools.partial(batch, checked=bool(self._valid)), (self._functions,)
 
     @property
     def lanes(self) -> int:
@@ -96,6 +103,8 @@ class Batch:
         for port, array in zip(self.inputs, given, strict=True):
             port.require(array, self._name, "input")
         states = self._states(given)
+        named = dict(zip((port.name for port in self.inputs), given, strict=True))
+        every = [valid(*(named[port.name] for port in valid.inputs)) for valid in self._valid]
         results = self._results(out, states)
         if out is not None:
             self._require_apart(given, results)
@@ -104,6 +113,10 @@ class Batch:
             self._interpret(given, results, count)
         else:
             self._run(self._code, [*given, *results], count, self._threads(threads, count))
+        for taken in every:  # rows that a model does not take
+            if not np.all(taken == 1.0):
+                for result in results:
+                    result[taken[..., 0] != 1.0] = np.nan
         if out is not None:
             return out
         return results[0] if len(results) == 1 else tuple(results)
@@ -217,7 +230,7 @@ class Batch:
             result[...] = np.array(answer.full().T).reshape(result.shape)
 
 
-def batch(functions: Function | Iterable[Function]) -> Batch:
+def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> Batch:
     """Functions of the same states as machine code for many of them: several in vector lanes.
 
     Sines, cosines and most elementary functions are computed in lanes too; what lanes do not know
@@ -228,6 +241,8 @@ def batch(functions: Function | Iterable[Function]) -> Batch:
     Args:
         functions: one or several, such as an inverse and a direct dynamics model: inputs of one
             name are one input, and operations that they have in common are done once.
+        checked: rows whose positions or parameters a model does not take, such as positions that
+            leave loops open, come out as NaN; otherwise they are computed as if they had sense.
 
     Raises:
         ModelError: one is no Function, or their inputs do not fit together.
@@ -242,7 +257,16 @@ def batch(functions: Function | Iterable[Function]) -> Batch:
         require_function(part)
     function, inputs, outputs = joined(parts)
     code, note = _code(function)
-    return Batch(function, tuple(inputs), tuple(outputs), _defaults(parts), note, code)
+    valid = _valid_functions(parts) if checked else {}
+    ports = tuple(inputs), tuple(outputs)
+    guards = tuple(batch(one, checked=False) for one in valid.values())
+    return Batch(function, *ports, _defaults(parts), note, code, tuple(parts), guards)
+
+
+def _valid_functions(parts: Sequence[Any]) -> dict[int, Function]:
+    """What tells whether models take a state, each once."""
+    asked = (part.valid() for part in parts if hasattr(part, "valid"))
+    return {hash(valid): valid for valid in asked if valid is not None}
 
 
 def _code(function: Function) -> tuple[_Code | None, str]:

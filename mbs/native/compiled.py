@@ -1,5 +1,6 @@
 """A Function as machine code: equal to the interpreted one to the last bit, or faster."""
 
+import functools
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -54,8 +55,13 @@ def compiled(
     like: Any = getattr(function, "like", None)
     library = _library(function, derivatives, fast) if compiler_found() else None
     if library is None:
-        return with_array_calls(casadi.Function(function), None, like)
-    return with_array_calls(casadi.external(function.name(), str(library)), library, like)
+        result: Any = with_array_calls(casadi.Function(function), None, like)
+    else:
+        code = casadi.external(function.name(), str(library))
+        result = with_array_calls(code, library, like)
+    again = functools.partial(compiled, derivatives=derivatives, fast=fast)
+    result._source = (again, (function,))
+    return result  # type: ignore[no-any-return]
 
 
 def _library(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:

@@ -66,7 +66,7 @@ def test_a_pickle_keeps_the_equations(pendulum):
         (lambda f: f(q=[0] * 6, v=[0] * 6, acc=[0] * 6), r"there is no input 'acc'"),
         (lambda f: f([0] * 6, [0] * 6, [0] * 6, 1, 2), r"5 arguments were given"),
         (lambda f: f(["a"] * 6, [0] * 6, [0] * 6), r"q is \["),
-        (lambda f: f([np.nan] * 6, [0] * 6, [0] * 6), r"the result is not a number"),
+        (lambda f: f([np.nan] * 6, [0] * 6, [0] * 6), r"q is not finite; give numbers"),
     ],
 )
 def test_wrong_calls(call, message):

@@ -67,7 +67,7 @@ typedef struct {
   object *new_[MOST]; /* its arguments for each output */
   long long inputs;
   long long outputs;
-  long long finite; /* whether results must be numbers */
+  long long finite; /* whether inputs and results must be numbers */
   long long integers;
   long long reals;
   shape in[MOST];
@@ -137,7 +137,10 @@ static void scatter(const shape *s, const double *stored, double *dense) {
 static int run(const function *f, const view *in, const view *out, double *w, long long *iw) {
   const double *arguments[MOST] = {0};
   double *results[MOST] = {0};
-  for (int k = 0; k < f->inputs; ++k) arguments[k] = in[k].data;
+  for (int k = 0; k < f->inputs; ++k) {
+    arguments[k] = in[k].data;
+    if (f->finite && !regular(in[k].data, f->in[k].rows * f->in[k].columns)) return 0;
+  }
   for (int k = 0; k < f->outputs; ++k) {
     results[k] = f->out[k].places ? w : out[k].data;
     if (f->out[k].places) w += f->out[k].stored;

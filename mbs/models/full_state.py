@@ -21,7 +21,7 @@ from mbs.models.devices import device_equations, state_count
 from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.energy import energy
 from mbs.models.hybrid_dynamics import hybrid_dynamics
-from mbs.models.impacts import jump
+from mbs.models.impacts import tree_jump
 from mbs.models.passage import passage
 from mbs.models.prescribed import Prescribed
 from mbs.models.projection import projected
@@ -94,25 +94,15 @@ def full_state(
         rhs=dense_function("rhs", [t, x, p], [rate]),
         project=dense_function("project", [t, x, p], moved) if keeps else None,
         observe=dense_function("observe", [t, x, p], observed),
-        events=_events(system, contact, [t, x, p], motions) if contact else None,
+        events=_events(system, contact, [t, x, p]) if contact else None,
         passage=through,
     )
 
 
-def _events(
-    system: System, contact: ContactEquations, txp: list[SX], motions: Sequence[Prescribed]
-) -> tuple[Function, Function]:
+def _events(system: System, contact: ContactEquations, txp: list[SX]) -> tuple[Function, Function]:
     """The functions of `FullState.events`."""
-    x, nq, n = txp[1], system.nq, system.nq + system.nv
     fired = SX.sym("fired", contact.indicators.numel())
-    v, modes = jump(
-        system,
-        contact.contacts,
-        contact.modes,
-        (x[:nq], x[nq:n], fired),
-        tuple(motion.velocity for motion in motions),
-    )
-    after = casadi.vertcat(x[:nq], v, x[n:])
+    after, modes = tree_jump(system, contact, txp[1], fired)
     return (
         dense_function("indicators", txp, [contact.indicators]),
         dense_function("jump", [*txp, fired], [after, modes]),

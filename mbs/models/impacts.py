@@ -9,6 +9,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.models.composition import outputs_of
 from mbs.models.constrained_accelerations import constrained, loop_rows
+from mbs.models.contact_dynamics import ContactEquations
 from mbs.models.contacts import CREEP, Contacts, Modes
 from mbs.models.symbols import symbols_of
 from mbs.recursions.composite_body import inertia_matrix
@@ -43,6 +44,23 @@ def impact(system: System, prescribed: tuple[int, ...]) -> Function:
         return [("q", s.q), ("dv_p", change), ("acting", acting)], [("dv", dv), ("P", P)]
 
     return model_function(system, ("impact", prescribed), build)
+
+
+def tree_jump(system: System, contact: ContactEquations, x: SX, fired: SX) -> tuple[SX, SX]:
+    """The state of the whole tree, and the modes, after an event; see `jump`.
+
+    Args:
+        system: open or closed.
+        contact: its equations of contact; what drives move, keeps its velocity.
+        x: [q; v; z], z the states of devices.
+        fired: (5 k, 1), 1 for each indicator that is not positive.
+
+    Returns:
+        x and modes (2 k, 1).
+    """
+    q, v, z = casadi.vertsplit(x, [0, system.nq, system.nq + system.nv, x.numel()])
+    after, modes = jump(system, contact.contacts, contact.modes, (q, v, fired), contact.driven)
+    return casadi.vertcat(q, after, z), modes
 
 
 def jump(

@@ -6,7 +6,7 @@ of sliding, and a limit that is not given is not watched.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -18,7 +18,7 @@ from mbs.assembly.tables import EFFORT_UNIT
 from mbs.models.composition import dense_function
 from mbs.models.contact_dynamics import ContactEquations
 from mbs.models.contacts import KINDS, Contacts
-from mbs.models.minimal_jump import minimal_jump, to_limits
+from mbs.models.minimal_jump import to_limits
 from mbs.models.minimal_motion import TreeMotion
 from mbs.models.minimal_standstill import RETURN_RATE
 
@@ -26,6 +26,8 @@ from mbs.models.minimal_standstill import RETURN_RATE
 @dataclass(frozen=True, slots=True, eq=False)
 class MinimalEvents:
     """Where states and modes jump, and how; p = [parameters; modes] in all functions.
+
+    The state x is that of the independent joints, or of the tree, which has no z.
 
     Attributes:
         modes: name of every mode, such as `stop.mode`.
@@ -78,29 +80,33 @@ def contact_efforts(system: System, contacts: Contacts) -> tuple[ContactEffort, 
     return tuple(ContactEffort(f"{name}.effort", units[k], k) for name, k in pairs)
 
 
-def few_modes(contact: ContactEquations, p: SX, values: list[SX]) -> tuple[SX, list[SX]]:
-    """[p; modes] of the elements alone, and expressions of all 2 k modes with these in them."""
+def few_modes(contact: ContactEquations | None, p: SX, values: Sequence[SX]) -> tuple[SX, list[SX]]:
+    """[p; modes] of the elements alone, and expressions of all 2 k modes with these in them.
+
+    Where there are no contacts, both as they are.
+    """
+    if contact is None:
+        return p, list(values)
     modes, count = used_modes(contact.contacts), contact.values.numel()
     few = SX.sym("modes", len(modes))
-    changed = casadi.substitute(values, [contact.values], [_spread(few, modes, count)])
+    changed = casadi.substitute(list(values), [contact.values], [_spread(few, modes, count)])
     return casadi.vertcat(p, few), [SX(value) for value in changed]
 
 
 def minimal_events(
-    system: System,
     contact: ContactEquations,
     motion: TreeMotion,
     point: Sequence[SX],
-    states: tuple[Sequence[int], Sequence[int]],
+    jump: Callable[[SX], tuple[SX, SX]],
 ) -> MinimalEvents:
     """The events of a state equation.
 
     Args:
-        system: open or closed.
         contact: its equations of contact.
         motion: of the tree.
         point: t, x, z, u and p, without modes.
-        states: numbers in q, and numbers in v, of the positions and velocities that x begins with.
+        jump: x and (2 k, 1) modes after an event, of (5 k, 1) 1 for each indicator that is not
+            positive.
     """
     contacts, modes = contact.contacts, used_modes(contact.contacts)
     watched = _watched(contacts)
@@ -115,7 +121,7 @@ def minimal_events(
     start, outside = contacts.first(motion.q, motion.v)
     beyond = casadi.vertcat(outside, -SX.ones(3 * len(contacts)))
     every = _spread(fired, numbers, 5 * len(contacts))
-    x, now = minimal_jump(system, contact, motion, (point[1], every), states)
+    x, now = jump(every)
     return MinimalEvents(
         modes=tuple(f"{name}.mode" for name in element_names(contacts)),
         names=tuple(name for _, name in watched),

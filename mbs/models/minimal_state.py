@@ -25,6 +25,7 @@ from mbs.models.minimal_accelerations import Accelerations, minimal_acceleration
 from mbs.models.minimal_contacts import MinimalEvents, at_limits, few_modes, minimal_events
 from mbs.models.minimal_controller import Equations, controlled
 from mbs.models.minimal_drive import Drive
+from mbs.models.minimal_jump import minimal_jump
 from mbs.models.minimal_layout import MinimalLayout, minimal_layout
 from mbs.models.minimal_motion import (
     TreeMotion,
@@ -183,9 +184,15 @@ def _equations(
         y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *vectors, external)))
     point = [s.t, s.x, s.z, s.u, system.p]
     contact, states = moved.contact, (layout.positions, layout.velocities)
-    events = minimal_events(system, contact, motion, point, states) if contact else None
+    events = None
     if contact:
-        point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
+        events = minimal_events(
+            contact,
+            motion,
+            point,
+            lambda fired: minimal_jump(system, contact, motion, (s.x, fired), states),
+        )
+    point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
     return Equations(
         rhs=dense_function("rhs", point, [rate, y]),
         motion=dense_function("motion", [s.t, s.x, s.z, s.u, system.p], [motion.q, motion.v]),

@@ -6,6 +6,7 @@ shows the same outputs.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi
@@ -15,10 +16,12 @@ from mbs.assembly import System
 from mbs.assembly.rates import position_rate
 from mbs.loops.scales import scales
 from mbs.models.composition import dense_function, outputs_of
-from mbs.models.contacts import contacts_of
+from mbs.models.contact_dynamics import contact_equations
 from mbs.models.devices import device_equations, state_count
 from mbs.models.direct_dynamics import direct_dynamics
+from mbs.models.impacts import tree_jump
 from mbs.models.minimal_accelerations import Accelerations
+from mbs.models.minimal_contacts import MinimalEvents, few_modes, minimal_events
 from mbs.models.minimal_controller import Equations, controlled
 from mbs.models.minimal_drive import Drive
 from mbs.models.minimal_layout import minimal_layout
@@ -33,11 +36,14 @@ from mbs.solvers.passage import Passage
 class TreeState:
     """A state equation of X = [q; v; states of devices]; functions take (t, X, z, u, p), z empty.
 
+    Where rigid stops or dry friction act, p has their modes behind the parameters.
+
     Attributes:
         rhs: `rhs(t, X, z, u, p) -> (Xdot, y)`, y the outputs of the independent state equation.
         project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
         start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
         passage: of rows, forces and regularity.
+        events: of rigid stops and dry friction; None where there are none.
         rate: `rate(X) -> q'`, the rates of the positions in X.
         states: numbers in X of the states x.
         dependents: numbers in X of the dependents z.
@@ -50,6 +56,7 @@ class TreeState:
     project: Function
     start: Function
     passage: Passage
+    events: MinimalEvents | None
     rate: Function
     states: tuple[int, ...]
     dependents: tuple[int, ...]
@@ -66,11 +73,11 @@ def tree_state(
     Args:
         system: open or closed.
         observe: as of `minimal_state`, likewise the next one.
-        drive: motions that are inputs, and contacts, are left to the independent state equation.
+        drive: motions that are inputs are left to the independent state equation.
     """
     drive = Drive() if drive is None else drive
     layout = minimal_layout(system, drive)
-    if not layout.dependents or layout.motions or len(contacts_of(system)):
+    if not layout.dependents or layout.motions:
         return None
     motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
     s = point_of(system, layout, motors)
@@ -83,44 +90,61 @@ def tree_state(
         tau[number] += s.efforts[column]
     external = wrenches_of(system, q, layout.frames, s.wrenches)
     load = load_of(system, q, external)
+    contact = contact_equations(system, q, v, tau + load, {})
     point = [s.t, X, none, s.u, system.p]
-    through = passage(system, (s.t, X, system.p), SX(tau + load), rates, inputs=s.u)
+    through = passage(
+        system, (s.t, X, system.p), SX(tau + load), rates, contact=contact, inputs=s.u
+    )
     if through is None:
         return None
-    (a, _) = outputs_of(system, direct_dynamics(system, coordinates="tree"), q, v, tau + load)
+    if contact is None:
+        (a, _) = outputs_of(system, direct_dynamics(system, coordinates="tree"), q, v, tau + load)
+    else:
+        a = contact.a
     active = list(system.active)
-    moved = Accelerations(a[active], a, tau, None)
+    moved = Accelerations(a[active], a, tau, contact)
     motion = TreeMotion(q, q, v[active], v, None, SX.zeros(nv))
     y = outputs_vector(system, layout, motion, moved, shown)
     if observe is not None:
         seen = (q, v, a, v[active], a[active], moved.every_effort)
         y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *seen, external)))
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, rates)
-    *kept, residual = projected(system, q, v, (), s.t)
-    rhs = dense_function("tree_rhs", point, [rate, y])
-    forces = through.forces
+    touch = (contact.contacts, contact.modes) if contact else None
+    *kept, residual = projected(system, q, v, (), s.t, touch)
+
+    def written(name: str, at: Sequence[SX], outputs: Sequence[SX]) -> Function:
+        few, values = few_modes(contact, system.p, outputs)
+        return dense_function(name, [*at, few], values)
+
+    whole = [*point[:4], casadi.vertcat(system.p, contact.values) if contact else system.p]
+    rhs = written("tree_rhs", point[:4], [rate, y])
+    forces = written("forces", point[:4], through.forces.call(whole))
+    events = None
+    if contact:
+        events = minimal_events(
+            contact, motion, point, lambda fired: tree_jump(system, contact, X, fired)
+        )
     if drive.effort is not None or drive.device is not None:
         at = dense_function("motion", point, [q, v])
         sizes = (len(motors), len(system.devices))
         sizes3 = (*sizes, s.u.numel() - sum(sizes))
-        rhs, forces = (
-            controlled(Equations(function, at, None, sizes3), drive, layout.extra).rhs
-            for function in (rhs, forces)
-        )
+        pushed = controlled(Equations(forces, at, None, sizes3), drive, layout.extra)
+        moving = controlled(Equations(rhs, at, events, sizes3), drive, layout.extra)
+        rhs, forces, events = moving.rhs, pushed.rhs, moving.events
     inputs = SX.sym("u", rhs.numel_in(3))
-    free = [s.t, X, none, inputs, system.p]
+    free = [s.t, X, none, inputs]
     first = motion_of(system, layout, s, [])
     start = casadi.vertcat(first.q, first.v, s.states)
-    at_start = [s.t, s.x, s.z, inputs, system.p]
     rows, regularity = (
-        dense_function(function.name(), free, list(function.call([s.t, X, none, s.u, system.p])))
+        written(function.name(), free, function.call(whole))
         for function in (through.rows, through.regularity)
     )
     return TreeState(
         rhs=rhs,
-        project=dense_function("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
-        start=dense_function("tree_start", at_start, [start]),
+        project=written("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
+        start=written("tree_start", [s.t, s.x, s.z, inputs], [start]),
         passage=replace(through, rows=rows, forces=forces, regularity=regularity),
+        events=events,
         states=(
             *layout.positions,
             *(nq + k for k in layout.velocities),

@@ -204,9 +204,9 @@ class FmuModel:
             z is. None when nothing watches them.
         passive: the first output that is a velocity of a dependent joint, the first that is an
             acceleration of one, and how many of each there are.
-        tree: the same motion in all coordinates, which "dopri5" and integrators outside integrate:
-            it passes configurations in which the states determine nothing. None where there is
-            none.
+        tree: the same motion in all coordinates, which "dopri5" integrates, and integrators outside
+            where nothing jumps: it passes configurations in which the states determine nothing.
+            None where there is none.
         jumps: events; None when the motion is smooth.
         stop_time: default end of a simulation, s.
         tolerance: default relative tolerance of the integration.
@@ -250,13 +250,18 @@ class FmuModel:
         check(self)
 
     @property
+    def charted(self) -> bool:
+        """Whether integrators outside pass singular configurations: charts.h."""
+        return self.tree is not None and self.jumps is None
+
+    @property
     def slots(self) -> tuple[State, ...]:
         """The states where the integrator is outside and loops are closed.
 
         They are the states of the independent joints but near singular configurations, so joints
         are outputs and no states there; see charts.h.
         """
-        if self.tree is None:
+        if not self.charted:
             return ()
         text = "{}, or near singular configurations a coordinate along the motion"
         return tuple(
@@ -313,7 +318,7 @@ class FmuModel:
             ("indicator", len(self.jumps.names) if self.jumps else 0),
             ("slot", len(self.slots)),
             ("rate", len(self.slots)),
-            ("chart", int(self.tree is not None)),
+            ("chart", int(self.charted)),
         )
         place = 0
         for name, count in order:
@@ -353,6 +358,6 @@ def _entries(model: FmuModel) -> Iterator[Entry]:
         yield Entry("indicator", Variable(name=words, description=text))
     yield from (Entry("slot", v) for v in model.slots)
     yield from (Entry("rate", derivative_of(v)) for v in model.slots)
-    if model.tree is not None:
+    if model.charted:
         text = "positive while the present states serve"
         yield Entry("chart", Variable(name="indicator.coordinates", description=text))

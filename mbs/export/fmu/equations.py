@@ -22,11 +22,11 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         gp)`.
         Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
         `mbs_sensitivity(x, z, p) -> steepness`, and `mbs_slopes(x, z, p) -> J` where J is watched.
-    Of a tree, `mbs_tree_rhs` and others as
-        `TreeState` has them. Where there are events, `mbs_first`, `mbs_first`,
-        `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
-        `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs. For
-        an implicit solver `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
+        Of a tree, `mbs_tree_rhs` and others as `TreeState` has them. Where there are events,
+        `mbs_first`, `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
+        `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs; the
+        last three also of a tree, as `mbs_tree_indicators` and so on. For an implicit solver
+        `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
     """
     t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
     z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
@@ -46,7 +46,10 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
             J = casadi.densify(model.slopes.call(loop)[0])
             answers.append(casadi.Function("mbs_slopes", whole, [J]))
     if (tree := model.tree) is not None:
-        answers.extend(_tree(tree, [t, casadi.MX.sym("X", tree.start.numel_out(0)), x, z, u, p]))
+        X = casadi.MX.sym("X", tree.start.numel_out(0))
+        answers.extend(_tree(tree, [t, X, x, z, u, p]))
+        if tree.events is not None:
+            answers.extend(_tree_events(model, tree, [t, X, z, u, p], du))
     if model.jumps is not None:
         answers.extend(_events(model.jumps, point))
         rates = _rates(model, point, du)
@@ -80,6 +83,26 @@ def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
     dX = casadi.MX.sym("dX", X.numel())
     moved = [tree.rate(X), *_forward(tree.rate, [X], [dX])]
     return [*functions, start, casadi.Function("mbs_tree_rate", [X, dX], _dense(moved))]
+
+
+def _tree_events(
+    model: FmuModel, tree: TreeState, point: list[casadi.MX], du: casadi.MX
+) -> list[casadi.Function]:
+    """The functions of events `mbs_tree_..(t, X, z, u, p)`, z ignored."""
+    t, X, _, u, p = point
+    events, own = tree.events, [t, X, casadi.MX(0, 1), u, p]
+    assert events is not None
+    fired = casadi.MX.sym("fired", len(events.names))
+    along = [casadi.MX(1), tree.rhs.call(own)[0], own[2], du, casadi.MX(p.numel(), 1)]
+    named = {
+        "indicators": (point, events.indicators.call(own)),
+        "rates": ([*point, du], _forward(events.indicators, own, along)),
+        "jump": ([*point, fired], events.jump.call([*own, fired])),
+    }
+    return [
+        casadi.Function(f"mbs_tree_{name}", taken, _dense(values))
+        for name, (taken, values) in named.items()
+    ]
 
 
 def watched(model: FmuModel) -> tuple[str, ...]:

@@ -186,11 +186,13 @@ def fmu_model(
         lambda seen: observed_values(system, request, seen),
         interface.drive(system, controller),
     )
-    tree = tree_state(
-        system,
-        lambda seen: observed_values(system, request, seen),
-        interface.drive(system, controller),
-    )
+    tree = None
+    if state.events is None or settings.solver == "dopri5":
+        tree = tree_state(
+            system,
+            lambda seen: observed_values(system, request, seen),
+            interface.drive(system, controller),
+        )
     x, z = consistent_start(system, state)
     x_variables = states(system, state, x)
     u_variables = (*inputs(system, state, interface.wrenches), *controller.inputs)

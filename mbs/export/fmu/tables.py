@@ -22,6 +22,7 @@ _TREE = tuple(
     for name in ("rhs", "project", "rows", "forces", "regularity", "start", "rate")
 )
 _EVENTS = ("mbs_first", "mbs_indicators", "mbs_rates", "mbs_jump")
+_TREE_EVENTS = ("mbs_tree_indicators", "mbs_tree_rates", "mbs_tree_jump")
 
 _HEADER = """\
 /* Sizes and tables of the model, generated together with modelDescription.xml. */
@@ -82,7 +83,7 @@ def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
     if model.closure is not None:
         names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
     if (tree := model.tree) is not None:
-        names = (*names, *_TREE)
+        names = (*names, *_TREE, *(_TREE_EVENTS if tree.events is not None else ()))
     if model.jumps is not None:
         names = (*names, *_EVENTS)
     if model.solver == "rodas":
@@ -105,9 +106,9 @@ def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
         passive_a=model.passive[1],
         n_passive=model.passive[2],
         ns=len(model.slots),
-        nc=int(model.tree is not None),
+        nc=int(model.charted),
         arrays=_ARRAYS if model.arrays else "",
-        options=options + ("" if tree is None else _tree_sizes(tree, model.solver == "dopri5")),
+        options=options + ("" if tree is None else _tree_sizes(model, tree)),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
@@ -151,11 +152,12 @@ def source(model: FmuModel, *, adjoint: bool) -> str:
     )
 
 
-def _tree_sizes(tree: TreeState, inside: bool) -> str:
+def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
     sizes = ", ".join(map(str, tree.passage.size))
     return (
         f"#define MODEL_TREE {tree.start.numel_out(0)} /* its states */\n"
-        f"#define MODEL_TREE_INSIDE {int(inside)} /* co-simulation integrates them */\n"
+        f"#define MODEL_TREE_INSIDE {int(model.solver == 'dopri5')} /* co-simulation has them */\n"
+        f"#define MODEL_TREE_OUTSIDE {int(model.charted)} /* model exchange has charts of them */\n"
         f"#define MODEL_PASSAGE {{{sizes}}}\n"
         f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
         "/* where states, dependents and velocities of dependent joints stand in it, and the\n"

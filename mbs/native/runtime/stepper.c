@@ -87,6 +87,7 @@ static double first_step(stepper *s, const double *x, double span) {
     const double *k1 = stepper_slope(s);
     double *y = stepper_trial(s), *k2 = stepper_candidate(s), d0, d1, d2, h0, h1;
     int i;
+    s->noise = 0.0; /* no attempt was made here yet */
     d0 = norm(s, x, x, x);
     d1 = norm(s, k1, x, x);
     h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;

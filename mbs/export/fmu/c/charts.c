@@ -1,6 +1,6 @@
 #include "charts.h"
 
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
 
 #include <float.h>
 #include <math.h>

@@ -11,7 +11,7 @@
 
 #include "core.h"
 
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
 
 /* The states after the initialization. */
 core_status charts_start(core *c);

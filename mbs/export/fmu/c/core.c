@@ -147,6 +147,14 @@ static core_status core_show(core *c) {
     return CORE_OK;
 }
 
+/* The same, where joints are the states outside. */
+static core_status show_joints(core *c) {
+    double *v = c->m.values;
+    memcpy(v + SLOTS, v + STATES, NS * sizeof *v);
+    memcpy(v + RATES, v + DERIVATIVES, NS * sizeof *v);
+    return core_show(c);
+}
+
 core_status core_refresh(core *c) {
     double *v = c->m.values, *x = v + STATES;
     int status;
@@ -155,18 +163,18 @@ core_status core_refresh(core *c) {
     if (ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION))) {
         double slope[NT];
         int i;
+#if MODEL_TREE_OUTSIDE
         if (!c->m.cosimulation) {
             core_status found = charts_refresh(c);
             return found ? found : core_show(c);
         }
+#endif
         core_show_tree(c);
         if (core_call_tree(c, c->m.tree, slope, v + OUTPUTS))
             return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
                                   c->m.time);
         for (i = 0; i < NX; i++) v[DERIVATIVES + i] = slope[MODEL_TREE_STATES[i]];
-        memcpy(v + SLOTS, v + STATES, NX * sizeof *v);
-        memcpy(v + RATES, v + DERIVATIVES, NX * sizeof *v);
-        return core_show(c);
+        return show_joints(c);
     }
 #endif
     status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
@@ -176,11 +184,7 @@ core_status core_refresh(core *c) {
         return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
                               c->m.time);
     memcpy(v + DEPENDENTS, c->z, NZ * sizeof *v);
-#ifdef MODEL_TREE
-    memcpy(v + SLOTS, v + STATES, NX * sizeof *v);
-    memcpy(v + RATES, v + DERIVATIVES, NX * sizeof *v);
-#endif
-    return core_show(c);
+    return show_joints(c);
 }
 
 static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
@@ -205,6 +209,9 @@ static int allocate(core *c) {
 #endif
 #if NK > 0
         mbs_first_work, mbs_indicators_work, mbs_rates_work, mbs_jump_work,
+#endif
+#if NK > 0 && defined MODEL_TREE
+        mbs_tree_indicators_work, mbs_tree_rates_work, mbs_tree_jump_work,
 #endif
 #ifdef MODEL_RODAS
         mbs_jacobian_work,
@@ -298,13 +305,14 @@ core_status core_exit_initialization(core *c) {
     status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     if (status) return status;
     stepper_start(&c->solver, c->m.time);
-    status = core_start_events(c);
 #ifdef MODEL_TREE
-    if (!status && ON_TREE(c)) status = c->m.cosimulation ? core_start_tree(c) : charts_start(c);
-    if (!status && (!ON_TREE(c) || !c->m.cosimulation)) status = guard_restart(c);
-#else
-    if (!status) status = guard_restart(c);
+    if (c->m.cosimulation && ON_TREE(c)) status = core_start_tree(c);
 #endif
+    if (!status) status = core_start_events(c);
+#if MODEL_TREE_OUTSIDE
+    if (!status && !c->m.cosimulation) status = charts_start(c);
+#endif
+    if (!status && !(c->m.cosimulation && ON_TREE(c))) status = guard_restart(c);
     if (status) return status;
     if (!c->m.cosimulation || c->event_mode) {
         c->m.mode = EVENT;

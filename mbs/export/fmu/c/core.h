@@ -29,7 +29,7 @@ enum {
 };
 
 /* The states, and their derivatives, where the integrator is outside. */
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
 enum { OUTSIDE = SLOTS, OUTSIDE_RATES = RATES };
 #else
 enum { OUTSIDE = STATES, OUTSIDE_RATES = DERIVATIVES };
@@ -38,9 +38,11 @@ enum { OUTSIDE = STATES, OUTSIDE_RATES = DERIVATIVES };
 /* What co-simulation integrates: all coordinates of the tree where they are known, else the states. */
 #ifdef MODEL_TREE
 #define NT MODEL_TREE
-#define ON_TREE(c) (MODEL_TREE_INSIDE || !(c)->m.cosimulation) /* they are what moves */
+/* They are what moves. */
+#define ON_TREE(c) ((c)->m.cosimulation ? MODEL_TREE_INSIDE : MODEL_TREE_OUTSIDE)
 #else
 #define NT NX
+#define ON_TREE(c) 0
 #endif
 #define MOST(a, b) ((a) > (b) ? (a) : (b))
 
@@ -77,7 +79,7 @@ typedef struct {
     double v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
 } core_watched;
 
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
 /* Which coordinates the states are read in: charts.h. */
 typedef struct {
     int tangent;   /* local tangent coordinates */
@@ -106,6 +108,8 @@ typedef struct {
 #ifdef MODEL_TREE
     int loose; /* the tree is to be moved onto its rows first */
     double tree[NT], passage[PASSAGE_MEMORY(NT)];
+#endif
+#if MODEL_TREE_OUTSIDE
     double slope[NT]; /* of it, where the integrator is outside */
     core_charts charts;
 #endif
@@ -126,7 +130,8 @@ typedef struct {
 #ifdef MODEL_TREE
     passage *passage;
 #endif
-    double work[MOST(SOLVER_WORK(NX), DOPRI5_WORK(NT)) + 1], event_work[EVENTS_WORK(NX, NK) + 1];
+    double work[MOST(SOLVER_WORK(NX), DOPRI5_WORK(NT)) + 1], 
+        event_work[EVENTS_WORK(MOST(NX, NT), NK) + 1];
     double z[NZ + 1], u[NU + 1];
     const double **arg;
     double **res;

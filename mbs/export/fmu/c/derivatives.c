@@ -15,7 +15,7 @@ typedef struct {
 
 /* 1 where these are local tangent coordinates. */
 static int in_chart(const core *c) {
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
     return !c->m.cosimulation && (c->m.mode & RUNNING) && c->m.charts.tangent;
 #else
     (void)c;
@@ -75,7 +75,7 @@ static core_status finite_answer(core *c, unsigned ref, double value) {
                           ref < N_VALUES ? MODEL_NAMES[ref] : "time", c->m.time);
 }
 
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
 
 static core_status move_in_chart(core *c, tangents *d) {
     charts_tangent along;
@@ -99,7 +99,7 @@ static core_status move_in_chart(core *c, tangents *d) {
 /* What moves when the seeds are moved. */
 static core_status move(core *c, tangents *d) {
     int i;
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
     if (in_chart(c)) return move_in_chart(c, d);
 #endif
     for (i = 0; i < NX; i++) d->dx[i] += d->dslot[i];

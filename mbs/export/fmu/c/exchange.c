@@ -16,7 +16,7 @@ core_status core_enter_event_mode(core *c) {
         return CORE_ERROR;
     if (!c->m.cosimulation) {
         core_status status = core_refresh(c);
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
         if (!status) status = charts_pause(c);
 #else
         if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
@@ -31,7 +31,7 @@ core_status core_enter_event_mode(core *c) {
 core_status core_update_discrete_states(core *c, int *changed) {
     *changed = 0;
     if (!core_allowed(c, EVENT, "updating discrete states")) return CORE_ERROR;
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
     if (!c->m.cosimulation) return charts_update(c, changed);
 #endif
     return core_settle(c, changed);
@@ -41,7 +41,7 @@ core_status core_enter_continuous_mode(core *c) {
     if (!core_allowed(c, c->m.cosimulation ? 0 : EVENT, "entering continuous-time mode"))
         return CORE_ERROR;
     c->m.mode = CONTINUOUS;
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
     if (c->m.charts.tangent) return CORE_OK;
 #endif
     return guard_restart(c);
@@ -53,7 +53,7 @@ core_status core_completed_step(core *c, int *event) {
     if (!core_allowed(c, CONTINUOUS, "completing a step") || core_before_stop(c, c->m.time))
         return CORE_ERROR;
     if (!NZ && !NK) return CORE_OK;
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
     status = charts_completed(c, event);
 #else
     status = core_arm_indicators(c);
@@ -124,7 +124,7 @@ core_status core_get_indicators(core *c, double *indicators, size_t n) {
     if (!core_allowed(c, NOT_STEPPING, "getting event indicators") ||
         !counted(c, indicators, n, NK + NC, "event indicators"))
         return CORE_ERROR;
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
     status = charts_show_indicator(c);
     indicators[NK] = c->m.values[CHART];
 #else

@@ -130,7 +130,7 @@ static int sane_events(const core_memory *m) {
     return 1;
 }
 
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
 static int sane_charts(const core_charts *m) {
     return is_flag(m->tangent) && is_flag(m->loose) && is_flag(m->settled) &&
            isfinite(m->time) && isfinite(m->turned) && all_finite(m->X, NT) &&
@@ -155,8 +155,11 @@ static int sane(const core_memory *m) {
     if (!sane_watch(&m->watched)) return 0;
 #ifdef MODEL_TREE
     if (!is_flag(m->loose) || !all_finite(m->tree, NT)) return 0;
-    if (!all_finite(m->passage, PASSAGE_MEMORY(NT)) || !all_finite(m->slope, NT)) return 0;
-    if (!all_finite(v + SLOTS, NX) || !sane_charts(&m->charts)) return 0;
+    if (!all_finite(m->passage, PASSAGE_MEMORY(NT))) return 0;
+#endif
+#if MODEL_TREE_OUTSIDE
+    if (!all_finite(v + SLOTS, NX) || !all_finite(m->slope, NT)) return 0;
+    if (!sane_charts(&m->charts)) return 0;
 #endif
     for (i = 0; i < STEPPER_MEMORY(0); i++)
         if (isnan(m->solver[i])) return 0;

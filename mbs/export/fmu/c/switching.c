@@ -17,6 +17,14 @@
 /* Events that rounding of a time this long [s] cannot tell apart count as standing still. */
 #define CHATTER_SPAN 1e3
 
+/* The dependents are at hand where a step ends with an evaluation at its end, which looks for events
+ * and the stages of an implicit method are not. */
+#if NK > 0 || defined MODEL_RODAS
+#define ENDS_AT_HAND 0
+#else
+#define ENDS_AT_HAND 1
+#endif
+
 static core_status step_failed(core *c, int status) {
     static const char *const reason[] = {
         "", "", "too many steps", "the step size became too small",
@@ -42,14 +50,87 @@ static core_status step_failed(core *c, int status) {
                           c->m.time, stepper_wanted_step(&c->solver), reason[status]);
 }
 
+/* What moves: the coordinates of the tree, or the states. */
+static double *moving(core *c) {
+#ifdef MODEL_TREE
+    if (ON_TREE(c)) return c->m.tree;
+#endif
+    return c->m.values + STATES;
+}
+
+/* After something that its rows depend on has changed, the tree is moved onto them. The chart of the
+ * last step may not be known any more. */
+static core_status tighten(core *c) {
+#ifdef MODEL_TREE
+    if (!ON_TREE(c) || !c->m.loose) return CORE_OK;
+    passage_forget(c->passage);
+    if (c->solver.project(c, c->m.time, c->m.tree))
+        return step_failed(c, STEPPER_PROJECTION_FAILED);
+    c->m.loose = 0;
+#else
+    (void)c;
+#endif
+    return CORE_OK;
+}
+
+void core_restart(core *c) {
+    stepper_restart(&c->solver);
 #if NK > 0
+    events_restart(&c->events);
+#endif
+#ifdef MODEL_TREE
+    c->m.loose = 1;
+#endif
+    guard_forget(c);
+}
+
+/* The states follow what has moved; at_hand: the dependents are known. */
+static core_status accept(core *c, int at_hand) {
+#ifdef MODEL_TREE
+    if (ON_TREE(c)) {
+        core_show_tree(c);
+        return CORE_OK;
+    }
+#endif
+    return at_hand ? core_accept_posture(c, c->m.values + STATES, c->z) : core_accept_states(c);
+}
+
+core_status core_step(core *c, double limit) {
+    double *x = moving(c);
+    int status = tighten(c);
+    if (!status && !ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
+    if (status) return status;
+#if NK > 0
+    status = events_step(&c->events, x, limit);
+#else
+    status = stepper_step(&c->solver, x, limit);
+#endif
+    c->m.time = stepper_time(&c->solver);
+    c->m.stale = 1;
+    status = status ? (int)step_failed(c, status) : (int)accept(c, ENDS_AT_HAND);
+    return status || ON_TREE(c) ? (core_status)status : guard_pass(c);
+}
+
+#if NK > 0
+
+#ifdef MODEL_TREE
+#define CALL(tree, f) ((tree) ? mbs_tree_##f : mbs_##f)(c->arg, c->res, c->iw, c->w, 0)
+#else
+#define CALL(tree, f) mbs_##f(c->arg, c->res, c->iw, c->w, 0)
+#endif
+
+/* The arguments of a function of events; dependents of the states alone have to be found. */
+static int place(core *c, const double *t, const double *x) {
+    if (!ON_TREE(c) && closure_solve(c, x, c->z)) return 1;
+    core_point(c, t, x, c->z);
+    return 0;
+}
 
 static int indicators(void *user, double t, const double *x, double *g) {
     core *c = user;
-    if (closure_solve(c, x, c->z)) return 1;
-    core_point(c, &t, x, c->z);
+    if (place(c, &t, x)) return 1;
     c->res[0] = g;
-    return mbs_indicators(c->arg, c->res, c->iw, c->w, 0);
+    return CALL(ON_TREE(c), indicators);
 }
 
 /* Right after the indicators at the same place: the dependent coordinates are there. */
@@ -60,19 +141,18 @@ static int rates(void *user, double t, const double *x, double *rise) {
     core_input_rates(c, t, du);
     c->arg[5] = du;
     c->res[0] = rise;
-    return mbs_rates(c->arg, c->res, c->iw, c->w, 0);
+    return CALL(ON_TREE(c), rates);
 }
 
 static int jump(void *user, double t, double *x, const double *fired) {
     core *c = user;
-    double next[NX + 1], modes[NM + 1];
-    if (closure_solve(c, x, c->z)) return 1;
-    core_point(c, &t, x, c->z);
+    double next[MOST(NX, NT) + 1], modes[NM + 1];
+    if (place(c, &t, x)) return 1;
     c->arg[5] = fired;
     c->res[0] = next;
     c->res[1] = modes;
-    if (mbs_jump(c->arg, c->res, c->iw, c->w, 0) || !stepper_all_finite(modes, NM)) return 1;
-    memcpy(x, next, NX * sizeof *x);
+    if (CALL(ON_TREE(c), jump) || !stepper_all_finite(modes, NM)) return 1;
+    memcpy(x, next, (size_t)c->solver.n * sizeof *x);
     memcpy(c->m.values + MODES, modes, NM * sizeof *modes);
     return 0;
 }
@@ -117,61 +197,50 @@ static void set_offsets(core *c) {
 core_status core_start_events(core *c) {
     int status;
     synchronize(c);
-    status = events_start(&c->events, c->m.values + STATES);
+    status = events_start(&c->events, moving(c));
     if (status) return step_failed(c, status);
     if (!c->m.cosimulation) set_offsets(c);
     return CORE_OK;
-}
-
-void core_restart(core *c) {
-    stepper_restart(&c->solver);
-    events_restart(&c->events);
-    guard_forget(c);
-}
-
-core_status core_step(core *c, double limit) {
-    int status = c->m.watched.on ? 0 : guard_restart(c);
-    if (status) return status;
-    status = events_step(&c->events, c->m.values + STATES, limit);
-    c->m.time = stepper_time(&c->solver);
-    c->m.stale = 1;
-    status = status ? (int)step_failed(c, status) : (int)core_accept_states(c);
-    return status ? (core_status)status : guard_pass(c);
 }
 
 int core_pending(const core *c) { return events_pending(&c->events); }
 
 /* Does the present state ask for a jump? */
 static int find(core *c) {
-    const double *x = c->m.values + STATES;
     synchronize(c);
-    if (c->m.cosimulation || core_pending(c)) return events_look(&c->events, x);
-    return events_found(&c->events, x, c->m.offset);
+    if (c->m.cosimulation || core_pending(c)) return events_look(&c->events, moving(c));
+    return events_found(&c->events, moving(c), c->m.offset);
 }
 
 core_status core_settle(core *c, int *changed) {
-    double *x = c->m.values + STATES, before[NX + 1];
-    int status = find(c);
+    double *x = moving(c), before[MOST(NX, NT) + 1];
+    size_t size = (size_t)c->solver.n * sizeof *x;
+    int status = tighten(c);
+    if (status) return status;
+    status = find(c);
     if (status) return step_failed(c, status);
     if (!core_pending(c)) return CORE_OK;
-    memcpy(before, x, NX * sizeof *x);
+    memcpy(before, x, size);
+#ifdef MODEL_TREE
+    if (ON_TREE(c)) passage_forget(c->passage); /* a chart ends where modes change */
+#endif
     status = events_settle(&c->events, x, fmax(c->m.time, CHATTER_SPAN));
     c->m.stale = 1;
     if (status != EVENTS_FIRED) return step_failed(c, status);
-    if (memcmp(before, x, NX * sizeof *x)) *changed = 1;
+    if (memcmp(before, x, size)) *changed = 1;
     if (!c->m.cosimulation) set_offsets(c);
     guard_forget(c);
-    return core_accept_states(c);
+    return accept(c, 0);
 }
 
 core_status core_show_indicators(core *c) {
     double *shown = c->m.values + INDICATORS;
     core_status status = core_refresh(c);
-    int k;
+    int k, tree = ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     if (status) return status;
-    core_point(c, &c->m.time, c->m.values + STATES, c->m.values + DEPENDENTS);
+    core_point(c, &c->m.time, tree ? moving(c) : c->m.values + STATES, c->m.values + DEPENDENTS);
     c->res[0] = shown;
-    if (mbs_indicators(c->arg, c->res, c->iw, c->w, 0))
+    if (CALL(tree, indicators))
         return core_no_answer(c, "%s: the event indicators have no value at time %.9g", c->name,
                               c->m.time);
     for (k = 0; k < NK; k++) {
@@ -204,55 +273,6 @@ core_status core_first_modes(core *c) {
 core_status core_start_events(core *c) {
     (void)c;
     return CORE_OK;
-}
-
-void core_restart(core *c) {
-    stepper_restart(&c->solver);
-    guard_forget(c);
-#ifdef MODEL_TREE
-    c->m.loose = 1;
-#endif
-}
-
-/* The dependent coordinates are at hand where a step ends with an evaluation at its end. */
-static core_status accept_end(core *c, const double *x) {
-#ifdef MODEL_RODAS
-    (void)x;
-    return core_accept_states(c);
-#else
-    return core_accept_posture(c, x, c->z);
-#endif
-}
-
-#ifdef MODEL_TREE
-
-static core_status tree_step(core *c, double limit) {
-    int status = 0;
-    if (c->m.loose) status = c->solver.project(c, c->m.time, c->m.tree);
-    if (status) return step_failed(c, STEPPER_PROJECTION_FAILED);
-    c->m.loose = 0;
-    status = stepper_step(&c->solver, c->m.tree, limit);
-    c->m.time = stepper_time(&c->solver);
-    c->m.stale = 1;
-    core_show_tree(c);
-    return status ? step_failed(c, status) : CORE_OK;
-}
-
-#endif
-
-core_status core_step(core *c, double limit) {
-    double *x = c->m.values + STATES;
-    int status;
-#ifdef MODEL_TREE
-    if (ON_TREE(c)) return tree_step(c, limit);
-#endif
-    status = c->m.watched.on ? 0 : guard_restart(c);
-    if (status) return status;
-    status = stepper_step(&c->solver, x, limit);
-    c->m.time = stepper_time(&c->solver);
-    c->m.stale = 1;
-    status = status ? (int)step_failed(c, status) : (int)accept_end(c, x);
-    return status ? (core_status)status : guard_pass(c);
 }
 
 int core_pending(const core *c) {

@@ -35,7 +35,7 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
         unsigned r = ref[i];
         if (r >= INDICATORS && r < SLOTS)
             status = core_show_indicators(c);
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
         else if (r == CHART)
             status = c->m.cosimulation ? core_refresh(c) : charts_show_indicator(c);
 #endif
@@ -142,7 +142,7 @@ static void set_slot(core *c, unsigned ref, double value) {
 
 /* Where joints are no states in event mode, they become so before they, or lengths, are set. */
 static core_status joints_set(core *c, unsigned ref) {
-#ifdef MODEL_TREE
+#if MODEL_TREE_OUTSIDE
     int ours = ref < DERIVATIVES || ref >= PARAMETERS;
     if (ours && !c->m.cosimulation && c->m.mode == EVENT) return charts_set(c);
 #endif

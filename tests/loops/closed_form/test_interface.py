@@ -73,7 +73,7 @@ def test_a_function_keeps_nan_within_maps():
 
 def test_values_that_are_no_numbers_are_refused_as_in_any_model():
     f = function(double_rocker())
-    with pytest.raises(ModelError, match="the result is not a number"):
+    with pytest.raises(ModelError, match="q_a is not finite"):
         f(np.nan)
     with pytest.raises(ModelError, match=r"loops\(rocker\): q_a has 2 values, it needs 1: j1"):
         f([1.0, 2.0])

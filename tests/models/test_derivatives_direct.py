@@ -174,8 +174,9 @@ def test_implicit_jacobian_of_quaternions():
     q, v, tau = random_state(system, np.random.default_rng(0))
     assert_close([ours(q, v, tau)], [ddm(q, v, tau)], 1e-10)
     far = q * np.random.default_rng(1).uniform(0.5, 1.5, system.nq)
+    plain = casadi.Function(ours)  # which refuses no quaternion
     columns = [
-        (ours(far + e, v, tau) - ours(far - e, v, tau)) / 2e-6 for e in 1e-6 * np.eye(system.nq)
+        (plain(far + e, v, tau) - plain(far - e, v, tau)) / 2e-6 for e in 1e-6 * np.eye(system.nq)
     ]
     assert_close(ours.jacobian()(far, v, tau, 0)[:1], [casadi.horzcat(*columns)], 1e-7)
     x = MX.sym("q", system.nq)

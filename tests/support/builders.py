@@ -40,6 +40,7 @@ BUILDERS = {
     "direct_dynamics_derivatives": models.direct_dynamics_derivatives,
     "actuation_matrix": models.actuation_matrix,
     "actuation_null_space": models.actuation_null_space,
+    "validity": models.validity,
     "energy": models.energy,
     "gravity_effort": models.gravity_effort,
     "hybrid_dynamics": lambda s: models.hybrid_dynamics(s, [s.speeds[s.active[0]].name]),

@@ -154,6 +154,13 @@ class ModelFunction(Function):
 
         return holds
 
+    def default_of_p(self) -> NDArray[np.float64] | None:
+        """Values of the parameters where they are left out; None where one has no value."""
+        try:
+            return np.array(self._system.parameter_values(), dtype=float)
+        except ModelError:
+            return None
+
     def rewritten(self, function: Function) -> ModelFunction:
         """An equal Function of other operations, its intermediate quantities named as here."""
         made = self.like(function)

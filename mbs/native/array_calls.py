@@ -25,7 +25,7 @@ def with_array_calls(function: Function, library: Path | None, like: Any = None)
     call = array_builtin(function, library, like is not None) if library else None
     result.__class__ = _class_with_arrays(type(result))
     result._arrays = call or _declined
-    result._last = None if like is None else default_of_last(function, like)
+    result._last = None if like is None else default_of_last(function, like.__self__)
     result._inputs = function.n_in()
     result._guard = getattr(result, "guard", lambda: None)() if library else None
     return result  # type: ignore[no-any-return]
@@ -98,17 +98,17 @@ def _declined(*_: Any) -> None:
     """The answer of a builtin that takes nothing."""
 
 
-def default_of_last(function: Function, like: Any) -> np.ndarray[Any, Any] | None:
-    """What a model takes for its last input p when it is left out; None when it must be given."""
+def default_of_last(function: Function, model: Any) -> np.ndarray[Any, Any] | None:
+    """What a model takes for its last input p when it is left out; None when it must be given.
+
+    Args:
+        function: with the inputs of the model.
+        model: knows its defaults, as `ModelFunction` does.
+    """
     if function.n_in() == 0 or function.name_in(function.n_in() - 1) != "p":
         return None
-    symbols = function.sx_in()
-    echo = like(Function("echo", symbols, symbols[-1:], function.name_in(), ["value"]))
-    try:
-        value = echo(*(DM.zeros(s.shape) for s in symbols[:-1]))
-    except ModelError:
-        return None
-    return np.array(value).ravel()
+    found: np.ndarray[Any, Any] | None = model.default_of_p()
+    return found
 
 
 def _numpy(result: Any) -> Any:

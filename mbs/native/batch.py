@@ -289,8 +289,8 @@ def _code(function: Function) -> tuple[_Code | None, str]:
 def _defaults(functions: Sequence[Function]) -> dict[str, Array]:
     """Values of the parameters of models, when they may be left out."""
     for function in functions:
-        like: Any = getattr(function, "like", None)
-        value = None if like is None else default_of_last(Function(function), like)
+        model = function if hasattr(function, "default_of_p") else None
+        value = None if model is None else default_of_last(function, model)
         if value is not None:
             return {"p": value}
     return {}

@@ -165,3 +165,10 @@ def test_a_mechanism_with_symbols_and_its_equations_travel():
     for a, b in zip(d.function()(*point), e.function()(*point), strict=True):
         assert np.array_equal(np.array(a), np.array(b))
     assert isinstance(e.x, casadi.SX)
+
+
+@pytest.mark.parametrize("make", [mbs.native.compiled, mbs.native.batch])
+def test_parameters_may_be_left_out_where_zeros_would_be_refused(ball, make):
+    ddm = mbs.models.direct_dynamics(ball)
+    q, v, tau = np.array([1.0, 0, 0, 0]), np.ones(3), np.array([0.1, 0.2, 0.3])
+    assert make(ddm)(q, v, tau) == pytest.approx(np.array(ddm(q, v, tau)).ravel(), rel=1e-12)

@@ -10,8 +10,8 @@ import casadi
 from casadi import SX, Function
 
 
-def packed(state: Any) -> tuple[bytes, str]:
-    """Any object made of plain data, Functions and SX, as bytes and a serialised Function.
+def packed(state: Any) -> tuple[bytes, list[str], str]:
+    """Any object made of plain data, Functions and SX: its bytes, names of symbols, and graphs.
 
     Args:
         state: whatever `pickle` takes, SX among it.
@@ -23,22 +23,13 @@ def packed(state: Any) -> tuple[bytes, str]:
     # one symbol at least: without any, numbers would come back as DM
     symbols = casadi.symvar(casadi.veccat(SX.sym("any"), *graphs))
     names = [symbol.name() for symbol in symbols]
-    whole = io.BytesIO()
-    pickle.dump((names, buffer.getvalue()), whole)
-    return whole.getvalue(), Function("graphs", symbols, graphs).serialize()
+    return buffer.getvalue(), names, Function("graphs", symbols, graphs).serialize()
 
 
-def unpacked(data: bytes, graphs: str) -> Any:
-    """What was packed; symbols have their names and are new.
-
-    Args:
-        data: first of what `packed` gave.
-        graphs: the second.
-    """
-    names, state = pickle.loads(data)
-    function = Function.deserialize(graphs)
-    found = function.call([SX.sym(name) for name in names])
-    return _Unpickler(io.BytesIO(state), found).load()
+def unpacked(data: bytes, names: list[str], graphs: str) -> Any:
+    """What was packed, all that `packed` gave; symbols have their names and are new."""
+    found = Function.deserialize(graphs).call([SX.sym(name) for name in names])
+    return _Unpickler(io.BytesIO(data), found).load()
 
 
 class _Pickler(pickle.Pickler):

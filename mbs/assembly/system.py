@@ -314,5 +314,5 @@ class System:
         return result
 
 
-def _unpickled(data: bytes, graphs: str) -> System:
-    return System(**unpacked(data, graphs))
+def _unpickled(*parts: Any) -> System:
+    return System(**unpacked(*parts))

@@ -224,5 +224,5 @@ def _start_algebraic(system: System, q: Array, v: Array, tau: Array, p: Array, s
     return z0
 
 
-def _unpickled(data: bytes, graphs: str) -> Dae:
-    return Dae(**unpacked(data, graphs))
+def _unpickled(*parts: Any) -> Dae:
+    return Dae(**unpacked(*parts))

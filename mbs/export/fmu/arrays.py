@@ -7,10 +7,7 @@ from dataclasses import dataclass, replace
 
 from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import Array, Entry, FmuModel, Kind, State, Variable
-from mbs.export.fmu.linearity import DependencyKind
-
-_KINDS: tuple[DependencyKind, ...] = ("constant", "fixed", "tunable", "discrete", "dependent")
-"""Each takes in those before it."""
+from mbs.export.fmu.linearity import KINDS, DependencyKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +135,7 @@ def dependencies_of_arrays(model: FmuModel, known: Mapping[int, Known]) -> dict[
         into = found.setdefault(owner.get(reference, reference), {})
         for other, kind in row.items():
             whole = owner.get(other, other)
-            into[whole] = max(into.get(whole, kind), kind, key=_KINDS.index)
+            into[whole] = max(into.get(whole, kind), kind, key=KINDS.index)
     return {reference: dict(sorted(row.items())) for reference, row in found.items()}
 
 

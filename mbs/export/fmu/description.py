@@ -28,6 +28,10 @@ Kind = Literal[
 ]
 
 
+WITH_START: tuple[Kind, ...] = ("state", "input", "parameter", "dependent", "slot")
+"""What has a start value."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variable:
     """An input, an output, a parameter or a dependent coordinate of an FMU.

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from mbs.assembly.parameter_bounds import MORE_THAN_ZERO
 from mbs.export.fmu.about import Table
-from mbs.export.fmu.description import FmuModel, Kind, Variable
+from mbs.export.fmu.description import WITH_START, FmuModel, Kind, Variable
 from mbs.export.fmu.svg import svg
 from mbs.operations import count
 from mbs.units import UNITS
@@ -63,7 +63,6 @@ _GROUPS: tuple[tuple[Kind, str], ...] = (
     ("rate", "Their derivatives"),
     ("chart", "Indicator that asks for other states"),
 )
-_WITH_START = ("input", "state", "parameter", "dependent")
 _FUNCTIONS = {
     "derivatives and outputs": "rhs",
     "one step that closes the loops": "closure",
@@ -133,7 +132,7 @@ def _variables(model: FmuModel) -> list[Table]:
     tables = []
     for kind, title in _GROUPS:
         rows = [entry.variable for entry in model.entries if entry.kind == kind]
-        starts = kind in _WITH_START
+        starts = kind in WITH_START
         columns = ("name", "unit", *(("start",) if starts else ()), "what it is")
         lines = tuple((v.name, v.unit, *_start(v, starts), _words(v)) for v in rows)
         tables.append(Table(title, columns, lines))

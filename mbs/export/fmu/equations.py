@@ -63,7 +63,7 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
 def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
     """The functions `mbs_tree_..(t, X, z, u, p)` of the tree, z ignored.
 
-    Beside them `mbs_tree_start(t, x, z, u, p)` and `mbs_tree_rate(X, dX) -> (q', how it changes)`.
+    Beside them `mbs_tree_start(t, x, z, u, p)` and `mbs_tree_rate(X) -> q'`.
     """
     t, X, x, z, u, p = symbols
     through = tree.passage
@@ -80,9 +80,7 @@ def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
         for name, function in named.items()
     ]
     start = casadi.Function("mbs_tree_start", first, _dense(tree.start.call(first)))
-    dX = casadi.MX.sym("dX", X.numel())
-    moved = [tree.rate(X), *_forward(tree.rate, [X], [dX])]
-    return [*functions, start, casadi.Function("mbs_tree_rate", [X, dX], _dense(moved))]
+    return [*functions, start, casadi.Function("mbs_tree_rate", [X], _dense([tree.rate(X)]))]
 
 
 def _tree_events(

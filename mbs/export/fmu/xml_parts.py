@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
-from mbs.export.fmu.description import Entry, FmuModel, State
+from mbs.export.fmu.description import WITH_START, Entry, FmuModel, State
 from mbs.export.fmu.linearity import KINDS, DependencyKind
 from mbs.export.fmu.names import is_structured
 from mbs.units import UNITS
@@ -26,7 +26,6 @@ _INITIAL = {
     "rate": "calculated",
     "chart": "calculated",
 }
-_STARTS = ("state", "input", "parameter", "dependent", "slot")
 _NOTHING: Known = {}
 TOOL = f"mbs {__version__}"
 CATEGORIES = {
@@ -179,7 +178,7 @@ def real_attributes(entry: Entry) -> dict[str, str]:
         if bound is not None and math.isfinite(bound):
             real[name] = repr(float(bound))
     real["nominal"] = repr(float(v.nominal))
-    if entry.kind in _STARTS:
+    if entry.kind in WITH_START:
         real["start"] = repr(float(v.start))
     return real
 

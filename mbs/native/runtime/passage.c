@@ -8,13 +8,9 @@
 #include "dense.h"
 #include "dopri5.h"
 
-/* Part of the largest regularity below which steps are made in the chart. A full step magnifies its
- * errors by 1 / regularity and rounding by its square; at a fifth that is little, and a tenth of the
- * way of a crank lies below it. */
-#define ON 0.2
 /* The regularity is foreseen for this many steps, a little more than the next one. */
 #define AHEAD 1.2
-/* Stages of a full step are looked at where it is below this many times ON at both ends. */
+/* Stages of a full step are looked at where it is below this many times PASSAGE_ON at both ends. */
 #define WATCHED 3.0
 /* Part of the largest sigma below which values are means: rounding reaches u' as its inverse square,
  * 3e-16 / (3e-5)^2 = 3e-7, and beyond it nothing is left; a larger part misses what a motion does
@@ -702,7 +698,7 @@ static double foreseen(passage *g, double t, const double *x, double h) {
 
 static int attempt(stepper *s, const double *x, double h) {
     passage *g = s->passage;
-    double t = stepper_time(s), ahead = foreseen(g, t, x, h), on = ON * g->memory[LARGEST];
+    double t = stepper_time(s), ahead = foreseen(g, t, x, h), on = PASSAGE_ON * g->memory[LARGEST];
     int status;
     g->charted = s->kept_closed = 0;
     s->noise = 0.0;
@@ -767,7 +763,7 @@ static int opening(stepper *s, const double *x) {
     passage *g = s->passage;
     double t = stepper_time(s);
     int status;
-    if (foreseen(g, t, x, 0.0) >= ON * g->memory[LARGEST])
+    if (foreseen(g, t, x, 0.0) >= PASSAGE_ON * g->memory[LARGEST])
         return stepper_evaluate(s, t, x, stepper_slope(s));
     status = prepare(g, t, x);
     g->sigma = HUGE_VAL;

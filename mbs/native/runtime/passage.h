@@ -21,6 +21,11 @@
 
 #include "stepper.h"
 
+/* Part of the largest regularity below which steps are made in the chart. A full step magnifies its
+ * errors by 1 / regularity and rounding by its square; at a fifth that is little, and a tenth of the
+ * way of a crank lies below it. */
+#define PASSAGE_ON 0.2
+
 typedef struct {
     int nq, nv, nz; /* positions, velocities and other states of x */
     int places;     /* rows of positions: the first ones belong to those of velocities, the last

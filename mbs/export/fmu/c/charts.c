@@ -10,10 +10,8 @@
 #include "guard.h"
 #include "internal.h"
 
-/* Part of the largest regularity of the rows below which tangent coordinates are used, as for the
- * solver inside; and of the largest velocity of all joints, that of the independent ones. Errors are
- * magnified by the inverse. */
-#define REGULAR 0.2
+/* Part of the largest velocity of all joints, that of the independent ones, below which tangent
+ * coordinates are used: errors are magnified by the inverse. */
 #define HOLD 0.1
 #define LEAVE 1.5      /* of that room, from which on the independent joints serve again */
 #define NEAR 1e-6      /* at the limit: where an importer finds it */
@@ -25,19 +23,16 @@ typedef struct {
     double X[NT], slope[NT], rate[NX + 1], y[NY + 1];
 } found;
 
-/* Velocities and accelerations of all joints by the outputs. */
+/* Where the states are those of the independent joints. */
 static int by_joints(core *c, const double *x, found *f) {
-    double z[NZ + 1], still[NT], none[NT];
+    double z[NZ + 1];
     int i;
     if (closure_solve(c, x, z) || core_call_rhs(c, c->m.time, x, z, f->rate, f->y)) return 1;
     for (i = 0; i < NX; i++) f->X[MODEL_TREE_STATES[i]] = x[i];
     for (i = 0; i < NZ; i++) f->X[MODEL_TREE_DEPENDENTS[i]] = z[i];
     for (i = 0; i < N_PASSIVE; i++) f->X[MODEL_TREE_PASSIVE[i]] = f->y[PASSIVE_V + i];
-    memset(still, 0, sizeof still);
     c->arg[0] = f->X;
-    c->arg[1] = still;
     c->res[0] = f->slope;
-    c->res[1] = none;
     if (mbs_tree_rate(c->arg, c->res, c->iw, c->w, 0)) return 1;
     for (i = 0; i < NX; i++) f->slope[MODEL_TREE_STATES[i]] = f->rate[i];
     for (i = 0; i < N_PASSIVE; i++) f->slope[MODEL_TREE_PASSIVE[i]] = f->y[PASSIVE_A + i];
@@ -55,6 +50,7 @@ static void foretell(const core *c, double *guide) {
         guide[i] += 0.5 * dt * dt * m->slope[size.nq + i];
 }
 
+/* Where the states are coordinates of a chart. */
 static int by_chart(core *c, const double *y, found *f) {
     static const passage_size size = MODEL_PASSAGE;
     double guide[NT], none[NT];
@@ -115,7 +111,7 @@ static double room(core *c) {
     double grip = 0.0;
     if (passage_grip(c->passage, c->m.time, c->m.tree, MODEL_TREE_HELD, MODEL_TREE_UNITS, &grip))
         return 0.0;
-    return fmin(passage_regularity(c->passage, c->m.time, c->m.tree) / REGULAR, grip / HOLD);
+    return fmin(passage_regularity(c->passage, c->m.time, c->m.tree) / PASSAGE_ON, grip / HOLD);
 }
 
 /* The coordinates of the next steps, which begin in the state of the tree. */

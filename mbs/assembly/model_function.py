@@ -8,16 +8,18 @@ from typing import Any
 
 import casadi
 import numpy as np
-from casadi import DM, MX, SX, Function
+from casadi import DM, MX, SX, Function, Sparsity
 from numpy.typing import NDArray
 
 from mbs.assembly.function_table import function_table
+from mbs.assembly.rates import quaternion_slices
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.validity import all_hold, plain_rows, require_plain
 from mbs.errors import MbsError, ModelError
 from mbs.messages import quoted
 from mbs.native import compiled
+from mbs.numbers import doubles
 from mbs.operations.naming import names_found
 
 Named = Sequence[tuple[str, SX]]
@@ -71,6 +73,8 @@ class ModelFunction(Function):
         self._system = system
         self._annotate = annotate
         self._check_posture = check
+        self._sizes = {name: self.size_in(name) for name in self.name_in()}
+        self._asks = bool(check or system.bounds or quaternion_slices(system.tree))
 
     @property
     def system(self) -> System:
@@ -89,10 +93,8 @@ class ModelFunction(Function):
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it on numbers or symbols, as a casadi.Function, its inputs checked."""
         given = self._given(args, kwargs)
-        for name, value in given.items():
-            self._check(name, value)
-        inputs = {name: _matrix(value) for name, value in given.items()}
-        self._require_posture(inputs)
+        inputs = {name: self._input(name, value) for name, value in given.items()}
+        self._require_valid(inputs)
         try:
             outputs = Function.__call__(self, *inputs.values())
         except (RuntimeError, NotImplementedError, TypeError, ValueError) as error:
@@ -194,7 +196,7 @@ class ModelFunction(Function):
 
     def _given(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
         """Every input by name, p completed by its defaults."""
-        names = self.name_in()
+        names = self._sizes
         given = dict(zip(names, args, strict=False))
         twice = [name for name in kwargs if name in given]
         if twice:
@@ -204,7 +206,7 @@ class ModelFunction(Function):
         given |= kwargs
         if "p" in names and "p" not in given:
             values = DM(self._system.parameter_values())
-            given["p"] = casadi.repmat(values, 1, self.size2_in("p"))
+            given["p"] = casadi.repmat(values, 1, self._sizes["p"][1])
         if len(args) > len(names) or set(given) != set(names):
             wrong = [name for name in kwargs if name not in names]
             missing = [name for name in names if name not in given]
@@ -216,11 +218,24 @@ class ModelFunction(Function):
             raise ModelError(f"{self._title}: {what}; the inputs are {self._shapes()}")
         return {name: given[name] for name in names}
 
-    def _check(self, name: str, value: Any) -> None:
-        wanted, width = self.size_in(name)
-        shape = _shape(value)
-        if shape is None:
-            raise ModelError(f"{self._title}: {name} is {quoted(value)}; give numbers")
+    def _input(self, name: str, value: Any) -> DM | SX | MX:
+        """What CasADi takes for a value: finite numbers of the size of an input, or symbols."""
+        if isinstance(value, (list, tuple)) and any(isinstance(e, (SX, MX, DM)) for e in value):
+            value = casadi.vertcat(*value)
+        if isinstance(value, (SX, MX, DM)):
+            self._check_size(name, value.shape, value)
+        else:
+            array = doubles(value)
+            if isinstance(array, str):
+                raise ModelError(f"{self._title}: {name} {array}")
+            self._check_size(name, array.shape, value)
+            value = _dm(array)
+        if isinstance(value, DM) and not value.is_regular():
+            raise ModelError(f"{self._title}: {name} is not finite; give numbers")
+        return value
+
+    def _check_size(self, name: str, shape: tuple[int, ...], value: Any) -> None:
+        wanted, width = self._sizes[name]
         rows, columns = (*shape, 1, 1)[:2]
         if width > 1 and not self.elements(name):
             if rows == wanted and columns % width == 0:
@@ -228,25 +243,28 @@ class ModelFunction(Function):
             raise ModelError(
                 f"{self._title}: {name} has the shape {shape}, it needs {(wanted, width)}"
             )
-        if rows == wanted or (rows, columns) == (1, wanted):
+        if shape == (wanted, wanted) and wanted > 1 and not isinstance(value, (SX, MX, DM)):
+            raise ModelError(
+                f"{self._title}: {name} is an array of shape {shape}, whose states may be rows or"
+                " columns; give casadi.DM(array), whose columns are states, or take"
+                " mbs.native.batch, whose rows are"
+            )
+        if len(shape) <= 2 and (rows == wanted or (rows, columns) == (1, wanted)):
             return
         if shape == () and isinstance(value, (int, float)) and value == 0:
             return
         elements = ", ".join(element for element, _ in self.elements(name))
         known = f": {elements}" if elements else ""
-        raise ModelError(f"{self._title}: {name} has {rows} values, it needs {wanted}{known}")
+        has = f"the shape {shape}" if len(shape) > 1 else f"{rows} values"
+        raise ModelError(f"{self._title}: {name} has {has}, it needs {wanted}{known}")
 
-    def _require_posture(self, inputs: dict[str, Any]) -> None:
+    def _require_valid(self, inputs: dict[str, Any]) -> None:
         """Refuse numbers at which the model has no sense."""
+        if not self._asks:
+            return
         system = self._system
-        numbers = {
-            name: DM(value) for name, value in inputs.items() if not isinstance(value, (SX, MX))
-        }
-        for name, value in numbers.items():
-            if not value.is_regular():
-                raise ModelError(f"{self._title}: {name} is not finite; give numbers")
         q, p = (
-            _columns(numbers.get(name), n)
+            _columns(inputs.get(name), n)
             for name, n in (("q", system.nq), ("p", len(system.parameters)))
         )
         require_plain(system, self._title, q, p)
@@ -258,7 +276,7 @@ class ModelFunction(Function):
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)
-        if all(isinstance(o, (SX, MX)) or DM(o).is_regular() for o in every):
+        if all(isinstance(o, (SX, MX)) or o.is_regular() for o in every):
             return
         loops = ", no posture closes the loops there" if self._system.is_closed else ""
         raise ModelError(
@@ -271,22 +289,15 @@ class ModelFunction(Function):
         return ", ".join(sizes)
 
 
-def _shape(value: Any) -> tuple[int, ...] | None:
-    """Rows and columns of what may be an input; None of what is no number."""
-    if isinstance(value, (SX, MX, DM)):
-        return value.shape
-    if isinstance(value, (list, tuple)) and any(isinstance(e, (SX, MX, DM)) for e in value):
-        return (len(value),)
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        return None
-    return array.shape if array.dtype.kind in "biuf" else None
+def _dm(array: NDArray[np.float64]) -> DM:
+    """An array as CasADi takes it; given a pattern, it converts in half the time."""
+    rows, columns = (*array.shape, 1, 1)[:2]
+    return DM(Sparsity.dense(rows, columns), array.ravel(order="F"))
 
 
-def _columns(value: DM | None, rows: int) -> NDArray[np.float64] | None:
+def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | None:
     """(rows, n) the configurations in an input; None where it is symbolic or of another size."""
-    if value is None or rows == 0:
+    if not isinstance(value, DM) or rows == 0:
         return None
     full = value.full()
     if full.shape == (1, rows):
@@ -298,15 +309,6 @@ def _columns(value: DM | None, rows: int) -> NDArray[np.float64] | None:
 
 def _unpickled(data: str, system: System, check: PostureCheck | None) -> ModelFunction:
     return ModelFunction(Function.deserialize(data), system, check=check)
-
-
-def _matrix(value: Any) -> Any:
-    """A list as the matrix that it writes; everything else as it is."""
-    if not isinstance(value, (list, tuple)):
-        return value
-    if any(isinstance(element, (SX, MX, DM)) for element in value):
-        return casadi.vertcat(*value)
-    return DM(np.array(value, dtype=float))
 
 
 def model_function(

@@ -19,28 +19,29 @@ def effort_function(system: System, tau: Effort) -> Function | None:
 
     Args:
         system: open or closed.
-        tau: constants by name, or all of them, or a function of (t, q, v), or None.
+        tau: constants of motors by name, or all of them, or a function of (t, q, v), or None. A
+            function that returns a dict names joints, also such as have no motor.
 
     Returns:
         the Function; None when there is no effort.
 
     Raises:
-        ModelError: a name is unknown or has no motor, or the efforts are not (nv, 1) numbers.
+        ModelError: a name is unknown, an effort is of a joint that has no motor, or the efforts
+            are not (nv, 1) numbers.
     """
     if tau is None:
         return None
     signal = Signal("tau", "efforts", [speed.name for speed in system.speeds])
-    if callable(tau):
-        return signal_function(system, signal, tau)
-    values = SX(DM(system.effort(tau)))
-    _check_motors(system, tau)
-    return signal_function(system, signal, values)
-
-
-def _check_motors(system: System, tau: Mapping[str, float] | Sequence[float]) -> None:
-    if not isinstance(tau, Mapping):
-        return
     driven = [speed.name for speed in system.speeds if speed.actuated]
+    if callable(tau):
+        return signal_function(system, signal, tau, driven)
+    values = SX(DM(system.effort(tau)))
+    if isinstance(tau, Mapping):
+        _require_motors(system, tau, driven)
+    return signal_function(system, signal, values, driven)
+
+
+def _require_motors(system: System, tau: Mapping[str, float], driven: Sequence[str]) -> None:
     for name in tau:
         if name not in driven:
             raise ModelError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.errors import ModelError
-from mbs.messages import quoted
+from mbs.messages import did_you_mean, quoted
 
 _LONGEST_REASON = 200
 
@@ -34,26 +34,37 @@ class Signal:
 
 
 def signal_function(
-    system: System, signal: Signal, given: SX | Function | Callable[[Any, Any, Any], Any]
+    system: System,
+    signal: Signal,
+    given: SX | Function | Callable[[Any, Any, Any], Any],
+    driven: Collection[str] | None = None,
 ) -> Function:
     """`f(t, q, v, p)` -> the values of the signal, (n, 1).
 
     Args:
         system: open or closed.
         signal: what it is, for messages.
-        given: the values, or a function of (t, q, v) that returns them.
+        given: the values, or a function of (t, q, v) that returns them: all of them in their order,
+            or a dict by name, where those that it does not name are zero.
+        driven: names of the elements that have a motor, outside of which a value is refused unless
+            a dict names it; every element may have one when left out.
 
     Raises:
-        ModelError: the function cannot be traced, or there are too few or too many values.
+        ModelError: the function cannot be traced, there are too few or too many values, a name is
+            unknown, or a value is given to what has no motor.
     """
     t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
-    values = given if isinstance(given, SX) else _traced(system, signal, given, (t, q, v))
+    values, by_name = given, False
+    if not isinstance(values, SX):
+        values, by_name = _traced(system, signal, given, (t, q, v))
     size = len(signal.elements)
     if values.numel() != size:
         raise ModelError(
             f"{system.name}: {signal.name} has {values.numel()} values, the system has {size}:"
             f" {', '.join(signal.elements)}"
         )
+    if driven is not None and not by_name:
+        _require_driven(system, signal, values, driven)
     inputs = [t, q, v, system.p]
     result = Function(signal.name, inputs, [casadi.densify(values)], {"allow_free": True})
     if result.has_free():
@@ -66,13 +77,16 @@ def signal_function(
 
 def _traced(
     system: System, signal: Signal, function: Callable[..., Any], point: tuple[SX, SX, SX]
-) -> SX:
-    """The values as an expression of t, q and v."""
+) -> tuple[SX, bool]:
+    """The values as an expression of t, q and v, and whether they were given by name."""
     _check_inputs(system, signal, function, point)
     try:
         values = function(*point)
     except Exception as error:
         raise untraceable(system, f"{signal.name}(t, q, v)", error) from error
+    by_name = isinstance(values, Mapping)
+    if by_name:
+        values = _in_order(system, signal, values)
     try:
         result = _column(values)
     except Exception:
@@ -83,7 +97,26 @@ def _traced(
             f" {len(signal.elements)} {signal.noun}, finite numbers or CasADi expressions of t, q"
             " and v"
         )
-    return result
+    return result, by_name
+
+
+def _in_order(system: System, signal: Signal, values: Mapping[str, Any]) -> list[Any]:
+    """Every element, zero where it is not named."""
+    for name in values:
+        if name not in signal.elements:
+            known = did_you_mean(str(name), signal.elements)
+            raise ModelError(f"{system.name}: {signal.name}(t, q, v) names {quoted(name)}; {known}")
+    return [values.get(name, 0) for name in signal.elements]
+
+
+def _require_driven(system: System, signal: Signal, values: SX, driven: Collection[str]) -> None:
+    for name, value in zip(signal.elements, casadi.vertsplit(casadi.densify(values)), strict=True):
+        if name not in driven and not value.is_zero():
+            raise ModelError(
+                f"{system.name}: {signal.name} drives {name!r}, which has no motor; make that joint"
+                f" actuated=True, return zero for it, or return a dict that names it, as in"
+                f" {{{name!r}: value}}"
+            )
 
 
 def untraceable(system: System, what: str, error: Exception) -> ModelError:

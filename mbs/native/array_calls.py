@@ -60,6 +60,11 @@ class ArrayCalls:
             ModelError: `out` does not fit; of a model, an input has a wrong size, or the result
                 is not a number.
         """
+        if not _MASKED.isdisjoint(map(type, args)):
+            raise ModelError(
+                f"{self.name()}: an input has a mask, which would be passed over; give"  # type: ignore[attr-defined]
+                " array.filled(value)"
+            )
         if self._last is not None and not kwargs and len(args) == self._inputs - 1:
             args = (*args, self._last)
         guard = self._guard
@@ -84,6 +89,7 @@ class ArrayCalls:
 
 
 _ARRAYS = (np.ndarray, np.generic)
+_MASKED = {np.ma.MaskedArray}
 _CLASSES: dict[type, type] = {}
 
 

@@ -59,11 +59,12 @@ class Batch:
     note: str
     _code: _Code | None
     _functions: tuple[Function, ...]
+    _checked: bool
     _valid: tuple[Batch, ...]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds the Functions, which are compiled where it is read."""
-        return functools.partial(batch, checked=bool(self._valid)), (self._functions,)
+        return functools.partial(batch, checked=self._checked), (self._functions,)
 
     @property
     def lanes(self) -> int:
@@ -82,11 +83,13 @@ class Batch:
 
         An input of n elements is an array (N, n) of N states, of r x c elements (N, r, c); one
         that is the same for all states is (n,) or (r, c). Rows may follow each other in memory
-        (order "C"), or states (order "F"), or be parts of a larger array: nothing is copied.
+        (order "C"), or states (order "F"), or be parts of a larger array: such arrays are not
+        copied. Rows are states, while a model called on arrays takes columns, as CasADi does.
         States do not depend on each other: neither N nor `threads` changes a bit of a result.
 
         Args:
-            *args: the inputs in their order, arrays of doubles.
+            *args: the inputs in their order: arrays, or nested lists, of real numbers. Arrays of
+                doubles that are evenly spaced are not copied.
             out: arrays that take the outputs, one or a tuple; an output may take the place of an
                 input of its shape.
             threads: how many work at once; as many as this process may use when left out.
@@ -99,9 +102,10 @@ class Batch:
         Raises:
             ModelError: an array does not fit; says which, and how it should be.
         """
-        given = self.ordered(args, named)
-        for port, array in zip(self.inputs, given, strict=True):
-            port.require(array, self._name, "input")
+        values = self.ordered(args, named)
+        given = [
+            port.taken(value, self._name) for port, value in zip(self.inputs, values, strict=True)
+        ]
         states = self._states(given)
         named = dict(zip((port.name for port in self.inputs), given, strict=True))
         every = [valid(*(named[port.name] for port in valid.inputs)) for valid in self._valid]
@@ -168,7 +172,7 @@ class Batch:
                 f"{self._name}: out has {len(arrays)} arrays, there are {len(self.outputs)} outputs"
             )
         for port, array in zip(self.outputs, arrays, strict=True):
-            port.require(array, self._name, "out for")
+            port.require_out(array, self._name)
             shape = port.shape if states is None else (states, *port.shape)
             if array.shape != shape or not array.flags.writeable or not spread(array):
                 raise ModelError(
@@ -226,8 +230,12 @@ class Batch:
         if states == 0:
             return
         answers = self.function.map(states).call([casadi.DM(c) for c in columns])
+        finite = np.all([np.isfinite(c).all(axis=0) for c in columns], axis=0)
         for answer, result in zip(answers, results, strict=True):
-            result[...] = np.array(answer.full().T).reshape(result.shape)
+            rows = np.array(answer.full().T)
+            if self._checked:
+                rows[~finite] = np.nan
+            result[...] = rows.reshape(result.shape)
 
 
 def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> Batch:
@@ -241,8 +249,10 @@ def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> 
     Args:
         functions: one or several, such as an inverse and a direct dynamics model: inputs of one
             name are one input, and operations that they have in common are done once.
-        checked: rows whose positions or parameters a model does not take, such as positions that
-            leave loops open, come out as NaN; otherwise they are computed as if they had sense.
+        checked: of models, rows come out as NaN where an input is not a finite number, also one
+            that has no effect, and where positions or parameters have no sense, such as positions
+            that leave loops open; otherwise, as of any other Function, they are computed as they
+            are.
 
     Raises:
         ModelError: one is no Function, or their inputs do not fit together.
@@ -256,25 +266,26 @@ def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> 
     for part in parts:
         require_function(part)
     function, inputs, outputs = joined(parts)
-    code, note = _code(function)
-    valid = _valid_functions(parts) if checked else {}
+    models = [part for part in parts if checked and hasattr(part, "valid")]
+    code, note = _code(function, bool(models))
+    valid = _valid_functions(models)
     ports = tuple(inputs), tuple(outputs)
     guards = tuple(batch(one, checked=False) for one in valid.values())
-    return Batch(function, *ports, _defaults(parts), note, code, tuple(parts), guards)
+    return Batch(function, *ports, _defaults(parts), note, code, tuple(parts), bool(models), guards)
 
 
-def _valid_functions(parts: Sequence[Any]) -> dict[int, Function]:
+def _valid_functions(models: Sequence[Any]) -> dict[int, Function]:
     """What tells whether models take a state, each once."""
-    asked = (part.valid() for part in parts if hasattr(part, "valid"))
+    asked = (model.valid() for model in models)
     return {hash(valid): valid for valid in asked if valid is not None}
 
 
-def _code(function: Function) -> tuple[_Code | None, str]:
+def _code(function: Function, finite: bool) -> tuple[_Code | None, str]:
     """The machine code, None where there can be none, and what to say about it."""
     if not compiler_found():
         return None, "interpreted by CasADi, for there is no C compiler"
     try:
-        source = batch_source(function)
+        source = batch_source(function, finite=finite)
     except ModelError as error:
         return None, f"interpreted by CasADi ({error})"
     files = {**source.files, "processor.h": f"/* {processor()} */\n"}

@@ -11,6 +11,7 @@ import numpy as np
 
 from mbs.errors import ModelError
 from mbs.messages import quoted
+from mbs.numbers import doubles
 
 Array: TypeAlias = np.ndarray[Any, Any]
 
@@ -49,41 +50,53 @@ class ArrayPort:
         """Whether an array that fits has a row for each state."""
         return array.ndim > len(self.shape)
 
-    def require(self, array: Any, owner: str, role: str) -> None:
-        """Refuse what is not an array of this shape, or of many.
+    def taken(self, value: Any, owner: str) -> Array:
+        """The doubles of an input; only arrays of doubles, evenly spaced, are not copied.
+
+        Args:
+            value: anything.
+            owner: who takes it, to begin a message.
+
+        Raises:
+            ModelError: it holds no numbers, or not of this shape, or of many; says what to give.
+        """
+        array = doubles(value)
+        fault = array if isinstance(array, str) else self._fault(array)
+        if isinstance(array, str) or fault:
+            raise ModelError(f"{owner}: input {self.name} {fault}")
+        return array if self._steps(array) else np.array(array, order="C")
+
+    def require_out(self, array: Any, owner: str) -> None:
+        """Refuse what cannot take this output, of one state or of many, as it is.
 
         Args:
             array: anything.
-            owner: who takes it, to begin a message.
-            role: what it is for it.
+            owner: who fills it, to begin a message.
 
         Raises:
             ModelError: says what to give.
         """
-        fault = self._fault(array)
-        if fault:
-            raise ModelError(f"{owner}: {role} {self.name} {fault}")
-
-    def _fault(self, array: Any) -> str:
-        """What is wrong with an array and what to give, the end of a message; else empty."""
+        fault = ""
         if not isinstance(array, np.ndarray) or array.dtype != np.float64:
             kind = f"an array of {array.dtype}" if isinstance(array, np.ndarray) else quoted(array)
-            return f"is {kind}; give a numpy array of float64"
-        if isinstance(array, np.ma.MaskedArray):
-            return "has a mask, which would be passed over; give array.filled(value)"
+            fault = f"is {kind}; give a numpy array of float64"
+        elif isinstance(array, np.ma.MaskedArray):
+            fault = "has a mask, which would be passed over; give an array without"
+        elif not (fault := self._fault(array)) and self._steps(array) is None:
+            fault = "has elements that are not evenly spaced in memory, in steps of 8 bytes"
+        if fault:
+            raise ModelError(f"{owner}: out for {self.name} {fault}")
+
+    def _fault(self, array: Array) -> str:
+        """What is wrong with the shape of an array and what to give; empty where it fits."""
         lengths = len(self.shape)
-        if array.shape[-lengths:] != self.shape or array.ndim > lengths + 1:
-            many = f"(N, {', '.join(map(str, self.shape))})"
-            return (
-                f"has the shape {array.shape}; give {many}, or {self.shape} that is the same for"
-                " all states"
-            )
-        if self._steps(array) is None:
-            return (
-                "has elements that are not evenly spaced in memory, in steps of 8 bytes; give"
-                " numpy.array(it)"
-            )
-        return ""
+        if array.shape[-lengths:] == self.shape and array.ndim <= lengths + 1:
+            return ""
+        many = f"(N, {', '.join(map(str, self.shape))})"
+        return (
+            f"has the shape {array.shape}; give {many}, or {self.shape} that is the same for"
+            " all states"
+        )
 
     def c_port(self, array: Array, past_caches: bool) -> CPort:
         """Where C finds the array.

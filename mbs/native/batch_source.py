@@ -56,12 +56,14 @@ class _States(LaneCode):
         return LaneCode._written(self, graph, number)
 
 
-def batch_source(function: Function, block: int = BLOCK) -> BatchSource:
+def batch_source(function: Function, block: int = BLOCK, finite: bool = False) -> BatchSource:
     """The C files of a Function whose inputs and outputs are dense columns.
 
     Args:
         function: made of scalar operations.
         block: assignments in one C function.
+        finite: outputs of a state are NaN where one of its inputs is not a finite number, also one
+            that has no effect.
 
     Raises:
         ModelError: it has no scalar operations, or one that C does not have.
@@ -97,6 +99,7 @@ def batch_source(function: Function, block: int = BLOCK) -> BatchSource:
             for k, size in enumerate(taken)
         ),
         *(f"    part{k}(in, out, w);" for k in range(len(pieces))),
+        *(_flagged([*zip(places, taken, strict=False)], given) if finite else ()),
         *(
             f"    mbs_give(ports + {count + k}, k, many, {size}, out[{k}]);"
             for k, size in enumerate(given)
@@ -108,6 +111,18 @@ def batch_source(function: Function, block: int = BLOCK) -> BatchSource:
     runtime = resources.files("mbs.native").joinpath("runtime")
     headers = {name: runtime.joinpath(name).read_text("utf-8") for name in (*HEADERS, "rows.h")}
     return BatchSource({"batch.c": "\n".join(lines), **headers}, _WIDEST * (starts[-1] + 1))
+
+
+def _flagged(inputs: list[tuple[str, int]], outputs: list[int]) -> list[str]:
+    """What makes outputs NaN in the lanes where an input is not finite: x * 0 is NaN there."""
+    return [
+        "    mbs_lanes zero = mbs_all(0.0);",
+        *(f"    zero += mbs_times_zero({place}, {size});" for place, size in inputs),
+        "    const mbs_bits wrong = ~(mbs_bits)(zero == 0.0);",
+        "    if (__builtin_expect(mbs_any(wrong), 0)) {",
+        *(f"      mbs_spoil(out[{k}], {size}, wrong);" for k, size in enumerate(outputs)),
+        "    }",
+    ]
 
 
 def _pointers(kind: str, places: list[str]) -> str:

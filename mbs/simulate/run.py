@@ -60,7 +60,8 @@ def run(
         v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
             they may be of any joints, and the others follow.
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
-            of CasADi operations that returns (nv, 1) efforts, or a casadi.Function of (t, q, v).
+            of CasADi operations, or a casadi.Function, that returns (nv, 1) efforts, zero where
+            there is no motor; or a dict that names joints, also such as have no motor.
         motion: laws of time for coordinates that drives move: by name such as "j1.q" a position,
             "j1.v" a velocity, "j1.a" an acceleration, each a number or a smooth function of t made
             of CasADi operations. The column `j1.tau` is the whole effort, the drive's included.

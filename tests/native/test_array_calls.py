@@ -140,7 +140,7 @@ def test_wrong_sizes_name_the_input(idm):
     q = np.zeros(6)
     with pytest.raises(ModelError, match="v has 5 values, it needs 6"):
         idm(q, np.zeros(5), q)
-    with pytest.raises(ModelError, match="v has 2 values, it needs 6"):
+    with pytest.raises(ModelError, match=r"v has the shape \(2, 3\), it needs 6"):
         idm(q, np.zeros((2, 3)), q)
     with pytest.raises(ModelError, match="a missing"):
         idm(q, q)

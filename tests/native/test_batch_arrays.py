@@ -116,8 +116,9 @@ def test_what_does_not_fit_is_refused():
     f = batch(example())
     x, m = np.ones((4, 5)), np.ones((4, 5, 3))
     y, z = np.ones((4, 5)), np.ones((4, 5, 3))
-    refused(lambda: f(x.astype(np.float32), m), "input x", "float32", "float64")
-    refused(lambda: f([1.0] * 5, m), "input x", "numpy array")
+    refused(lambda: f(x.astype(complex), m), "input x", "complex128", "give numbers")
+    refused(lambda: f("x", m), "input x is 'x'; give numbers")
+    refused(lambda: f(x, m, out=(y.astype(np.float32), z)), "out for y", "float32", "float64")
     refused(lambda: f(np.ones((4, 6)), m), "input x", r"\(4, 6\)", r"\(N, 5\)")
     refused(lambda: f(x, np.ones((5, 4, 3))), "input m", r"\(N, 5, 3\)")
     refused(lambda: f(x, np.ones((3, 5, 3))), "x has 4 states", "m has 3 states")
@@ -125,7 +126,8 @@ def test_what_does_not_fit_is_refused():
     refused(lambda: f(x, m, x), "3 inputs")
     refused(lambda: f(x, m, w=x), "'w'", "x, m")
     refused(lambda: f(x, m, x=x), "'x'")
-    refused(lambda: f(x, np.asfortranarray(np.ones((5, 4, 3))).swapaxes(0, 1)), "evenly spaced")
+    uneven = np.asfortranarray(np.ones((5, 4, 3))).swapaxes(0, 1)
+    refused(lambda: f(x, m, out=(y, uneven.swapaxes(0, 1)[:4, :, ::2])), "out for z")
     refused(lambda: f(x, m, out=y), "1 arrays", "2 outputs")
     refused(lambda: f(x, m, out=(y, z[:3])), "out for z", r"\(4, 5, 3\)")
     refused(lambda: f(x, m, out=(np.broadcast_to(y[0], (4, 5)), z)), "out for y", "writable")
@@ -141,6 +143,23 @@ def test_what_does_not_fit_is_refused():
     refused(lambda: batch(None), "None is not a Function")
     refused(lambda: batch([example(), 3]), "3 is not a Function")
     refused(lambda: batch([example(5), example(4)]), r"x\[4\]", r"x\[5\]")
+
+
+def test_numbers_of_every_kind_are_taken():
+    f = batch(example())
+    x, m = np.arange(20.0).reshape(4, 5) / 32, np.arange(15.0).reshape(5, 3) / 8
+    wanted = f(x, m)
+    many = np.broadcast_to(m, (4, 5, 3))
+    for given in (
+        (x.astype(np.float32), m),
+        (x.tolist(), m.tolist()),
+        (x, np.asfortranarray(many.swapaxes(0, 1)).swapaxes(0, 1)),
+        (np.frombuffer(b"0" + x.tobytes(), offset=1).reshape(4, 5), m),
+    ):
+        for a, b in zip(f(*given), wanted, strict=True):
+            np.testing.assert_array_equal(a, b)
+    ones = np.ones((2, 5), dtype=int)
+    np.testing.assert_array_equal(f(ones, m)[0], f(ones.astype(float), m)[0])
 
 
 def test_without_a_compiler_casadi_interprets(monkeypatch):

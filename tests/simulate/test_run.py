@@ -196,12 +196,21 @@ def test_bad_arguments(arguments, message):
     assert len(text) < 400
 
 
-def test_a_joint_without_motor_takes_no_constant():
+def test_a_joint_without_motor_is_driven_by_name_alone():
     system = pendulum(actuated=False)
     with pytest.raises(ModelError, match="tau names 'j', which has no motor"):
         mbs.simulate.run(system, 1.0, tau={"j": 1.0})
-    result = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: np.array([2.0]))
+    for law in (lambda t, q, v: np.array([2.0]), lambda t, q, v: -v):
+        with pytest.raises(ModelError, match="tau drives 'j', which has no motor; make that"):
+            mbs.simulate.run(system, 1.0, tau=law)
+    with pytest.raises(ModelError, match="tau drives 'j', which has no motor"):
+        mbs.simulate.run(system, 1.0, tau=[2.0])
+    result = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: {"j": 2.0})
     assert np.array_equal(result["j.tau"], np.full(11, 2.0))
+    result = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: [0])
+    assert not result["j.tau"].any()
+    with pytest.raises(ModelError, match="names 'k'; did you mean 'j'|names 'k'; use one of"):
+        mbs.simulate.run(system, 0.1, tau=lambda t, q, v: {"k": 2.0})
 
 
 @pytest.mark.parametrize("wrong", [None, "four_bar", Mechanism("m")])

@@ -117,7 +117,7 @@ def test_rows_of_all_legs_up_to_the_stop():
     options = {"v0": {"j1": 6.0}, "step": 0.05, **QUIET}
     with pytest.raises(SolverError) as caught:
         mbs.simulate.run(
-            system, 3.0, tau=lambda t, _q, v: 1e-9 * casadi.sqrt(2.02 - t) + 0 * v, **options
+            system, 3.0, tau=lambda t, _q, _v: {"j1": 1e-9 * casadi.sqrt(2.02 - t)}, **options
         )
     part, whole = caught.value.result, mbs.simulate.run(system, 2.0, **options)
     assert len(part) == len(whole) == 41

@@ -113,6 +113,19 @@ MBS_ALWAYS void mbs_take(const mbs_port *port, long long first, int many, int si
   mbs_take_each(port, first, many, size, lanes);
 }
 
+/* Zero in the lanes of finite numbers, NaN in the others. */
+MBS_ALWAYS mbs_lanes mbs_times_zero(const mbs_lanes *lanes, int size) {
+  mbs_lanes sum = mbs_all(0.0);
+  for (int k = 0; k < size; ++k) sum += lanes[k] * 0.0;
+  return sum;
+}
+
+/* NaN in some lanes. */
+MBS_ALWAYS void mbs_spoil(mbs_lanes *lanes, int size, mbs_bits where) {
+  for (int l = 0; l < MBS_LANES; ++l)
+    for (int k = 0; where[l] && k < size; ++k) lanes[k][l] = __builtin_nan("");
+}
+
 MBS_ALWAYS void mbs_give_each(const mbs_port *port, long long first, int many, int size,
                               const mbs_lanes *lanes) {
   for (int l = 0; l < many; ++l) {

@@ -1,0 +1,32 @@
+"""What counts as numbers in a call: one rule for lists, arrays and scalars of every kind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.messages import quoted
+
+
+def doubles(value: Any) -> NDArray[np.float64] | str:
+    """The numbers in a value as doubles; integers, booleans and shorter floats become doubles.
+
+    Args:
+        value: anything.
+
+    Returns:
+        an array, the value itself where it is one of doubles already; or, of what holds no
+        numbers, what is wrong and what to do, the end of a sentence.
+    """
+    if isinstance(value, np.ma.MaskedArray):
+        return "has a mask, which would be passed over; give array.filled(value)"
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return f"is {quoted(value)}; give numbers"
+    if array.dtype.kind not in "biuf":
+        what = f"an array of {array.dtype}" if isinstance(value, np.ndarray) else quoted(value)
+        return f"is {what}; give numbers"
+    return array.astype(float, copy=False)

@@ -15,7 +15,7 @@ from mbs.assembly.function_table import function_table
 from mbs.assembly.rates import quaternion_slices
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
-from mbs.assembly.validity import all_hold, plain_rows, require_plain
+from mbs.assembly.validity import all_hold, plain_fault, plain_rows
 from mbs.errors import MbsError, ModelError
 from mbs.messages import quoted
 from mbs.native import compiled
@@ -45,11 +45,21 @@ def _plainly_valid(system: System) -> Function:
     return all_hold(system, "plain", q, plain_rows(system, q))
 
 
-def _refuses_nothing(system: System, q: Any, p: Any) -> None:
-    """What is plainly valid is taken."""
+def _refuses(system: System, q: Any, p: Any) -> None:
+    """Say which row fails, of a rule that no component has a sentence for.
+
+    Raises:
+        ModelError: always.
+    """
+    symbols = SX.sym("q", system.nq)
+    rows = plain_rows(system, symbols)
+    residuals = casadi.vertcat(*(row.residual - row.bound for row in rows))
+    found = Function("rows", [symbols, system.p], [residuals])(q, p).full().ravel()
+    row = rows[int(np.argmin(found <= 0))]
+    raise ModelError(f"{system.name}: {row.name} is passed by these values; give others")
 
 
-_PLAIN = PostureCheck(_plainly_valid, _refuses_nothing)
+_PLAIN = PostureCheck(_plainly_valid, _refuses)
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
 
@@ -74,6 +84,7 @@ class ModelFunction(Function):
         self._annotate = annotate
         self._check_posture = check
         self._sizes = {name: self.size_in(name) for name in self.name_in()}
+        self._valid: Function | None = None
         self._asks = bool(check or system.bounds or quaternion_slices(system.tree))
 
     @property
@@ -131,7 +142,7 @@ class ModelFunction(Function):
         names = self.name_in()
         if not asked or "q" not in names or self.size_in("q") != (system.nq, 1):
             return None
-        return (self._check_posture or _PLAIN).valid(system)
+        return self._validity()
 
     def guard(self) -> Callable[..., bool] | None:
         """What tells whether arrays are valid inputs, for calls that go past `__call__`.
@@ -230,9 +241,10 @@ class ModelFunction(Function):
                 raise ModelError(f"{self._title}: {name} {array}")
             self._check_size(name, array.shape, value)
             value = _dm(array)
-        if isinstance(value, DM) and not value.is_regular():
+        taken: DM | SX | MX = value
+        if isinstance(taken, DM) and not taken.is_regular():
             raise ModelError(f"{self._title}: {name} is not finite; give numbers")
-        return value
+        return taken
 
     def _check_size(self, name: str, shape: tuple[int, ...], value: Any) -> None:
         wanted, width = self._sizes[name]
@@ -263,16 +275,34 @@ class ModelFunction(Function):
         if not self._asks:
             return
         system = self._system
-        q, p = (
-            _columns(inputs.get(name), n)
-            for name, n in (("q", system.nq), ("p", len(system.parameters)))
-        )
-        require_plain(system, self._title, q, p)
-        if self._check_posture is None or q is None or ("p" in inputs and p is None):
+        q, p = inputs.get("q"), inputs.get("p")
+        point = [q] if p is None else [q, p]
+        wanted = [(system.nq, 1), (len(system.parameters), 1)][: len(point)]
+        alone = len(point) == 1 + bool(system.parameters) and all(isinstance(x, DM) for x in point)
+        if alone and [x.shape for x in point] == wanted and self._holds(point):
             return
-        for k in range(q.shape[1]):
-            at = DM() if p is None else p[:, min(k, p.shape[1] - 1)]
-            self._check_posture.refuse(system, q[:, k], at)
+        # which sentence to say, of which column, is looked for where one of them fails
+        q, p = _columns(q, system.nq), _columns(p, len(system.parameters))
+        known = [values for values in (q, p) if values is not None]
+        whole = q is not None and (p is not None or not system.parameters)
+        for k in range(max((values.shape[1] for values in known), default=0)):
+            q_k, p_k = (None if x is None else x[:, k % x.shape[1]] for x in (q, p))
+            column = [_dm(x) for x in (q_k, p_k) if x is not None]
+            if whole and self._holds(column):
+                continue
+            if fault := plain_fault(system, q_k, p_k):
+                raise ModelError(f"{self._title}: {fault}")
+            if whole:
+                (self._check_posture or _PLAIN).refuse(system, q_k, DM() if p_k is None else p_k)
+
+    def _holds(self, point: Sequence[DM]) -> bool:
+        return bool(self._validity().call([*point])[0] == 1)
+
+    def _validity(self) -> Function:
+        """``valid(q)``, or ``valid(q, p)``, made once."""
+        if self._valid is None:
+            self._valid = (self._check_posture or _PLAIN).valid(self._system)
+        return self._valid
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)

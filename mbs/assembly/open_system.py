@@ -14,7 +14,7 @@ from mbs.assembly.drive_tables import attached_devices, shaft_rows
 from mbs.assembly.graph import Graph, connection_graph
 from mbs.assembly.joint_rows import joint_rows
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
-from mbs.assembly.parameter_bounds import parameter_bounds
+from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
 from mbs.assembly.proof import prove
 from mbs.assembly.rates import zero_position
 from mbs.assembly.sensors import attached_sensors
@@ -49,7 +49,8 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     known = {p.name: p.default for p in parameters if p.default is not None}
     for component in mechanism.components.values():
         component.check_values(known)
-    bounds = parameter_bounds(mechanism.components.values(), parameters)
+    described = [c for c in mechanism.components.values() if c.parameters()]
+    bounds = parameter_bounds(described, parameters)
     line = drive_line(mechanism)
     mechanism = line.mechanism
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
@@ -87,6 +88,8 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         couplings=_couplings(mechanism, coordinates, symbols),
         parameters=parameters,
         bounds=bounds,
+        bounded=tuple(bounded_fields(described, symbols)),
+        described=tuple(described),
         p=casadi.vertcat(*symbols.values()) if symbols else SX(0, 1),
         coordinates=coordinates,
         speeds=speeds,

@@ -1,19 +1,27 @@
-"""Between which values a parameter must lie: what the components that hold it take as a number."""
+"""Between which values parameters must lie: what the components that hold them take as numbers."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Any
 
-from mbs.components import Component
+from casadi import SX
+
+from mbs.components import Box, Component, Cylinder
 from mbs.errors import DescriptionError
-from mbs.expressions import Parameter, parameters_of
+from mbs.expressions import (
+    MORE_THAN_ZERO,
+    Number,
+    Operation,
+    Parameter,
+    parameters_of,
+    to_sx,
+)
 
 Bounds = tuple[float | None, float | None]
 """The least and the greatest value; None where there is none."""
-
-MORE_THAN_ZERO = sys.float_info.min
-"""The least value of what must be more than zero: the smallest normal number."""
 
 _BELOW_ZERO = (
     -1.0,
@@ -25,11 +33,11 @@ _ABOVE_ONE = (1.1, 1e3)
 def parameter_bounds(
     components: Iterable[Component], parameters: Iterable[Parameter]
 ) -> dict[str, Bounds]:
-    """The bounds zero and one of parameters, by what components refuse.
+    """The bounds of parameters: their own, and zero and one by what components refuse.
 
     A component is asked with the values themselves, all other parameters left open, so that its
     rule is stated in one place. Rules between several parameters, such as of an inner and an outer
-    radius, are no bounds.
+    radius, are no bounds; `BoundedField` and the components themselves know them.
 
     Args:
         components: of a mechanism.
@@ -38,31 +46,78 @@ def parameter_bounds(
     Returns:
         least and greatest value by name, of those that have one.
     """
-    known = {parameter.name for parameter in parameters}
-    found: dict[str, Bounds] = {}
+    found: dict[str, Bounds] = {p.name: (p.min, p.max) for p in parameters}
     for component in components:
-        names = {p.name for e in component.expressions() for p in parameters_of(e)}
-        unvalued = component.without_defaults() if names else component
-        for name in sorted(names & known):
-            low, high = _bounds(unvalued, name)
-            before = found.get(name, (None, None))
-            low = max((x for x in (low, before[0]) if x is not None), default=None)
-            found[name] = low, high if before[1] is None else before[1]
+        for name in sorted(component.parameters() & found.keys()):
+            low, high = _bounds(partial(_with_value, component.without_defaults(), name))
+            found[name] = _tighter(max, low, found[name][0]), _tighter(min, high, found[name][1])
     return {name: bounds for name, bounds in found.items() if bounds != (None, None)}
 
 
-def _bounds(component: Component, name: str) -> Bounds:
+@dataclass(frozen=True, slots=True, eq=False)
+class BoundedField:
+    """A number of a component that is made of parameters, and its bounds.
+
+    Attributes:
+        name: of the component and the field, such as "arm, mass".
+        value: (1, 1) on the symbols of the parameters.
+        bounds: least and greatest value.
+    """
+
+    name: str
+    value: SX
+    bounds: Bounds
+
+
+def bounded_fields(
+    components: Iterable[Component], symbols: Mapping[str, SX]
+) -> Iterator[BoundedField]:
+    """What is computed from parameters and has bounds, such as a mass of "M1 + M2".
+
+    Args:
+        components: of a mechanism.
+        symbols: of its parameters.
+    """
+    for component in components:
+        unvalued = component.without_defaults()
+        for f in fields(component):
+            value = getattr(component, f.name)
+            if f.init and isinstance(value, Operation) and any(parameters_of(value)):
+                bounds = _bounds(partial(_with_field, unvalued, f.name))
+                if bounds != (None, None):
+                    yield BoundedField(f"{component.name}, {f.name}", to_sx(value, symbols), bounds)
+        if isinstance(component, (Box, Cylinder)) and isinstance(component.solid_mass, Operation):
+            mass = to_sx(component.solid_mass, symbols)
+            yield BoundedField(f"{component.name}, mass", mass, (0.0, None))
+
+
+def _with_value(component: Component, name: str, value: float) -> None:
+    component.check_values({name: value})
+
+
+def _with_field(component: Component, name: str, value: float) -> None:
+    changed: dict[str, Any] = {name: Number(value)}
+    replace(component, **changed)
+
+
+def _tighter(choose: Callable[[Iterable[float]], float], *bounds: float | None) -> float | None:
+    known = [bound for bound in bounds if bound is not None]
+    return choose(known) if known else None
+
+
+def _bounds(check: Callable[[float], object]) -> Bounds:
+    """What a rule refuses among values below zero, of zero, and above one."""
     low: float | None = None
-    if all(_refuses(component, name, value) for value in _BELOW_ZERO):
-        open_end = _refuses(component, name, 0.0) and not _refuses(component, name, MORE_THAN_ZERO)
+    if all(_refused(check, value) for value in _BELOW_ZERO):
+        open_end = _refused(check, 0.0) and not _refused(check, MORE_THAN_ZERO)
         low = MORE_THAN_ZERO if open_end else 0.0
-    above = all(_refuses(component, name, value) for value in _ABOVE_ONE)
-    return low, 1.0 if above and not _refuses(component, name, 1.0) else None
+    above = all(_refused(check, value) for value in _ABOVE_ONE)
+    return low, 1.0 if above and not _refused(check, 1.0) else None
 
 
-def _refuses(component: Component, name: str, value: float) -> bool:
+def _refused(check: Callable[[float], object], value: float) -> bool:
     try:
-        component.check_values({name: value})
+        check(value)
     except (DescriptionError, ArithmeticError):
         return True
     return False

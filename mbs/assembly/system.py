@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
@@ -17,15 +17,16 @@ from mbs.assembly.coordinate_coupling import CoordinateCoupling
 from mbs.assembly.drive_tables import AttachedDevice, ShaftRow
 from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.khalil_frames import Cut
-from mbs.assembly.parameter_bounds import Bounds
+from mbs.assembly.parameter_bounds import BoundedField, Bounds
 from mbs.assembly.pickled import packed, unpacked
 from mbs.assembly.rates import position_rate
 from mbs.assembly.report import report
 from mbs.assembly.sensors import AttachedSensor
 from mbs.assembly.tables import BodyRow, Closure, Coordinate, LinkRow, LoopRow, link_rows
 from mbs.assembly.tree import Tree
-from mbs.errors import ModelError
-from mbs.expressions import Parameter
+from mbs.components import Component
+from mbs.errors import MbsError, ModelError
+from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
 from mbs.messages import did_you_mean, quoted
 from mbs.spatial import Pose
@@ -64,6 +65,8 @@ class System:
         shafts: inertias and rigid gears of drive lines, and the coordinates that they turn with.
         devices: motors and torques that drive shafts, with states and inputs of their own.
         bounds: least and greatest value of the parameters that have one, by name.
+        bounded: what is computed from parameters and has bounds.
+        described: the components that hold parameters, as they were described.
     """
 
     name: str
@@ -88,6 +91,8 @@ class System:
     shafts: tuple[ShaftRow, ...] = ()
     devices: tuple[AttachedDevice, ...] = ()
     bounds: Mapping[str, Bounds] = field(default_factory=dict)
+    bounded: tuple[BoundedField, ...] = ()
+    described: tuple[Component, ...] = ()
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -286,7 +291,8 @@ class System:
                 where they have none.
 
         Raises:
-            ModelError: a name is unknown, or a symbol has no value.
+            ModelError: a name is unknown, a symbol has no value, or a value is out of its bounds or
+                refused by a component that holds it.
         """
         names = [parameter.name for parameter in self.parameters]
         if values is not None and not isinstance(values, Mapping):
@@ -311,7 +317,30 @@ class System:
             if value is not None and name in given:
                 value = self._number(value, f"parameter {name}")
             result.append(math.nan if value is None else value)
+        if given and (fault := self.parameter_fault(result)):
+            raise ModelError(f"{self.name}: {fault}")
         return result
+
+    def parameter_fault(self, p: Iterable[float]) -> str:
+        """What is wrong with values of the parameters and what to give; empty where nothing is.
+
+        Args:
+            p: (np,) values; a NaN is one that nobody gave.
+        """
+        values = {
+            parameter.name: float(value)
+            for parameter, value in zip(self.parameters, p, strict=True)
+            if not math.isnan(value)
+        }
+        for component in self.described:
+            try:
+                component.check_values(values)
+            except MbsError as error:
+                return str(error)
+        for name, value in values.items():
+            if fault := out_of_bounds(value, *self.bounds.get(name, (None, None))):
+                return f"parameter {name} is {value:.6g}; {fault}"
+        return ""
 
 
 def _unpickled(*parts: Any) -> System:

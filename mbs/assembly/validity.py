@@ -15,10 +15,11 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly.rates import quaternion_slices
-from mbs.errors import ModelError
 
 if TYPE_CHECKING:
     from mbs.assembly.system import System
+
+Vector = NDArray[np.float64]
 
 UNIT = 1e-5
 """How far the length of a quaternion may be from one: finite differences move it by 1e-6."""
@@ -57,6 +58,12 @@ def plain_rows(system: System, q: SX) -> list[Row]:
             rows.append(Row(f"least value of {name}", -symbols[name], -low))
         if high is not None:
             rows.append(Row(f"greatest value of {name}", symbols[name], high))
+    for own in system.bounded:
+        low, high = own.bounds
+        if low is not None:
+            rows.append(Row(f"least value of {own.name}", -own.value, -low))
+        if high is not None:
+            rows.append(Row(f"greatest value of {own.name}", own.value, high))
     return rows
 
 
@@ -81,41 +88,17 @@ def all_hold(system: System, key: str, q: SX, rows: Iterable[Row]) -> Function:
     return function
 
 
-def require_plain(
-    system: System, title: str, q: NDArray[np.float64] | None, p: NDArray[np.float64] | None
-) -> None:
-    """Refuse quaternions that are not of unit length, and parameters out of their bounds.
+def plain_fault(system: System, q: Vector | None, p: Vector | None) -> str:
+    """What is wrong with a configuration or parameters and what to give; empty where nothing is.
 
     Args:
         system: any.
-        title: of the model, for the message.
-        q: (nq, n) positions, or None.
-        p: (np, n) parameters, or None.
-
-    Raises:
-        ModelError: says which and what to do.
+        q: (nq,) positions, or None where they are not known.
+        p: (np,) parameters, or None.
     """
-    if q is not None and len(q) == system.nq:
-        for part in quaternion_slices(system.tree):
-            lengths = np.linalg.norm(q[part], axis=0)
-            far = lengths[np.argmax(np.abs(lengths - 1))]
-            if not abs(far - 1) <= UNIT:
-                joint = system.coordinates[part.start].joint
-                raise ModelError(
-                    f"{title}: the quaternion of {joint} has the length {far:.6g}; divide it by"
-                    " its length"
-                )
-    if p is None or len(p) != len(system.parameters):
-        return
-    for k, parameter in enumerate(system.parameters):
-        low, high = system.bounds.get(parameter.name, (None, None))
-        if low is not None and not p[k].min() >= low:
-            least = "more than zero" if low > 0 else "at least 0"
-            raise ModelError(
-                f"{title}: {parameter.name} = {p[k].min():.6g} has no sense; it must be {least}"
-            )
-        if high is not None and not p[k].max() <= high:
-            raise ModelError(
-                f"{title}: {parameter.name} = {p[k].max():.6g} has no sense; it must be at most"
-                f" {high:g}"
-            )
+    for part in quaternion_slices(system.tree):
+        length = 1.0 if q is None else float(np.linalg.norm(q[part]))
+        if not abs(length - 1) <= UNIT:
+            joint = system.coordinates[part.start].joint
+            return f"the quaternion of {joint} has the length {length:.6g}; divide it by its length"
+    return "" if p is None else system.parameter_fault(p)

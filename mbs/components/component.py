@@ -16,7 +16,15 @@ from mbs.components.placement import (
     displacement,
 )
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, renamed, with_values, without_defaults
+from mbs.expressions import (
+    Expression,
+    Scalar,
+    expression,
+    parameters_of,
+    renamed,
+    with_values,
+    without_defaults,
+)
 
 _NAME = re.compile(r"[^\s.'\"]+(?:\.[^\s.'\"]+)*")
 
@@ -91,6 +99,10 @@ class Component:
         """Every scalar of the component that may hold parameters."""
         for f in fields(self):
             yield from _expressions(getattr(self, f.name))
+
+    def parameters(self) -> frozenset[str]:
+        """The names of the symbols that it holds."""
+        return frozenset(p.name for value in self.expressions() for p in parameters_of(value))
 
     def _normalise(self, *names: str) -> None:
         """Turn fields that a user wrote as numbers or texts into expressions, checking each."""

@@ -214,14 +214,8 @@ class Mechanism:
         """
         found: dict[str, Parameter] = {}
         for parameter in self.used_parameters():
-            known = found.setdefault(parameter.name, parameter)
-            if known.default is None:
-                found[parameter.name] = parameter
-            elif parameter.default not in (None, known.default):
-                raise AssemblyError(
-                    f"{self.name}: parameter {parameter.name} has the values {known.default:g} and"
-                    f" {parameter.default:g}; give it one"
-                )
+            known = found.get(parameter.name)
+            found[parameter.name] = parameter if known is None else self._joined(known, parameter)
         for name, value in self.values.items():
             if name not in found:
                 known_names = ", ".join(found) or "none"
@@ -231,6 +225,23 @@ class Mechanism:
                 )
             found[name] = replace(found[name], default=value.default)
         return tuple(found.values())
+
+    def _joined(self, known: Parameter, other: Parameter) -> Parameter:
+        """Two uses of one symbol: a value and bounds may stand at either, but not differ."""
+        for what in ("default", "min", "max"):
+            one, two = getattr(known, what), getattr(other, what)
+            if None not in (one, two) and one != two:
+                noun = {"default": "values", "min": "least values", "max": "greatest values"}[what]
+                raise AssemblyError(
+                    f"{self.name}: parameter {known.name} has the {noun} {one:g} and {two:g}; give"
+                    " it one"
+                )
+        first, second = (other, known) if known.default is None else (known, other)
+        low, high = (
+            getattr(second, bound) if getattr(first, bound) is None else getattr(first, bound)
+            for bound in ("min", "max")
+        )
+        return replace(first, min=low, max=high)
 
     def used_parameters(self) -> Iterator[Parameter]:
         """Every symbol of components and places, as often as it is used."""

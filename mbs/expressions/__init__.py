@@ -19,21 +19,25 @@ from mbs.expressions.evaluate import (
     without_defaults,
 )
 from mbs.expressions.expression import (
+    MORE_THAN_ZERO,
     Expression,
     Number,
     Operation,
     Parameter,
     Scalar,
     expression,
+    out_of_bounds,
 )
 
 __all__ = [
+    "MORE_THAN_ZERO",
     "Expression",
     "Number",
     "Operation",
     "Parameter",
     "Scalar",
     "expression",
+    "out_of_bounds",
     "parameters_of",
     "renamed",
     "to_float",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,6 +63,10 @@ class Expression:
         return _text(self)
 
 
+MORE_THAN_ZERO = sys.float_info.min
+"""The least value of what must be more than zero: the smallest normal number."""
+
+
 @dataclass(frozen=True, slots=True)
 class Number(Expression):
     """A number that is known."""
@@ -69,6 +74,16 @@ class Number(Expression):
     value: float
 
     __str__ = Expression.__str__
+
+
+def out_of_bounds(value: float, low: float | None, high: float | None) -> str:
+    """What to give in place of a value, the end of a sentence; empty where it is within bounds."""
+    if low is not None and not value >= low:
+        least = "more than zero" if low == MORE_THAN_ZERO else f"{low:g} or more"
+        return f"give {'zero or more' if low == 0 else least}"
+    if high is not None and not value <= high:
+        return f"give {high:g} or less"
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +95,17 @@ class Parameter(Expression):
         default: its value in `default_in` of the Functions, or None when it has none.
         unit: a unit of `mbs.units.UNITS`.
         description: what it means, for tables and FMUs.
+        min: the least value that has a sense, or None; components add their own rules, such as of
+            masses.
+        max: the greatest, or None.
     """
 
     name: str
     default: float | None = None
     unit: str = "1"
     description: str = ""
+    min: float | None = None
+    max: float | None = None
 
     def __post_init__(self) -> None:
         match = TOKEN.fullmatch(self.name) if isinstance(self.name, str) else None
@@ -101,6 +121,17 @@ class Parameter(Expression):
                 f"parameter {self.name}: unit {self.unit!r} is unknown; use one of "
                 + ", ".join(UNITS)
             )
+        for bound in ("min", "max"):
+            if getattr(self, bound) is not None:
+                value = finite(getattr(self, bound), f"parameter {self.name}, {bound}")
+                object.__setattr__(self, bound, value)
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ExpressionError(
+                f"parameter {self.name}: min is {self.min:g} and max is {self.max:g}; give a min"
+                " that is not above max"
+            )
+        if self.default is not None and (fault := out_of_bounds(self.default, self.min, self.max)):
+            raise ExpressionError(f"parameter {self.name} is {self.default:g}; {fault}")
 
     __str__ = Expression.__str__
 

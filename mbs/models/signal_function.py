@@ -54,8 +54,9 @@ def signal_function(
             unknown, or a value is given to what has no motor.
     """
     t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
-    values, by_name = given, False
-    if not isinstance(values, SX):
+    if isinstance(given, SX):
+        values, by_name = given, False
+    else:
         values, by_name = _traced(system, signal, given, (t, q, v))
     size = len(signal.elements)
     if values.numel() != size:

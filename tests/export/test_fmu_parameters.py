@@ -6,7 +6,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import mbs
-from mbs.assembly.parameter_bounds import MORE_THAN_ZERO
+from mbs.expressions import MORE_THAN_ZERO
 from mbs.components import Body, Box, CoulombFriction, Revolute, RigidStop
 from mbs.errors import ExportError, ModelError, SolverError
 from mbs.export.fmu.system_fmu import Contents, Settings, fmu_model

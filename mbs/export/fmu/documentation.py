@@ -5,10 +5,10 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable
 
-from mbs.assembly.parameter_bounds import MORE_THAN_ZERO
 from mbs.export.fmu.about import Table
 from mbs.export.fmu.description import WITH_START, FmuModel, Kind, Variable
 from mbs.export.fmu.svg import svg
+from mbs.expressions import MORE_THAN_ZERO
 from mbs.operations import count
 from mbs.units import UNITS
 

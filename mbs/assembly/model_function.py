@@ -276,7 +276,7 @@ class ModelFunction(Function):
             return
         system = self._system
         q, p = inputs.get("q"), inputs.get("p")
-        point = [q] if p is None else [q, p]
+        point: list[Any] = [q] if p is None else [q, p]
         wanted = [(system.nq, 1), (len(system.parameters), 1)][: len(point)]
         alone = len(point) == 1 + bool(system.parameters) and all(isinstance(x, DM) for x in point)
         if alone and [x.shape for x in point] == wanted and self._holds(point):
@@ -295,7 +295,7 @@ class ModelFunction(Function):
             if whole:
                 (self._check_posture or _PLAIN).refuse(system, q_k, DM() if p_k is None else p_k)
 
-    def _holds(self, point: Sequence[DM]) -> bool:
+    def _holds(self, point: Sequence[Any]) -> bool:
         return bool(self._validity().call([*point])[0] == 1)
 
     def _validity(self) -> Function:

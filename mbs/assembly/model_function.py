@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -229,22 +230,26 @@ class ModelFunction(Function):
             raise ModelError(f"{self._title}: {what}; the inputs are {self._shapes()}")
         return {name: given[name] for name in names}
 
-    def _input(self, name: str, value: Any) -> DM | SX | MX:
+    def _input(self, name: str, value: Any) -> Any:
         """What CasADi takes for a value: finite numbers of the size of an input, or symbols."""
         if isinstance(value, (list, tuple)) and any(isinstance(e, (SX, MX, DM)) for e in value):
             value = casadi.vertcat(*value)
         if isinstance(value, (SX, MX, DM)):
             self._check_size(name, value.shape, value)
+            finite = not isinstance(value, DM) or value.is_regular()
         else:
             array = doubles(value)
             if isinstance(array, str):
                 raise ModelError(f"{self._title}: {name} {array}")
             self._check_size(name, array.shape, value)
-            value = _dm(array)
-        taken: DM | SX | MX = value
-        if isinstance(taken, DM) and not taken.is_regular():
+            line = array.ndim == 1 and array.size > 0
+            # the sum of squares is the fastest question, which a large number may also answer
+            finite = (line and math.isfinite(array.dot(array))) or bool(np.isfinite(array).all())
+            checked = self._asks and name in ("q", "p")
+            value = array if line and not checked else _dm(array)
+        if not finite:
             raise ModelError(f"{self._title}: {name} is not finite; give numbers")
-        return taken
+        return value
 
     def _check_size(self, name: str, shape: tuple[int, ...], value: Any) -> None:
         wanted, width = self._sizes[name]

@@ -57,7 +57,7 @@ def _refuses(system: System, q: Any, p: Any) -> None:
     residuals = casadi.vertcat(*(row.residual - row.bound for row in rows))
     found = Function("rows", [symbols, system.p], [residuals])(q, p).full().ravel()
     row = rows[int(np.argmin(found <= 0))]
-    raise ModelError(f"{system.name}: {row.name} is passed by these values; give others")
+    raise ModelError(f"{system.name}: {row.sentence}")
 
 
 _PLAIN = PostureCheck(_plainly_valid, _refuses)

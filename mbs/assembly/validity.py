@@ -5,6 +5,7 @@ Loops add rows of their own; `mbs.models.validity` has all of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,7 +15,9 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
+from mbs.assembly.parameter_bounds import Bounds
 from mbs.assembly.rates import quaternion_slices
+from mbs.expressions import out_of_bounds
 
 if TYPE_CHECKING:
     from mbs.assembly.system import System
@@ -33,37 +36,67 @@ class Row:
         name: what it tells.
         residual: (1, 1).
         bound: (1, 1) or a number.
+        sentence: what is wrong where it is larger, and what to do.
     """
 
     name: str
     residual: SX
     bound: SX | float
+    sentence: str
 
 
 def plain_rows(system: System, q: SX) -> list[Row]:
-    """Rows of quaternions and of parameters that have bounds.
+    """Rows of quaternions, of parameters that have bounds, and of what is computed from them.
 
     Args:
         system: any.
         q: (nq, 1).
     """
+    quaternions = quaternion_rows(system, q, quaternion_slices(system.tree))
+    return [*quaternions, *_parameter_rows(system), *field_rows(system)]
+
+
+def quaternion_rows(system: System, q: SX, parts: Iterable[slice]) -> list[Row]:
+    """The lengths of some quaternions.
+
+    Args:
+        system: any.
+        q: (nq, 1).
+        parts: where they stand in q.
+    """
     rows = []
-    for part in quaternion_slices(system.tree):
+    for part in parts:
         joint = system.coordinates[part.start].joint
-        length = casadi.norm_2(q[part])
-        rows.append(Row(f"quaternion of {joint}", casadi.fabs(length - 1), UNIT))
+        away = casadi.fabs(casadi.norm_2(q[part]) - 1)
+        wrong = f"the quaternion of {joint} is not of unit length; divide it by its length"
+        rows.append(Row(f"quaternion of {joint}", away, UNIT, wrong))
+    return rows
+
+
+def _parameter_rows(system: System) -> list[Row]:
     symbols = system.symbol_table
-    for name, (low, high) in system.bounds.items():
-        if low is not None:
-            rows.append(Row(f"least value of {name}", -symbols[name], -low))
-        if high is not None:
-            rows.append(Row(f"greatest value of {name}", symbols[name], high))
-    for own in system.bounded:
-        low, high = own.bounds
-        if low is not None:
-            rows.append(Row(f"least value of {own.name}", -own.value, -low))
-        if high is not None:
-            rows.append(Row(f"greatest value of {own.name}", own.value, high))
+    bounds = system.bounds.items()
+    return [row for name, own in bounds for row in _bound_rows(name, symbols[name], own)]
+
+
+def field_rows(system: System) -> list[Row]:
+    """What is computed from parameters, such as a mass of "M1 + M2", and has bounds.
+
+    Args:
+        system: any.
+    """
+    return [row for own in system.bounded for row in _bound_rows(own.name, own.value, own.bounds)]
+
+
+def _bound_rows(name: str, value: SX, bounds: Bounds) -> list[Row]:
+    low, high = bounds
+    rows = []
+    if low is not None:
+        wrong = f"{name} is too small; {out_of_bounds(-math.inf, low, None)}"
+        rows.append(Row(f"least value of {name}", -value, -low, wrong))
+    if high is not None:
+        wrong = f"{name} is too large; {out_of_bounds(math.inf, None, high)}"
+        rows.append(Row(f"greatest value of {name}", value, high, wrong))
     return rows
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.validity import plain_fault
 from mbs.errors import ModelError
 from mbs.loops.closing import Vector
 from mbs.loops.posture import require_closed, solve
@@ -36,9 +37,12 @@ def start(
     Raises:
         Unclosable: the loops cannot be closed at these positions.
         LoopError: q0 holds all positions and leaves the loops open.
-        ModelError: a name is unknown, or the loops allow no motion with these velocities.
+        ModelError: a name is unknown, a quaternion is not of unit length, or the loops allow no
+            motion with these velocities.
     """
     q = np.array(system.position(q0))
+    if fault := plain_fault(system, q, None):
+        raise ModelError(f"{system.name}: {fault}")
     if not system.is_closed:
         return q, np.array(system.velocity(v0))
     if isinstance(q0, Mapping) or q0 is None:

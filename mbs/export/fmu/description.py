@@ -185,6 +185,21 @@ class Entry:
     variable: Variable
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Rules:
+    """What states at the start, and parameters, must fulfil beside the bounds of each.
+
+    Attributes:
+        excess: `excess(x, p) -> (k, 1)`, more than zero where a rule is broken.
+        sentences: for each what is wrong and what to do.
+        at_start: how many of them, the first ones, are of states at the start.
+    """
+
+    excess: casadi.Function
+    sentences: tuple[str, ...]
+    at_start: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FmuModel:
     """All that an FMU says and computes; nx, nz, nu, np, ny count the variables below.
@@ -212,6 +227,7 @@ class FmuModel:
             where nothing jumps: it passes configurations in which the states determine nothing.
             None where there is none.
         jumps: events; None when the motion is smooth.
+        rules: what is asked of states and parameters; None where their bounds say all.
         stop_time: default end of a simulation, s.
         tolerance: default relative tolerance of the integration.
         step_size: default communication step, s.
@@ -239,6 +255,7 @@ class FmuModel:
     passive: tuple[int, int, int] = (0, 0, 0)
     tree: TreeState | None = None
     jumps: Jumps | None = None
+    rules: Rules | None = None
     stop_time: float = 10.0
     tolerance: float = 1e-8
     step_size: float = 0.01

@@ -25,7 +25,8 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         Of a tree, `mbs_tree_rhs` and others as `TreeState` has them. Where there are events,
         `mbs_first`, `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
         `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs; the
-        last three also of a tree, as `mbs_tree_indicators` and so on. For an implicit solver
+        last three also of a tree, as `mbs_tree_indicators` and so on. Where states and parameters
+        have rules, `mbs_excess(x, p)`. For an implicit solver
         `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
     """
     t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
@@ -54,6 +55,9 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         answers.extend(_events(model.jumps, point))
         rates = _rates(model, point, du)
         answers.append(casadi.Function("mbs_rates", [*point, du], _dense([rates])))
+    if model.rules is not None:
+        excess = _dense(model.rules.excess.call([x, _own(model, p)]))
+        answers.append(casadi.Function("mbs_excess", [x, p], excess))
     if model.solver == "rodas":
         slopes = _dense(_jacobian(model, point, du))
         answers.append(casadi.Function("mbs_jacobian", [*point, du], slopes))

@@ -7,13 +7,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import casadi
+from casadi import SX, Function
+
 from mbs.assembly import System, symbolic
 from mbs.assembly.model_function import require_system
+from mbs.assembly.rates import quaternion_slices
+from mbs.assembly.validity import field_rows, quaternion_rows
 from mbs.errors import ExportError
 from mbs.export.fmu.arrays import Group, in_arrays
 from mbs.export.fmu.c_law import read_sources
 from mbs.export.fmu.controller import Law, controller_of
-from mbs.export.fmu.description import FmuModel, Origin, Solver
+from mbs.export.fmu.description import FmuModel, Origin, Rules, Solver
 from mbs.export.fmu.events import jumps
 from mbs.export.fmu.faces import require_version
 from mbs.export.fmu.interface import interface_of, terminals
@@ -212,6 +217,7 @@ def fmu_model(
         passive=_passive(state),
         tree=tree,
         jumps=jumps(system, state),
+        rules=_rules(system, state),
         **asdict(settings),
         documentation="\n\n".join([system.report(), system.source]),
         terminals=terminals(system, interface, (*x_variables, *u_variables, *y_variables)),
@@ -219,6 +225,23 @@ def fmu_model(
         about=about(system),
     )
     return in_arrays(model, _arrays(state)) if arrays else model
+
+
+def _rules(system: System, state: MinimalState) -> Rules | None:
+    """Quaternions of unit length at the start, and bounds of what parameters make together."""
+    x, q = SX.sym("x", state.rhs.size1_in(1)), SX.sym("q", system.nq)
+    q[list(state.positions)] = x[: len(state.positions)]
+    own = [part for part in quaternion_slices(system.tree) if part.start in state.positions]
+    starts, fields = quaternion_rows(system, q, own), field_rows(system)
+    rows = [*starts, *fields]
+    if not rows:
+        return None
+    excess = casadi.vertcat(*(row.residual - row.bound for row in rows))
+    return Rules(
+        excess=Function("excess", [x, system.p], [excess]),
+        sentences=tuple(row.sentence for row in rows),
+        at_start=len(starts),
+    )
 
 
 def _arrays(state: MinimalState) -> tuple[Group, ...]:

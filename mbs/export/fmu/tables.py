@@ -86,6 +86,11 @@ def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
         names = (*names, *_TREE, *(_TREE_EVENTS if tree.events is not None else ()))
     if model.jumps is not None:
         names = (*names, *_EVENTS)
+    if (rules := model.rules) is not None:
+        names = (*names, "mbs_excess")
+        options += f"#define MODEL_RULES_AT_START {rules.at_start}\n"
+        options += f"#define MODEL_RULES {len(rules.sentences)}\n"
+        options += "extern const char *const MODEL_SENTENCES[];\n"
     if model.solver == "rodas":
         names = (*names, "mbs_jacobian")
         options += "#define MODEL_RODAS\n"
@@ -140,6 +145,7 @@ def source(model: FmuModel, *, adjoint: bool) -> str:
         _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
         _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
+        *_sentences(model),
         *_size_tables(model),
         *_block_tables(_blocks(model)),
         *_tree_tables(model),
@@ -179,6 +185,13 @@ def _tree_tables(model: FmuModel) -> list[str]:
         _table("const int MODEL_TREE_HELD", map(str, tree.held)),
         _numbers("MODEL_TREE_UNITS", (1 / unit for unit in tree.units)),
     ]
+
+
+def _sentences(model: FmuModel) -> list[str]:
+    """What is said where a rule is broken."""
+    if model.rules is None:
+        return []
+    return [_table("const char *const MODEL_SENTENCES", map(_quoted, model.rules.sentences))]
 
 
 def _size_tables(model: FmuModel) -> list[str]:

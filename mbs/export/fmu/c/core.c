@@ -210,6 +210,9 @@ static int allocate(core *c) {
 #if NK > 0
         mbs_first_work, mbs_indicators_work, mbs_rates_work, mbs_jump_work,
 #endif
+#ifdef MODEL_RULES
+        mbs_excess_work,
+#endif
 #if NK > 0 && defined MODEL_TREE
         mbs_tree_indicators_work, mbs_tree_rates_work, mbs_tree_jump_work,
 #endif
@@ -296,10 +299,27 @@ core_status core_enter_initialization(core *c) {
     return CORE_OK;
 }
 
+/* States keep to their rules from the start on; parameters may be set later. */
+core_status core_check_rules(core *c) {
+#ifdef MODEL_RULES
+    double excess[MODEL_RULES];
+    int i = c->m.mode == INITIALIZATION ? 0 : MODEL_RULES_AT_START;
+    c->arg[0] = c->m.values + STATES;
+    c->arg[1] = c->m.values + PARAMETERS;
+    c->res[0] = excess;
+    if (mbs_excess(c->arg, c->res, c->iw, c->w, 0)) excess[i] = NAN;
+    for (; i < MODEL_RULES; i++)
+        if (!(excess[i] <= 0.0)) return core_refuse(c, "%s: %s", c->name, MODEL_SENTENCES[i]);
+#endif
+    (void)c;
+    return CORE_OK;
+}
+
 core_status core_exit_initialization(core *c) {
     core_status status;
     int changed;
     if (!core_allowed(c, INITIALIZATION, "leaving initialization mode")) return CORE_ERROR;
+    if (core_check_rules(c)) return CORE_ERROR;
     status = core_refresh(c);
     if (status) return status;
     status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);

@@ -38,7 +38,7 @@ core_status core_do_step(core *c, double time, double h, core_stop *stop) {
     if (fabs(time - c->m.time) > SAME_TIME * fmax(1.0, fabs(time)))
         return core_refuse(c, "%s: the step starts at time %.12g; the model is at %.12g", c->name,
                            time, c->m.time);
-    if (core_before_stop(c, end)) return CORE_ERROR;
+    if (core_before_stop(c, end) || core_check_rules(c)) return CORE_ERROR;
     core_prepare_solver(c);
     c->solver.since_output = 0;
     core_begin_inputs(c);

@@ -40,6 +40,7 @@ core_status core_update_discrete_states(core *c, int *changed) {
 core_status core_enter_continuous_mode(core *c) {
     if (!core_allowed(c, c->m.cosimulation ? 0 : EVENT, "entering continuous-time mode"))
         return CORE_ERROR;
+    if (core_check_rules(c)) return CORE_ERROR;
     c->m.mode = CONTINUOUS;
 #if MODEL_TREE_OUTSIDE
     if (c->m.charts.tangent) return CORE_OK;

@@ -20,6 +20,7 @@ const char *core_mode_name(int mode);
 core_status core_before_stop(core *c, double time);
 
 /* A message, and the status of an evaluation that has no answer. */
+core_status core_check_rules(core *c);
 core_status core_no_answer(core *c, const char *format, ...);
 
 /* The states in words, in the array. */

@@ -13,6 +13,7 @@ from mbs.components.motion import Motion
 from mbs.expressions import to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint
 from mbs.view.measures import Measures
+from mbs.view.mesh import turned_to
 from mbs.view.posed import Array, Posed
 from mbs.view.primitives import (
     Axis,
@@ -95,7 +96,7 @@ def _axes(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primi
         else:
             side = 1.9 * radius
             seat = _seat(scene, joint, direction, 1.5 * side)
-            pose = scene.local_pose(link, _turned_to(direction), center + seat)
+            pose = scene.local_pose(link, turned_to(direction), center + seat)
             yield Box(role, link, colour, pose, (side, side, 1.5 * side))
         a, b = _around(scene, link, center, 4.5 * sizes.joint * direction)
         yield Axis("axis", link, a, b)
@@ -131,14 +132,6 @@ def _seat(scene: Posed, joint: SkeletonJoint, direction: Array, length: float) -
         for k in other.points
     )
     return np.array(-1.1 * length * direction if crowded else 0.0 * direction)
-
-
-def _turned_to(direction: Array) -> Array:
-    """A rotation whose z axis is a direction."""
-    other = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    x = np.cross(other, direction)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(direction, x), direction])
 
 
 def _wheel(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:

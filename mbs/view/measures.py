@@ -110,7 +110,7 @@ def views(scene: Posed) -> dict[str, Vector]:
     up = scene.up
     right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else _across(up))
     front = np.cross(right, up)
-    normal = _plane_normal(scene)
+    normal = plane_normal(scene)
     flat = normal is not None and abs(float(normal @ up)) < 0.1
     if flat and normal is not None:
         front = normal if float(normal @ front) > -1e-9 else -normal
@@ -127,7 +127,7 @@ def _is_level(scene: Posed) -> bool:
     """Whether everything lies near a level plane."""
     heights = scene.points @ scene.up
     spread = float(np.linalg.norm(np.ptp(scene.points, axis=0)))
-    return bool(np.ptp(heights) < 0.12 * spread) and _plane_normal(scene) is not None
+    return bool(np.ptp(heights) < 0.12 * spread) and plane_normal(scene) is not None
 
 
 def _across(up: Array) -> Array:
@@ -136,7 +136,7 @@ def _across(up: Array) -> Array:
     return x - float(x @ up) * up
 
 
-def _plane_normal(scene: Posed) -> Array | None:
+def plane_normal(scene: Posed) -> Array | None:
     """The common direction of all revolute axes; None where they differ, or where there is none."""
     axes = [
         scene.directions[axis.direction]

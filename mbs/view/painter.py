@@ -11,7 +11,7 @@ import numpy as np
 from mbs.result import optional_module
 from mbs.view.camera import Camera, camera
 from mbs.view.mesh import Faces, faces_of, stretched
-from mbs.view.palette import PALETTE, Theme
+from mbs.view.palette import PALETTE, Theme, rgb
 from mbs.view.posed import Array
 from mbs.view.primitives import Label, Span, Spring
 from mbs.view.scene import HIDDEN, Scene
@@ -158,11 +158,7 @@ class Painter:
                 self.axes.text(x + 0.02, y, item.text, gid=item.text, **look)
 
     def _colour(self, name: str) -> Array:
-        colours = PALETTE[self.theme]
-        first, _, number = name.partition(".")
-        value = colours[first]
-        text = value[int(number)] if isinstance(value, list) else str(value)
-        return np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])
+        return rgb(name, self.theme)
 
     def _number(self, name: str) -> float:
         value = PALETTE[self.theme][name]

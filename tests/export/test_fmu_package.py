@@ -22,13 +22,13 @@ import mbs
 from mbs.errors import ExportError
 from mbs.export.fmu.about import About
 from mbs.export.fmu.description import FmuModel, State, Variable
-from mbs.export.fmu.figure import Figure, Stroke
 from mbs.export.fmu.licences import MBS
 from mbs.export.fmu.pack import write_fmu
 from mbs.export.fmu.reference import FOLDER, reference_files
 from mbs.solvers.integrate import integrate
+from mbs.view.drawing import Drawing, Stroke
 
-DRAWN = About(figure=Figure((Stroke("link", ((0.0, 0.0), (100.0, 0.0))),)))
+DRAWN = About(drawing=Drawing((Stroke("link", "link0", ((0.0, 0.0), (100.0, 0.0))),)))
 
 
 def model():

@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from mbs.assembly.parameter_bounds import MORE_THAN_ZERO
 from mbs.export.fmu.about import Table
 from mbs.export.fmu.description import WITH_START, FmuModel, Kind, Variable
-from mbs.export.fmu.svg import svg
 from mbs.operations import count
 from mbs.units import UNITS
+from mbs.view.drawing_files import svg
 
 _PAGE = """\
 <!DOCTYPE html>
@@ -67,6 +67,7 @@ _FUNCTIONS = {
     "derivatives and outputs": "rhs",
     "one step that closes the loops": "closure",
 }
+_KEY = {"active": "Orange: driven joints", "loop": "Red: joints that close loops"}
 _LICENCE = (
     "The headers fmi2*.h or fmi3*.h among the sources are those of the FMI standard, copyright"
     " Modelica Association, under the 2-clause BSD licence; the other C files but model.c are those"
@@ -99,14 +100,15 @@ def documentation(model: FmuModel) -> str:
 
 
 def _drawing(model: FmuModel) -> list[str]:
-    if model.about is None or model.about.figure is None:
+    if model.about is None or model.about.drawing is None:
         return []
-    figure = model.about.figure
-    caption = f"{model.name} at its start, {figure.caption}."
-    closing = any(stroke.style == "closing" for stroke in figure.strokes)
-    words = f"{caption} Orange: joints that close loops." if closing else caption
+    drawn = model.about.drawing
+    caption = f"{model.name} at its start, {drawn.caption}."
+    used = {stroke.colour for stroke in drawn.strokes}
+    key = [words for colour, words in _KEY.items() if colour in used]
+    words = f"{caption} {'; '.join(key)}." if key else caption
     return [
-        f"<figure>\n{svg(figure, caption)}",
+        f"<figure>\n{svg(drawn, caption)}",
         f"<figcaption>{html.escape(words)}</figcaption>",
         "</figure>",
     ]

@@ -12,8 +12,8 @@ from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.tables import LinkRow
 from mbs.assembly.tree import Link
 from mbs.export.fmu.about import About, Table
-from mbs.export.fmu.drawing import figure
 from mbs.spatial.inertia import TEN_PARAMETERS
+from mbs.view.drawing import drawing
 
 _LONGEST = 24
 """Letters of an expression that a cell of a table holds."""
@@ -32,7 +32,7 @@ def about(system: System) -> About:
         _bodies(system),
         _loops(system),
     )
-    return About(tuple(table for table in tables if table.rows), figure(system))
+    return About(tuple(table for table in tables if table.rows), drawing(system))
 
 
 def _joints(system: System) -> Table:

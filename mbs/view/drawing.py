@@ -29,6 +29,7 @@ from mbs.view.primitives import (
     Ring,
     Span,
     Spring,
+    Vector,
 )
 from mbs.view.scene import HIDDEN, scene
 
@@ -125,7 +126,7 @@ class _Eye:
         """(..., 3) points of the base frame: right, up, near."""
         return np.array(self.scale * (points @ self.axes.T))
 
-    def moved(self, link: int, points: Sequence[Sequence[float]] | Array) -> Array:
+    def moved(self, link: int, points: Sequence[Vector] | Vector | Array) -> Array:
         """(..., 3) points in the frame of a link: right, up, near."""
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return self.seen(np.array(points) @ R.T + p)
@@ -195,20 +196,19 @@ def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
 def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
     """The strokes of a shape, and how near its middle is."""
     if isinstance(item, (Span, Spring)):
-        ends = [eye.moved(k, end) for k, end in zip(item.links, item.ends, strict=True)]
-        middle = float((ends[0] + ends[1])[2]) / 2
+        start, end = (eye.moved(k, at) for k, at in zip(item.links, item.ends, strict=True))
+        middle = float((start + end)[2]) / 2
         if isinstance(item, Spring):
-            return [_coil(item, *ends, eye.scale * item.radius)], middle
-        return [_area(item, _capsule(ends, eye.scale * item.radius))], middle
+            return [_coil(item, start, end, eye.scale * item.radius)], middle
+        return [_area(item, _capsule([start, end], eye.scale * item.radius))], middle
     if isinstance(item, Bar):
         ends = list(eye.moved(item.link, (item.a, item.b)))
         area = _area(item, _capsule(ends, eye.scale * item.radius))
         return [area], float((ends[0] + ends[1])[2]) / 2
     if isinstance(item, Ball):
         center = eye.moved(item.link, item.at)
-        return [_area(item, center[:2] + eye.scale * item.radius * _CIRCLE[:, :2])], float(
-            center[2]
-        )
+        ring = center[:2] + eye.scale * item.radius * _CIRCLE[:, :2]
+        return [_area(item, ring)], float(center[2])
     if isinstance(item, Cylinder):
         return _cylinder(item, eye)
     if isinstance(item, Box):
@@ -217,8 +217,8 @@ def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
         corners = eye.moved(item.link, item.points)
         return [_area(item, corners[:, :2], item.opacity)], float(corners[:, 2].mean()) - _SIZE
     if isinstance(item, Ring):
-        ring = item.radius * _CIRCLE @ turned_to(np.array(item.axis)).T + np.array(item.at)
-        points = eye.moved(item.link, ring)
+        around = item.radius * _CIRCLE @ turned_to(np.array(item.axis)).T + np.array(item.at)
+        points = eye.moved(item.link, around)
         tube = 2 * eye.scale * item.tube
         line = Stroke(item.role, item.colour, _path(points), closed=True, width=tube)
         return [line], float(points[:, 2].mean())

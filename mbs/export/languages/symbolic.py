@@ -15,39 +15,26 @@ from mbs.errors import ModelError
 from mbs.export.languages.plan import CONDITIONS, Plan
 from mbs.export.languages.unit import Line
 from mbs.operations.graph import Node
+from mbs.operations.text import CODES, NAMES
 
 Expr = Any
 
 _SYMPY = {
-    casadi.OP_SIN: sympy.sin,
-    casadi.OP_COS: sympy.cos,
-    casadi.OP_TAN: sympy.tan,
-    casadi.OP_ASIN: sympy.asin,
-    casadi.OP_ACOS: sympy.acos,
-    casadi.OP_ATAN: sympy.atan,
-    casadi.OP_ATAN2: sympy.atan2,
-    casadi.OP_SINH: sympy.sinh,
-    casadi.OP_COSH: sympy.cosh,
-    casadi.OP_TANH: sympy.tanh,
-    casadi.OP_ASINH: sympy.asinh,
-    casadi.OP_ACOSH: sympy.acosh,
-    casadi.OP_ATANH: sympy.atanh,
-    casadi.OP_EXP: sympy.exp,
-    casadi.OP_LOG: sympy.log,
     casadi.OP_FABS: sympy.Abs,
-    casadi.OP_ERF: sympy.erf,
+    **{
+        CODES[name]: getattr(sympy, name)
+        for name in (
+            *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "erf"),
+            *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+        )
+    },
 }
 _OURS = {
-    casadi.OP_SIGN: "step",
-    casadi.OP_FLOOR: "floor_",
-    casadi.OP_CEIL: "ceil_",
-    casadi.OP_FMOD: "fmod",
-    casadi.OP_COPYSIGN: "copysign",
-    casadi.OP_FMIN: "fmin",
-    casadi.OP_FMAX: "fmax",
-    casadi.OP_HYPOT: "hypot",
-    casadi.OP_LOG1P: "log1p",
-    casadi.OP_EXPM1: "expm1",
+    **{casadi.OP_SIGN: "step", casadi.OP_FLOOR: "floor_", casadi.OP_CEIL: "ceil_"},
+    **{
+        CODES[name]: name
+        for name in ("fmod", "copysign", "fmin", "fmax", "hypot", "log1p", "expm1")
+    },
 }
 """Functions that sympy has under other meanings, or not at all; see `Forms`."""
 
@@ -142,7 +129,7 @@ class Writer:
         if node.op in _OURS:
             return _UNDEFINED[_OURS[node.op]](*values)
         raise ModelError(
-            f"{self.plan.graph.name}: it has the operation {_operation_name(node.op)}, which has"
+            f"{self.plan.graph.name}: it has the operation {NAMES[node.op]}, which has"
             " no text; expand the Function and leave that operation out"
         )
 
@@ -258,11 +245,6 @@ def _power(base: Expr, exponent: Expr) -> Expr:
         positive = _pow(base, Integer(abs(int(exponent))))
         return positive if exponent > 0 else _inverse(positive)
     return _pow(base, exponent)
-
-
-def _operation_name(op: int) -> str:
-    names = (name for name, code in vars(casadi).items() if name.startswith("OP_") and code == op)
-    return next(names, str(op)).removeprefix("OP_").lower()
 
 
 _RULES: Mapping[int, Callable[..., Expr]] = {

@@ -26,6 +26,7 @@ from mbs.expressions.expression import (
     Scalar,
     expression,
 )
+from mbs.expressions.numbers import number, plain_numbers, whole_number
 
 __all__ = [
     "Expression",
@@ -34,10 +35,13 @@ __all__ = [
     "Parameter",
     "Scalar",
     "expression",
+    "number",
     "parameters_of",
+    "plain_numbers",
     "renamed",
     "to_float",
     "to_sx",
+    "whole_number",
     "with_values",
     "without_defaults",
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mbs.app.cli.arguments import Json, Parameters, Robot, examples
-from mbs.app.cli.loading import numbers, posture, system, value
+from mbs.app.cli.loading import numbers, posture, system
 from mbs.app.cli.printing import note, print_json
 from mbs.errors import ModelError
 
@@ -158,7 +158,9 @@ def _pose(
 
 
 def _three(texts: Sequence[str], option: str) -> list[float]:
-    return [value(text, option) for text in texts]
+    from mbs.expressions import number
+
+    return [number(text, option) for text in texts]
 
 
 def _reason(found: Postures) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mbs.app.cli.arguments import Json, Parameters, Robot, examples
+from mbs.app.cli.arguments import Json, Parameters, Robot, examples, output
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import Table, note, number, print_json, print_tables
@@ -76,16 +76,7 @@ Tolerance = Annotated[
 Method = Annotated[str, typer.Option(metavar="METHOD", help="dopri5, or rodas for stiff systems.")]
 
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="CSV file to write, - for the standard output.",
-        show_default=False,
-    ),
-]
+Output = Annotated[Path | None, output("CSV file to write, - for the standard output.")]
 Plot = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Picture to write: .png, .svg or .pdf.", show_default=False),

@@ -16,19 +16,19 @@ import numpy as np
 from mbs.assembly import System
 from mbs.view.measures import plane_normal
 from mbs.view.mesh import turned_to
-from mbs.view.posed import Array, Posed, posed
+from mbs.view.posed import Array, PosedLinks, posed
 from mbs.view.primitives import (
-    Axis,
-    Ball,
-    Bar,
-    Box,
-    Cylinder,
-    Frame,
-    Plate,
+    AxisShape,
+    BallShape,
+    BarShape,
+    BoxShape,
+    CylinderShape,
+    FrameShape,
+    PlateShape,
     Primitive,
-    Ring,
-    Span,
-    Spring,
+    RingShape,
+    SpanShape,
+    SpringShape,
     Vector,
 )
 from mbs.view.scene import HIDDEN, scene
@@ -158,7 +158,7 @@ def drawing(
     return Drawing(tuple(strokes), placed(_names(at, eye)), eye.caption)
 
 
-def _eye(at: Posed, iso: Array) -> _Eye:
+def _eye(at: PosedLinks, iso: Array) -> _Eye:
     """Into the plane in which everything moves where there is one, right and up positive."""
     normal = plane_normal(at)
     slides = [
@@ -195,36 +195,36 @@ def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
 
 def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
     """The strokes of a shape, and how near its middle is."""
-    if isinstance(item, (Span, Spring)):
+    if isinstance(item, (SpanShape, SpringShape)):
         start, end = (eye.moved(k, at) for k, at in zip(item.links, item.ends, strict=True))
         middle = float((start + end)[2]) / 2
-        if isinstance(item, Spring):
+        if isinstance(item, SpringShape):
             return [_coil(item, start, end, eye.scale * item.radius)], middle
         return [_area(item, _capsule([start, end], eye.scale * item.radius))], middle
-    if isinstance(item, Bar):
+    if isinstance(item, BarShape):
         ends = list(eye.moved(item.link, (item.a, item.b)))
         area = _area(item, _capsule(ends, eye.scale * item.radius))
         return [area], float((ends[0] + ends[1])[2]) / 2
-    if isinstance(item, Ball):
+    if isinstance(item, BallShape):
         center = eye.moved(item.link, item.at)
         ring = center[:2] + eye.scale * item.radius * _CIRCLE[:, :2]
         return [_area(item, ring)], float(center[2])
-    if isinstance(item, Cylinder):
+    if isinstance(item, CylinderShape):
         return _cylinder(item, eye)
-    if isinstance(item, Box):
+    if isinstance(item, BoxShape):
         return _box(item, eye)
-    if isinstance(item, Plate):
+    if isinstance(item, PlateShape):
         corners = eye.moved(item.link, item.points)
         return [_area(item, corners[:, :2], item.opacity)], float(corners[:, 2].mean()) - _SIZE
-    if isinstance(item, Ring):
+    if isinstance(item, RingShape):
         around = item.radius * _CIRCLE @ turned_to(np.array(item.axis)).T + np.array(item.at)
         points = eye.moved(item.link, around)
         tube = 2 * eye.scale * item.tube
         line = Stroke(item.role, item.colour, _path(points), closed=True, width=tube)
         return [line], float(points[:, 2].mean())
-    if isinstance(item, Frame):
+    if isinstance(item, FrameShape):
         return _tripod(item, eye)
-    assert isinstance(item, Axis), f"{type(item).__name__} has no strokes"
+    assert isinstance(item, AxisShape), f"{type(item).__name__} has no strokes"
     ends = list(eye.moved(item.link, (item.a, item.b)))
     line = Stroke(item.role, item.colour, _path(np.array(ends)), width=0.3)
     long = math.dist(*line.points) > 0.01 * _SIZE  # none of an axis that is seen end on
@@ -240,7 +240,7 @@ def _capsule(ends: Sequence[Array], radius: float) -> Array:
     return hull(np.vstack([end[:2] + radius * _CIRCLE[:, :2] for end in ends]))
 
 
-def _cylinder(item: Cylinder, eye: _Eye) -> tuple[list[Stroke], float]:
+def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
     """Its outline, the end that is seen, and the bore there."""
     a, b = np.array(item.a), np.array(item.b)
     across = _CIRCLE @ turned_to(b - a).T
@@ -256,7 +256,7 @@ def _cylinder(item: Cylinder, eye: _Eye) -> tuple[list[Stroke], float]:
     return parts, float(sum(heads)) / 2
 
 
-def _box(item: Box, eye: _Eye) -> tuple[list[Stroke], float]:
+def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
     """The sides that are seen."""
     pose = np.array(item.pose).reshape(3, 4)
     local = _CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
@@ -271,7 +271,7 @@ def _box(item: Box, eye: _Eye) -> tuple[list[Stroke], float]:
     return parts, float(corners[:, 2].mean())
 
 
-def _tripod(item: Frame, eye: _Eye) -> tuple[list[Stroke], float]:
+def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
     """Its three axes, but one that points at the eye."""
     pose = np.array(item.pose).reshape(3, 4)
     ends = pose[:, 3] + item.length * pose[:, :3].T
@@ -284,7 +284,7 @@ def _tripod(item: Frame, eye: _Eye) -> tuple[list[Stroke], float]:
     return lines, float(points[0, 2])
 
 
-def _coil(item: Spring, start: Array, end: Array, radius: float) -> Stroke:
+def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
     """A zigzag; a line where its ends are one place on the drawing."""
     start, along = start[:2], (end - start)[:2]
     length = float(np.linalg.norm(along))
@@ -297,7 +297,7 @@ def _coil(item: Spring, start: Array, end: Array, radius: float) -> Stroke:
     return Stroke(item.role, item.colour, _path(np.array(points)), width=0.8)
 
 
-def _grounds(at: Posed, eye: _Eye) -> Iterator[Stroke]:
+def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
     """A line with hatches under every end of a force element on the base."""
     for force in at.parts.forces:
         for link, column in zip(force.links, force.points, strict=True):
@@ -308,14 +308,14 @@ def _grounds(at: Posed, eye: _Eye) -> Iterator[Stroke]:
                     yield Stroke("base", "base", ((head, y), (head - 1.4, y - 1.8)))
 
 
-def _masses(at: Posed, eye: _Eye) -> Iterator[Stroke]:
+def _masses(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
     for link in at.parts.links:
         if link.mass_centre is not None:
             dot = eye.seen(at.points[link.mass_centre])[:2] + 0.8 * _CIRCLE[:, :2]
             yield Stroke("mass", "text", _path(dot), closed=True, opacity=1.0)
 
 
-def _names(at: Posed, eye: _Eye) -> Iterator[Name]:
+def _names(at: PosedLinks, eye: _Eye) -> Iterator[Name]:
     def name(colour: str, text: str, columns: Sequence[int]) -> Name:
         middle = eye.seen(at.points[list(columns)].mean(axis=0))
         return Name(colour, text, (float(middle[0]), float(middle[1])))

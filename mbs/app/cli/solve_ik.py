@@ -13,7 +13,7 @@ from mbs.app.cli.printing import note, print_json
 from mbs.errors import ModelError
 
 if TYPE_CHECKING:
-    from mbs.app.tasks.postures import Postures
+    from mbs.app.tasks.postures import PostureList
     from mbs.assembly import System
 
 EXAMPLES = examples(
@@ -163,7 +163,7 @@ def _three(texts: Sequence[str], option: str) -> list[float]:
     return [number(text, option) for text in texts]
 
 
-def _reason(found: Postures) -> str:
+def _reason(found: PostureList) -> str:
     reason = f"{found.system}: no solution, {found.reason}"
     near = found.nearest
     if near is None:
@@ -174,7 +174,7 @@ def _reason(found: Postures) -> str:
     return f"{reason}; the nearest posture is {nearest}"
 
 
-def _data(found: Postures) -> dict[str, Any]:
+def _data(found: PostureList) -> dict[str, Any]:
     near = found.nearest
     return {
         "robot": found.system,

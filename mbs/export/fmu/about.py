@@ -8,7 +8,7 @@ from mbs.view.drawing import Drawing
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class PageTable:
     """A table of the documentation.
 
     Attributes:
@@ -33,5 +33,5 @@ class About:
         drawing: of it at the start posture, or None; the icon is made of it too.
     """
 
-    tables: tuple[Table, ...] = ()
+    tables: tuple[PageTable, ...] = ()
     drawing: Drawing | None = None

@@ -6,8 +6,8 @@ import html
 from collections.abc import Iterable
 
 from mbs.assembly.parameter_bounds import MORE_THAN_ZERO
-from mbs.export.fmu.about import Table
-from mbs.export.fmu.description import WITH_START, FmuModel, Kind, Variable
+from mbs.export.fmu.about import PageTable
+from mbs.export.fmu.description import WITH_START, FmuModel, FmuVariable, Kind
 from mbs.operations import count
 from mbs.units import UNITS
 from mbs.view.drawing_files import svg
@@ -114,7 +114,7 @@ def _drawing(model: FmuModel) -> list[str]:
     ]
 
 
-def _table(table: Table) -> str:
+def _table(table: PageTable) -> str:
     if not table.rows:
         return ""
     note = f'<p class="note">{html.escape(table.note)}</p>\n' if table.note else ""
@@ -130,18 +130,18 @@ def _row(tag: str, cells: Iterable[str]) -> str:
     return f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
 
 
-def _variables(model: FmuModel) -> list[Table]:
+def _variables(model: FmuModel) -> list[PageTable]:
     tables = []
     for kind, title in _GROUPS:
         rows = [entry.variable for entry in model.entries if entry.kind == kind]
         starts = kind in WITH_START
         columns = ("name", "unit", *(("start",) if starts else ()), "what it is")
         lines = tuple((v.name, v.unit, *_start(v, starts), _words(v)) for v in rows)
-        tables.append(Table(title, columns, lines))
+        tables.append(PageTable(title, columns, lines))
     return tables
 
 
-def _start(v: Variable, shown: bool) -> tuple[str, ...]:
+def _start(v: FmuVariable, shown: bool) -> tuple[str, ...]:
     if not shown:
         return ()
     unit = UNITS[v.unit]
@@ -151,7 +151,7 @@ def _start(v: Variable, shown: bool) -> tuple[str, ...]:
     return (text,)
 
 
-def _words(v: Variable) -> str:
+def _words(v: FmuVariable) -> str:
     bounds = ""
     if v.min is not None or v.max is not None:
         low = "" if v.min is None else "more than 0" if v.min == MORE_THAN_ZERO else f"{v.min:g}"
@@ -160,7 +160,7 @@ def _words(v: Variable) -> str:
     return f"{v.description}{bounds}{', fixed' if v.fixed else ''}"
 
 
-def _simulation(model: FmuModel) -> Table:
+def _simulation(model: FmuModel) -> PageTable:
     step = f", steps of {model.internal_step:g} s" if model.solver == "rk4" else ""
     rows = (
         ("stop time", f"{model.stop_time:g} s"),
@@ -168,10 +168,10 @@ def _simulation(model: FmuModel) -> Table:
         ("relative tolerance", f"{model.tolerance:g}"),
         ("solver of co-simulation", f"{model.solver}{step}"),
     )
-    return Table("Default experiment", ("what", "value"), rows)
+    return PageTable("Default experiment", ("what", "value"), rows)
 
 
-def _operations(model: FmuModel) -> Table:
+def _operations(model: FmuModel) -> PageTable:
     """How many operations the equations take, where they are a graph of scalars."""
     rows = []
     for title, attribute in _FUNCTIONS.items():
@@ -182,4 +182,4 @@ def _operations(model: FmuModel) -> Table:
             rows.append((title, *(str(number) for number in numbers)))
     columns = ("function", "×", "+ −", "÷", "√", "sin, cos, ..", "others")
     note = "What depends on parameters alone is left out."
-    return Table("Operations of the equations", columns, tuple(rows), note)
+    return PageTable("Operations of the equations", columns, tuple(rows), note)

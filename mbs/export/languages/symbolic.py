@@ -12,8 +12,8 @@ import sympy
 from sympy import Add, Float, Integer, Mul, Pow, S, Symbol
 
 from mbs.errors import ModelError
-from mbs.export.languages.plan import CONDITIONS, Plan
-from mbs.export.languages.unit import Line
+from mbs.export.languages.plan import CONDITIONS, LinePlan
+from mbs.export.languages.unit import CodeLine
 from mbs.operations.graph import Node
 from mbs.operations.text import CODES, NAMES
 
@@ -66,7 +66,7 @@ _LARGEST_INTEGER_POWER = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Writer:
+class SympyWriter:
     """What writes the lines of a plan as expressions.
 
     Attributes:
@@ -75,20 +75,20 @@ class Writer:
         squares_as_products: whether x^2 is x*x.
     """
 
-    plan: Plan
+    plan: LinePlan
     names: Mapping[int, str]
     squares_as_products: bool
 
-    def line(self, number: int) -> Line:
+    def line(self, number: int) -> CodeLine:
         """The line of a node."""
         name, node = self.names[number], self.plan.graph.nodes[number]
         choice = self.plan.choices.get(number)
         if choice:
             other = number_of(0.0) if choice.otherwise is None else self.value(choice.otherwise)
-            return Line(name, self.value(choice.value), self.condition(choice.condition), other)
+            return CodeLine(name, self.value(choice.value), self.condition(choice.condition), other)
         if node.op in CONDITIONS:
-            return Line(name, number_of(1.0), self.condition(number), number_of(0.0))
-        return Line(name, self._operation(node))
+            return CodeLine(name, number_of(1.0), self.condition(number), number_of(0.0))
+        return CodeLine(name, self._operation(node))
 
     def value(self, number: int) -> Expr:
         """A node inside of an expression: its name where it has one."""

@@ -46,7 +46,7 @@ def _split(value: SX) -> tuple[bool, SX]:
     return False, value
 
 
-class _Factor(Infix):
+class _FactorText(Infix):
     """A factor, absolute values as in mathematics."""
 
     def _called(self, op: int) -> str:
@@ -57,7 +57,7 @@ def _factor(value: SX) -> str:
     """An expression of numbers and symbols, in brackets where it is a sum."""
     symbols = casadi.symvar(value)
     graph = graph_of(Function("value", [casadi.vertcat(SX(0, 1), *symbols)], [value], ["p"], ["y"]))
-    return _Factor(graph, {"p": [s.name() for s in symbols]}).text(graph.results[0][0], PRODUCT)
+    return _FactorText(graph, {"p": [s.name() for s in symbols]}).text(graph.results[0][0], PRODUCT)
 
 
 def table(rows: Sequence[tuple[str, str]]) -> Iterator[str]:

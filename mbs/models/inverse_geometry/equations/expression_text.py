@@ -28,13 +28,13 @@ def expression_lines(
         results: names of the elements of the output.
         prefix: with a number behind it, the name of what stands in several expressions.
     """
-    writer = _Writer(graph, inputs, prefix)
+    writer = _LineWriter(graph, inputs, prefix)
     texts = [writer.text(number) for number in graph.results[0]]
     written = [f"{name} = {text}" for name, text in zip(results, texts, strict=True)]
     return [*writer.lines, *written]
 
 
-class _Writer(Infix):
+class _LineWriter(Infix):
     """What writes the nodes of a graph.
 
     Attributes:

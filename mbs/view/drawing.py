@@ -15,7 +15,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.view.measures import plane_normal
-from mbs.view.mesh import turned_to
+from mbs.view.mesh import BOX_CORNERS, BOX_FACES, turned_to
 from mbs.view.posed import Array, PosedLinks, posed
 from mbs.view.primitives import (
     AxisShape,
@@ -42,8 +42,6 @@ _SIZE = 100.0
 _PARALLEL = 1e-6  # sine of the angle up to which axes are parallel: files hold six digits
 _ROUND = np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False)
 _CIRCLE = np.column_stack([np.cos(_ROUND), np.sin(_ROUND), np.zeros(32)])
-_CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 _LIGHT = np.array([0.08, 0.2, 0.1])
 """How much lighter sides are that look to the right, upwards and at the eye."""
 
@@ -259,10 +257,10 @@ def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
 def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
     """The sides that are seen."""
     pose = np.array(item.pose).reshape(3, 4)
-    local = _CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
+    local = BOX_CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
     corners = eye.moved(item.link, local)
     parts = []
-    for side in _SIDES:
+    for side in BOX_FACES:
         outside = np.cross(corners[side[2]] - corners[side[0]], corners[side[3]] - corners[side[1]])
         size = float(np.linalg.norm(outside))
         if outside[2] > 1e-3 * size:  # it looks at the eye

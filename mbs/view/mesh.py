@@ -28,8 +28,8 @@ _PIECES = 8
 """A long bar is cut into so many, since faces are sorted by their middles."""
 
 _TURNS = 8
-_BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-_BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +142,7 @@ def _cuboid(size: Array) -> Array:
     """Faces about the origin, cut across the longest side."""
     longest = int(np.argmax(size))
     faces = []
-    for corners in _BOX_CORNERS[np.array(_BOX_FACES)]:
+    for corners in BOX_CORNERS[np.array(BOX_FACES)]:
         first, last = corners[:, longest].min(), corners[:, longest].max()
         cuts = np.linspace(first, last, _PIECES + 1) if last > first else np.array([first, last])
         for low, high in itertools.pairwise(cuts):

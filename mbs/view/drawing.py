@@ -320,7 +320,8 @@ def _names(at: PosedLinks, eye: _Eye) -> Iterator[Name]:
 
     for joint in at.parts.joints:
         if joint.kind not in ("free", "fixed"):
-            yield name("loop" if joint.cut else "text", joint.name, joint.points[:1])
+            end = joint.points[1 if joint.kind == "rollingdisc" else 0]  # at the wheel
+            yield name("loop" if joint.cut else "text", joint.name, (end,))
     for link in at.parts.links:
         columns = [k for segment in link.segments for k in segment]
         columns = columns or ([] if link.mass_centre is None else [link.mass_centre])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import casadi
 import numpy as np
@@ -27,15 +28,16 @@ def main() -> None:
         plain = casadi.Function(model)
         point = [np.full(model.size1_in(k), 0.3) for k in range(model.n_in())]
         point[0] = np.array(system.posture) if system.is_closed else point[0]
-        for kind, (a, b) in {
+        pairs = {
             "interpreted": (model, plain),
             "compiled": (mbs.native.compiled(model), mbs.native.compiled(plain)),
-        }.items():
-            show(f"{name} ddm, {kind}", lambda a=a: a(*point), lambda b=b: b(*point), 1)
+        }
+        for kind, pair in pairs.items():
+            show(f"{name} ddm, {kind}", *(partial(f, *point) for f in pair), 1)
         rows = [np.tile(x, (4096, 1)) for x in point]
-        many, free = (mbs.native.batch(model, checked=checked) for checked in (True, False))
-        label = f"{name} ddm, a row of a batch"
-        show(label, lambda: many(*rows, threads=1), lambda: free(*rows, threads=1), 4096)
+        batches = [mbs.native.batch(model, checked=checked) for checked in (True, False)]
+        one, other = (partial(f, *rows, threads=1) for f in batches)
+        show(f"{name} ddm, a row of a batch", one, other, 4096)
 
 
 def show(label: str, one: Callable[[], object], other: Callable[[], object], states: int) -> None:

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 import mbs
 from mbs.components import Box, CoulombFriction, Revolute, RigidStop
-from mbs.export.fmu.description import FmuModel, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable
 from mbs.export.fmu.pack import write_fmu
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/co_simulation")
@@ -63,12 +63,12 @@ controller = write_fmu(
     FmuModel(
         name="controller",
         rhs=law,
-        inputs=(Variable(name="q", unit="rad"), Variable(name="v", unit="rad/s")),
-        outputs=(Variable(name="tau", unit="N.m"),),
+        inputs=(FmuVariable(name="q", unit="rad"), FmuVariable(name="v", unit="rad/s")),
+        outputs=(FmuVariable(name="tau", unit="N.m"),),
         parameters=(
-            Variable(name="stiffness", unit="N.m/rad", start=60.0),
-            Variable(name="damping", unit="N.m.s/rad", start=12.0),
-            Variable(name="goal", unit="rad", start=1.0),
+            FmuVariable(name="stiffness", unit="N.m/rad", start=60.0),
+            FmuVariable(name="damping", unit="N.m.s/rad", start=12.0),
+            FmuVariable(name="goal", unit="rad", start=1.0),
         ),
     ),
     folder / "controller.fmu",

@@ -44,7 +44,7 @@ def progress(
     Yields:
         a function of what was reached.
     """
-    bar = _Bar(label, start, stop, shown=not quiet and sys.stderr.isatty())
+    bar = _DelayedBar(label, start, stop, shown=not quiet and sys.stderr.isatty())
     listener = _LISTENER.get()
     try:
         yield bar.reach if listener is None else _told(bar, listener)
@@ -52,7 +52,7 @@ def progress(
         bar.close()
 
 
-class _Bar:
+class _DelayedBar:
     """A rich progress bar that is made only when somebody has waited long enough."""
 
     def __init__(self, label: str, start: float, stop: float, *, shown: bool) -> None:
@@ -95,7 +95,7 @@ class _Bar:
         self._bar.start()
 
 
-def _told(bar: _Bar, listener: Listener) -> Callable[[float], None]:
+def _told(bar: _DelayedBar, listener: Listener) -> Callable[[float], None]:
     """Reach that also tells the listener."""
 
     def reach(simulated: float) -> None:

@@ -44,7 +44,7 @@ _GOLDEN = (5**0.5 - 1) / 2
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class FlangeTurn:
     """How a flange turns: `factor` times the coordinate."""
 
     coordinate: str
@@ -63,7 +63,7 @@ class DriveLine:
     """
 
     mechanism: Mechanism
-    turns: Mapping[Key, Turn]
+    turns: Mapping[Key, FlangeTurn]
     parts: tuple[Flanged, ...]
     links: Mapping[str, str]
 
@@ -90,22 +90,22 @@ def drive_line(mechanism: Mechanism) -> DriveLine:
 
 def _turns(
     mechanism: Mechanism, parts: tuple[Flanged, ...]
-) -> tuple[dict[str, Flange], dict[Key, Turn]]:
+) -> tuple[dict[str, Flange], dict[Key, FlangeTurn]]:
     """The flange that leads each rigid group, by the name of its coordinate, and all turns."""
     ties = _ties(mechanism, parts)
     values = _generic(mechanism)
     leads: dict[str, Flange] = {}
-    turns: dict[Key, Turn] = {}
+    turns: dict[Key, FlangeTurn] = {}
     for name, lead in _candidates(mechanism, parts):
         if lead.key in turns:
             continue
         leads[name] = lead
-        turns[lead.key] = Turn(name, _ONE)
+        turns[lead.key] = FlangeTurn(name, _ONE)
         queue = deque([lead.key])
         while queue:
             key = queue.popleft()
             for other, factor in ties.get(key, ()):
-                turn = Turn(name, times(factor, turns[key].factor))
+                turn = FlangeTurn(name, times(factor, turns[key].factor))
                 if other not in turns:
                     turns[other] = turn
                     queue.append(other)
@@ -183,7 +183,7 @@ def _driven(
     name: str,
     lead: Flange,
     parts: Iterable[Flanged],
-    turns: Mapping[Key, Turn],
+    turns: Mapping[Key, FlangeTurn],
 ) -> Joint:
     """The joint that leads a group, with the inertias and motors of the group."""
     devices = [part for part in parts if isinstance(part, Device)]
@@ -204,7 +204,7 @@ def _driven(
 
 
 def _lowered(
-    mechanism: Mechanism, changed: Mapping[str, Joint], turns: Mapping[Key, Turn]
+    mechanism: Mechanism, changed: Mapping[str, Joint], turns: Mapping[Key, FlangeTurn]
 ) -> Mechanism:
     """The mechanism with the joints that lead, couplings to the others, and forces."""
     result = _with_joints(mechanism, changed)
@@ -248,7 +248,7 @@ def _with_joints(mechanism: Mechanism, joints: Mapping[str, Joint]) -> Mechanism
 
 
 def _levers(
-    mechanism: Mechanism, part: ShaftForce, turns: Mapping[Key, Turn]
+    mechanism: Mechanism, part: ShaftForce, turns: Mapping[Key, FlangeTurn]
 ) -> tuple[tuple[str, Expression], ...]:
     levers = []
     for flange, share in part.shares:

@@ -25,7 +25,7 @@ Port = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Node:
+class BodyNode:
     """Bodies and joint frames that are welded together: one rigid body.
 
     Attributes:
@@ -57,7 +57,7 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Graph:
+class BodyGraph:
     """Rigid bodies and the joints between them; node 0 holds the world.
 
     Attributes:
@@ -66,14 +66,14 @@ class Graph:
         size: of the largest body, between joints on it; of the world where bodies have none [m].
     """
 
-    nodes: tuple[Node, ...]
+    nodes: tuple[BodyNode, ...]
     edges: tuple[Edge, ...]
     size: float
 
 
 def connection_graph(
     mechanism: Mechanism, symbols: Mapping[str, SX], values: Mapping[str, float]
-) -> Graph:
+) -> BodyGraph:
     """The graph of a mechanism.
 
     Args:
@@ -93,19 +93,19 @@ def connection_graph(
     welds = _welds(mechanism, symbols)
     _require_connected(mechanism, welds)
     at = _evaluator(symbols, values)
-    nodes: list[Node] = []
+    nodes: list[BodyNode] = []
     home: dict[Port, int] = {}
     for port in _ports(mechanism):
         if port not in home:
             members = _grow(port, welds, at)
             home.update(dict.fromkeys(members, len(nodes)))
-            nodes.append(Node(port[0], members))
+            nodes.append(BodyNode(port[0], members))
     edges = tuple(
         _edge(mechanism, joint, nodes, home, symbols)
         for joint in mechanism.joints()
         if joint.name in joints
     )
-    return Graph(tuple(nodes), edges, _size(len(nodes), edges, at))
+    return BodyGraph(tuple(nodes), edges, _size(len(nodes), edges, at))
 
 
 def _check_transmissions(mechanism: Mechanism) -> None:
@@ -128,7 +128,7 @@ def _check_transmissions(mechanism: Mechanism) -> None:
                     )
 
 
-def inertia_of(node: Node, mechanism: Mechanism, symbols: Mapping[str, SX]) -> Inertia:
+def inertia_of(node: BodyNode, mechanism: Mechanism, symbols: Mapping[str, SX]) -> Inertia:
     """Inertia of all bodies of a node about the origin of its frame."""
     total = Inertia.zero()
     for (name, _), pose in node.members.items():
@@ -234,7 +234,7 @@ def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -
 def _edge(
     mechanism: Mechanism,
     joint: Joint,
-    nodes: list[Node],
+    nodes: list[BodyNode],
     home: Mapping[Port, int],
     symbols: Mapping[str, SX],
 ) -> Edge:
@@ -270,7 +270,7 @@ def _size(nodes: int, edges: Sequence[Edge], at: _Evaluator) -> float:
 
 
 def _given_khalil(
-    mechanism: Mechanism, joint: Joint, node: Node, symbols: Mapping[str, SX]
+    mechanism: Mechanism, joint: Joint, node: BodyNode, symbols: Mapping[str, SX]
 ) -> Khalil | None:
     """The Khalil parameters that place frame_a on the frame of its node, if written as such."""
     for a, b in mechanism.connections:

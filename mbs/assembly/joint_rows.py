@@ -17,7 +17,7 @@ from mbs.spatial import Inertia, MatrixTurn
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Part:
+class WeldedPart:
     """What a Fixed joint holds: the bodies of a link on one side of it.
 
     Attributes:
@@ -48,7 +48,7 @@ class JointRow:
     cut: bool
     frame_a: Frame
     frame_b: Frame
-    part: Part | None
+    part: WeldedPart | None
 
 
 def joint_rows(
@@ -78,7 +78,7 @@ def joint_rows(
 
 def _part(
     mechanism: Mechanism, joint: Joint, places: Places, symbols: Mapping[str, SX]
-) -> Part | None:
+) -> WeldedPart | None:
     """The side of a weld that is not the world; None where both sides are welded elsewhere."""
     sides = {port: _welded(mechanism, joint, port) for port in "ab"}
     if (joint.name, "a") in sides["b"]:
@@ -90,7 +90,7 @@ def _part(
         if isinstance(component, RigidBody):
             pose = places[name, ""][1]
             inertia = inertia + component.inertial(symbols).seen_from(MatrixTurn(pose.R), pose.p)
-    return Part(frozenset(sides[side]), inertia, sign)
+    return WeldedPart(frozenset(sides[side]), inertia, sign)
 
 
 def _welded(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import casadi
 from casadi import DM, SX
 
-from mbs.assembly.graph import Edge, Graph, inertia_of
+from mbs.assembly.graph import BodyGraph, Edge, inertia_of
 from mbs.assembly.spanning_tree import Branch, SpanningTree
 from mbs.assembly.tree import CarriedRotor, Frame, Link, Tree
 from mbs.components import Mechanism
@@ -75,7 +75,7 @@ class Framed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Draft:
+class _DescribedLink:
     """A link as it was described, before its frame is chosen.
 
     Attributes:
@@ -118,7 +118,7 @@ class _Chosen:
 
 
 def khalil_frames(
-    mechanism: Mechanism, graph: Graph, spanning: SpanningTree, symbols: Mapping[str, SX]
+    mechanism: Mechanism, graph: BodyGraph, spanning: SpanningTree, symbols: Mapping[str, SX]
 ) -> Framed:
     """Number the links, place their frames and gather their inertias.
 
@@ -128,7 +128,7 @@ def khalil_frames(
         spanning: which joints are in the tree, in which order.
         symbols: CasADi symbol of every parameter.
     """
-    drafts: list[_Draft] = []
+    drafts: list[_DescribedLink] = []
     home: dict[int, int] = {0: -1}
     base = {0: Pose.identity()}
     stubs: dict[int, int] = {}
@@ -179,7 +179,7 @@ def _kept(spanning: SpanningTree) -> list[Branch]:
 
 
 def _extend(
-    drafts: list[_Draft],
+    drafts: list[_DescribedLink],
     base: dict[int, Pose],
     parent: int,
     branch: Branch,
@@ -194,7 +194,7 @@ def _extend(
     for freedom in freedoms:
         aligned = _aligned(freedom, branch.forward)
         drafts.append(
-            _Draft(
+            _DescribedLink(
                 freedom.coordinate_of(edge.joint.name),
                 edge.joint.name,
                 parent,
@@ -209,7 +209,7 @@ def _extend(
     return parent, here @ end
 
 
-def _chosen_frames(drafts: Sequence[_Draft], size: float) -> list[_Chosen]:
+def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chosen]:
     """The frame of every link: as it was given, else Khalil's where it is near.
 
     The gamma and b of the first link behind a revolute or prismatic joint move the frame of that
@@ -268,7 +268,7 @@ def _rotor(
 
 
 def _links(
-    drafts: list[_Draft],
+    drafts: list[_DescribedLink],
     chosen: list[_Chosen],
     inertias: list[Inertia],
     rotors: list[CarriedRotor | None],

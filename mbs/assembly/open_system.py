@@ -11,7 +11,7 @@ from mbs.assembly.attached import attached_forces, force_elements
 from mbs.assembly.coordinate_coupling import CoordinateCoupling
 from mbs.assembly.drive_line import drive_line
 from mbs.assembly.drive_tables import attached_devices, shaft_rows
-from mbs.assembly.graph import Graph, connection_graph
+from mbs.assembly.graph import BodyGraph, connection_graph
 from mbs.assembly.joint_rows import joint_rows
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
 from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
@@ -188,7 +188,7 @@ def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
     return tuple(rows)
 
 
-def _bodies(mechanism: Mechanism, graph: Graph, framed: Framed) -> tuple[BodyRow, ...]:
+def _bodies(mechanism: Mechanism, graph: BodyGraph, framed: Framed) -> tuple[BodyRow, ...]:
     """The moving bodies, in the order in which their links are numbered."""
     homes = {
         name: framed.homes[number][0]
@@ -214,7 +214,7 @@ def _mass(body: Component, values: Mapping[str, float]) -> float | None:
     return 0.0
 
 
-def _places(graph: Graph, framed: Framed) -> Places:
+def _places(graph: BodyGraph, framed: Framed) -> Places:
     return {
         port: (link, pose @ inside)
         for node, (link, pose) in zip(graph.nodes, framed.homes, strict=True)

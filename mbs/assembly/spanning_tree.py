@@ -6,7 +6,7 @@ import heapq
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from mbs.assembly.graph import Edge, Graph
+from mbs.assembly.graph import BodyGraph, Edge
 from mbs.errors import AssemblyError
 
 
@@ -37,7 +37,7 @@ class SpanningTree:
 
 def spanning_tree(
     name: str,
-    graph: Graph,
+    graph: BodyGraph,
     *,
     need: Collection[str] = (),
     keep: Collection[str] = (),
@@ -81,7 +81,7 @@ def spanning_tree(
     return SpanningTree(tuple(branches), cuts)
 
 
-def _unreached(name: str, graph: Graph, number: int) -> str:
+def _unreached(name: str, graph: BodyGraph, number: int) -> str:
     """That nothing places a node, and what to do."""
     holders = [e.joint for e in graph.edges if number in (e.a, e.b) and not e.joint.places]
     where = f"{name}: no chain of joints leads from the world to {graph.nodes[number].name!r}"
@@ -94,7 +94,7 @@ def _unreached(name: str, graph: Graph, number: int) -> str:
     return f"{where}; connect it, or connect it to the world by a Free joint"
 
 
-def _prim(graph: Graph, need: set[str], keep: set[str], cut: set[str]) -> list[Edge]:
+def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> list[Edge]:
     depth = {0: 0}
     chosen: list[Edge] = []
     queue: list[tuple[tuple[bool, int, int, int, int], int]] = []
@@ -122,7 +122,7 @@ def _prim(graph: Graph, need: set[str], keep: set[str], cut: set[str]) -> list[E
     return chosen
 
 
-def _depth_first(graph: Graph, chosen: list[Edge]) -> list[Branch]:
+def _depth_first(graph: BodyGraph, chosen: list[Edge]) -> list[Branch]:
     branches: list[Branch] = []
     rank = {id(edge): number for number, edge in enumerate(graph.edges)}
     ordered = sorted(chosen, key=lambda edge: rank[id(edge)])
@@ -147,7 +147,7 @@ def _branches_from(node: int, edges: list[Edge]) -> list[Branch]:
     ]
 
 
-def _in_given_order(graph: Graph, branches: list[Branch]) -> list[Branch]:
+def _in_given_order(graph: BodyGraph, branches: list[Branch]) -> list[Branch]:
     """The branches by the order of their joints, as far as antecedents allow."""
     rank = {edge.joint.name: number for number, edge in enumerate(graph.edges)}
     waiting = sorted(branches, key=lambda branch: rank[branch.edge.joint.name])

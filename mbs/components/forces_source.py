@@ -21,7 +21,7 @@ _AXES = ("world", "body")
 
 
 @dataclass(frozen=True, slots=True)
-class Source(ForceElement):
+class PointSource(ForceElement):
     """Something constant that acts on one point.
 
     Attributes:
@@ -64,7 +64,7 @@ class Source(ForceElement):
 
 
 @dataclass(frozen=True, slots=True)
-class Force(Source):
+class Force(PointSource):
     """A constant force.
 
     Attributes:
@@ -89,7 +89,7 @@ class Force(Source):
 
 
 @dataclass(frozen=True, slots=True)
-class Torque(Source):
+class Torque(PointSource):
     """A constant torque.
 
     Attributes:

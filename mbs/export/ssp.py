@@ -15,7 +15,7 @@ from mbs.archives import check_archive
 from mbs.errors import ExportError
 from mbs.export.ssp_xml import (
     Connection,
-    Part,
+    SspPart,
     ssp_kind,
     structure_description,
     unit_exponents,
@@ -67,7 +67,7 @@ def ssp(
     described = {part: _described(part, file) for part, file in files.items()}
     values = _start_values(described, start or {})
     parts = {
-        part: Part(part, sources[part], described[part], values.get(part, {})) for part in files
+        part: SspPart(part, sources[part], described[part], values.get(part, {})) for part in files
     }
     links = _connections(parts, connections)
     title = target.stem if name is None else name
@@ -188,7 +188,7 @@ def _variable(described: Mapping[str, Any], what: str, address: object) -> tuple
 
 
 def _connections(
-    parts: Mapping[str, Part], connections: Iterable[tuple[str, str]]
+    parts: Mapping[str, SspPart], connections: Iterable[tuple[str, str]]
 ) -> list[Connection]:
     described = {name: part.description for name, part in parts.items()}
     fed: dict[tuple[str, str], str] = {}
@@ -254,7 +254,7 @@ def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> 
         )
 
 
-def _span(parts: Iterable[Part], stop_time: float | None) -> tuple[float, float]:
+def _span(parts: Iterable[SspPart], stop_time: float | None) -> tuple[float, float]:
     experiments = [part.description.defaultExperiment for part in parts]
     begins = [float(getattr(e, "startTime", None) or 0.0) for e in experiments]
     stops = [float(e.stopTime) for e in experiments if e is not None and e.stopTime is not None]

@@ -26,7 +26,7 @@ _KINDS = {"Real": "Real", "Float64": "Real", "Float32": "Real", "Boolean": "Bool
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class SspPart:
     """A component of a system structure.
 
     Attributes:
@@ -86,7 +86,7 @@ def unit_exponents(description: Any, name: str) -> dict[str, str] | None:
 
 def structure_description(
     name: str,
-    parts: Iterable[Part],
+    parts: Iterable[SspPart],
     connections: Iterable[Connection],
     span: tuple[float, float],
 ) -> str:
@@ -125,7 +125,7 @@ def _tag(name: str) -> str:
     return f"{{{_SPACES[prefix]}}}{local}"
 
 
-def _component(parent: Element, part: Part) -> None:
+def _component(parent: Element, part: SspPart) -> None:
     element = SubElement(
         parent,
         _tag("ssd:Component"),
@@ -158,7 +158,7 @@ def _connector(parent: Element, variable: Any) -> None:
         kind.set("unit", unit)
 
 
-def _bindings(parent: Element, part: Part) -> None:
+def _bindings(parent: Element, part: SspPart) -> None:
     bindings = SubElement(parent, _tag("ssd:ParameterBindings"))
     binding = SubElement(
         bindings, _tag("ssd:ParameterBinding"), type="application/x-ssp-parameter-set"
@@ -188,7 +188,7 @@ def _connections(parent: Element, connections: list[Connection]) -> None:
         )
 
 
-def _units(parts: list[Part]) -> dict[str, dict[str, str]]:
+def _units(parts: list[SspPart]) -> dict[str, dict[str, str]]:
     """Every unit of a connector, and the attributes of its BaseUnit."""
     return {
         unit: unit_exponents(part.description, unit) or {}

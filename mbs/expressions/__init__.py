@@ -28,6 +28,7 @@ from mbs.expressions.expression import (
     expression,
     out_of_bounds,
 )
+from mbs.expressions.numbers import number, plain_numbers, whole_number
 
 __all__ = [
     "MORE_THAN_ZERO",
@@ -37,11 +38,14 @@ __all__ = [
     "Parameter",
     "Scalar",
     "expression",
+    "number",
     "out_of_bounds",
     "parameters_of",
+    "plain_numbers",
     "renamed",
     "to_float",
     "to_sx",
+    "whole_number",
     "with_values",
     "without_defaults",
 ]

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from mbs.errors import DescriptionError
-from mbs.expressions import expression, to_float
+from mbs.expressions import number, whole_number
+from mbs.messages import quoted
 
 FRAME_KEYS = ("ant", "sigma", "b", "d", "r", "gamma", "alpha", "mu", "theta")
 """Vectors with one value for each frame."""
@@ -62,12 +63,8 @@ _KNOWN = (
     *_OTHER_KEYS,
 )
 _ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
-_COMMENT = re.compile(r"\(\*.*?\*\)", re.DOTALL)
-_NAME = re.compile(r"\(\*\s*Robotname\s*=\s*'([^'\n]*)'")
-_SOURCE = re.compile(r"\(\*\s*Source\s*=\s*'([^\n]*)'\s*\*\)")
-_REMARK = re.compile(
-    r"\(\*\s*(Value|Guess|Fs_width|rest|grouped)\s+([\w.]+)\s*=\s*([^\n]*?)\s*\*\)"
-)
+_REMARKS = ("Value", "Guess", "Fs_width", "rest", "grouped")
+_REMARKED = re.compile(r"[\w.]+")
 _SHORTEST_MISSPELT, _SIMILAR = 3, 0.75
 
 
@@ -96,13 +93,18 @@ class ParFile:
         Raises:
             DescriptionError: a line cannot be read, or its key is misspelt or given twice.
         """
-        name, source = _NAME.search(text), _SOURCE.search(text)
+        lines, comments = _without_comments(text)
+        entries, remarks = _entries(path, lines), _remarks(path, comments)
+        said = [_said(comment) for _, comment in reversed(comments)]  # the first of a kind counts
+        quotes = {key: value[1:] for key, value in said if value[:1] == "'"}
+        name, closed, _ = quotes.get("Robotname", "").partition("'")
+        source = quotes.get("Source", "")
         return ParFile(
             path,
-            name[1].strip() if name else "",
-            source[1] if source else "",
-            _entries(path, text),
-            _remarks(path, text),
+            name.strip() if closed and "\n" not in name else "",
+            source[:-1] if source[-1:] == "'" and "\n" not in source else "",
+            entries,
+            remarks,
         )
 
     def where(self, key: str) -> str:
@@ -122,10 +124,7 @@ class ParFile:
 
     def integer(self, key: str, text: str) -> int:
         """The whole number that a value of a key is."""
-        value = to_float(expression(text, self.where(key)))
-        if value is None or value != int(value):
-            raise DescriptionError(f"{self.where(key)} is {text!r}; give a whole number")
-        return int(value)
+        return whole_number(text, self.where(key))
 
     def count(self, key: str) -> int:
         """The number of links, joints or frames."""
@@ -145,28 +144,41 @@ class ParFile:
 
     def numbers(self, kind: str) -> dict[str, float]:
         """The remarks of a kind that must be numbers, by name."""
-        values: dict[str, float] = {}
-        for where, name, text in self.remarked(kind):
-            value = to_float(expression(text, where))
-            if value is None:
-                raise DescriptionError(f"{where} is {text!r}; give a number")
-            values[name] = value
-        return values
+        return {name: number(text, where) for where, name, text in self.remarked(kind)}
 
 
-def _entries(path: str, text: str) -> dict[str, tuple[int, tuple[str, ...]]]:
-    lines = _COMMENT.sub(lambda m: "\n" * m[0].count("\n"), text).splitlines()
+def _without_comments(text: str) -> tuple[list[str], list[tuple[int, str]]]:
+    """The lines of a text without its comments; line and inside of every comment."""
+    kept, comments = [], []
+    after, line = 0, 1
+    while (start := text.find("(*", after)) >= 0 and (end := text.find("*)", start + 2)) >= 0:
+        line += text.count("\n", after, start)
+        inside = text[start + 2 : end]
+        comments.append((line, inside))
+        breaks = inside.count("\n")
+        kept += [text[after:start], "\n" * breaks]
+        after, line = end + 2, line + breaks
+    kept.append(text[after:])
+    return "".join(kept).splitlines(), comments
+
+
+def _said(comment: str) -> tuple[str, str]:
+    """What a comment such as `Source = 'a book'` speaks of, and what it says."""
+    key, _, value = comment.partition("=")
+    return " ".join(key.split()), value.strip()
+
+
+def _entries(path: str, lines: list[str]) -> dict[str, tuple[int, tuple[str, ...]]]:
     entries: dict[str, tuple[int, tuple[str, ...]]] = {}
     number = 0
     while number < len(lines):
-        start, line = number, lines[number]
-        number += 1
-        if not line.strip():
-            continue
-        while line.count("{") > line.count("}") and number < len(lines):
-            line += "\n" + lines[number]
+        start, depth = number, 0
+        while number < len(lines) and (number == start or depth > 0):
+            depth += lines[number].count("{") - lines[number].count("}")
             number += 1
-        key, values = _assignment(f"{path}:{start + 1}", line)
+        if not lines[start].strip():
+            continue
+        key, values = _assignment(f"{path}:{start + 1}", "\n".join(lines[start:number]))
         if key in entries:
             raise DescriptionError(
                 f"{path}:{start + 1}: {key} was given on line {entries[key][0]}; give it once"
@@ -175,11 +187,15 @@ def _entries(path: str, text: str) -> dict[str, tuple[int, tuple[str, ...]]]:
     return entries
 
 
-def _remarks(path: str, text: str) -> dict[tuple[str, str], tuple[int, str]]:
+def _remarks(path: str, comments: list[tuple[int, str]]) -> dict[tuple[str, str], tuple[int, str]]:
     remarks: dict[tuple[str, str], tuple[int, str]] = {}
-    for match in _REMARK.finditer(text):
-        kind, name, value = match.groups()
-        line = text.count("\n", 0, match.start()) + 1
+    for line, comment in comments:
+        key, value = _said(comment)
+        kind, _, name = key.partition(" ")
+        if kind not in _REMARKS or not _REMARKED.fullmatch(name) or "=" not in comment:
+            continue
+        if "\n" in value:  # prose
+            continue
         if (kind, name) in remarks:
             raise DescriptionError(
                 f"{path}:{line}: {kind} {name} was given on line {remarks[kind, name][0]}; give it"
@@ -195,8 +211,8 @@ def _assignment(where: str, line: str) -> tuple[str, tuple[str, ...]]:
     braces = (value[:1], value[-1:])
     if match is None or not value or ("{" in braces) != ("}" in braces) or "{" in value[1:]:
         raise DescriptionError(
-            f"{where}: {line.splitlines()[0].strip()!r} is not an assignment; write KEY = number,"
-            " KEY = {value, ...} or a comment (* ... *)"
+            f"{where}: {quoted(line.splitlines()[0].strip())} is not an assignment; write"
+            " KEY = number, KEY = {value, ...} or a comment (* ... *)"
         )
     _check_spelling(where, match[1])
     key = _OLD_SPELLING.get(match[1], match[1])
@@ -205,14 +221,13 @@ def _assignment(where: str, line: str) -> tuple[str, tuple[str, ...]]:
 
 def _split(text: str) -> tuple[str, ...]:
     """The values between commas that stand outside of brackets."""
-    depth, parts = 0, [""]
-    for letter in text:
+    depth, start, parts = 0, 0, []
+    for k, letter in enumerate(text):
         depth += (letter == "(") - (letter == ")")
         if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
-    return tuple(" ".join(part.split()) for part in parts)
+            parts.append(text[start:k])
+            start = k + 1
+    return tuple(" ".join(part.split()) for part in (*parts, text[start:]))
 
 
 def _check_spelling(where: str, key: str) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from mbs.components import Rotor
 from mbs.components.joint_limits import motor_range
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, parameters_of, to_float
+from mbs.expressions import Expression, Scalar, expression, number, parameters_of, to_float
 from mbs.formats.rows import (
     BODY_SCALARS,
     GEOMETRY,
@@ -164,9 +164,8 @@ def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
 
 def _limits(where: str, limits: Any) -> tuple[float, float]:
     pair = list(limits) if isinstance(limits, (list, tuple, np.ndarray)) else []
-    values = [to_float(expression(value, f"{where}, limits")) for value in pair]
-    numbers = [value for value in values if value is not None]
-    if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
+    numbers = [number(value, f"{where}: limits") for value in pair]
+    if len(numbers) != 2 or not numbers[0] < numbers[1]:
         raise DescriptionError(
             f"{where}: limits {limits!r} are not [lower, upper]; give two numbers in order"
         )
@@ -192,12 +191,7 @@ def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float
             raise DescriptionError(
                 f"{name}: parameter {key!r} is used by no row; {did_you_mean(key, used)}"
             )
-        number = None if isinstance(value, bool) else to_float(expression(value, f"{name}, {key}"))
-        if number is None:
-            raise DescriptionError(
-                f"{name}: parameter {key} is {value!r}; give it a number as its value"
-            )
-        values[key] = number
+        values[key] = number(value, f"{name}, parameter {key}")
     return values
 
 
@@ -210,10 +204,7 @@ def _guess(table: RobotTable) -> dict[str, float]:
             raise DescriptionError(
                 f"{where}: there is no joint {joint!r}; {did_you_mean(joint, known)}"
             )
-        number = None if isinstance(value, bool) else to_float(expression(value, where))
-        if number is None:
-            raise DescriptionError(f"{where} of {joint} is {value!r}; give a number")
-        values[joint] = number
+        values[joint] = number(value, f"{where} of {joint}")
     return values
 
 
@@ -244,8 +235,8 @@ def _check_bodies(table: RobotTable) -> None:
 
 def _check_loops(table: RobotTable) -> None:
     used: set[int] = set()
-    for number, loop in enumerate(table.loops, 1):
-        where = f"{table.name}/loop {number}"
+    for k, loop in enumerate(table.loops, 1):
+        where = f"{table.name}/loop {k}"
         _check_loop(where, loop, table.frames)
         if used & set(loop.cut):
             raise DescriptionError(

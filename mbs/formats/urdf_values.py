@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from mbs.errors import DescriptionError
+from mbs.expressions import plain_numbers
 
 Vector = tuple[float, ...]
 
@@ -33,13 +34,7 @@ class Reader:
         text = None if element is None else element.get(key)
         if text is None:
             return default
-        try:
-            values = tuple(float(word) for word in text.split())
-        except ValueError:
-            values = ()
-        if len(values) != len(default) or not all(map(math.isfinite, values)):
-            self.fail(f"{key}={text!r} is not {len(default)} finite number(s); correct it")
-        return values
+        return plain_numbers(text, len(default), f"{self.where}: {key}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ Watch = Callable[[float], None]
 _OUTPUTS = ("x", "f", "g", "lam_x", "lam_g", "lam_p")
 
 
-class Follower(casadi.Callback):
+class SolverFollower(casadi.Callback):
     """Called by the solver after every step; it must be kept as long as the solver."""
 
     def __init__(

@@ -22,7 +22,7 @@ from mbs.messages import quoted
 from mbs.models.contacts import require_no_contacts
 from mbs.models.dae_forms import (
     FORMS,
-    Equations,
+    DaeEquations,
     carried_positions,
     closed_form,
     implicit,
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Dae(Equations):
+class Dae(DaeEquations):
     """Differential-algebraic equations with names, and a consistent start.
 
     Attributes:
@@ -174,8 +174,8 @@ def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
     return tuple(label for label in labels if label)
 
 
-def _built(system: System, kind: _Kind) -> tuple[Equations, Mapping[str, Elements]]:
-    def build() -> tuple[Equations, Mapping[str, Elements]]:
+def _built(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elements]]:
+    def build() -> tuple[DaeEquations, Mapping[str, Elements]]:
         form, branch = kind
         match form:
             case "open":
@@ -188,7 +188,7 @@ def _built(system: System, kind: _Kind) -> tuple[Equations, Mapping[str, Element
                 equations = implicit(system, form)
         return equations, elements_of(system, form)
 
-    built: tuple[Equations, Mapping[str, Elements]] = system.cached(("dae", *kind), build)
+    built: tuple[DaeEquations, Mapping[str, Elements]] = system.cached(("dae", *kind), build)
     return built
 
 

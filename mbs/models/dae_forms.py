@@ -34,7 +34,7 @@ FORMS = ("reduced", "index1", "index2", "index3", "ggl")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equations:
+class DaeEquations:
     """dx/dt = ode(x, z, u, p), 0 = alg(x, z, u, p), on symbols x, z, u, p.
 
     Attributes:
@@ -65,7 +65,7 @@ def motors(system: System) -> list[int]:
     return [k for k, speed in enumerate(system.speeds) if speed.actuated]
 
 
-def implicit(system: System, form: str, held: Held | None = None) -> Equations:
+def implicit(system: System, form: str, held: Held | None = None) -> DaeEquations:
     """The forms with x = [q; v] and z = [a; lam], or [a; lam; mu]; the mass stays implicit.
 
     No inertia matrix is built or factorised: the rows of a are the inverse dynamic model, which
@@ -110,7 +110,7 @@ def _kept(rows: Rows, form: str) -> SX:
     return casadi.vertcat(rows.positions, rows.velocities)
 
 
-def open_chain(system: System) -> Equations:
+def open_chain(system: System) -> DaeEquations:
     """Open chains, x = [q; v] and no z: the accelerations are those of the direct dynamic model."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     u, tau = motor_efforts(system)
@@ -125,7 +125,7 @@ def open_chain(system: System) -> Equations:
     )
 
 
-def closed_form(system: System, branch: tuple[str, ...]) -> Equations:
+def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
     """Closed forms, x = [q_a; v_a] and no z: q is an explicit function of q_a on one branch.
 
     Raises:
@@ -145,7 +145,7 @@ def closed_form(system: System, branch: tuple[str, ...]) -> Equations:
     )
 
 
-def carried_positions(system: System) -> Equations:
+def carried_positions(system: System) -> DaeEquations:
     """Other loops, x = [q; v_a] and no z: all positions are integrated, phi(q) is an invariant."""
     q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.active))
     u, v, a = _independent_motion(system, q, v_a)
@@ -183,7 +183,7 @@ def equations(
     alg: SX,
     invariants: SX,
     motion: tuple[SX, SX],
-) -> Equations:
+) -> DaeEquations:
     """The expressions with their common parts shared."""
     shared = casadi.cse([casadi.densify(e) for e in (ode, alg, invariants, *motion)])
-    return Equations(*states, system.p, *(SX(e) for e in shared))
+    return DaeEquations(*states, system.p, *(SX(e) for e in shared))

@@ -14,7 +14,7 @@ from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.models.composition import outputs_of
 from mbs.models.dae import Dae, start_efforts
-from mbs.models.dae_forms import FORMS, Equations, equations, implicit, motor_efforts, motors
+from mbs.models.dae_forms import FORMS, DaeEquations, equations, implicit, motor_efforts, motors
 from mbs.models.dae_names import Elements, elements_of
 from mbs.models.dae_rows import rows_of
 from mbs.models.dae_standing import PhaseStart, Standing, split
@@ -74,7 +74,7 @@ def phase_dae(standing: Standing, explicit: Function, form: str, begin: PhaseSta
     )
 
 
-_Built = tuple[Equations, SX, Mapping[str, Elements]]
+_Built = tuple[DaeEquations, SX, Mapping[str, Elements]]
 
 
 def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, ...]) -> _Built:
@@ -95,7 +95,7 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
 
 def _explicit(
     standing: Standing, explicit: Function, kept: tuple[int, ...]
-) -> tuple[Equations, SX]:
+) -> tuple[DaeEquations, SX]:
     """States [q; v] and no z: accelerations and forces are solved for."""
     system = standing.system
     s, (u, tau) = symbols_of(system, "tree"), motor_efforts(system)

@@ -11,7 +11,7 @@ from mbs.errors import ModelError
 from mbs.loops.reduction import reduction
 from mbs.messages import quoted
 from mbs.models.symbols import check_coordinates, is_reduced, posture_check
-from mbs.recursions.jacobian import Target
+from mbs.recursions.jacobian import VelocityTarget
 from mbs.recursions.renaud import cheapest_jacobian, renaud
 
 
@@ -60,12 +60,12 @@ def jacobian(
 
     def full() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        J = cheapest_jacobian(Target(system.tree, q, system.p, target, axes))
+        J = cheapest_jacobian(VelocityTarget(system.tree, q, system.p, target, axes))
         return [("q", q)], [("J", in_coordinates(system, q, J, coordinates))]
 
     def factors() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
-        found = renaud(Target(system.tree, q, system.p, target, axes), *between)
+        found = renaud(VelocityTarget(system.tree, q, system.p, target, axes), *between)
         J = in_coordinates(system, q, found.J, coordinates)
         return [("q", q)], [("R6", found.rotation), ("L", found.displacement), ("J", J)]
 

@@ -111,7 +111,7 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Rows:
+class _LoopRows:
     """Rows that act on the velocities of the tree, and the two kinds of columns.
 
     Attributes:
@@ -134,14 +134,14 @@ def _require_loops(system: System) -> None:
         )
 
 
-def _loop_rows(system: System, q: SX) -> _Rows:
+def _loop_rows(system: System, q: SX) -> _LoopRows:
     _require_loops(system)
     closure = system.closure
     assert closure is not None
     J = independent_constraint_rows(system, q)
     cut = [cut_velocities(system, q, cut) for cut in system.cuts if not cut.welded]
     C = casadi.vertcat(*cut) if cut else SX(0, system.nv)
-    return _Rows(J, casadi.densify(C), list(closure.active), list(closure.passive))
+    return _LoopRows(J, casadi.densify(C), list(closure.active), list(closure.passive))
 
 
 def cut_velocities(system: System, q: SX, cut: Cut) -> SX:

@@ -10,11 +10,11 @@ import casadi
 from casadi import MX, SX, Function
 
 from mbs.models.minimal_contacts import MinimalEvents
-from mbs.models.minimal_drive import Drive
+from mbs.models.minimal_drive import DriveInputs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equations:
+class StateEquations:
     """The functions of a state equation.
 
     Attributes:
@@ -31,7 +31,7 @@ class Equations:
     sizes: tuple[int, int, int]
 
 
-def controlled(equations: Equations, drive: Drive, extra: int) -> Equations:
+def controlled(equations: StateEquations, drive: DriveInputs, extra: int) -> StateEquations:
     """The same with inputs that the laws of a drive compute.
 
     The functions are of scalars where the laws are. Else they hold calls of the laws, which may be
@@ -46,7 +46,7 @@ def controlled(equations: Equations, drive: Drive, extra: int) -> Equations:
     wiring = _Wiring(
         equations, drive, (0 if drive.effort else tau, 0 if drive.device else u, rest, extra)
     )
-    return Equations(
+    return StateEquations(
         rhs=_driven(wiring, equations.rhs),
         motion=equations.motion,
         events=_events(wiring, equations.events),
@@ -58,8 +58,8 @@ def controlled(equations: Equations, drive: Drive, extra: int) -> Equations:
 class _Wiring:
     """What computes the inputs, and the sizes of the parts of u that are left."""
 
-    equations: Equations
-    drive: Drive
+    equations: StateEquations
+    drive: DriveInputs
     sizes: tuple[int, int, int, int]
 
 

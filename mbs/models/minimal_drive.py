@@ -19,7 +19,7 @@ Kind = Literal["q", "a"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Drive:
+class DriveInputs:
     """Inputs of a state equation beside the efforts of motors, and laws in place of them.
 
     Attributes:
@@ -61,7 +61,7 @@ class InputMotion:
         return 1 if self.position is None else 3
 
 
-def frames_of(system: System, drive: Drive) -> tuple[Frame, ...]:
+def frames_of(system: System, drive: DriveInputs) -> tuple[Frame, ...]:
     """Link and pose of every frame on which a wrench acts.
 
     Raises:
@@ -78,7 +78,7 @@ def frames_of(system: System, drive: Drive) -> tuple[Frame, ...]:
     return frames
 
 
-def motions_of(system: System, drive: Drive) -> tuple[InputMotion, ...]:
+def motions_of(system: System, drive: DriveInputs) -> tuple[InputMotion, ...]:
     """The joints whose motions are inputs.
 
     Raises:
@@ -123,7 +123,7 @@ def _motion(system: System, name: str, kind: str) -> InputMotion:
     return InputMotion(speeds.index(name), positions.index(name))
 
 
-def further_inputs(system: System, drive: Drive) -> int:
+def further_inputs(system: System, drive: DriveInputs) -> int:
     """How many inputs w the laws of a drive take.
 
     Raises:

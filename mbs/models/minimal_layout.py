@@ -9,7 +9,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import Frame
 from mbs.models.contacts import contacts_of
 from mbs.models.minimal_contacts import ContactEffort, contact_efforts
-from mbs.models.minimal_drive import Drive, InputMotion, frames_of, further_inputs, motions_of
+from mbs.models.minimal_drive import DriveInputs, InputMotion, frames_of, further_inputs, motions_of
 from mbs.models.minimal_orientation import Orientation, orientations_of
 
 
@@ -72,7 +72,7 @@ def motors_of(system: System, moved: Sequence[int] = ()) -> tuple[int, ...]:
     )
 
 
-def minimal_layout(system: System, drive: Drive) -> MinimalLayout:
+def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
     """The elements of the state equation of a system.
 
     Args:

@@ -23,8 +23,8 @@ from mbs.models.devices import device_equations, state_count
 from mbs.models.geometry import terminal_frame
 from mbs.models.minimal_accelerations import Accelerations, minimal_accelerations
 from mbs.models.minimal_contacts import MinimalEvents, at_limits, few_modes, minimal_events
-from mbs.models.minimal_controller import Equations, controlled
-from mbs.models.minimal_drive import Drive
+from mbs.models.minimal_controller import StateEquations, controlled
+from mbs.models.minimal_drive import DriveInputs
 from mbs.models.minimal_jump import minimal_jump
 from mbs.models.minimal_layout import MinimalLayout, minimal_layout
 from mbs.models.minimal_motion import (
@@ -39,7 +39,7 @@ from mbs.recursions.route import relative_pose
 from mbs.solvers.newton_step import newton_step
 from mbs.spatial import Wrench
 
-__all__ = ["Drive", "MinimalState", "Observe", "Seen", "consistent_start", "minimal_state"]
+__all__ = ["DriveInputs", "MinimalState", "Observe", "Seen", "consistent_start", "minimal_state"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +95,7 @@ class MinimalState(MinimalLayout):
 
 
 def minimal_state(
-    system: System, observe: Observe | None = None, drive: Drive | None = None
+    system: System, observe: Observe | None = None, drive: DriveInputs | None = None
 ) -> MinimalState:
     """The state equation of the independent joints.
 
@@ -110,7 +110,7 @@ def minimal_state(
             with the posture, which contacts do not follow.
     """
     require_lasting_rows(system, contacts_of(system))
-    drive = Drive() if drive is None else drive
+    drive = DriveInputs() if drive is None else drive
     layout = minimal_layout(system, drive)
     equations = _equations(system, observe, layout, drive)
     if drive.effort is not None or drive.device is not None:
@@ -126,7 +126,7 @@ def minimal_state(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Point:
+class StatePoint:
     """Symbols, and the parts of x and u."""
 
     t: SX
@@ -142,7 +142,7 @@ class Point:
     motions: SX
 
 
-def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> Point:
+def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> StatePoint:
     """Symbols of a state equation.
 
     Args:
@@ -155,7 +155,7 @@ def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> Po
     in_u.append(sum(motion.size for motion in layout.motions))
     x, u = SX.sym("x", sum(in_x)), SX.sym("u", sum(in_u))
     parts = (*_split(x, in_x), *_split(u, in_u))
-    return Point(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
+    return StatePoint(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
 
 
 def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
@@ -163,8 +163,8 @@ def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
 
 
 def _equations(
-    system: System, observe: Observe | None, layout: MinimalLayout, drive: Drive
-) -> Equations:
+    system: System, observe: Observe | None, layout: MinimalLayout, drive: DriveInputs
+) -> StateEquations:
     """The functions, where u has no w, and all efforts and inputs of devices that laws give."""
     motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
     s = point_of(system, layout, motors)
@@ -193,7 +193,7 @@ def _equations(
             lambda fired: minimal_jump(system, contact, motion, (s.x, fired), states),
         )
     point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
-    return Equations(
+    return StateEquations(
         rhs=dense_function("rhs", point, [rate, y]),
         motion=dense_function("motion", [s.t, s.x, s.z, s.u, system.p], [motion.q, motion.v]),
         events=events,
@@ -202,7 +202,7 @@ def _equations(
 
 
 def motion_of(
-    system: System, layout: MinimalLayout, s: Point, laws: Sequence[tuple[SX, SX, SX]]
+    system: System, layout: MinimalLayout, s: StatePoint, laws: Sequence[tuple[SX, SX, SX]]
 ) -> TreeMotion:
     """The motion of the tree, from states, dependent positions and prescribed motions."""
     raw, q = positions_of(system, layout, s)
@@ -214,7 +214,7 @@ def motion_of(
     return tree_motion(system, raw, q, v[list(system.active)])
 
 
-def positions_of(system: System, layout: MinimalLayout, s: Point) -> tuple[SX, SX]:
+def positions_of(system: System, layout: MinimalLayout, s: StatePoint) -> tuple[SX, SX]:
     """(nq, 1) positions as in the state, and on the loops."""
     raw = SX.zeros(system.nq)
     raw[list(layout.dependents)] = s.z

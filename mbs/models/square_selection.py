@@ -15,7 +15,7 @@ from mbs.loops.examine import LED
 from mbs.loops.reduction import reduction
 from mbs.messages import did_you_mean, quoted
 from mbs.models.symbols import check_coordinates, is_reduced
-from mbs.recursions.jacobian import Target
+from mbs.recursions.jacobian import VelocityTarget
 from mbs.recursions.square_jacobian import SquareJacobian, square_jacobian
 
 _ROWS = ("Vx", "Vy", "Vz", "wx", "wy", "wz")
@@ -56,7 +56,7 @@ class Selection:
     def _formed(self, system: System) -> tuple[SX, SquareJacobian]:
         q = SX.sym("q", system.nq)
         frame, axes = system.frame(self.frame), system.frame(self.expressed_in)
-        target = Target(system.tree, q, system.p, frame, axes)
+        target = VelocityTarget(system.tree, q, system.p, frame, axes)
         G = reduction(system, q).G if self.reduced else None
         return q, square_jacobian(target, self.rows, self.columns, G)
 

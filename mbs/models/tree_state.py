@@ -22,8 +22,8 @@ from mbs.models.direct_dynamics import direct_dynamics
 from mbs.models.impacts import tree_jump
 from mbs.models.minimal_accelerations import Accelerations
 from mbs.models.minimal_contacts import MinimalEvents, few_modes, minimal_events
-from mbs.models.minimal_controller import Equations, controlled
-from mbs.models.minimal_drive import Drive
+from mbs.models.minimal_controller import StateEquations, controlled
+from mbs.models.minimal_drive import DriveInputs
 from mbs.models.minimal_layout import minimal_layout
 from mbs.models.minimal_motion import TreeMotion, load_of, wrenches_of
 from mbs.models.minimal_state import Observe, Seen, motion_of, outputs_vector, point_of
@@ -66,7 +66,7 @@ class TreeState:
 
 
 def tree_state(
-    system: System, observe: Observe | None = None, drive: Drive | None = None
+    system: System, observe: Observe | None = None, drive: DriveInputs | None = None
 ) -> TreeState | None:
     """The state equation of the tree; None where it has no advantage, or is not known.
 
@@ -75,7 +75,7 @@ def tree_state(
         observe: as of `minimal_state`, likewise the next one.
         drive: motions that are inputs are left to the independent state equation.
     """
-    drive = Drive() if drive is None else drive
+    drive = DriveInputs() if drive is None else drive
     layout = minimal_layout(system, drive)
     if not layout.dependents or layout.motions:
         return None
@@ -128,8 +128,8 @@ def tree_state(
         at = dense_function("motion", point, [q, v])
         sizes = (len(motors), len(system.devices))
         sizes3 = (*sizes, s.u.numel() - sum(sizes))
-        pushed = controlled(Equations(forces, at, None, sizes3), drive, layout.extra)
-        moving = controlled(Equations(rhs, at, events, sizes3), drive, layout.extra)
+        pushed = controlled(StateEquations(forces, at, None, sizes3), drive, layout.extra)
+        moving = controlled(StateEquations(rhs, at, events, sizes3), drive, layout.extra)
         rhs, forces, events = moving.rhs, pushed.rhs, moving.events
     inputs = SX.sym("u", rhs.numel_in(3))
     free = [s.t, X, none, inputs]

@@ -6,7 +6,7 @@ import casadi
 from casadi import SX
 
 from mbs.assembly import System
-from mbs.assembly.joint_rows import JointRow, Part
+from mbs.assembly.joint_rows import JointRow, WeldedPart
 from mbs.models.surroundings import Surroundings, wrenches_on_links
 from mbs.models.symbols import ModelSymbols
 from mbs.recursions.accelerations import Acceleration, link_accelerations
@@ -66,7 +66,7 @@ def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench
     return sign * f, sign * m
 
 
-def _outside(system: System, part: Part, around: Surroundings) -> dict[int, Wrench]:
+def _outside(system: System, part: WeldedPart, around: Surroundings) -> dict[int, Wrench]:
     """What the bodies of the part exert on their environment."""
     f_ext = dict(around.inputs).get("f_ext")
     if f_ext is None:
@@ -75,7 +75,7 @@ def _outside(system: System, part: Part, around: Surroundings) -> dict[int, Wren
     return wrenches_on_links(system, casadi.mtimes(f_ext, casadi.diag(keep)))
 
 
-def _spin(system: System, part: Part, v: SX, a: SX, motion: Acceleration) -> SX:
+def _spin(system: System, part: WeldedPart, v: SX, a: SX, motion: Acceleration) -> SX:
     """The moment (3, 1) that turns the spin of rotors on the part, in the frame of its link."""
     total = zeros()
     for link in system.tree.links:

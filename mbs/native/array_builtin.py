@@ -42,7 +42,7 @@ class _Shape(ctypes.Structure):
     )
 
 
-class _Python(ctypes.Structure):
+class _PythonInterface(ctypes.Structure):
     _fields_ = (("none", _Pointer), *((name, _Pointer) for name in _STABLE_INTERFACE))
 
 
@@ -129,7 +129,7 @@ def _caller() -> Callable[[Any], ArrayCall] | None:
     addresses = (
         ctypes.cast(getattr(ctypes.pythonapi, name), _Pointer).value for name in _STABLE_INTERFACE
     )
-    library.mbs_setup(ctypes.byref(_Python(id(None), *addresses)))
+    library.mbs_setup(ctypes.byref(_PythonInterface(id(None), *addresses)))
     make = library.mbs_builtin
     make.restype = ctypes.py_object
     return make

@@ -9,8 +9,7 @@ from typing import ClassVar
 import casadi
 
 from mbs.native.block_code import BlockCode
-from mbs.native.lane_operators import FUNCTIONS
-from mbs.native.operators import expression, operand
+from mbs.native.operators import VECTORS, expression, operand
 from mbs.native.schedule import LANES, Batch, Step
 from mbs.operations.graph import Graph
 
@@ -46,8 +45,8 @@ class LaneCode(BlockCode):
         if not vectors:
             return [f"  const mbs_lanes t{step} = mbs_all({expression(self.graph, step)});"]
         op = self.graph.nodes[step].op
-        if op in FUNCTIONS:
-            text = f"{FUNCTIONS[op]}({', '.join(map(self._vector, operands))})"
+        if op in VECTORS:
+            text = f"{VECTORS[op]}({', '.join(map(self._vector, operands))})"
         else:
             text = expression(self.graph, step, self._written)
         return [f"  const mbs_lanes t{step} = {text};"]

@@ -1,4 +1,4 @@
-"""One operation of a graph as a C expression."""
+"""One operation of a graph as a C expression, of numbers and of vectors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ import casadi
 
 from mbs.errors import ModelError
 from mbs.operations.graph import Graph, Node
+from mbs.operations.text import CODES, NAMES
 
+_OF_TWO = ("fmod", "remainder", "copysign", "fmin", "fmax", "atan2", "hypot")
+_OF_ONE = (
+    *("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil"),
+    *("fabs", "erf", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "log1p", "expm1"),
+)
 BINARY: Mapping[int, str] = {
     casadi.OP_ADD: "{} + {}",
     casadi.OP_SUB: "{} - {}",
@@ -24,13 +30,7 @@ BINARY: Mapping[int, str] = {
     casadi.OP_IF_ELSE_ZERO: "{} ? {} : 0.0",
     casadi.OP_POW: "pow({}, {})",
     casadi.OP_CONSTPOW: "pow({}, {})",
-    casadi.OP_FMOD: "fmod({}, {})",
-    casadi.OP_REMAINDER: "remainder({}, {})",
-    casadi.OP_COPYSIGN: "copysign({}, {})",
-    casadi.OP_FMIN: "fmin({}, {})",
-    casadi.OP_FMAX: "fmax({}, {})",
-    casadi.OP_ATAN2: "atan2({}, {})",
-    casadi.OP_HYPOT: "hypot({}, {})",
+    **{CODES[name]: f"{name}({{}}, {{}})" for name in _OF_TWO},
 }
 """C text of the operations of two numbers, by CasADi's codes."""
 
@@ -42,18 +42,24 @@ _UNARY: Mapping[int, str] = {
     casadi.OP_INV: "1.0 / {0}",
     casadi.OP_NOT: "!{0}",
     casadi.OP_SIGN: "({0} > 0.0 ? 1.0 : {0} < 0.0 ? -1.0 : {0})",
-    **{
-        getattr(casadi, f"OP_{name.upper()}"): f"{name}({{0}})"
-        for name in (
-            *("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil"),
-            *("fabs", "erf", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "log1p", "expm1"),
-        )
-    },
+    **{CODES[name]: f"{name}({{0}})" for name in _OF_ONE},
 }
 
 
 ELEMENTWISE = frozenset((*BINARY, *_UNARY))
 """CasADi's codes of the operations that C has."""
+
+_SIGNS_OF_VECTORS = ("add", "sub", "mul", "div", "assign", "neg", "sq", "twice", "inv")
+_IN_EACH_LANE = ("erf", "asinh", "acosh", "atanh", "log1p")
+VECTORS: Mapping[int, str] = {
+    **{
+        op: f"mbs_each_{NAMES[op]}" if NAMES[op] in _IN_EACH_LANE else f"mbs_{NAMES[op]}"
+        for op in ELEMENTWISE - {CODES[name] for name in (*_SIGNS_OF_VECTORS, "sin", "cos")}
+    },
+    casadi.OP_CONSTPOW: "mbs_pow",
+}
+"""Of every operation on vectors that has no sign in C, the function in elementary.h; sines and
+cosines of one angle are made together."""
 
 
 def expression(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import islice, product
 
 import casadi
@@ -20,6 +22,7 @@ _DEEPEST_NAME = 6
 _DEEPEST_PRODUCT = 6
 _LONGEST_MONOMIAL = 12
 _ALLOWANCES = (1000, 4, 0)
+_MOST_PAIRS = 24
 _MOST_WORK = 40_000
 
 
@@ -75,18 +78,39 @@ def multiplied_out(algebra: Algebra, polynomial: Polynomial, pair: Pair) -> Poly
     return total
 
 
-def improved(graph: Graph, parameters: tuple[str, ...], reshapes: Iterable[Reshape]) -> Graph:
-    """A graph reshaped in each way that makes it cheaper.
+def improved(
+    graph: Graph,
+    parameters: Iterable[str],
+    reshape: Callable[[Pair, Algebra, Polynomial], Polynomial],
+    pairs: Callable[[Pair], bool],
+) -> Graph:
+    """A graph reshaped for each pair of angles for which that makes it cheaper, by themselves.
 
     A polynomial stays as it is where the reshaped one is much dearer by itself; a little dearer
-    it may be, as what is no longer needed then may be worth more. Of a large graph only the first
-    ways are tried, so that the work grows with the number of nodes.
+    it may be, as what is no longer needed then may be worth more. Of a large graph only the pairs
+    that are met most often are tried, so that the work grows with the number of nodes.
+
+    Args:
+        graph: what is computed.
+        parameters: names of the inputs that are constant.
+        reshape: gives a polynomial as it is with a pair; itself where nothing changes.
+        pairs: whether a pair is of the kind that is reshaped.
     """
-    best = count_graph(graph, parameters).total
+    names, met = tuple(parameters), Counter[Pair]()
+
+    def noted(algebra: Algebra, polynomial: Polynomial) -> int:
+        for pair in angles_met(algebra, polynomial):
+            if pairs(pair) and reshape(pair, algebra, polynomial) != polynomial:
+                met[pair] += 1
+        return algebra.plain(polynomial)
+
+    rewritten(graph, names, noted)
+    most = [partial(reshape, pair) for pair, _ in met.most_common(_MOST_PAIRS)]
+    best = count_graph(graph, names).total
     trials = max(2, _MOST_WORK // max(1, len(graph.nodes)))
-    for reshape, allowance in islice(product(reshapes, _ALLOWANCES), trials):
-        trial = rewritten(graph, parameters, _writer(reshape, allowance))
-        total = count_graph(trial, parameters).total
+    for way, allowance in islice(product(most, _ALLOWANCES), trials):
+        trial = rewritten(graph, names, _writer(way, allowance))
+        total = count_graph(trial, names).total
         if total < best:
             graph, best = trial, total
     return graph

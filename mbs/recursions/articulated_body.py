@@ -17,7 +17,7 @@ from casadi import SX
 from mbs.assembly.tree import Link, Tree
 from mbs.components.motion import Motion
 from mbs.recursions.accelerations import Acceleration, link_accelerations
-from mbs.recursions.articulated_inertia import ArticulatedInertia, Drive, Pivot
+from mbs.recursions.articulated_inertia import ArticulatedInertia, Pivot, RotorDrive
 from mbs.recursions.newton_euler import inertial_wrench
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regrouped
@@ -45,7 +45,7 @@ _DIRECTIONS = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Elimination:
+class JointElimination:
     """A joint taken out of the equations, in the frame where this is cheapest.
 
     Attributes:
@@ -140,12 +140,12 @@ def _numbers(link: Link) -> range:
 
 def _eliminations(
     tree: Tree, poses: list[LinkPose], bodies: Sequence[Inertia]
-) -> list[Elimination]:
+) -> list[JointElimination]:
     """Every joint taken out, from the leaves to the base."""
     regroup = regrouped(tree, poses, list(bodies))
     articulated = [ArticulatedInertia.of(body) for body in regroup]
     leaves = set(range(len(tree.links))) - {link.antecedent for link in tree.links}
-    result: list[Elimination] = []
+    result: list[JointElimination] = []
     for j in reversed(range(len(tree.links))):
         link, pose = tree.links[j], poses[j]
         inner: tuple[Displacement, ...] = ()
@@ -159,25 +159,27 @@ def _eliminations(
         for direction in _DIRECTIONS[link.motion]:
             pivots.append(Pivot.of(body, direction, drive))
             body = body.without(pivots[-1])
-        result.append(Elimination(inner, outer, tuple(pivots)))
+        result.append(JointElimination(inner, outer, tuple(pivots)))
         if link.antecedent >= 0:
             articulated[link.antecedent] += body_through(outer, body)
     return result[::-1]
 
 
-def _drive(tree: Tree, poses: list[LinkPose], j: int) -> Drive:
+def _drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
     """What drives joint j, in the frame of its link."""
     link = tree.links[j]
     if link.rotor is None:
-        return Drive(link.Ia, zeros())
+        return RotorDrive(link.Ia, zeros())
     on_link = link.rotor.carrier == j
     momentum = link.rotor.momentum if on_link else poses[j].apply_inverse(link.rotor.momentum)
     along = momentum[2] if link.motion is Motion.REVOLUTE else SX(0)
     inertia = link.Ia + link.rotor.seen_at_joint + (along if on_link else -along)
-    return Drive(inertia, momentum)
+    return RotorDrive(inertia, momentum)
 
 
-def _solution(tree: Tree, joints: list[Elimination], wrenches: Sequence[SX], efforts: SX) -> SX:
+def _solution(
+    tree: Tree, joints: list[JointElimination], wrenches: Sequence[SX], efforts: SX
+) -> SX:
     """(nv, 1) accelerations; `wrenches` are those that the links need already."""
     needed, left = list(wrenches), zeros(tree.nv)
     for j in reversed(range(len(tree.links))):

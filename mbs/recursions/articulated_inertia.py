@@ -87,7 +87,7 @@ class ArticulatedInertia:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class RotorDrive:
     """What turns with a joint without being a part of its link.
 
     Attributes:
@@ -122,7 +122,7 @@ class Pivot:
     ratio: SX
 
     @staticmethod
-    def of(body: ArticulatedInertia, direction: int, drive: Drive) -> Pivot:
+    def of(body: ArticulatedInertia, direction: int, drive: RotorDrive) -> Pivot:
         """Along a direction of a body, with what drives the joint."""
         column = body.column(direction)
         column[3:] += drive.momentum

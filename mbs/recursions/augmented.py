@@ -18,7 +18,7 @@ from mbs.spatial import Displacement, PseudoInertia, cross, skew, zeros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Column:
+class VelocityField:
     """What the velocity field u of a unit joint velocity does, about an origin and in its axes.
 
     With r a particle seen from the origin and u its velocity:
@@ -36,13 +36,13 @@ class Column:
     drag: SX
 
     @staticmethod
-    def nothing() -> Column:
+    def nothing() -> VelocityField:
         """The column of no mass."""
-        return Column(zeros(), zeros(), zeros(), zeros(), zeros())
+        return VelocityField(zeros(), zeros(), zeros(), zeros(), zeros())
 
-    def __add__(self, other: Column) -> Column:
+    def __add__(self, other: VelocityField) -> VelocityField:
         """The column of two masses that move with the same velocity."""
-        return Column(
+        return VelocityField(
             self.f + other.f,
             self.m + other.m,
             self.f_rate + other.f_rate,
@@ -50,12 +50,12 @@ class Column:
             self.drag + other.drag,
         )
 
-    def through(self, step: Displacement, velocity: SX) -> Column:
+    def through(self, step: Displacement, velocity: SX) -> VelocityField:
         """The column in the frame before a displacement whose translation has this velocity."""
         f, m = step.wrench(self.f, self.m)
         f_rate, m_rate = step.wrench(self.f_rate, self.m_rate)
         drag = step.turn.apply(self.drag) + cross(velocity, f)
-        return Column(f, m, f_rate, m_rate, drag)
+        return VelocityField(f, m, f_rate, m_rate, drag)
 
     def row(self, motion: Motion, w: SX) -> SX:
         """Entries of B in the row of u for the velocities of a link that turns at w."""
@@ -107,7 +107,7 @@ class Augmented:
         spin = self.spin + cross(ms, linear) + _inertia_times(S, angular)
         return Augmented(self.mass, rate, spin)
 
-    def column(self, w: SX, linear: SX, angular: SX) -> Column:
+    def column(self, w: SX, linear: SX, angular: SX) -> VelocityField:
         """The column of the velocity field linear + angular x r.
 
         Args:
@@ -119,7 +119,7 @@ class Augmented:
         f = self.mass.m * linear + cross(angular, ms)
         change, twist = _inertia_times(self.rate.S, angular), cross(angular, self.spin)
         flow = cross(w, ms) + 2 * self.rate.ms
-        return Column(
+        return VelocityField(
             f=f,
             m=cross(ms, linear) + _inertia_times(S, angular),
             f_rate=cross(w, f) + 2 * cross(angular, self.rate.ms),
@@ -131,7 +131,7 @@ class Augmented:
         )
 
 
-def rotor_column(link: Link, carrier: int, w: SX) -> Column:
+def rotor_column(link: Link, carrier: int, w: SX) -> VelocityField:
     """The column of the joint's velocity in the rotor that it spins on a carrier.
 
     Args:
@@ -141,7 +141,7 @@ def rotor_column(link: Link, carrier: int, w: SX) -> Column:
     """
     momentum = momentum_on(link, carrier)
     half_turn = 0.5 * cross(w, momentum)
-    return Column(zeros(), momentum, zeros(), half_turn, half_turn)
+    return VelocityField(zeros(), momentum, zeros(), half_turn, half_turn)
 
 
 def _inertia_times(S: SX, a: SX) -> SX:

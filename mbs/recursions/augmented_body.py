@@ -19,7 +19,7 @@ from casadi import DM, SX
 from mbs.assembly.tree import Tree
 from mbs.components.motion import Motion
 from mbs.recursions.accelerations import link_accelerations, resting_base
-from mbs.recursions.augmented import Augmented, Column, rotor_column
+from mbs.recursions.augmented import Augmented, VelocityField, rotor_column
 from mbs.recursions.cost import parameters_of, price
 from mbs.recursions.motion import effort, relative_motion, unit_motions
 from mbs.recursions.poses import LinkPose
@@ -58,7 +58,7 @@ class LagrangeForm:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Place:
+class _FormPlace:
     """Where the columns of a joint are written: its seat, or the frame of its link.
 
     Joints with parallel axes, one after the other, may have parallel places: what comes from
@@ -80,7 +80,7 @@ class _Place:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Work:
+class _FormWork:
     """The form being filled, and what its entries are read with.
 
     Attributes:
@@ -92,7 +92,7 @@ class _Work:
 
     form: LagrangeForm
     tree: Tree
-    places: list[_Place]
+    places: list[_FormPlace]
     w: list[SX]
 
 
@@ -130,7 +130,7 @@ def _form(tree: Tree, poses: list[LinkPose], bodies: list[PseudoInertia], v: SX)
     framed = [Augmented.of(body, spins.get(j, zeros())) for j, body in enumerate(bodies)]
     placed = [Augmented.nothing()] * len(bodies)
     form = LagrangeForm(zeros(tree.nv, tree.nv), zeros(tree.nv, tree.nv), zeros(tree.nv))
-    work = _Work(form, tree, places, w)
+    work = _FormWork(form, tree, places, w)
     for j in reversed(range(len(tree.links))):
         link, place = tree.links[j], places[j]
         body = framed[j]
@@ -147,12 +147,12 @@ def _form(tree: Tree, poses: list[LinkPose], bodies: list[PseudoInertia], v: SX)
     return form
 
 
-def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Place]:
+def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_FormPlace]:
     """Where the columns of every joint are written.
 
     Nothing is read before a joint on the base, so that it needs no seat.
     """
-    result: list[_Place] = []
+    result: list[_FormPlace] = []
     gravity: list[SX] = []
     for j, link in enumerate(tree.links):
         pose, i = poses[j], link.antecedent
@@ -164,11 +164,11 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Plac
             continue
         steps = _moving_steps(pose, w_i, linear)
         if i < 0 or link.motion.nv > 1:
-            result.append(_Place(w[j], gravity[j], [], steps))
+            result.append(_FormPlace(w[j], gravity[j], [], steps))
         else:
             seat = len(pose.seat)
             seat_w, seat_g = pose.at_seat(w_i) + angular, pose.at_seat(g_i)
-            result.append(_Place(seat_w, seat_g, steps[seat:], steps[:seat]))
+            result.append(_FormPlace(seat_w, seat_g, steps[seat:], steps[:seat]))
     return result
 
 
@@ -185,7 +185,7 @@ def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
     return not (turning[0].is_zero() and turning[1].is_zero())
 
 
-def _parallel(pose: LinkPose, before: _Place, angular: SX) -> _Place:
+def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
     """The place of a joint that is parallel to that of the joint before it."""
     inner, _ = before.inner[0]
     p = inner.point(pose.foot)
@@ -195,7 +195,7 @@ def _parallel(pose: LinkPose, before: _Place, angular: SX) -> _Place:
     assert isinstance(pose.spin, Turn)
     w = before.w + angular
     screw = Screw(pose.spin, motion.t)
-    return _Place(
+    return _FormPlace(
         w,
         before.g,
         [(screw, cross(w, screw.point(zeros())))],
@@ -216,7 +216,7 @@ def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
     return steps
 
 
-def _fill_columns(work: _Work, j: int, body: Augmented) -> None:
+def _fill_columns(work: _FormWork, j: int, body: Augmented) -> None:
     """Columns and rows of the velocities of joint j, its own block and those of its ancestors."""
     form, link, place = work.form, work.tree.links[j], work.places[j]
     spin = _at(place.inner, rotor_column(link, j, work.w[j]))
@@ -243,7 +243,7 @@ def _add_drives(form: LagrangeForm, tree: Tree, v: SX) -> None:
             form.B[linear, linear] += link.Ia * skew(angular)
 
 
-def _fill_ancestors(work: _Work, j: int, k: int, column: Column) -> None:
+def _fill_ancestors(work: _FormWork, j: int, k: int, column: VelocityField) -> None:
     """Entries of velocity k of joint j, at whose place the column is, with its ancestors."""
     form, tree, places, w = work.form, work.tree, work.places, work.w
     driven = tree.links[j]
@@ -261,7 +261,7 @@ def _fill_ancestors(work: _Work, j: int, k: int, column: Column) -> None:
         j = i
 
 
-def _at(steps: list[Step], column: Column) -> Column:
+def _at(steps: list[Step], column: VelocityField) -> VelocityField:
     """A column in the frame before these displacements."""
     for step, velocity in reversed(steps):
         column = column.through(step, velocity)

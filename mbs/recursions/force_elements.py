@@ -13,7 +13,7 @@ from casadi import SX
 from mbs.assembly.attached import AttachedForce
 from mbs.assembly.tree import Frame, Tree
 from mbs.components.forces import CoordinateForce, PairForce, RelativeMotion
-from mbs.components.forces_source import Source
+from mbs.components.forces_source import PointSource
 from mbs.recursions.frame_motion import BASE, relative_motion
 from mbs.recursions.motion import effort
 from mbs.recursions.poses import LinkPose
@@ -106,7 +106,7 @@ def _on_frames(
     tree: Tree, force: AttachedForce, q: SX, moving: list[Velocity]
 ) -> list[tuple[Frame, Wrench]]:
     """What an element does to each of its frames: force and moment about it, in its axes."""
-    if isinstance(force.element, Source):
+    if isinstance(force.element, PointSource):
         (frame,) = force.frames
         R = relative_pose(tree, q, BASE, frame).R
         return [(frame, force.element.wrench(R, force.symbols))]

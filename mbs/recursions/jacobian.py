@@ -34,7 +34,7 @@ from mbs.spatial import Pose, Rotation, cross, is_zero, zeros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Target:
+class VelocityTarget:
     """A frame whose velocity is asked for.
 
     Attributes:
@@ -51,7 +51,7 @@ class Target:
     frame: Frame
     axes: Frame
 
-    def along(self, axes: Frame) -> Target:
+    def along(self, axes: Frame) -> VelocityTarget:
         """The same in other axes."""
         return replace(self, axes=axes)
 
@@ -75,7 +75,7 @@ class Outlook:
         return max(sum(isinstance(s, Tilt) for s in branch) for branch in self.branches)
 
 
-def outlook(target: Target) -> Outlook:
+def outlook(target: VelocityTarget) -> Outlook:
     """What the Jacobian of a frame in certain axes is made of."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     back, out = way_between(tree, q, axes, frame)

@@ -18,7 +18,7 @@ from mbs.assembly.tree import Tree
 from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regressor_sums import Elements, filled
-from mbs.recursions.regressor_twists import Twist, path_twists
+from mbs.recursions.regressor_twists import PathTwist, path_twists
 from mbs.spatial import cross, vector, zeros
 
 Unit = tuple[SX | None, SX | None]
@@ -64,13 +64,13 @@ def axis(k: int) -> SX:
     return result
 
 
-def work(twist: Twist, unit: Unit) -> SX:
+def work(twist: PathTwist, unit: Unit) -> SX:
     """Work of a wrench in a velocity, both about the origin of one frame and in it."""
     f, m = unit
     turning = SX(0) if m is None else SX(casadi.dot(twist.n, m))
     return turning if f is None else turning + casadi.dot(twist.t, f)
 
 
-def element(twist: Twist, units: list[Unit], k: int) -> SX:
+def element(twist: PathTwist, units: list[Unit], k: int) -> SX:
     """Work of the unit of parameter k."""
     return work(twist, units[k])

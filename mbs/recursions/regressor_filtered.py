@@ -19,7 +19,7 @@ from mbs.recursions.poses import LinkPose
 from mbs.recursions.regressor import Unit, axis, element, work
 from mbs.recursions.regressor_sums import Elements, filled
 from mbs.recursions.regressor_twists import (
-    Twist,
+    PathTwist,
     path_twist_rates,
     path_twists,
     seen_by_links,
@@ -66,7 +66,7 @@ def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
     return filled(tree, poses, tree.nv, links)
 
 
-def _level_rows(tree: Tree, paths: list[list[Twist]], ups: list[SX]) -> set[int]:
+def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:
     """Velocities that raise nothing: turns about vertical axes and level slides."""
     own = [
         (twist, ups[j])
@@ -99,6 +99,8 @@ def unit_lifts(up: SX) -> list[Unit]:
     return [nothing] * 6 + [(None, cross(axis(k), up)) for k in range(3)] + [(up, None)]
 
 
-def _element(twist: Twist | None, rate: Twist, lifts: list[Unit], units: list[Unit], k: int) -> SX:
+def _element(
+    twist: PathTwist | None, rate: PathTwist, lifts: list[Unit], units: list[Unit], k: int
+) -> SX:
     lifted = SX(0) if twist is None else work(twist, lifts[k])
     return lifted - work(rate, units[k])

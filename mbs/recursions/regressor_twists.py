@@ -18,7 +18,7 @@ from mbs.spatial import cross, origin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Twist:
+class PathTwist:
     """What a unit of one joint velocity gives a link, or the rate at which that changes.
 
     Attributes:
@@ -31,28 +31,28 @@ class Twist:
     t: SX
     n: SX
 
-    def at(self, p: SX) -> Twist:
+    def at(self, p: SX) -> PathTwist:
         """About the point p, (3, 1) in the same axes."""
-        return Twist(self.row, self.t + cross(self.n, p), self.n)
+        return PathTwist(self.row, self.t + cross(self.n, p), self.n)
 
-    def seen(self, turn: Callable[[SX], SX]) -> Twist:
+    def seen(self, turn: Callable[[SX], SX]) -> PathTwist:
         """In other axes."""
-        return Twist(self.row, turn(self.t), turn(self.n))
+        return PathTwist(self.row, turn(self.t), turn(self.n))
 
-    def rate(self, of: Velocity) -> Twist:
+    def rate(self, of: Velocity) -> PathTwist:
         """How it changes where it is fixed on a link that moves with this velocity."""
         t = cross(of.V, self.n) + cross(of.w, self.t)
-        return Twist(self.row, t, cross(of.w, self.n))
+        return PathTwist(self.row, t, cross(of.w, self.n))
 
 
-def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[Twist]]:
+def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
     """For every link unit velocities of the joints from the base to it, in its frame."""
     return _carried(tree, poses, _unit_twists(tree))
 
 
 def path_twist_rates(
     tree: Tree, poses: list[LinkPose], velocities: list[Velocity]
-) -> list[list[Twist]]:
+) -> list[list[PathTwist]]:
     """How those of `path_twists` change, each fixed on the link of its joint, seen at rest.
 
     Args:
@@ -75,21 +75,23 @@ def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
     return result
 
 
-def _unit_twists(tree: Tree) -> list[list[Twist]]:
+def _unit_twists(tree: Tree) -> list[list[PathTwist]]:
     return [
-        [Twist(link.v.start + k, t, n) for k, (t, n) in enumerate(unit_motions(link.motion))]
+        [PathTwist(link.v.start + k, t, n) for k, (t, n) in enumerate(unit_motions(link.motion))]
         for link in tree.links
     ]
 
 
-def _carried(tree: Tree, poses: list[LinkPose], own: list[list[Twist]]) -> list[list[Twist]]:
+def _carried(
+    tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]
+) -> list[list[PathTwist]]:
     """To every link the twists of the links before it, and its own."""
-    outer: list[list[Twist]] = []
-    inner: list[list[Twist]] = []
-    result: list[list[Twist]] = []
+    outer: list[list[PathTwist]] = []
+    inner: list[list[PathTwist]] = []
+    result: list[list[PathTwist]] = []
     for j, pose in enumerate(poses):
         i = tree.links[j].antecedent
-        passed: list[Twist] = []
+        passed: list[PathTwist] = []
         if len(pose.run) > 1:
             p = poses[i].spin.apply(pose.p)
             seated = [twist.at(p) for twist in outer[i]]

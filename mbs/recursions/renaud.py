@@ -18,7 +18,7 @@ import numpy as np
 from casadi import DM, SX
 
 from mbs.recursions.cost import cost
-from mbs.recursions.jacobian import Target, jacobian, outlook
+from mbs.recursions.jacobian import VelocityTarget, jacobian, outlook
 from mbs.recursions.route import expressed, relative_pose
 from mbs.recursions.survey import Survey, nonzero, survey, varying
 from mbs.spatial import Pose, skew, zeros
@@ -65,7 +65,7 @@ class Renaud:
         )
 
 
-def cheapest_jacobian(target: Target, reference: int | None = None) -> SX:
+def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> SX:
     """(6, nv) Jacobian, of the ways to form it the one with the fewest operations.
 
     Args:
@@ -79,7 +79,9 @@ def cheapest_jacobian(target: Target, reference: int | None = None) -> SX:
     return min(candidates, key=lambda J: cost(J, target.q, target.p))
 
 
-def renaud(target: Target, intermediate: int | None = None, reference: int | None = None) -> Renaud:
+def renaud(
+    target: VelocityTarget, intermediate: int | None = None, reference: int | None = None
+) -> Renaud:
     """The three factors; what is not asked for is chosen for the fewest operations of J.
 
     Args:
@@ -98,7 +100,7 @@ def renaud(target: Target, intermediate: int | None = None, reference: int | Non
     return Renaud(i, r, R, arm_from(target.along((i, _HOME)), r), J)
 
 
-def arm_from(target: Target, reference: int | None) -> SX:
+def arm_from(target: VelocityTarget, reference: int | None) -> SX:
     """(3, 1) from the origin of a link's frame to that of the frame that moves [m]."""
     if reference is None:
         return zeros()

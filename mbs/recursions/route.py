@@ -31,7 +31,7 @@ from mbs.spatial import (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spin:
+class RouteTurn:
     """A turn about z by an angle [rad], backwards when the way is walked back."""
 
     angle: SX
@@ -66,7 +66,7 @@ class OriginOf:
     link: int
 
 
-Step = Spin | Tilt | Shift | JointAt | OriginOf
+Step = RouteTurn | Tilt | Shift | JointAt | OriginOf
 
 
 def way_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[Step]:
@@ -96,9 +96,9 @@ def _link_steps(k: int, link: Link, q: SX) -> list[Step]:
     if motion in (Motion.REVOLUTE, Motion.PRISMATIC):
         steps.append(JointAt(k))
     if motion is Motion.REVOLUTE:
-        steps += [Spin(q), Spin(place.theta), Shift(vector([0, 0, slid]))]
+        steps += [RouteTurn(q), RouteTurn(place.theta), Shift(vector([0, 0, slid]))]
     else:
-        steps += [Spin(place.theta), Shift(vector([0, 0, slid]))]
+        steps += [RouteTurn(place.theta), Shift(vector([0, 0, slid]))]
     if motion is Motion.FREE:
         steps.append(Shift(q[0:3]))
     if motion in (Motion.SPHERICAL, Motion.FREE):
@@ -109,7 +109,7 @@ def _link_steps(k: int, link: Link, q: SX) -> list[Step]:
 def _seat_steps(frame: Khalil) -> list[Step]:
     """From one frame to the axis of the next."""
     return [
-        Spin(frame.gamma),
+        RouteTurn(frame.gamma),
         Shift(vector([0, 0, frame.b])),
         Tilt(axis_turn("x", frame.alpha)),
         Shift(vector([frame.d, 0, 0])),
@@ -118,12 +118,12 @@ def _seat_steps(frame: Khalil) -> list[Step]:
 
 def _fixed_steps(frame: Khalil) -> list[Step]:
     """From one frame to the next, which does not move."""
-    return [*_seat_steps(frame), Spin(frame.theta), Shift(vector([0, 0, frame.r]))]
+    return [*_seat_steps(frame), RouteTurn(frame.theta), Shift(vector([0, 0, frame.r]))]
 
 
 def _is_idle(step: Step) -> bool:
     match step:
-        case Spin(angle=angle):
+        case RouteTurn(angle=angle):
             return bool(angle.is_zero())
         case Tilt(rotation=Turn(s=s, c=c)):
             return bool(s.is_zero() and c.is_one())
@@ -139,8 +139,8 @@ def walked_back(steps: Iterable[Step]) -> list[Step]:
 
 def _inverse(step: Step) -> Step:
     match step:
-        case Spin(angle=angle, backwards=backwards):
-            return Spin(angle, not backwards)
+        case RouteTurn(angle=angle, backwards=backwards):
+            return RouteTurn(angle, not backwards)
         case Tilt(rotation=rotation):
             return Tilt(inverse_rotation(rotation))
         case Shift(p=p):
@@ -166,10 +166,10 @@ def joined(steps: Sequence[Step], tree: Tree) -> list[Step]:
         the steps, without a Spin in them.
     """
     result: list[Step] = []
-    spins: list[Spin] = []
+    spins: list[RouteTurn] = []
     for step in steps:
         match step:
-            case Spin():
+            case RouteTurn():
                 spins.append(step)
             case Shift(p=p):
                 result.append(Shift(_total(spins).apply(p)))
@@ -187,11 +187,11 @@ def _along_z(link: Link) -> bool:
     return link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
 
 
-def _turns(spins: list[Spin]) -> list[Step]:
+def _turns(spins: list[RouteTurn]) -> list[Step]:
     return [Tilt(_total(spins))] if spins else []
 
 
-def _total(spins: list[Spin]) -> Turn:
+def _total(spins: list[RouteTurn]) -> Turn:
     """One turn of several, their angles added in the order of the tree whichever way one goes."""
     forward, backward = (
         [spin.angle for spin in spins if spin.backwards is way] for way in (False, True)

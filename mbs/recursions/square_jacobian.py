@@ -18,7 +18,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly.tree import Tree
-from mbs.recursions.jacobian import Target
+from mbs.recursions.jacobian import VelocityTarget
 from mbs.recursions.renaud import arm_from, cheapest_jacobian, spread
 from mbs.recursions.route import relative_pose
 from mbs.recursions.survey import Array, Survey, nonzero, random_samples, survey, varying
@@ -91,7 +91,7 @@ class _View:
 
 
 def square_jacobian(
-    target: Target, rows: Sequence[int], columns: Sequence[int], G: SX | None = None
+    target: VelocityTarget, rows: Sequence[int], columns: Sequence[int], G: SX | None = None
 ) -> SquareJacobian:
     """Rows and columns of the Jacobian of a tree, in blocks.
 
@@ -129,7 +129,7 @@ def square_jacobian(
     return _signed(B, view.B, view.blocks, X_inverse, whole)
 
 
-def _values(target: Target, A: SX) -> Array:
+def _values(target: VelocityTarget, A: SX) -> Array:
     """(samples, ...) a matrix at the postures of a survey."""
     f = Function("f", [target.q, target.p], [casadi.densify(A)])
     samples = random_samples(target.tree, target.p.numel())

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly.tree import Frame, Tree
 from mbs.components.motion import Motion
-from mbs.recursions.jacobian import Target, jacobian, outlook
+from mbs.recursions.jacobian import VelocityTarget, jacobian, outlook
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose
 
@@ -92,7 +92,7 @@ class Survey:
         return np.asarray(np.einsum("sji,sj->si", self.R[-1], arm))
 
 
-def survey(target: Target) -> Survey:
+def survey(target: VelocityTarget) -> Survey:
     """The Jacobian of a frame at random postures and parameters."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     path = tree.path(frame[0])

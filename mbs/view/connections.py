@@ -16,7 +16,7 @@ _MOST_NAMES = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class ConnectionNode:
     """A rigid link: its number, 0 for the base, and the names of its bodies, a line each."""
 
     number: int
@@ -24,7 +24,7 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class ConnectionEdge:
     """A joint or constraint.
 
     Attributes:
@@ -53,9 +53,9 @@ class Connections:
         remarks: couplings of coordinates, in sentences.
     """
 
-    nodes: dict[int, Node]
-    children: dict[int, tuple[Edge, ...]]
-    cuts: tuple[Edge, ...]
+    nodes: dict[int, ConnectionNode]
+    children: dict[int, tuple[ConnectionEdge, ...]]
+    cuts: tuple[ConnectionEdge, ...]
     remarks: tuple[str, ...]
 
 
@@ -64,27 +64,27 @@ def connections(system: System) -> Connections:
     edges = [_edge(system, k) for k, row in enumerate(system.joints) if row.part is None]
     edges = [edge for edge in edges if edge.ends[0] != edge.ends[1]]
     numbers = sorted({0, *(end for edge in edges for end in edge.ends)})
-    children: dict[int, tuple[Edge, ...]] = dict.fromkeys(numbers, ())
+    children: dict[int, tuple[ConnectionEdge, ...]] = dict.fromkeys(numbers, ())
     reached, waiting = {0}, [0]
     for here in waiting:
         for edge in edges:
             if here in edge.ends and not edge.cut:
                 there = sum(edge.ends) - here
                 if there not in reached:
-                    turned = Edge(edge.name, edge.kind, edge.driven, False, (here, there))
+                    turned = ConnectionEdge(edge.name, edge.kind, edge.driven, False, (here, there))
                     children[here] += (turned,)
                     reached.add(there)
                     waiting.append(there)
-    nodes = {number: Node(number, _names(system, number)) for number in numbers}
+    nodes = {number: ConnectionNode(number, _names(system, number)) for number in numbers}
     return Connections(nodes, children, tuple(e for e in edges if e.cut), _remarks(system))
 
 
-def _edge(system: System, k: int) -> Edge:
+def _edge(system: System, k: int) -> ConnectionEdge:
     row = system.joints[k]
     speeds = (*system.speeds, *system.cut_coordinates)
     driven = any(speed.actuated for speed in speeds if speed.joint == row.name)
     ends = row.frame_a[0] + 1, row.frame_b[0] + 1
-    return Edge(row.name, _KINDS.get(row.kind, row.kind), driven, row.cut, ends)
+    return ConnectionEdge(row.name, _KINDS.get(row.kind, row.kind), driven, row.cut, ends)
 
 
 def _names(system: System, number: int) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from mbs.view.connections import Connections, Edge, Node
+from mbs.view.connections import ConnectionEdge, ConnectionNode, Connections
 
 LINE, LETTER = 15.0, 6.9
 """Height of a line of text and width of a letter [px]."""
@@ -24,7 +24,7 @@ _LONGEST = 8
 class PlacedNode:
     """A link: the middle of its box, and its size [px]."""
 
-    node: Node
+    node: ConnectionNode
     x: float
     y: float
     width: float
@@ -35,7 +35,7 @@ class PlacedNode:
 class PlacedEdge:
     """A joint: the middle of its pill, and its width [px]; below or beside the first link."""
 
-    edge: Edge
+    edge: ConnectionEdge
     x: float
     y: float
     width: float
@@ -56,7 +56,7 @@ class Layout:
 def layout(graph: Connections) -> Layout:
     """Places for a graph."""
     hung = _hung(graph)
-    draft = _Draft(graph, hung, {}, [], [], {})
+    draft = _DiagramSoFar(graph, hung, {}, [], [], {})
     chain = _chain(graph) if not graph.cuts else []
     if len(chain) > _LONGEST + 1:
         draft.wrap(chain)
@@ -81,16 +81,16 @@ def _chain(graph: Connections) -> list[int]:
     return found
 
 
-def _hung(graph: Connections) -> dict[int, tuple[Edge, ...]]:
+def _hung(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
     """For each link the cut joints that hang below it: the link that fewer of them join."""
     count = Counter(end for edge in graph.cuts for end in edge.ends)
     depth = _depths(graph)
-    hung: dict[int, tuple[Edge, ...]] = dict.fromkeys(graph.nodes, ())
+    hung: dict[int, tuple[ConnectionEdge, ...]] = dict.fromkeys(graph.nodes, ())
     for edge in graph.cuts:
         a, b = edge.ends
         owner = min((a, b), key=lambda n: (bool(n == 0), count[n], -depth[n]))
         other = b if owner == a else a
-        turned = Edge(edge.name, edge.kind, edge.driven, True, (owner, other))
+        turned = ConnectionEdge(edge.name, edge.kind, edge.driven, True, (owner, other))
         hung[owner] += (turned,)
     return hung
 
@@ -109,22 +109,22 @@ def _text_width(text: str) -> float:
     return LETTER * len(text) + 2 * _PAD
 
 
-def pill_width(edge: Edge) -> float:
+def pill_width(edge: ConnectionEdge) -> float:
     """Width of the pill of a joint [px]."""
     return _text_width(f"{edge.name}  {edge.kind}")
 
 
-def _box(node: Node) -> tuple[float, float]:
+def _box(node: ConnectionNode) -> tuple[float, float]:
     width = max(_text_width(line) for line in node.lines)
     return max(width, 56.0), LINE * len(node.lines) + 14
 
 
 @dataclass(frozen=True, slots=True)
-class _Draft:
+class _DiagramSoFar:
     """What is placed so far."""
 
     graph: Connections
-    hung: dict[int, tuple[Edge, ...]]
+    hung: dict[int, tuple[ConnectionEdge, ...]]
     nodes: dict[int, PlacedNode]
     tree: list[PlacedEdge]
     cuts: list[PlacedEdge]
@@ -137,7 +137,7 @@ class _Draft:
         needed = sum(below) + _GAP * max(0, len(below) - 1)
         return max(_box(self.graph.nodes[number])[0], needed)
 
-    def branch(self, edge: Edge) -> float:
+    def branch(self, edge: ConnectionEdge) -> float:
         """Width of a joint with all that is below it."""
         return max(pill_width(edge), self.width(edge.ends[1]))
 
@@ -179,6 +179,6 @@ class _Draft:
                 edge = edges[k - 1]
                 self.tree.append(PlacedEdge(edge, x, (row - 0.5) * LEVEL + 3, pill_width(edge)))
 
-    def branch_alone(self, edge: Edge) -> float:
+    def branch_alone(self, edge: ConnectionEdge) -> float:
         """Width of a joint with the link below it."""
         return max(pill_width(edge), _box(self.graph.nodes[edge.ends[1]])[0])

@@ -13,24 +13,25 @@ from mbs.components.motion import Motion
 from mbs.expressions import to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint
 from mbs.view.measures import Measures
-from mbs.view.posed import Array, Posed
+from mbs.view.mesh import turned_to
+from mbs.view.posed import Array, PosedLinks
 from mbs.view.primitives import (
-    Axis,
-    Ball,
-    Box,
-    Cylinder,
-    Label,
+    AxisShape,
+    BallShape,
+    BoxShape,
+    CylinderShape,
+    LabelShape,
     Primitive,
-    Ring,
-    Span,
-    Spring,
+    RingShape,
+    SpanShape,
+    SpringShape,
     Vector,
 )
 
 _COILED = ("spring", "bushing")
 
 
-def joint_shapes(scene: Posed, sizes: Measures) -> Iterator[Primitive]:
+def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
     """Every joint: cylinders about axes, boxes along them, balls; and their names."""
     for joint in _shown(scene):
         if joint.kind == "rollingdisc":
@@ -41,14 +42,14 @@ def joint_shapes(scene: Posed, sizes: Measures) -> Iterator[Primitive]:
     yield from _labels(scene, sizes)
 
 
-def _shown(scene: Posed) -> Iterator[SkeletonJoint]:
+def _shown(scene: PosedLinks) -> Iterator[SkeletonJoint]:
     """All but those that leave a body free, or weld it without closing a loop."""
     for joint in scene.parts.joints:
         if joint.kind != "free" and (joint.kind != "fixed" or joint.cut):
             yield joint
 
 
-def _labels(scene: Posed, sizes: Measures) -> Iterator[Label]:
+def _labels(scene: PosedLinks, sizes: Measures) -> Iterator[LabelShape]:
     """The names of joints, one above the other where they are at one place."""
     taken: list[Array] = []
     for joint in _shown(scene):
@@ -57,10 +58,10 @@ def _labels(scene: Posed, sizes: Measures) -> Iterator[Label]:
         row = sum(bool(np.linalg.norm(point - other) < sizes.joint) for other in taken)
         taken.append(point)
         at = scene.local(joint.links[side], point)
-        yield Label("label", joint.links[side], at, joint.name, row)
+        yield LabelShape("label", joint.links[side], at, joint.name, row)
 
 
-def _look(scene: Posed, joint: SkeletonJoint) -> tuple[str, str]:
+def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
     """Role and colour."""
     if joint.cut:
         return "loop", "loop"
@@ -68,7 +69,7 @@ def _look(scene: Posed, joint: SkeletonJoint) -> tuple[str, str]:
     return "joint", "active" if driven else "joint"
 
 
-def _joined(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+def _joined(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
     """A bar between frames that are not one place, balls where a joint has no axes."""
     role, colour = _look(scene, joint)
     a, b = (scene.points[k] for k in joint.points)
@@ -76,13 +77,13 @@ def _joined(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Pri
     slides = any(axis.motion == "prismatic" for axis in joint.axes)
     if slides or np.linalg.norm(a - b) > 1e-6 * sizes.size or joint.cut:
         paint = colour if joint.cut or not slides else "joint"
-        yield Span(role, joint.links, paint, ends, 0.45 * sizes.bar)
+        yield SpanShape(role, joint.links, paint, ends, 0.45 * sizes.bar)
     if not joint.axes:
         for link, end in dict(zip(joint.links, ends, strict=True)).items():
-            yield Ball(role, link, colour, end, 1.15 * sizes.joint)
+            yield BallShape(role, link, colour, end, 1.15 * sizes.joint)
 
 
-def _axes(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
     role, colour = _look(scene, joint)
     carriers = _carriers(scene, joint)
     shrink = 1.0 if len(joint.axes) == 1 else 0.8
@@ -91,17 +92,17 @@ def _axes(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primi
         radius = shrink * sizes.joint
         if axis.motion == "revolute":
             a, b = _around(scene, link, center, 1.35 * radius * direction)
-            yield Cylinder(role, link, colour, a, b, radius)
+            yield CylinderShape(role, link, colour, a, b, radius)
         else:
             side = 1.9 * radius
             seat = _seat(scene, joint, direction, 1.5 * side)
-            pose = scene.local_pose(link, _turned_to(direction), center + seat)
-            yield Box(role, link, colour, pose, (side, side, 1.5 * side))
+            pose = scene.local_pose(link, turned_to(direction), center + seat)
+            yield BoxShape(role, link, colour, pose, (side, side, 1.5 * side))
         a, b = _around(scene, link, center, 4.5 * sizes.joint * direction)
-        yield Axis("axis", link, a, b)
+        yield AxisShape("axis", link, a, b)
 
 
-def _carriers(scene: Posed, joint: SkeletonJoint) -> list[tuple[int, int]]:
+def _carriers(scene: PosedLinks, joint: SkeletonJoint) -> list[tuple[int, int]]:
     """For each axis the link that it is fixed on, and the point that it goes through."""
     if joint.cut:
         return [(joint.links[min(k, 1)], joint.points[min(k, 1)]) for k in range(len(joint.axes))]
@@ -114,11 +115,11 @@ def _carriers(scene: Posed, joint: SkeletonJoint) -> list[tuple[int, int]]:
     ]
 
 
-def _around(scene: Posed, link: int, center: Array, half: Array) -> tuple[Vector, Vector]:
+def _around(scene: PosedLinks, link: int, center: Array, half: Array) -> tuple[Vector, Vector]:
     return scene.local(link, center - half), scene.local(link, center + half)
 
 
-def _seat(scene: Posed, joint: SkeletonJoint, direction: Array, length: float) -> Array:
+def _seat(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: float) -> Array:
     """Where a slide sits, seen from frame_b: beside a ball that is there too."""
     a, b = (scene.points[k] for k in joint.points)
     back = float((a - b) @ direction)
@@ -133,15 +134,7 @@ def _seat(scene: Posed, joint: SkeletonJoint, direction: Array, length: float) -
     return np.array(-1.1 * length * direction if crowded else 0.0 * direction)
 
 
-def _turned_to(direction: Array) -> Array:
-    """A rotation whose z axis is a direction."""
-    other = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    x = np.cross(other, direction)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(direction, x), direction])
-
-
-def _wheel(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+def _wheel(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
     cut = next(cut for cut in scene.system.cuts if cut.edge.joint.name == joint.name)
     disc = cut.edge.joint
     radius = to_float(disc.radius, scene.parameters) if isinstance(disc, RollingDisc) else None
@@ -151,17 +144,17 @@ def _wheel(scene: Posed, joint: SkeletonJoint, sizes: Measures) -> Iterator[Prim
     axis = scene.poses[link, :, :3] @ _rotation(scene, cut) @ np.array(disc.axis, dtype=float)
     tube = min(0.06 * radius, 0.7 * sizes.joint)
     direction, at = scene.local_direction(link, axis), scene.local(link, center)
-    yield Ring("loop", link, "loop", at, direction, radius - tube, tube)
+    yield RingShape("loop", link, "loop", at, direction, radius - tube, tube)
 
 
-def _rotation(scene: Posed, cut: Cut) -> Array:
+def _rotation(scene: PosedLinks, cut: Cut) -> Array:
     """Frame_b of a cut joint in its link's frame."""
     system = scene.system
     R = casadi.Function("R", [system.p], [casadi.densify(cut.pose_b.R)])
     return np.array(R([scene.parameters[p.name] for p in system.parameters]))
 
 
-def force_shapes(scene: Posed, sizes: Measures) -> Iterator[Primitive]:
+def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
     """Springs as coils, other elements between two points as bars."""
     for force in scene.parts.forces:
         a, b = (scene.points[k] for k in force.points)
@@ -171,8 +164,8 @@ def force_shapes(scene: Posed, sizes: Measures) -> Iterator[Primitive]:
 
 def _element(
     force: SkeletonForce, ends: tuple[Vector, Vector], length: float, sizes: Measures
-) -> Spring | Span:
+) -> SpringShape | SpanShape:
     if force.kind in _COILED:
         nominal = max(length, 4 * sizes.joint)
-        return Spring("force", force.links, "force", ends, 0.8 * sizes.joint, nominal)
-    return Span("force", force.links, "force", ends, 0.35 * sizes.bar)
+        return SpringShape("force", force.links, "force", ends, 0.8 * sizes.joint, nominal)
+    return SpanShape("force", force.links, "force", ends, 0.35 * sizes.bar)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi
 import numpy as np
 
-from mbs.view.posed import Array, Posed, three
+from mbs.view.posed import Array, PosedLinks, three
 from mbs.view.primitives import Vector
 
 _NICE = (1.0, 2.0, 5.0)
@@ -31,7 +31,7 @@ class Measures:
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class BoundingBall:
     """A ball that holds the mechanism: center and radius [m], in the base frame."""
 
     center: Vector
@@ -47,7 +47,7 @@ class Floor:
     reach: float
 
 
-def measures(scene: Posed, solid_points: Array) -> Measures:
+def measures(scene: PosedLinks, solid_points: Array) -> Measures:
     """Sizes from the extent of a mechanism and from how long its links are.
 
     Args:
@@ -68,7 +68,7 @@ def measures(scene: Posed, solid_points: Array) -> Measures:
     return Measures(size, joint, 0.62 * joint, max(3.6 * joint, 0.07 * size))
 
 
-def _gyration(scene: Posed) -> float:
+def _gyration(scene: PosedLinks) -> float:
     """A length from the inertia of the bodies; 1 m where they have none."""
     system = scene.system
     found = 0.0
@@ -80,15 +80,15 @@ def _gyration(scene: Posed) -> float:
     return found or 1.0
 
 
-def bounds_of(points: Array, margin: float) -> Bounds:
+def bounds_of(points: Array, margin: float) -> BoundingBall:
     """The ball about a cuboid that holds points (n, 3), a margin wider [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle = three((low + high) / 2)
     reach = float(np.linalg.norm(points - (low + high) / 2, axis=1).max())
-    return Bounds(middle, reach + margin)
+    return BoundingBall(middle, reach + margin)
 
 
-def floor_of(points: Array, up: Array, bounds: Bounds, gap: float = 0.0) -> Floor:
+def floor_of(points: Array, up: Array, bounds: BoundingBall, gap: float = 0.0) -> Floor:
     """A ground that is a gap [m] below points (n, 3) and below the base frame."""
     lowest = min(0.0, float((points @ up).min())) - gap
     center = np.array(bounds.center)
@@ -102,7 +102,7 @@ def _nice(value: float) -> float:
     return float(min((n * power for n in (*_NICE, 10.0)), key=lambda n: abs(n - value)))
 
 
-def views(scene: Posed) -> dict[str, Vector]:
+def views(scene: PosedLinks) -> dict[str, Vector]:
     """Unit vectors from a mechanism towards who looks at it, by the name of the view.
 
     The front of a mechanism that moves in a plane is the side from which the plane is seen.
@@ -110,7 +110,7 @@ def views(scene: Posed) -> dict[str, Vector]:
     up = scene.up
     right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else _across(up))
     front = np.cross(right, up)
-    normal = _plane_normal(scene)
+    normal = plane_normal(scene)
     flat = normal is not None and abs(float(normal @ up)) < 0.1
     if flat and normal is not None:
         front = normal if float(normal @ front) > -1e-9 else -normal
@@ -123,11 +123,11 @@ def views(scene: Posed) -> dict[str, Vector]:
     return {name: three(_unit(value)) for name, value in found.items()}
 
 
-def _is_level(scene: Posed) -> bool:
+def _is_level(scene: PosedLinks) -> bool:
     """Whether everything lies near a level plane."""
     heights = scene.points @ scene.up
     spread = float(np.linalg.norm(np.ptp(scene.points, axis=0)))
-    return bool(np.ptp(heights) < 0.12 * spread) and _plane_normal(scene) is not None
+    return bool(np.ptp(heights) < 0.12 * spread) and plane_normal(scene) is not None
 
 
 def _across(up: Array) -> Array:
@@ -136,7 +136,7 @@ def _across(up: Array) -> Array:
     return x - float(x @ up) * up
 
 
-def _plane_normal(scene: Posed) -> Array | None:
+def plane_normal(scene: PosedLinks) -> Array | None:
     """The common direction of all revolute axes; None where they differ, or where there is none."""
     axes = [
         scene.directions[axis.direction]

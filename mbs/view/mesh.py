@@ -10,17 +10,17 @@ import numpy as np
 
 from mbs.view.posed import Array
 from mbs.view.primitives import (
-    Axis,
-    Ball,
-    Bar,
-    Box,
-    Cylinder,
-    Frame,
-    Plate,
+    AxisShape,
+    BallShape,
+    BarShape,
+    BoxShape,
+    CylinderShape,
+    FrameShape,
+    PlateShape,
     Primitive,
-    Ring,
-    Span,
-    Spring,
+    RingShape,
+    SpanShape,
+    SpringShape,
 )
 
 _SIDES = 14
@@ -28,8 +28,8 @@ _PIECES = 8
 """A long bar is cut into so many, since faces are sorted by their middles."""
 
 _TURNS = 8
-_BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-_BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,33 +57,33 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
         item: any but a label, which has none, and what is stretched between two links.
         size: of the mechanism [m], for the dashes of axes.
     """
-    if isinstance(item, (Bar, Cylinder)):
+    if isinstance(item, (BarShape, CylinderShape)):
         yield Faces(_round(item), item.colour)
-    elif isinstance(item, Ball):
+    elif isinstance(item, BallShape):
         turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
         profile = item.radius * np.column_stack([np.cos(turn), np.sin(turn)])
         yield Faces(revolved(profile) + np.array(item.at), item.colour)
-    elif isinstance(item, Ring):
+    elif isinstance(item, RingShape):
         turn = np.linspace(0, 2 * np.pi, 9)
         profile = item.tube * np.column_stack([np.cos(turn), np.sin(turn)]) + [item.radius, 0]
         R = turned_to(np.array(item.axis))
         yield Faces(revolved(profile, 48) @ R.T + np.array(item.at), item.colour)
-    elif isinstance(item, Box):
+    elif isinstance(item, BoxShape):
         yield Faces(_posed(_cuboid(np.array(item.size)), item.pose), item.colour)
-    elif isinstance(item, Plate):
+    elif isinstance(item, PlateShape):
         yield Faces(_fan(np.array(item.points)), item.colour, "open", item.opacity)
-    elif isinstance(item, Frame):
+    elif isinstance(item, FrameShape):
         for k in range(3):
             arrow = _arrow(item.length) @ turned_to(np.eye(3)[k]).T
             yield Faces(_posed(arrow, item.pose), f"axes.{k}")
-    elif isinstance(item, Axis):
+    elif isinstance(item, AxisShape):
         yield Faces(_dashes(np.array(item.a), np.array(item.b), size), item.colour, "line")
 
 
-def stretched(item: Span | Spring, a: Array, b: Array) -> Faces:
+def stretched(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
     """Faces of what lies between two points of the base frame."""
-    if isinstance(item, Span):
-        bar = _round(Cylinder(item.role, 0, item.colour, tuple(a), tuple(b), item.radius))
+    if isinstance(item, SpanShape):
+        bar = _round(CylinderShape(item.role, 0, item.colour, tuple(a), tuple(b), item.radius))
         return Faces(bar, item.colour)
     t = np.linspace(0, 1, 24 * _TURNS + 1)
     grown = item.radius * np.minimum(1, 12 * np.minimum(t, 1 - t))
@@ -121,11 +121,11 @@ def turned_to(direction: Array) -> Array:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _round(item: Bar | Cylinder) -> Array:
+def _round(item: BarShape | CylinderShape) -> Array:
     a, b = np.array(item.a), np.array(item.b)
     length, r = float(np.linalg.norm(b - a)), item.radius
     along = np.column_stack([np.full(_PIECES + 1, r), np.linspace(0, length, _PIECES + 1)])
-    if isinstance(item, Bar):
+    if isinstance(item, BarShape):
         turn = np.linspace(0, np.pi / 2, 4)
         foot = r * np.column_stack([np.sin(turn), -np.cos(turn)])
         head = r * np.column_stack([np.cos(turn), np.sin(turn)]) + [0, length]
@@ -142,7 +142,7 @@ def _cuboid(size: Array) -> Array:
     """Faces about the origin, cut across the longest side."""
     longest = int(np.argmax(size))
     faces = []
-    for corners in _BOX_CORNERS[np.array(_BOX_FACES)]:
+    for corners in BOX_CORNERS[np.array(BOX_FACES)]:
         first, last = corners[:, longest].min(), corners[:, longest].max()
         cuts = np.linspace(first, last, _PIECES + 1) if last > first else np.array([first, last])
         for low, high in itertools.pairwise(cuts):

@@ -11,9 +11,9 @@ import numpy as np
 from mbs.result import optional_module
 from mbs.view.camera import Camera, camera
 from mbs.view.mesh import Faces, faces_of, stretched
-from mbs.view.palette import PALETTE, Theme
+from mbs.view.palette import PALETTE, Theme, rgb
 from mbs.view.posed import Array
-from mbs.view.primitives import Label, Span, Spring
+from mbs.view.primitives import LabelShape, SpanShape, SpringShape
 from mbs.view.scene import HIDDEN, Scene
 
 _LIGHT = np.array([0.35, 0.85, 0.55])
@@ -80,7 +80,7 @@ class Painter:
         """Corners on the picture, colours, widths of edges: far ones first; and the shadow."""
         every = [(self._moved(faces, places[link]), faces) for link, faces in self.solid]
         for item in self.scene.primitives:
-            if isinstance(item, (Span, Spring)) and item.role in self.shown:
+            if isinstance(item, (SpanShape, SpringShape)) and item.role in self.shown:
                 a, b = (
                     places[k, :, :3] @ np.array(end) + places[k, :, 3]
                     for k, end in zip(item.links, item.ends, strict=True)
@@ -150,7 +150,7 @@ class Painter:
         effects = optional_module("matplotlib.patheffects", "plot")
         halo = [effects.withStroke(linewidth=2.5, foreground=self._colour("background"))]
         for item in self.scene.primitives:
-            if isinstance(item, Label) and item.role in self.shown:
+            if isinstance(item, LabelShape) and item.role in self.shown:
                 at = places[item.link, :, :3] @ np.array(item.at) + places[item.link, :, 3]
                 (x, y), _ = self.eye.seen(at)
                 look = {"color": self._colour("text"), "fontsize": 9, "path_effects": halo}
@@ -158,11 +158,7 @@ class Painter:
                 self.axes.text(x + 0.02, y, item.text, gid=item.text, **look)
 
     def _colour(self, name: str) -> Array:
-        colours = PALETTE[self.theme]
-        first, _, number = name.partition(".")
-        value = colours[first]
-        text = value[int(number)] if isinstance(value, list) else str(value)
-        return np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])
+        return rgb(name, self.theme)
 
     def _number(self, name: str) -> float:
         value = PALETTE[self.theme][name]
@@ -190,7 +186,7 @@ def painter(scene: Scene, view: str, theme: Theme, shown: Collection[str] = ()) 
     solid = [
         (item.link, faces)
         for item in scene.primitives
-        if not isinstance(item, (Span, Spring)) and item.role in roles
+        if not isinstance(item, (SpanShape, SpringShape)) and item.role in roles
         for faces in faces_of(item, scene.size)
     ]
     figure = figures.Figure(figsize=_INCHES)

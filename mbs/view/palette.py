@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 Theme = Literal["light", "dark"]
 Colours = Mapping[str, str | float | list[str]]
 
@@ -58,3 +61,11 @@ PALETTE: Mapping[Theme, Colours] = MappingProxyType({"light": _LIGHT, "dark": _D
 def link_colour(number: int) -> str:
     """The name of the colour of a link, 0 for the base."""
     return "base" if number == 0 else LINK_COLOURS[(number - 1) % len(LINK_COLOURS)]
+
+
+def rgb(name: str, theme: Theme) -> NDArray[np.float64]:
+    """Red, green and blue from 0 to 1 of a colour; "axes.0" is the first colour of the axes."""
+    first, _, number = name.partition(".")
+    value = PALETTE[theme][first]
+    text = value[int(number)] if isinstance(value, list) else str(value)
+    return np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])

@@ -22,7 +22,7 @@ Values = Mapping[str, float] | Sequence[float] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Posed:
+class PosedLinks:
     """A system whose links have places.
 
     Attributes:
@@ -70,7 +70,7 @@ def rows(pose: Array) -> Rows:
     return tuple(float(value) for value in np.ravel(pose))
 
 
-def posed(system: System, q: Sequence[float], parameters: Mapping[str, float] | None) -> Posed:
+def posed(system: System, q: Sequence[float], parameters: Mapping[str, float] | None) -> PosedLinks:
     """The links and the skeleton at positions q.
 
     Args:
@@ -88,7 +88,7 @@ def posed(system: System, q: Sequence[float], parameters: Mapping[str, float] | 
     poses = pose_rows(system, np.array(given[0]).reshape(-1, 1), p)[:, 0]
     gravity = Function("gravity", [system.p], [casadi.densify(system.tree.gravity)])
     names = [parameter.name for parameter in system.parameters]
-    return Posed(
+    return PosedLinks(
         system,
         dict(zip(names, p, strict=True)),
         parts,

@@ -13,7 +13,7 @@ Rows = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Bar:
+class BarShape:
     """A round bar with rounded ends from a to b [m], in the frame of the link."""
 
     role: str
@@ -25,7 +25,7 @@ class Bar:
 
 
 @dataclass(frozen=True, slots=True)
-class Cylinder:
+class CylinderShape:
     """A cylinder from a to b [m], with a bore where that is above zero [m]."""
 
     role: str
@@ -38,7 +38,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True, slots=True)
-class Ball:
+class BallShape:
     """A ball at a point [m]."""
 
     role: str
@@ -49,7 +49,7 @@ class Ball:
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class BoxShape:
     """A cuboid with these sides [m] about the origin of a pose."""
 
     role: str
@@ -60,7 +60,7 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
-class Ring:
+class RingShape:
     """A ring about an axis through a point: radius of its middle line and of the tube [m]."""
 
     role: str
@@ -73,7 +73,7 @@ class Ring:
 
 
 @dataclass(frozen=True, slots=True)
-class Plate:
+class PlateShape:
     """A thin polygon with these corners [m]."""
 
     role: str
@@ -84,7 +84,7 @@ class Plate:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class FrameShape:
     """Three arrows along the axes of a frame: pose, and their length [m]."""
 
     role: str
@@ -95,7 +95,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class AxisShape:
     """A dashed line from a to b [m]."""
 
     role: str
@@ -106,7 +106,7 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True)
-class Label:
+class LabelShape:
     """A text beside a point [m], above as many others that are there as `row` says."""
 
     role: str
@@ -118,7 +118,7 @@ class Label:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class SpanShape:
     """A round bar between points on two links, however far apart they are.
 
     `ends` are in the frames of the two links [m].
@@ -132,7 +132,7 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
-class Spring:
+class SpringShape:
     """A coil between points on two links; `length` is the one at which its wire is round [m]."""
 
     role: str
@@ -143,4 +143,16 @@ class Spring:
     length: float
 
 
-Primitive = Bar | Cylinder | Ball | Box | Ring | Plate | Frame | Axis | Label | Span | Spring
+Primitive = (
+    BarShape
+    | CylinderShape
+    | BallShape
+    | BoxShape
+    | RingShape
+    | PlateShape
+    | FrameShape
+    | AxisShape
+    | LabelShape
+    | SpanShape
+    | SpringShape
+)

@@ -13,10 +13,19 @@ from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.view.joint_shapes import force_shapes, joint_shapes
 from mbs.view.link_shapes import base_shapes, corners, frame_shapes, link_shapes, solid_shapes
-from mbs.view.measures import Bounds, Floor, bounds_of, floor_of, measures, views
+from mbs.view.measures import BoundingBall, Floor, bounds_of, floor_of, measures, views
 from mbs.view.palette import PALETTE
 from mbs.view.posed import Array, Values, pose_rows, posed, position_of
-from mbs.view.primitives import Ball, Bar, Box, Cylinder, Frame, Primitive, Ring, Vector
+from mbs.view.primitives import (
+    BallShape,
+    BarShape,
+    BoxShape,
+    CylinderShape,
+    FrameShape,
+    Primitive,
+    RingShape,
+    Vector,
+)
 
 HIDDEN = ("link frame", "label")
 """Roles that are not shown until asked for."""
@@ -47,7 +56,7 @@ class Scene:
     links: tuple[str, ...]
     up: Vector
     size: float
-    bounds: Bounds
+    bounds: BoundingBall
     floor: Floor
     views: Mapping[str, Vector]
     q: tuple[float, ...]
@@ -163,17 +172,17 @@ def _gap(system: System) -> float:
 
 
 def _plain(item: Primitive) -> dict[str, Any]:
-    return {"kind": type(item).__name__.lower(), **asdict(item)}
+    return {"kind": type(item).__name__.removesuffix("Shape").lower(), **asdict(item)}
 
 
 def _marks(primitives: tuple[Primitive, ...]) -> list[tuple[int, Array]]:
     """Points of shapes on their links, which bound a motion."""
     found: list[tuple[int, Array]] = []
     for item in primitives:
-        if isinstance(item, (Bar, Cylinder)):
+        if isinstance(item, (BarShape, CylinderShape)):
             found += [(item.link, np.array(item.a)), (item.link, np.array(item.b))]
-        elif isinstance(item, (Ball, Ring)):
+        elif isinstance(item, (BallShape, RingShape)):
             found.append((item.link, np.array(item.at)))
-        elif isinstance(item, (Box, Frame)):
+        elif isinstance(item, (BoxShape, FrameShape)):
             found.append((item.link, np.array(item.pose).reshape(3, 4)[:, 3]))
     return found

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from mbs.export.fmu.description import FmuModel, Jumps, State, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps, State
 from mbs.solvers import integrate
 
 
@@ -68,16 +68,18 @@ def pendulum() -> FmuModel:
                 description="angular velocity",
             ),
         ),
-        inputs=(Variable(name="tau", unit="N.m", description="torque on the joint"),),
+        inputs=(FmuVariable(name="tau", unit="N.m", description="torque on the joint"),),
         outputs=(
-            Variable(name="tip.x", unit="m", description="where the mass is"),
-            Variable(name="tip.y", unit="m", description="how high it is"),
+            FmuVariable(name="tip.x", unit="m", description="where the mass is"),
+            FmuVariable(name="tip.y", unit="m", description="how high it is"),
         ),
         parameters=(
-            Variable(name="mass", unit="kg", start=1.0, min=1e-6, max=1e6, description="mass"),
-            Variable(name="length", unit="m", start=0.5, min=1e-6, description="length"),
-            Variable(name="damping", unit="N.m.s/rad", start=0.05, min=0.0, description="damping"),
-            Variable(name="g", unit="m/s2", start=9.81, description="gravity"),
+            FmuVariable(name="mass", unit="kg", start=1.0, min=1e-6, max=1e6, description="mass"),
+            FmuVariable(name="length", unit="m", start=0.5, min=1e-6, description="length"),
+            FmuVariable(
+                name="damping", unit="N.m.s/rad", start=0.05, min=0.0, description="damping"
+            ),
+            FmuVariable(name="g", unit="m/s2", start=9.81, description="gravity"),
         ),
         rhs=ca.Function("pendulum_rhs", [t, x, z, u, p], [xdot, y]),
         stop_time=3.0,
@@ -122,31 +124,35 @@ def slider_crank() -> FmuModel:
                 nominal=5.0,
             ),
         ),
-        inputs=(Variable(name="torque", description="torque on the crank", unit="N.m", start=0.1),),
+        inputs=(
+            FmuVariable(name="torque", description="torque on the crank", unit="N.m", start=0.1),
+        ),
         outputs=(
-            Variable(name="slider.v", description="velocity of the slider", unit="m/s"),
-            Variable(name="force", description="force on the slider", unit="N"),
+            FmuVariable(name="slider.v", description="velocity of the slider", unit="m/s"),
+            FmuVariable(name="force", description="force on the slider", unit="N"),
         ),
         parameters=(
-            Variable(
+            FmuVariable(
                 name="crank.length",
                 description="length of the crank",
                 unit="m",
                 start=0.1,
                 min=1e-6,
             ),
-            Variable(
+            FmuVariable(
                 name="rod.length", description="length of the rod", unit="m", start=0.3, min=1e-6
             ),
-            Variable(
+            FmuVariable(
                 name="inertia",
                 description="inertia of the crank",
                 unit="kg.m2",
                 start=0.01,
                 min=1e-9,
             ),
-            Variable(name="mass", description="mass of the slider", unit="kg", start=0.5, min=0.0),
-            Variable(
+            FmuVariable(
+                name="mass", description="mass of the slider", unit="kg", start=0.5, min=0.0
+            ),
+            FmuVariable(
                 name="damping",
                 description="viscous friction of the crank",
                 unit="N.m.s/rad",
@@ -155,8 +161,8 @@ def slider_crank() -> FmuModel:
             ),
         ),
         dependents=(
-            Variable(name="rod.angle", description="angle of the rod", unit="rad", start=0.0),
-            Variable(name="slider.s", description="place of the slider", unit="m", start=0.4),
+            FmuVariable(name="rod.angle", description="angle of the rod", unit="rad", start=0.0),
+            FmuVariable(name="slider.s", description="place of the slider", unit="m", start=0.4),
         ),
         rhs=ca.Function(
             "crank_rhs",
@@ -181,15 +187,15 @@ def ball() -> FmuModel:
             moving("h", "m", "m/s", "height", start=1.0),
             moving("v", "m/s", "m/s2", "velocity"),
         ),
-        outputs=(Variable(name="energy", unit="J", description="per mass"),),
+        outputs=(FmuVariable(name="energy", unit="J", description="per mass"),),
         parameters=(
-            Variable(name="g", unit="m/s2", start=10.0, description="gravity"),
-            Variable(name="e", start=0.8, min=0.0, max=1.0, description="restitution"),
-            Variable(name="slow", unit="m/s", start=1e-3, description="it rests below"),
+            FmuVariable(name="g", unit="m/s2", start=10.0, description="gravity"),
+            FmuVariable(name="e", start=0.8, min=0.0, max=1.0, description="restitution"),
+            FmuVariable(name="slow", unit="m/s", start=1e-3, description="it rests below"),
         ),
         rhs=ca.Function("rhs", point, [ca.vertcat(v, -g * (1 - rest)), g * h + v**2 / 2]),
         jumps=Jumps(
-            modes=(Variable(name="rests", description="1 on the floor"),),
+            modes=(FmuVariable(name="rests", description="1 on the floor"),),
             first=ca.Function("first", point, [0, -h]),
             indicators=ca.Function("indicators", point, [ca.if_else(rest, 1, h)]),
             jump=ca.Function(
@@ -216,17 +222,17 @@ def clapper() -> FmuModel:
             moving("q", "rad", "rad/s", "angle", start=1.0),
             moving("w", "rad/s", "rad/s2", "angular velocity", nominal=3.0),
         ),
-        inputs=(Variable(name="push", unit="rad/s2", description="torque over inertia"),),
-        outputs=(Variable(name="energy", unit="J", description="over inertia"),),
+        inputs=(FmuVariable(name="push", unit="rad/s2", description="torque over inertia"),),
+        outputs=(FmuVariable(name="energy", unit="J", description="over inertia"),),
         parameters=(
-            Variable(name="length", unit="m", start=0.5, min=0.01, description="length"),
-            Variable(name="e", start=0.9, min=0.0, max=1.0, description="restitution"),
-            Variable(name="low", unit="rad", start=-0.5, description="lower stop"),
-            Variable(name="high", unit="rad", start=1.2, description="upper stop"),
+            FmuVariable(name="length", unit="m", start=0.5, min=0.01, description="length"),
+            FmuVariable(name="e", start=0.9, min=0.0, max=1.0, description="restitution"),
+            FmuVariable(name="low", unit="rad", start=-0.5, description="lower stop"),
+            FmuVariable(name="high", unit="rad", start=1.2, description="upper stop"),
         ),
         rhs=ca.Function("rhs", point, [xdot, w**2 / 2 - 9.81 / length * ca.cos(q)]),
         jumps=Jumps(
-            modes=(Variable(name="hits", description="number of impacts"),),
+            modes=(FmuVariable(name="hits", description="number of impacts"),),
             first=ca.Function("first", point, [0, ca.vertcat(low - q, q - high)]),
             indicators=ca.Function("indicators", point, [ca.vertcat(q - low, high - q)]),
             jump=ca.Function(
@@ -253,15 +259,15 @@ def block() -> FmuModel:
             moving("s", "m", "m/s", "way"),
             moving("v", "m/s", "m/s2", "velocity", start=1.0),
         ),
-        inputs=(Variable(name="force", unit="N", description="along the way"),),
-        outputs=(Variable(name="a", unit="m/s2", description="acceleration"),),
+        inputs=(FmuVariable(name="force", unit="N", description="along the way"),),
+        outputs=(FmuVariable(name="a", unit="m/s2", description="acceleration"),),
         parameters=(
-            Variable(name="mass", unit="kg", start=2.0, min=1e-3, description="mass"),
-            Variable(name="most", unit="N", start=3.0, min=0.0, description="friction force"),
+            FmuVariable(name="mass", unit="kg", start=2.0, min=1e-3, description="mass"),
+            FmuVariable(name="most", unit="N", start=3.0, min=0.0, description="friction force"),
         ),
         rhs=ca.Function("rhs", point, [ca.vertcat(v, a), a]),
         jumps=Jumps(
-            modes=(Variable(name="mode", description="0 sticks; 1, -1 slides"),),
+            modes=(FmuVariable(name="mode", description="0 sticks; 1, -1 slides"),),
             first=ca.Function("first", point, [ca.sign(v), ca.SX(2, 1)]),
             indicators=ca.Function(
                 "indicators", point, [ca.vertcat(first, ca.if_else(slides, 1, most + force))]
@@ -291,13 +297,13 @@ def stopped_crank() -> FmuModel:
         name="stopped_crank",
         parameters=(
             *model.parameters,
-            Variable(name="place", unit="m", start=0.35, description="of the stop"),
-            Variable(name="e", start=0.7, min=0.0, max=1.0, description="restitution"),
+            FmuVariable(name="place", unit="m", start=0.35, description="of the stop"),
+            FmuVariable(name="e", start=0.7, min=0.0, max=1.0, description="restitution"),
         ),
         rhs=ca.Function("rhs", point, model.rhs(t, x, z, u, p[:5])),
         closure=ca.Function("closure", [x, z, p[:7]], model.closure(x, z, p[:5])),
         jumps=Jumps(
-            modes=(Variable(name="hits", description="number of impacts"),),
+            modes=(FmuVariable(name="hits", description="number of impacts"),),
             first=ca.Function("first", point, [0, place - z[1]]),
             indicators=ca.Function("indicators", point, [z[1] - place]),
             jump=ca.Function("jump", [*point, fired], [ca.vertcat(x[0], turned), hits + 1]),
@@ -339,7 +345,7 @@ def logarithm() -> FmuModel:
         name="logarithm",
         states=(State(name="x", start=1.0, output=True),),
         rhs=ca.Function("rhs", symbols, [ca.SX(-1), ca.SX(0, 1)]),
-        jumps=Jumps(modes=(Variable(name="x.mode"),), names=("x",), **made),
+        jumps=Jumps(modes=(FmuVariable(name="x.mode"),), names=("x",), **made),
     )
 
 

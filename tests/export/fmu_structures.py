@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from mbs.export.fmu.description import FmuModel, Jumps, State, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps, State
 
 
 def ball(jumps=True):
@@ -18,20 +18,20 @@ def ball(jumps=True):
             State(name="h", unit="m", start=1.0, output=True),
             State(name="v", unit="m/s", start=0.0),
         ),
-        inputs=(Variable(name="push", unit="m/s2"),),
+        inputs=(FmuVariable(name="push", unit="m/s2"),),
         outputs=(
-            Variable(name="scaled", unit="m"),
-            Variable(name="weighted", unit="m"),
-            Variable(name="plain", unit="m/s2"),
+            FmuVariable(name="scaled", unit="m"),
+            FmuVariable(name="weighted", unit="m"),
+            FmuVariable(name="plain", unit="m/s2"),
         ),
         parameters=(
-            Variable(name="e", start=0.5, fixed=True),
-            Variable(name="g", unit="m/s2", start=9.81),
-            Variable(name="drag", unit="1/s", start=0.1),
+            FmuVariable(name="e", start=0.5, fixed=True),
+            FmuVariable(name="g", unit="m/s2", start=9.81),
+            FmuVariable(name="drag", unit="1/s", start=0.1),
         ),
         rhs=ca.Function("rhs", point, [xdot, ca.vertcat(count * x[0], e * x[0] + x[1], g)]),
         jumps=Jumps(
-            modes=(Variable(name="count"),),
+            modes=(FmuVariable(name="count"),),
             first=ca.Function("first", point, [ca.if_else(x[0] > 5, 1.0, 0.0), -x[0]]),
             indicators=ca.Function("indicators", point, [x[0]]),
             jump=ca.Function(
@@ -61,10 +61,10 @@ def two_cranks(coupled):
     return FmuModel(
         name="cranks",
         states=(State(name="a", unit="rad"), State(name="b", unit="rad")),
-        outputs=(Variable(name="s1", unit="m"), Variable(name="s2", unit="m")),
-        parameters=(Variable(name="l1", start=3.0), Variable(name="l2", start=3.0)),
+        outputs=(FmuVariable(name="s1", unit="m"), FmuVariable(name="s2", unit="m")),
+        parameters=(FmuVariable(name="l1", start=3.0), FmuVariable(name="l2", start=3.0)),
         dependents=tuple(
-            Variable(name=n, start=s) for n, s in zip("cdef", (0, 4, 0, 4), strict=True)
+            FmuVariable(name=n, start=s) for n, s in zip("cdef", (0, 4, 0, 4), strict=True)
         ),
         rhs=ca.Function("rhs", [t, x, z, u, p], [ca.DM([1, 1]), ca.vertcat(z[1], z[3])]),
         closure=ca.Function("closure", [x, z, p], [step, ca.norm_inf(r)]),

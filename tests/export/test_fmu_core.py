@@ -17,7 +17,7 @@ from fmu_models import MODELS, crank_reference, pendulum, slider_crank
 
 from mbs.errors import CompilerError, ExportError
 from mbs.export.fmu import fmi2_xml
-from mbs.export.fmu.description import State, Variable
+from mbs.export.fmu.description import FmuVariable, State
 from mbs.export.fmu.faces import FACES
 from mbs.export.fmu.pack import write_fmu
 from mbs.native import find_compiler
@@ -129,12 +129,12 @@ def test_a_failing_compiler_leaves_the_old_file(tmp_path, monkeypatch):
     [
         ({"name": ""}, "no name"),
         ({"inputs": ()}, "rhs has inputs of sizes"),
-        ({"inputs": (Variable(name="j1.q"),)}, "two variables are called 'j1.q'"),
-        ({"inputs": (Variable(name="time"),)}, "'time' is the name of time itself; use another"),
-        ({"inputs": (Variable(name="u", unit="lb"),)}, "unit 'lb'; use one of"),
-        ({"inputs": (Variable(name="u", start=float("nan")),)}, "u starts at nan"),
+        ({"inputs": (FmuVariable(name="j1.q"),)}, "two variables are called 'j1.q'"),
+        ({"inputs": (FmuVariable(name="time"),)}, "'time' is the name of time itself; use another"),
+        ({"inputs": (FmuVariable(name="u", unit="lb"),)}, "unit 'lb'; use one of"),
+        ({"inputs": (FmuVariable(name="u", start=float("nan")),)}, "u starts at nan"),
         ({"states": (State(name="a", nominal=0.0), State(name="b"))}, "nominal 0.0"),
-        ({"dependents": (Variable(name="z"),)}, "rhs has inputs"),
+        ({"dependents": (FmuVariable(name="z"),)}, "rhs has inputs"),
         ({"closure": slider_crank().closure}, "0 dependent coordinates need no closure"),
         ({"tolerance": 0.0}, "tolerance 0.0 must be positive"),
     ],
@@ -146,7 +146,7 @@ def test_a_description_that_contradicts_itself(change, message):
 
 def test_names_that_c_would_trip_over(tmp_path):
     model = pendulum()
-    odd = Variable(name='ä "quoted" \\ ??/ <é>', unit="N.m", description='"a" < b & c')
+    odd = FmuVariable(name='ä "quoted" \\ ??/ <é>', unit="N.m", description='"a" < b & c')
     path = write_fmu(
         dataclasses.replace(model, name="1 möbius/arm", inputs=(odd,)), tmp_path / "odd.fmu"
     )

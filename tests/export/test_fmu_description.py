@@ -16,7 +16,7 @@ import mbs
 from mbs.components import Body, Revolute, RigidStop
 from mbs.errors import ExportError
 from mbs.export.fmu import fmi2_xml, fmi3_xml
-from mbs.export.fmu.description import FmuModel, Member, Terminal, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, Member, Terminal
 from mbs.export.fmu.system_fmu import fmu_model
 from mbs.export.fmu.terminals import terminals_and_icons
 
@@ -144,7 +144,7 @@ def named(name):
     """A model of one parameter."""
     return FmuModel(
         name="odd",
-        parameters=(Variable(name=name),),
+        parameters=(FmuVariable(name=name),),
         rhs=ca.Function("rhs", [ca.SX.sym("a", k) for k in (1, 0, 0, 0, 1)], [ca.SX(0, 1)] * 2),
     )
 
@@ -181,7 +181,7 @@ def test_names_beyond_ascii_stay_and_are_announced_as_flat():
 
 def test_two_names_that_are_quoted_alike_are_refused():
     with pytest.raises(ExportError, match="two variables are called \"'a b'\"; rename one"):
-        dataclasses.replace(named("a b"), inputs=(Variable(name="'a b'"),))
+        dataclasses.replace(named("a b"), inputs=(FmuVariable(name="'a b'"),))
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])

@@ -6,7 +6,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmu_instances import Fmu
 
-from mbs.export.fmu.description import FmuModel, State, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, State
 from mbs.export.fmu.pack import write_fmu
 
 
@@ -20,8 +20,8 @@ def bent(change, rows=None):
     return FmuModel(
         name="bent",
         states=(State(name="x", output=True),),
-        outputs=(Variable(name="v"), Variable(name="a")),
-        dependents=(Variable(name="z"),),
+        outputs=(FmuVariable(name="v"), FmuVariable(name="a")),
+        dependents=(FmuVariable(name="z"),),
         rhs=ca.Function("rhs", [t, x, z, u, p], [ca.SX(1.0), ca.vertcat(v, 0.0)]),
         closure=step,
         slopes=rows,

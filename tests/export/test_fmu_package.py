@@ -21,14 +21,14 @@ from fmu_structures import ball
 import mbs
 from mbs.errors import ExportError
 from mbs.export.fmu.about import About
-from mbs.export.fmu.description import FmuModel, State, Variable
-from mbs.export.fmu.figure import Figure, Stroke
+from mbs.export.fmu.description import FmuModel, FmuVariable, State
 from mbs.export.fmu.licences import MBS
 from mbs.export.fmu.pack import write_fmu
 from mbs.export.fmu.reference import FOLDER, reference_files
 from mbs.solvers.integrate import integrate
+from mbs.view.drawing import Drawing, Stroke
 
-DRAWN = About(figure=Figure((Stroke("link", ((0.0, 0.0), (100.0, 0.0))),)))
+DRAWN = About(drawing=Drawing((Stroke("link", "link0", ((0.0, 0.0), (100.0, 0.0))),)))
 
 
 def model():
@@ -60,9 +60,9 @@ def oscillator(**changes):
     values = {
         "name": "oscillator",
         "states": (State(name="x", start=1.0, output=True), State(name="v")),
-        "inputs": (Variable(name="u", start=2.0),),
-        "outputs": (Variable(name="shifted"),),
-        "parameters": (Variable(name="k", start=4.0),),
+        "inputs": (FmuVariable(name="u", start=2.0),),
+        "outputs": (FmuVariable(name="shifted"),),
+        "parameters": (FmuVariable(name="k", start=4.0),),
         "rhs": ca.Function("rhs", [t, x, z, u, p], [ca.vertcat(x[1], u - p * x[0]), x[0] + t]),
         "stop_time": 3.0,
         "step_size": 0.25,
@@ -93,7 +93,7 @@ def test_stiff_and_fixed_step_models_have_references_too(solver):
 
 def test_reference_results_go_through_events():
     """Fall from 1 m, bounce to a quarter of the height, count the bounces."""
-    parameters = (*ball().parameters[:2], Variable(name="drag", unit="1/s", start=0.0))
+    parameters = (*ball().parameters[:2], FmuVariable(name="drag", unit="1/s", start=0.0))
     files = reference_files(dataclasses.replace(ball(), parameters=parameters))
     time, g = column(files, "time"), 9.81
     first = np.sqrt(2 / g)

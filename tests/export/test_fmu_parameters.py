@@ -6,10 +6,10 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import mbs
-from mbs.expressions import MORE_THAN_ZERO
 from mbs.components import Body, Box, CoulombFriction, Revolute, RigidStop
 from mbs.errors import ExportError, ModelError, SolverError
 from mbs.export.fmu.system_fmu import Contents, Settings, fmu_model
+from mbs.expressions import MORE_THAN_ZERO
 
 TENSOR = ((0.02, 0.001, 0), (0.001, 0.03, 0.002), (0, 0.002, 0.04))
 

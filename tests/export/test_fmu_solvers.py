@@ -11,7 +11,7 @@ from fmu_models import pendulum, slider_crank
 
 from mbs.errors import ExportError
 from mbs.export.fmu import fmi2_xml, fmi3_xml
-from mbs.export.fmu.description import FmuModel, State, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, State
 from mbs.export.fmu.pack import write_fmu
 
 MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}
@@ -24,7 +24,7 @@ def stiff():
     return FmuModel(
         name="stiff",
         states=(State(name="x", start=1.0, output=True, description="state"),),
-        parameters=(Variable(name="rate", unit="1/s", start=1e6, description="how fast"),),
+        parameters=(FmuVariable(name="rate", unit="1/s", start=1e6, description="how fast"),),
         rhs=ca.Function("rhs", [t, x, z, u, p], [xdot, ca.SX(0, 1)]),
     )
 

@@ -12,7 +12,7 @@ from lxml import etree
 
 import mbs
 from mbs.errors import ExportError
-from mbs.export.fmu.description import FmuModel, State, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, State
 from mbs.export.fmu.pack import write_fmu
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
@@ -35,12 +35,12 @@ def controller():
     return FmuModel(
         name="controller",
         rhs=ca.Function("control", [t, x, z, u, p], [ca.SX(0, 1), y]),
-        inputs=tuple(Variable(name=name, unit=unit) for name, unit in units),
-        outputs=tuple(Variable(name=name, unit="N.m") for name in ("tau1", "tau2")),
+        inputs=tuple(FmuVariable(name=name, unit=unit) for name, unit in units),
+        outputs=tuple(FmuVariable(name=name, unit="N.m") for name in ("tau1", "tau2")),
         parameters=(
-            Variable(name="stiffness", unit="N.m/rad", start=20.0),
-            Variable(name="damping", unit="N.m.s/rad", start=6.0),
-            Variable(name="goal", unit="rad", start=0.5),
+            FmuVariable(name="stiffness", unit="N.m/rad", start=20.0),
+            FmuVariable(name="damping", unit="N.m.s/rad", start=6.0),
+            FmuVariable(name="goal", unit="rad", start=0.5),
         ),
     )
 
@@ -264,8 +264,8 @@ def test_a_unit_of_another_size_is_another_unit(parts, tmp_path):
         name="lag",
         rhs=ca.Function("lag", inputs, [inputs[3] - x, x]),
         states=(State(name="x"),),
-        inputs=(Variable(name="u", unit="m"),),
-        outputs=(Variable(name="y", unit="m"),),
+        inputs=(FmuVariable(name="u", unit="m"),),
+        outputs=(FmuVariable(name="y", unit="m"),),
     )
     lag = write_fmu(model, tmp_path / "lag.fmu")
     millimetres = tmp_path / "mm.fmu"

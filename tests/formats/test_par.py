@@ -141,16 +141,22 @@ BAD = {
     "code": (("RL1", "__import__('os')"), "robot.par:7: r of frame 1: cannot read"),
     "call": (("RL1", "exp(2)"), "'exp' is not a function here"),
     "length": (("{0,1}", "{0,1,2}"), "robot.par:4: ant has 3 value(s); give 2, one for each frame"),
-    "count": (("NL = 2", "NL = two"), "robot.par:2: NL is 'two'; give a whole number"),
+    "count": (("NL = 2", "NL = two"), "robot.par:2: NL: 'two' is not a whole number"),
     "no NJ": (("NJ = 2\n", ""), "NJ is missing"),
     "fewer": (("NJ = 2", "NJ = 1"), "NJ is 1, below NL = 2"),
     "type": (("NJ = 2", "NJ = 2\nType = 2"), "robot.par:4: Type is 2 with NL = 2 and NJ = 2"),
     "twice": (("NJ = 2", "NJ = 2\nNL = 2"), "robot.par:4: NL was given on line 2"),
     "sigma": (("sigma = {0,1}", "sigma = {0,3}"), "small/frame 2: sigma is 3"),
-    "sigma text": (("sigma = {0,1}", "sigma = {0,s}"), "robot.par:5: sigma is 's'"),
+    "sigma text": (
+        ("sigma = {0,1}", "sigma = {0,s}"),
+        "robot.par:5: sigma: 's' is not a whole number",
+    ),
     "cyclic": (("ant = {0,1}", "ant = {2,1}"), "small/frame 1: antecedent 2 must be 0"),
     "flexible": (("NJ = 2", "NJ = 2\neta = {0,2}"), "robot.par:4: eta of joint 2 is 2; use 0"),
-    "flexible text": (("NJ = 2", "NJ = 2\neta = {0,e}"), "robot.par:4: eta is 'e'; give a whole"),
+    "flexible text": (
+        ("NJ = 2", "NJ = 2\neta = {0,e}"),
+        "robot.par:4: eta: 'e' is not a whole number",
+    ),
     "flexible weld": (
         ("sigma = {0,1}", "sigma = {0,2}\neta = {0,1}"),
         "eta of joint 2 is 1; use 0 for a rigid or fixed joint",
@@ -175,7 +181,7 @@ BAD = {
     ),
     "value": (
         ("NL =", "(* Value RL1 = 2*x *)\nNL ="),
-        "robot.par:2: Value RL1 is '2*x'; give a number",
+        "robot.par:2: Value RL1: '2*x' is not a number",
     ),
     "value text": (
         ("NL =", "(* Value RL1 = 1- *)\nNL ="),
@@ -185,7 +191,7 @@ BAD = {
         ("NL =", "(* Value RL1 = 1 *)\n(* Value RL1 = 2 *)\nNL ="),
         "robot.par:3: Value RL1 was given on line 2; give it once",
     ),
-    "guess": (("NL =", "(* Guess q1 = a *)\nNL ="), "robot.par:2: Guess q1 is 'a'; give a number"),
+    "guess": (("NL =", "(* Guess q1 = a *)\nNL ="), "robot.par:2: Guess q1: 'a' is not a number"),
     "no joint": (
         ("NL =", "(* Guess q7 = 1 *)\nNL ="),
         "small, guess: there is no joint 'q7'; use one of q1, q2",

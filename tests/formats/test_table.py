@@ -167,7 +167,7 @@ BAD = {
         dict(parameters={"RL": 1}),
         "'RL' is used by no row; did you mean 'RL4",
     ),
-    "parameter_text": (dict(parameters={"RL4": "A"}), "parameter RL4 is 'A'; give it a number"),
+    "parameter_text": (dict(parameters={"RL4": "A"}), "parameter RL4: 'A' is not a number"),
     "two_bodies": (dict(body__1__frame=1), "body 1: two bodies are on this frame"),
     "no_frame": (dict(body__1__frame=9), "body 9: there is no such frame; use 1 to 4"),
     "frame_table": (dict(frame={"antecedent": 0}), "give a list of tables [[frame]]"),
@@ -176,7 +176,7 @@ BAD = {
         dict(guess={"q3": 1}),
         "arm, guess: there is no joint 'q3'; use one of q1, q2, wrist",
     ),
-    "guess text": (dict(guess={"q2": "A"}), "arm, guess of q2 is 'A'; give a number"),
+    "guess text": (dict(guess={"q2": "A"}), "arm, guess of q2: 'A' is not a number"),
     "grouped": (dict(body__0__grouped=1), "grouped is 1; give true or false"),
     "extras": (dict(extras={"FX": [0]}), "not a list of texts"),
 }

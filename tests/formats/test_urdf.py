@@ -135,7 +135,7 @@ BAD = {
     "no name": ("<link/>", "a <link> has no name"),
     "no links": ("", "there is no <link>"),
     "type": (LINKS + TYPED.format("hinge", ""), "joint 'j': type 'hinge' is unknown"),
-    "axis": (LINKS + TYPED.format("revolute", '<axis xyz="0 0"/>'), "xyz='0 0' is not 3 finite"),
+    "axis": (LINKS + TYPED.format("revolute", '<axis xyz="0 0"/>'), "xyz: '0 0' is not 3 finite"),
     "zero axis": (LINKS + TYPED.format("revolute", '<axis xyz="0 0 0"/>'), "zero length"),
     "nan": (LINKS + TYPED.format("fixed", '<origin xyz="0 nan 0"/>'), "is not 3 finite"),
     "code": (LINKS + TYPED.format("fixed", '<origin xyz="0 0 id(1)"/>'), "is not 3 finite"),

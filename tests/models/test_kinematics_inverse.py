@@ -22,7 +22,7 @@ from mbs.models.jacobian_inverse import (
 from mbs.models.kinematics import jacobian
 from mbs.models.singularities import singularities
 from mbs.operations import count
-from mbs.recursions.jacobian import Target
+from mbs.recursions.jacobian import VelocityTarget
 from mbs.recursions.square_jacobian import square_jacobian
 
 COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
@@ -56,7 +56,9 @@ def test_arm(name, axes):
 )
 def test_blocks_of_an_arm_with_symbols(name, sizes):
     system = symbolic_robot(name, "none").assemble()
-    target = Target(system.tree, SX.sym("q", 6), system.p, system.frame(6), system.frame("base"))
+    target = VelocityTarget(
+        system.tree, SX.sym("q", 6), system.p, system.frame(6), system.frame("base")
+    )
     square = square_jacobian(target, range(6), range(6))
     assert sorted(block.size for block in square.blocks) == sizes
 

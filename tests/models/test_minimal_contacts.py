@@ -26,12 +26,12 @@ from mbs.components import (
     RigidStop,
 )
 from mbs.errors import ModelError
-from mbs.models.minimal_state import Drive, minimal_state
+from mbs.models.minimal_state import DriveInputs, minimal_state
 
 
 def compared(system, duration, q0=None, v0=None, tau=None, motion=None):
     """The motion of the state equation and of the simulation, their events at the same times."""
-    drive = Drive(motions=tuple((name[:-2], name[-1]) for name in motion or {}))
+    drive = DriveInputs(motions=tuple((name[:-2], name[-1]) for name in motion or {}))
     state, times = minimal_state(system, drive=drive), np.linspace(0, duration, 41)
 
     def inputs(t):
@@ -97,7 +97,7 @@ def test_a_bouncing_pendulum_loses_what_restitution_takes():
 @pytest.mark.parametrize("method", ["dopri5", "rodas"])
 def test_a_block_that_is_pulled_by_a_spring_sticks_and_slips_in_closed_form(method):
     system = stick_slip()
-    state = minimal_state(system, drive=Drive(motions=(("pull", "q"),)))
+    state = minimal_state(system, drive=DriveInputs(motions=(("pull", "q"),)))
     assert [system.coordinates[k].name for k in state.positions] == ["x"]
     own = moved(
         system, state, np.linspace(0, 12, 61), lambda t: [0, 0.5 * t, 0.5, 0], method=method
@@ -285,4 +285,4 @@ def test_the_start_tells_what_touches_and_what_is_beyond(q, v, modes, beyond):
 def test_a_motion_is_not_prescribed_where_a_contact_acts():
     system = stick_slip()
     with pytest.raises(ModelError, match="motion prescribes x, on which a rigid stop or dry"):
-        minimal_state(system, drive=Drive(motions=(("x", "a"),)))
+        minimal_state(system, drive=DriveInputs(motions=(("x", "a"),)))

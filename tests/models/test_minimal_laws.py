@@ -18,7 +18,7 @@ from mbs.components import (
     Torque,
 )
 from mbs.errors import ModelError
-from mbs.models.minimal_state import Drive, minimal_state
+from mbs.models.minimal_state import DriveInputs, minimal_state
 
 
 def controller(system, kind, index=0):
@@ -32,7 +32,7 @@ def controller(system, kind, index=0):
 
 def test_a_controller_drives_a_loop_with_a_stop_as_in_a_simulation():
     system = stopped_rocker()
-    state = minimal_state(system, drive=Drive(effort=controller(system, casadi.SX)))
+    state = minimal_state(system, drive=DriveInputs(effort=controller(system, casadi.SX)))
     assert (state.inputs, state.extra, state.efforts) == ((), 1, (0,))
     own = moved(system, state, np.linspace(0, 2, 41), lambda t: [1.6 + casadi.sin(2 * t)])
 
@@ -50,7 +50,7 @@ def test_a_controller_drives_a_loop_with_a_stop_as_in_a_simulation():
 def test_a_controller_that_is_no_expression_of_scalars_stays_a_call():
     system = stopped_rocker()
     both = [
-        minimal_state(system, drive=Drive(effort=controller(system, kind)))
+        minimal_state(system, drive=DriveInputs(effort=controller(system, kind)))
         for kind in (casadi.SX, casadi.MX)
     ]
     assert [state.rhs.is_a("MXFunction") for state in both] == [False, True]
@@ -93,7 +93,7 @@ def test_wrench_motions_law_and_contacts_together_move_an_arm_as_in_a_simulation
     system = loaded_arm()
     t, q, v, w, p = (casadi.SX.sym(n, k) for n, k in zip("tqvwp", (1, 4, 4, 1, 0), strict=True))
     law = casadi.Function("law", [t, q, v, w, p], [arm_law(t, q, v, w)])
-    drive = Drive(wrenches=("grip",), motions=(("q1", "q"), ("q4", "a")), effort=law)
+    drive = DriveInputs(wrenches=("grip",), motions=(("q1", "q"), ("q4", "a")), effort=law)
     state = minimal_state(system, drive=drive)
 
     def inputs(t):
@@ -143,7 +143,7 @@ def test_a_law_of_devices_is_that_of_a_simulation():
     system = driven()
     t, q, v, w, p = (casadi.SX.sym(n, k) for n, k in zip("tqvwp", (1, 1, 1, 2, 0), strict=True))
     law = casadi.Function("law", [t, q, v, w, p], [w[0] * (w[1] - q) - 0.3 * v])
-    state = minimal_state(system, drive=Drive(device=law))
+    state = minimal_state(system, drive=DriveInputs(device=law))
     assert (state.inputs, state.devices, state.extra) == ((), (), 2)
     own = moved(system, state, np.linspace(0, 0.5, 11), lambda t: [20.0, 0.4], method="rodas")
     full = mbs.simulate.run(
@@ -179,4 +179,4 @@ def law_of(inputs, outputs):
 )
 def test_a_law_that_does_not_fit_is_refused(build, drive, message):
     with pytest.raises(ModelError, match=message):
-        minimal_state(build(), drive=Drive(**drive))
+        minimal_state(build(), drive=DriveInputs(**drive))

@@ -20,7 +20,7 @@ from mbs.components import (
 )
 from mbs.errors import ModelError
 from mbs.models import direct_dynamics, hybrid_dynamics, transform
-from mbs.models.minimal_state import Drive, consistent_start, minimal_state
+from mbs.models.minimal_state import DriveInputs, consistent_start, minimal_state
 
 
 def floating():
@@ -81,7 +81,7 @@ _WRENCHES = {
 def test_a_wrench_on_a_frame_is_the_opposite_of_f_ext(name):
     build, frame = _WRENCHES[name]
     system = build()
-    state = minimal_state(system, drive=Drive(wrenches=(frame,)))
+    state = minimal_state(system, drive=DriveInputs(wrenches=(frame,)))
     x, z, rng = random_point(system, state)
     tau, wrench = rng.uniform(-5, 5, len(state.inputs)), rng.uniform(-5, 5, 6)
     xdot, _ = state.rhs(0.0, x, z, [*tau, *wrench], system.p_default)
@@ -110,7 +110,7 @@ def pushed(*acts):
 
 def test_a_wrench_moves_a_loop_with_dry_friction_as_force_elements_do():
     system = pushed()
-    state = minimal_state(system, drive=Drive(wrenches=("middle",)))
+    state = minimal_state(system, drive=DriveInputs(wrenches=("middle",)))
     wrench = [2.0, -3.0, 0.0, 0.0, 0.0, 0.7]
     motors = [0.0] * len(state.inputs)
     own = moved(system, state, np.linspace(0, 0.5, 11), lambda t: [*motors, *wrench])
@@ -127,7 +127,7 @@ def test_a_wrench_moves_a_loop_with_dry_friction_as_force_elements_do():
 
 def test_prescribed_positions_and_accelerations_move_as_in_a_simulation():
     system = mbs.load("puma560").assemble()
-    state = minimal_state(system, drive=Drive(motions=(("q2", "q"), ("q4", "a"))))
+    state = minimal_state(system, drive=DriveInputs(motions=(("q2", "q"), ("q4", "a"))))
     assert state.velocities == (0, 2, 3, 4, 5)
     assert state.accelerations == (0, 2, 4, 5)
     assert state.inputs == (0, 2, 4, 5)
@@ -153,7 +153,7 @@ def test_prescribed_positions_and_accelerations_move_as_in_a_simulation():
 
 def test_a_prescribed_acceleration_of_a_loop_is_that_of_hybrid_dynamics():
     system = five_bar(-9.81)
-    state = minimal_state(system, drive=Drive(motions=(("a1", "a"),)))
+    state = minimal_state(system, drive=DriveInputs(motions=(("a1", "a"),)))
     x, z, _ = random_point(system, state)
     xdot, y = state.rhs(0.0, x, z, [3.0, 0.7], [])
     v = np.zeros(4)
@@ -172,7 +172,7 @@ def test_the_acceleration_that_a_loop_has_anyway_needs_no_drive(name):
     system = mbs.load(name).assemble()
     first = system.active[0]
     motion = ((system.speeds[first].name, "a"),)
-    free, driven = (minimal_state(system, drive=Drive(motions=m)) for m in ((), motion))
+    free, driven = (minimal_state(system, drive=DriveInputs(motions=m)) for m in ((), motion))
     x, z, _ = random_point(system, free)
     efforts = {k: 0.5 for k in free.inputs if k != first}
     u = [efforts.get(k, 0.0) for k in free.inputs]
@@ -221,4 +221,4 @@ def ball():
 )
 def test_what_does_not_fit_is_refused(build, drive, message):
     with pytest.raises(ModelError, match=message):
-        minimal_state(build(), drive=Drive(**drive))
+        minimal_state(build(), drive=DriveInputs(**drive))

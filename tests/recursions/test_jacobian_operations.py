@@ -10,7 +10,7 @@ import mbs.models
 from mbs.models.kinematics import jacobian
 from mbs.operations import count
 from mbs.recursions.cost import cost
-from mbs.recursions.jacobian import Target, outlook
+from mbs.recursions.jacobian import VelocityTarget, outlook
 from mbs.recursions.jacobian import jacobian as frame_jacobian
 from mbs.recursions.renaud import cheapest_jacobian
 
@@ -43,7 +43,7 @@ def test_operations_in_the_intermediate_axes(name, most):
 def test_choice_is_the_least_of_all_ways():
     system = symbolic_robot("general_6r", "none").assemble()
     q = SX.sym("q", 6)
-    target = Target(system.tree, q, system.p, system.frame(6), system.frame("base"))
+    target = VelocityTarget(system.tree, q, system.p, system.frame(6), system.frame("base"))
     seen = outlook(target)
     ways = [frame_jacobian(seen, matrices=m) for m in range(seen.turns + 1)]
     every = [cost(J, q, system.p) for J in ways]
@@ -57,7 +57,7 @@ def test_choice_is_the_least_of_all_ways():
 def test_no_choice_changes_the_result(axes, reference):
     system = symbolic_robot("general_6r", "none").assemble()
     q = SX.sym("q", 6)
-    target = Target(system.tree, q, system.p, system.frame(6), system.frame(axes))
+    target = VelocityTarget(system.tree, q, system.p, system.frame(6), system.frame(axes))
     seen = outlook(target)
     ways = [frame_jacobian(seen, reference, m) for m in (0, 3, seen.turns)]
     f = casadi.Function("f", [q, system.p], ways)

@@ -9,8 +9,8 @@ from symbolic_robots import symbolic_robot
 
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.recursions.route import (
+    RouteTurn,
     Shift,
-    Spin,
     Tilt,
     expressed,
     joined,
@@ -55,7 +55,7 @@ def test_there_and_back_is_nowhere():
                 point = point + p
             case Tilt(rotation=rotation):
                 point = rotation.apply(point)
-            case Spin():
+            case RouteTurn():
                 pytest.fail("a spin was not made a turn")
     f = casadi.Function("f", [q, system.p], [point])
     end = np.array(f(np.arange(6) * 0.4, system.p_default)).ravel()

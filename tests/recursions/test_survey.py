@@ -7,7 +7,7 @@ from casadi import SX
 import mbs
 import mbs.models
 from mbs.models.singularities import singularities
-from mbs.recursions.jacobian import Target
+from mbs.recursions.jacobian import VelocityTarget
 from mbs.recursions.survey import nonzero, survey, varying
 
 
@@ -26,7 +26,7 @@ def arm(size):
 def surveyed(size):
     system = arm(size)
     q = SX.sym("q", system.nq)
-    return survey(Target(system.tree, q, system.p, system.frame(4), system.frame("base")))
+    return survey(VelocityTarget(system.tree, q, system.p, system.frame(4), system.frame("base")))
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-6, 1e6])

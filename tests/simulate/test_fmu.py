@@ -9,7 +9,7 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError, SolverError
-from mbs.export.fmu.description import FmuModel, Jumps, State, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps, State
 from mbs.export.fmu.pack import write_fmu
 from mbs.result import Result
 from mbs.simulate.fmu import fmu
@@ -29,12 +29,12 @@ def spring():
             State(name="s", unit="m", derivative_unit="m/s", start=1.0, output=True),
             State(name="v", unit="m/s", derivative_unit="m/s2"),
         ),
-        inputs=(Variable(name="push", unit="N"),),
-        outputs=(Variable(name="force", unit="N"),),
+        inputs=(FmuVariable(name="push", unit="N"),),
+        outputs=(FmuVariable(name="force", unit="N"),),
         parameters=(
-            Variable(name="stiffness", unit="1", start=4.0, min=0.0),
-            Variable(name="mass", unit="kg", start=1.0, min=1e-9),
-            Variable(name="reach", unit="m", start=100.0),
+            FmuVariable(name="stiffness", unit="1", start=4.0, min=0.0),
+            FmuVariable(name="mass", unit="kg", start=1.0, min=1e-9),
+            FmuVariable(name="reach", unit="m", start=100.0),
         ),
         rhs=ca.Function("f", [t, x, z, u, p], [ca.vertcat(x[1], (force + u) / mass), force]),
         stop_time=2.0,
@@ -74,12 +74,12 @@ def ball():
             State(name="h", unit="m", start=1.0, derivative_unit="m/s", output=True),
             State(name="v", unit="m/s", derivative_unit="m/s2", output=True),
         ),
-        parameters=(Variable(name="restitution", start=0.5, min=0.0, max=1.0),),
+        parameters=(FmuVariable(name="restitution", start=0.5, min=0.0, max=1.0),),
         rhs=ca.Function(
             "fall", point, [ca.vertcat(x[1], ca.if_else(resting, 0, -9.81)), ca.SX(0, 1)]
         ),
         jumps=Jumps(
-            modes=(Variable(name="resting"),),
+            modes=(FmuVariable(name="resting"),),
             first=ca.Function("first", point, [ca.SX(0.0), -x[0]]),
             indicators=ca.Function("height", point, [ca.if_else(resting, 1, x[0])]),
             jump=ca.Function("impact", [*point, fired], after),
@@ -312,7 +312,7 @@ def test_runs_in_threads_keep_their_errors_apart(path, capfd):
 def test_inputs_that_are_not_given_keep_their_start_and_nothing_is_printed(tmp_path, capfd):
     model = spring()
     t, z, x, u, p = (ca.SX.sym(n, k) for n, k in (("t", 1), ("z", 0), ("x", 2), ("u", 2), ("p", 3)))
-    pull = Variable(name="pull", unit="N", start=4.0)
+    pull = FmuVariable(name="pull", unit="N", start=4.0)
     rhs = ca.Function("f", [t, x, z, u, p], [ca.vertcat(x[1], ca.sum1(u) - 4 * x[0]), u[1]])
     model = dataclasses.replace(model, inputs=(*model.inputs, pull), rhs=rhs)
     two = write_fmu(model, tmp_path / "two.fmu")

@@ -209,7 +209,7 @@ def test_a_joint_without_motor_is_driven_by_name_alone():
     assert np.array_equal(result["j.tau"], np.full(11, 2.0))
     result = mbs.simulate.run(system, 0.1, tau=lambda t, q, v: [0])
     assert not result["j.tau"].any()
-    with pytest.raises(ModelError, match="names 'k'; did you mean 'j'|names 'k'; use one of"):
+    with pytest.raises(ModelError, match="names 'k'; "):
         mbs.simulate.run(system, 0.1, tau=lambda t, q, v: {"k": 2.0})
 
 

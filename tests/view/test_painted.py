@@ -13,7 +13,15 @@ import mbs
 from mbs.errors import ExportError
 from mbs.view.camera import camera
 from mbs.view.mesh import faces_of, revolved, stretched, turned_to
-from mbs.view.primitives import Ball, Bar, Box, Cylinder, Frame, Ring, Span
+from mbs.view.primitives import (
+    BallShape,
+    BarShape,
+    BoxShape,
+    CylinderShape,
+    FrameShape,
+    RingShape,
+    SpanShape,
+)
 
 images = pytest.importorskip("PIL.Image", reason="pictures need matplotlib")
 
@@ -27,12 +35,12 @@ def normals(corners):
 @pytest.mark.parametrize(
     ("item", "volume"),
     [
-        (Ball("link", 0, "joint", (1, 2, 3), 0.5), 4 / 3 * np.pi * 0.125),
-        (Cylinder("link", 0, "joint", (1, 0, 0), (1, 2, 0), 0.5), np.pi * 0.5),
-        (Cylinder("link", 0, "joint", (1, 0, 0), (1, 2, 0), 0.5, 0.3), np.pi * 0.32),
-        (Bar("link", 0, "joint", (0, 0, 0), (0, 3, 4), 0.5), np.pi * (1.25 + 0.5 / 3)),
-        (Box("link", 0, "joint", FLAT, (1, 2, 3)), 6.0),
-        (Ring("link", 0, "joint", (0, 0, 0), (0, 1, 0), 2.0, 0.3), 2 * np.pi**2 * 2 * 0.09),
+        (BallShape("link", 0, "joint", (1, 2, 3), 0.5), 4 / 3 * np.pi * 0.125),
+        (CylinderShape("link", 0, "joint", (1, 0, 0), (1, 2, 0), 0.5), np.pi * 0.5),
+        (CylinderShape("link", 0, "joint", (1, 0, 0), (1, 2, 0), 0.5, 0.3), np.pi * 0.32),
+        (BarShape("link", 0, "joint", (0, 0, 0), (0, 3, 4), 0.5), np.pi * (1.25 + 0.5 / 3)),
+        (BoxShape("link", 0, "joint", FLAT, (1, 2, 3)), 6.0),
+        (RingShape("link", 0, "joint", (0, 0, 0), (0, 1, 0), 2.0, 0.3), 2 * np.pi**2 * 2 * 0.09),
     ],
 )
 def test_faces_enclose_a_solid_and_look_outwards(item, volume):
@@ -44,7 +52,7 @@ def test_faces_enclose_a_solid_and_look_outwards(item, volume):
 
 
 def test_a_frame_has_three_arrows_of_its_length():
-    arrows = list(faces_of(Frame("frame", 0, FLAT, 0.5), 1.0))
+    arrows = list(faces_of(FrameShape("frame", 0, FLAT, 0.5), 1.0))
     assert [arrow.colour for arrow in arrows] == ["axes.0", "axes.1", "axes.2"]
     for k, arrow in enumerate(arrows):
         assert arrow.corners[..., k].max() == pytest.approx(0.5, abs=1e-15)
@@ -61,7 +69,9 @@ def test_a_turn_takes_z_to_a_direction():
 
 def test_what_is_stretched_reaches_from_end_to_end():
     a, b = np.array([1.0, 0, 0]), np.array([1.0, 2.0, 0])
-    corners = stretched(Span("joint", (0, 1), "joint", ((0, 0, 0), (0, 0, 0)), 0.1), a, b).corners
+    corners = stretched(
+        SpanShape("joint", (0, 1), "joint", ((0, 0, 0), (0, 0, 0)), 0.1), a, b
+    ).corners
     assert np.allclose(corners[..., 1].min(), 0)
     assert np.allclose(corners[..., 1].max(), 2)
 

@@ -9,10 +9,10 @@ import mbs
 from mbs.components import Body, Box, Cylinder, Free, PointMass, Prismatic, Revolute, Spring
 from mbs.errors import ModelError
 from mbs.models.skeleton import skeleton
-from mbs.view.primitives import Ball, Bar, Label, Ring
-from mbs.view.primitives import Box as BoxShape
-from mbs.view.primitives import Cylinder as CylinderShape
-from mbs.view.primitives import Spring as SpringShape
+from mbs.view.primitives import BallShape, BarShape, LabelShape, RingShape
+from mbs.view.primitives import BoxShape as BoxShape
+from mbs.view.primitives import CylinderShape as CylinderShape
+from mbs.view.primitives import SpringShape as SpringShape
 
 SEED = 20261122
 CATALOGUE = mbs.robots.catalogue()
@@ -81,7 +81,7 @@ def test_shapes_stay_on_the_skeleton(name, assembled):
     parts = skeleton(system)
     points = np.array(parts.function(q)[0]).T
     wanted = [points[[a, b]] for link in parts.links for a, b in link.segments]
-    bars = [bar for bar in scene.primitives if isinstance(bar, Bar) and bar.role == "link"]
+    bars = [bar for bar in scene.primitives if isinstance(bar, BarShape) and bar.role == "link"]
     placed = [
         np.array([bar.a, bar.b]) @ poses[bar.link, :, :3].T + poses[bar.link, :, 3] for bar in bars
     ]
@@ -105,7 +105,7 @@ def test_sizes_follow_from_the_mechanism(scale):
     assert 1.0 * scale < scene.bounds.radius < 1.3 * scale
     cell = scene.floor.step / 10.0 ** np.floor(np.log10(scene.floor.step))
     assert min(abs(cell - nice) for nice in (1, 2, 5, 10)) < 1e-9
-    radii = {item.radius / scale for item in scene.primitives if isinstance(item, Bar)}
+    radii = {item.radius / scale for item in scene.primitives if isinstance(item, BarShape)}
     assert max(radii) == pytest.approx(0.62 * 0.028 * 2, rel=1e-9)
 
 
@@ -126,7 +126,7 @@ def test_bodies_with_dimensions_are_drawn_as_they_are():
     (round_,) = (i for i in scene.primitives if isinstance(i, CylinderShape) and i.role == "link")
     assert (round_.radius, round_.bore) == (0.04, 0.03)
     assert np.linalg.norm(np.subtract(round_.b, round_.a)) == pytest.approx(0.3, abs=1e-15)
-    assert not [i for i in scene.primitives if isinstance(i, Bar) and i.role == "link"]
+    assert not [i for i in scene.primitives if isinstance(i, BarShape) and i.role == "link"]
     centre = np.array(scene.poses({"j1": 0.0})).reshape(-1, 3, 4)[1]
     pose = np.array(next(i for i in scene.primitives if isinstance(i, BoxShape)).pose)
     middle = centre[:, :3] @ pose.reshape(3, 4)[:, 3] + centre[:, 3]
@@ -159,7 +159,9 @@ def test_a_planar_mechanism_is_seen_from_the_front(assembled):
 
 def test_wheels_springs_and_motors_are_told_apart(assembled):
     rings = [
-        i for i in mbs.view.scene(assembled("whipple_bicycle")).primitives if isinstance(i, Ring)
+        i
+        for i in mbs.view.scene(assembled("whipple_bicycle")).primitives
+        if isinstance(i, RingShape)
     ]
     assert sorted(round(ring.radius + ring.tube, 12) for ring in rings) == [0.3, 0.35]
     m = mbs.Mechanism("cart")
@@ -172,7 +174,7 @@ def test_wheels_springs_and_motors_are_told_apart(assembled):
     assert (spring.role, spring.links) == ("force", (1, 2))
     boxes = {item.colour for item in items if isinstance(item, BoxShape)}
     assert boxes == {"active", "joint"}
-    labels = [(item.text, item.row) for item in items if isinstance(item, Label)]
+    labels = [(item.text, item.row) for item in items if isinstance(item, LabelShape)]
     assert labels == [("x", 0), ("z", 1)]
 
 
@@ -182,7 +184,7 @@ def test_a_body_that_floats_has_a_size_from_its_inertia():
     m.connect(m.world, Free("root"), stone)
     scene = mbs.view.scene(m.assemble())
     assert scene.size == pytest.approx(4 * np.sqrt(0.06 / 4), rel=1e-12)
-    assert any(isinstance(item, Ball) and item.role == "link" for item in scene.primitives)
+    assert any(isinstance(item, BallShape) and item.role == "link" for item in scene.primitives)
 
 
 def test_mistakes_are_told_in_a_sentence(assembled):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -33,16 +33,18 @@ Parameters = Annotated[
 Json = Annotated[
     bool, typer.Option("--json", help="Print JSON on the standard output, and nothing else there.")
 ]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="File to write; it is replaced as a whole, or left alone.",
-        show_default=False,
-    ),
-]
+
+
+def output(what: str) -> Any:
+    """The option --output.
+
+    Args:
+        what: is written, for the help.
+    """
+    return typer.Option("--output", "-o", metavar="FILE", help=what, show_default=False)
+
+
+Output = Annotated[Path | None, output("File to write; it is replaced as a whole, or left alone.")]
 
 
 def examples(*lines: str) -> str:

@@ -11,7 +11,7 @@ from mbs.app.cli import completion
 from mbs.app.cli.arguments import Json, Parameters, Robot, examples
 from mbs.app.cli.loading import system
 from mbs.app.cli.model import Options, count_data
-from mbs.app.cli.printing import Table, note, print_json, print_tables
+from mbs.app.cli.printing import PrintedTable, note, print_json, print_tables
 from mbs.errors import ModelError
 
 if TYPE_CHECKING:
@@ -105,12 +105,12 @@ def _data(row: CountRow, optimise: bool) -> dict[str, Any]:
     return {"key": row.key, "title": row.title, "before": count_data(row.before), "after": after}
 
 
-def _tables(name: str, rows: Sequence[CountRow], optimise: bool) -> list[Table]:
+def _tables(name: str, rows: Sequence[CountRow], optimise: bool) -> list[PrintedTable]:
     before = [_cells(row.key, row.before) for row in rows]
-    tables = [Table(f"{name}, as built", _COLUMNS, before, _COLUMNS[1:])]
+    tables = [PrintedTable(f"{name}, as built", _COLUMNS, before, _COLUMNS[1:])]
     if optimise:
         after = [_cells(row.key, row.after) for row in rows]
-        tables.append(Table(f"{name}, after the optimizer", _COLUMNS, after, _COLUMNS[1:]))
+        tables.append(PrintedTable(f"{name}, after the optimizer", _COLUMNS, after, _COLUMNS[1:]))
     return tables
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from mbs.errors import DescriptionError
-
 if TYPE_CHECKING:
     from mbs.assembly import System
     from mbs.components import Mechanism
@@ -48,9 +46,10 @@ def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
         DescriptionError: a text is no assignment of a number.
     """
     from mbs.app.tasks.simulation_laws import assignments
+    from mbs.expressions import number
 
     given = assignments(texts or (), option)
-    return {name: value(text, f"{option} {name}") for name, text in given.items()}
+    return {name: number(text, f"{option} {name}") for name, text in given.items()}
 
 
 def posture(system: System, texts: Sequence[str] | None, option: str = "--q") -> list[float]:
@@ -72,17 +71,3 @@ def posture(system: System, texts: Sequence[str] | None, option: str = "--q") ->
     from mbs import loops
 
     return [float(x) for x in loops.solve(system, given)]
-
-
-def value(text: str, what: str) -> float:
-    """The number of a text such as "pi/2".
-
-    Raises:
-        DescriptionError: it is not a number, or has a symbol in it.
-    """
-    from mbs.expressions import expression, to_float
-
-    found = to_float(expression(text, what))
-    if found is None:
-        raise DescriptionError(f"{what}: {text!r} is no number; write one, such as 0.3 or pi/2")
-    return found

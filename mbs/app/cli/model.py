@@ -14,7 +14,7 @@ from mbs.app.cli.loading import system
 from mbs.app.cli.printing import note, print_json
 
 if TYPE_CHECKING:
-    from mbs.app.tasks.equations import Equations
+    from mbs.app.tasks.equations import WrittenEquations
     from mbs.assembly import System
     from mbs.operations import Count
 
@@ -97,7 +97,7 @@ def equations_of(
     options: Sequence[str] | None = None,
     language: str | None = None,
     optimise: bool = True,
-) -> Equations:
+) -> WrittenEquations:
     """The equations that the words of a command line ask for.
 
     Args:
@@ -119,7 +119,7 @@ def equations_of(
     return task.equations(assembled, key, values, language, passes)
 
 
-def _counted(written: Equations) -> str:
+def _counted(written: WrittenEquations) -> str:
     if written.before is None or written.after is None:
         return f"{written.system} {written.key}: {written.title}"
     told = f"{written.system} {written.key}: {_said(written.after)}"
@@ -150,7 +150,7 @@ def _many(amount: int, name: str) -> str:
     return f"{amount} {name.replace('function', 'functions') if ' ' in name else f'{name}s'}"
 
 
-def _data(written: Equations) -> dict[str, Any]:
+def _data(written: WrittenEquations) -> dict[str, Any]:
     return {
         "robot": written.system,
         "key": written.key,

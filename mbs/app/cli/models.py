@@ -10,7 +10,7 @@ import typer
 from mbs.app.cli import completion
 from mbs.app.cli.arguments import Json, Parameters, examples
 from mbs.app.cli.loading import system
-from mbs.app.cli.printing import Table, plain, print_json, print_tables
+from mbs.app.cli.printing import PrintedTable, plain, print_json, print_tables
 
 if TYPE_CHECKING:
     from mbs.assembly import System
@@ -77,10 +77,10 @@ def _row_of(system: System, entry: Entry) -> dict[str, Any]:
     return {**_row(entry), "options": options}
 
 
-def _tables(rows: Sequence[dict[str, Any]]) -> list[Table]:
+def _tables(rows: Sequence[dict[str, Any]]) -> list[PrintedTable]:
     menus = dict.fromkeys(row["menu"] for row in rows)
     return [
-        Table(
+        PrintedTable(
             menu,
             ("key", "model", "formula", "robots", "options"),
             [

@@ -19,7 +19,7 @@ _NARROWEST = 20
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class PrintedTable:
     """Rows under a heading.
 
     Attributes:
@@ -39,7 +39,7 @@ class Table:
     cut: bool = False
 
 
-def print_tables(tables: Iterable[Table]) -> None:
+def print_tables(tables: Iterable[PrintedTable]) -> None:
     """Print tables, with an empty line between them; those without rows are left out."""
     from rich.console import Console
     from rich.text import Text
@@ -54,7 +54,7 @@ def print_tables(tables: Iterable[Table]) -> None:
         console.print(_drawn(table, _widths(table)))
 
 
-def _widths(table: Table) -> list[int]:
+def _widths(table: PrintedTable) -> list[int]:
     """Columns that each column of a table takes."""
     widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
     if table.cut and sys.stdout.isatty():
@@ -63,7 +63,7 @@ def _widths(table: Table) -> list[int]:
     return widths
 
 
-def _drawn(table: Table, widths: Sequence[int]) -> Any:
+def _drawn(table: PrintedTable, widths: Sequence[int]) -> Any:
     from rich import box
     from rich.table import Table as Rich
     from rich.text import Text

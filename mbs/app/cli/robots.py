@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mbs.app.cli.arguments import Json, examples
-from mbs.app.cli.printing import Table, print_json, print_tables
+from mbs.app.cli.printing import PrintedTable, print_json, print_tables
 from mbs.app.cli.structure import structure
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def robots(
     columns = [name for name in rows[0] if name != "source"]
     cells = [[str(row[name]) for name in columns] + [row["source"]] for row in rows]
     counts = ("joints", "dofs", "loops", "mobility")
-    print_tables([Table("", (*columns, "source"), cells, counts, cut=True)])
+    print_tables([PrintedTable("", (*columns, "source"), cells, counts, cut=True)])
 
 
 def described(robots: Mapping[str, Callable[[], Mechanism]]) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ import typer
 from mbs.app.cli.arguments import Json, Parameters, Robot, examples
 from mbs.app.cli.description import DRIVE, GEOMETRY, TEN, described
 from mbs.app.cli.loading import system
-from mbs.app.cli.printing import Table, number, print_json, print_tables
+from mbs.app.cli.printing import PrintedTable, number, print_json, print_tables
 
 EXAMPLES = examples(
     "mbs show puma560",
@@ -38,7 +38,7 @@ def show(robot: Robot, *, parameter: Parameters = None, json: Json = False) -> N
     typer.echo(f"\n{data['report']}")
 
 
-def _tables(data: dict[str, Any]) -> list[Table]:
+def _tables(data: dict[str, Any]) -> list[PrintedTable]:
     links = {row["number"]: row["name"] for row in data["links"]}
     inertia = [{**row, "name": links[row["link"]]} for row in data["inertia"]]
     drive = [name for name in DRIVE if any(row[name] != 0 for row in inertia)]
@@ -51,10 +51,10 @@ def _tables(data: dict[str, Any]) -> list[Table]:
     ]
 
 
-def _table(title: str, rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> Table:
+def _table(title: str, rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> PrintedTable:
     names = names or list(rows[0] if rows else ())
     right = [name for name in names if any(_is_number(row[name]) for row in rows)]
-    return Table(title, names, [[_cell(row[name]) for name in names] for row in rows], right)
+    return PrintedTable(title, names, [[_cell(row[name]) for name in names] for row in rows], right)
 
 
 def _is_number(value: object) -> bool:

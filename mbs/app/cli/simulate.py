@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mbs.app.cli.arguments import Json, Parameters, Robot, examples
+from mbs.app.cli.arguments import Json, Parameters, Robot, examples, output
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
-from mbs.app.cli.printing import Table, note, number, print_json, print_tables
+from mbs.app.cli.printing import PrintedTable, note, number, print_json, print_tables
 from mbs.errors import Interrupted, SolverError
 
 if TYPE_CHECKING:
@@ -76,16 +76,7 @@ Tolerance = Annotated[
 Method = Annotated[str, typer.Option(metavar="METHOD", help="dopri5, or rodas for stiff systems.")]
 
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="CSV file to write, - for the standard output.",
-        show_default=False,
-    ),
-]
+Output = Annotated[Path | None, output("CSV file to write, - for the standard output.")]
 Plot = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Picture to write: .png, .svg or .pdf.", show_default=False),
@@ -218,6 +209,6 @@ def _show(result: Result) -> None:
     ]
     title = f"{result.name}: {len(result)} rows, {result.time[0]:g} to {result.time[-1]:g} s"
     columns = ("signal", "unit", "start", "least", "greatest", "end")
-    print_tables([Table(title, columns, rows, columns[2:])])
+    print_tables([PrintedTable(title, columns, rows, columns[2:])])
     for time, name, what in result.events:
         typer.echo(f"{time:.6g} s  {name}  {what}")

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mbs.app.cli.arguments import Json, Parameters, Robot, examples
-from mbs.app.cli.loading import numbers, posture, system, value
+from mbs.app.cli.loading import numbers, posture, system
 from mbs.app.cli.printing import note, print_json
 from mbs.errors import ModelError
 
 if TYPE_CHECKING:
-    from mbs.app.tasks.postures import Postures
+    from mbs.app.tasks.postures import PostureList
     from mbs.assembly import System
 
 EXAMPLES = examples(
@@ -158,10 +158,12 @@ def _pose(
 
 
 def _three(texts: Sequence[str], option: str) -> list[float]:
-    return [value(text, option) for text in texts]
+    from mbs.expressions import number
+
+    return [number(text, option) for text in texts]
 
 
-def _reason(found: Postures) -> str:
+def _reason(found: PostureList) -> str:
     reason = f"{found.system}: no solution, {found.reason}"
     near = found.nearest
     if near is None:
@@ -172,7 +174,7 @@ def _reason(found: Postures) -> str:
     return f"{reason}; the nearest posture is {nearest}"
 
 
-def _data(found: Postures) -> dict[str, Any]:
+def _data(found: PostureList) -> dict[str, Any]:
     near = found.nearest
     return {
         "robot": found.system,

@@ -13,7 +13,7 @@ _Port = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Structure:
+class StructureRow:
     """The connection graph of a mechanism in numbers.
 
     Attributes:
@@ -29,7 +29,7 @@ class Structure:
     loops: int
 
 
-def structure(mechanism: Mechanism) -> Structure:
+def structure(mechanism: Mechanism) -> StructureRow:
     """The numbers of a mechanism: rigid bodies are nodes, joints that move are edges."""
     home: dict[_Port, _Port] = {}
     for a, b in mechanism.connections:
@@ -45,7 +45,7 @@ def structure(mechanism: Mechanism) -> Structure:
     nodes = {world, *(node for pair in ends for node in pair)}
     loops = len(moving) - (len(nodes) - 1) + len(list(mechanism.couplings()))
     dofs = sum(joint.nv for joint in moving)
-    return Structure(_kind(ends, world, loops), len(moving), dofs, loops)
+    return StructureRow(_kind(ends, world, loops), len(moving), dofs, loops)
 
 
 def _kind(ends: list[tuple[_Port, _Port]], world: _Port, loops: int) -> str:

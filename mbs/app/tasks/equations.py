@@ -26,8 +26,8 @@ __all__ = [
     "EVERY_PASS",
     "MENUS",
     "WORDS",
-    "Equations",
     "OptionRow",
+    "WrittenEquations",
     "entries",
     "entry",
     "equations",
@@ -48,7 +48,7 @@ _NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class Equations:
+class WrittenEquations:
     """A model written down.
 
     Attributes:
@@ -123,7 +123,7 @@ def equations(
     passes: Sequence[str] = EVERY_PASS,
     *,
     name: str | None = None,
-) -> Equations:
+) -> WrittenEquations:
     """The equations of a model as text.
 
     Args:
@@ -150,7 +150,7 @@ def equations(
         return _written(system, one, chosen, one.text(system, **chosen), started)
     model = one.build(system, **chosen)
     final, steps = _optimised(model, passes)
-    return Equations(
+    return WrittenEquations(
         **_about(system, one, chosen),
         language=spoken,
         text=code(final, spoken, name=name),
@@ -173,8 +173,8 @@ def _optimised(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[
 
 def _written(
     system: System, one: Entry, chosen: Mapping[str, Any], text: str, started: float
-) -> Equations:
-    return Equations(
+) -> WrittenEquations:
+    return WrittenEquations(
         **_about(system, one, chosen),
         language=WORDS,
         text=text,

@@ -15,13 +15,13 @@ from mbs.models import inverse_geometry
 from mbs.models.catalogue.postures import SIX, held_at, moving_joints, surplus_joints
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry import Solution, Solutions
-from mbs.models.inverse_geometry.answers.limits import Bounds, bounds
+from mbs.models.inverse_geometry.answers.limits import CoordinateLimits, bounds
 
 __all__ = [
     "METHODS",
     "Near",
     "Posture",
-    "Postures",
+    "PostureList",
     "locked_by_default",
     "pose_from",
     "pose_from_text",
@@ -82,7 +82,7 @@ class Near:
 
 
 @dataclass(frozen=True, slots=True)
-class Postures:
+class PostureList:
     """Every posture that takes a frame to a pose.
 
     Attributes:
@@ -129,7 +129,7 @@ def postures(
     seed: Seed = None,
     locked: Mapping[str, float] | None = None,
     parameters: Values = None,
-) -> Postures:
+) -> PostureList:
     """Every posture that takes a frame to a pose, with and without loops.
 
     Args:
@@ -153,7 +153,7 @@ def postures(
         system, T, name, way, seed=seed, locked=held or None, parameters=parameters
     )
     limits = bounds(system)
-    return Postures(
+    return PostureList(
         system=system.name,
         frame=name,
         T=_rows_of(np.asarray(T, dtype=float)),
@@ -173,7 +173,7 @@ def _method(system: System, frame: str | int, method: str, held: Mapping[str, fl
     return "search" if method == "general" and free and len(free) != SIX else method
 
 
-def _row(one: Solution, limits: Bounds) -> Posture:
+def _row(one: Solution, limits: CoordinateLimits) -> Posture:
     return Posture(
         q=_tuple(one.q),
         label=one.branch,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.errors import ModelError
-from mbs.expressions import Scalar, expression, to_float
+from mbs.expressions import Scalar, number
 from mbs.messages import quoted
 from mbs.models import transform
 from mbs.models.geometry import terminal_frame
@@ -66,8 +66,8 @@ def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
             " write x y z roll pitch yaw"
         )
     T = np.eye(4)
-    T[:3, 3] = [_number(value) for value in xyz]
-    roll, pitch, yaw = (_number(value) for value in rpy)
+    T[:3, 3] = [number(value, "pose") for value in xyz]
+    roll, pitch, yaw = (number(value, "pose") for value in rpy)
     T[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
     return T
 
@@ -101,15 +101,8 @@ def pose_from_text(text: str) -> Array:
     if len(parts) not in (12, 16):
         raise ModelError(f"the pose {quoted(text)} has {len(parts)} numbers; {_FORMS}")
     T = np.eye(4)
-    T[: len(parts) // 4] = np.array([_number(part) for part in parts]).reshape(-1, 4)
+    T[: len(parts) // 4] = np.array([number(part, "pose") for part in parts]).reshape(-1, 4)
     return T
-
-
-def _number(value: Scalar) -> float:
-    number = to_float(expression(value, "pose"))
-    if number is None:
-        raise ModelError(f"{quoted(value)} in a pose has no value; write a number such as pi/2")
-    return number
 
 
 def _turn(axis: int, angle: float) -> Array:

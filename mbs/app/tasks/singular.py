@@ -32,7 +32,7 @@ _OPEN = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Factor:
+class DeterminantFactor:
     """A factor of the determinant.
 
     Attributes:
@@ -71,7 +71,7 @@ class Singular:
     columns: tuple[str, ...]
     determinant: str
     constant: str
-    factors: tuple[Factor, ...]
+    factors: tuple[DeterminantFactor, ...]
     verdict: str
 
 
@@ -107,7 +107,7 @@ def singular(
     )
 
 
-def _verdict(constant: str, factors: Sequence[Factor]) -> str:
+def _verdict(constant: str, factors: Sequence[DeterminantFactor]) -> str:
     if constant == "0":
         return "The determinant is zero in every posture; name other rows or columns."
     if not factors:
@@ -115,14 +115,16 @@ def _verdict(constant: str, factors: Sequence[Factor]) -> str:
     return "Singular where " + ", or where ".join(one.condition for one in factors) + "."
 
 
-def _factor(system: System, one: SingularFactor, determinant: Function, start: Array) -> Factor:
+def _factor(
+    system: System, one: SingularFactor, determinant: Function, start: Array
+) -> DeterminantFactor:
     names = [(c.name, c.kind == "revolute") for c in system.coordinates]
     posture = _zero(system, one.function, start)
     value: float | None = None
     if posture is not None:
         p = [system.p_default] if system.parameters else []
         value = float(Function.__call__(determinant, posture, *p))
-    return Factor(
+    return DeterminantFactor(
         text=str(one),
         power=one.power,
         condition=condition(one.text, names),

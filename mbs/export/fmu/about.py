@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mbs.export.fmu.figure import Figure
+from mbs.view.drawing import Drawing
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class PageTable:
     """A table of the documentation.
 
     Attributes:
@@ -30,8 +30,8 @@ class About:
 
     Attributes:
         tables: in the order of the page.
-        figure: a drawing at the start posture, or None; the icon is made of it too.
+        drawing: of it at the start posture, or None; the icon is made of it too.
     """
 
-    tables: tuple[Table, ...] = ()
-    figure: Figure | None = None
+    tables: tuple[PageTable, ...] = ()
+    drawing: Drawing | None = None

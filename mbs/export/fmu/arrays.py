@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from mbs.export.fmu.dependencies import Known
-from mbs.export.fmu.description import Array, Entry, FmuModel, Kind, State, Variable
+from mbs.export.fmu.description import Array, FmuEntry, FmuModel, FmuVariable, Kind, State
 from mbs.export.fmu.linearity import KINDS, DependencyKind
 
 
@@ -41,8 +41,8 @@ class Listed:
     """
 
     reference: int
-    entry: Entry
-    elements: tuple[Variable, ...]
+    entry: FmuEntry
+    elements: tuple[FmuVariable, ...]
     array: bool
 
     @property
@@ -63,7 +63,7 @@ def in_arrays(model: FmuModel, groups: Iterable[Group]) -> FmuModel:
         model: without arrays.
         groups: states bring their derivatives with them.
     """
-    changed: dict[Kind, list[Variable]] = {
+    changed: dict[Kind, list[FmuVariable]] = {
         "state": list(model.states),
         "input": list(model.inputs),
         "output": list(model.outputs),
@@ -116,7 +116,7 @@ def listed(model: FmuModel) -> list[Listed]:
                 min=None,
                 max=None,
             )
-            entry = Entry(entry.kind, shared)
+            entry = FmuEntry(entry.kind, shared)
         found.append(Listed(place, entry, elements, array is not None))
         place += size
     return found

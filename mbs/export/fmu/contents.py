@@ -8,10 +8,9 @@ from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.documentation import documentation
 from mbs.export.fmu.faces import FACES
-from mbs.export.fmu.icon import icon
 from mbs.export.fmu.licences import licence_files
-from mbs.export.fmu.svg import standalone
 from mbs.export.fmu.terminals import terminals_and_icons
+from mbs.view.drawing_files import icon, standalone
 
 
 def description(model: FmuModel, fmi: str, identity: str, compiled: Sequence[str]) -> str:
@@ -43,16 +42,16 @@ def plain_files(
     own = [name for name, _ in model.sources]
     for name, text in licence_files(standard_header, own).items():
         files[f"documentation/licenses/{name}"] = text.encode()
-    figure = model.about.figure if model.about else None
+    drawn = model.about.drawing if model.about else None
     if fmi == "2.0":
-        return files | ({"model.png": icon(figure)} if figure else {})
+        return files | ({"model.png": icon(drawn)} if drawn else {})
     build = fmi3_xml.build_description(model, compiled)
     files["sources/buildDescription.xml"] = build.encode()
-    if figure or model.terminals:
+    if drawn or model.terminals:
         files["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model).encode()
-    if figure:
-        files["terminalsAndIcons/icon.png"] = icon(figure)
-        files["terminalsAndIcons/icon.svg"] = standalone(figure, model.name).encode()
+    if drawn:
+        files["terminalsAndIcons/icon.png"] = icon(drawn)
+        files["terminalsAndIcons/icon.svg"] = standalone(drawn, model.name).encode()
     return files
 
 

@@ -13,7 +13,7 @@ from casadi import MX, SX, Function
 from mbs.assembly import System
 from mbs.errors import ExportError
 from mbs.export.fmu.c_law import CController, Sources, c_function
-from mbs.export.fmu.description import Variable
+from mbs.export.fmu.description import FmuVariable
 from mbs.messages import quoted
 from mbs.models.effort import effort_function
 
@@ -36,7 +36,7 @@ class Controller:
 
     effort: Function | None = None
     device: Function | None = None
-    inputs: tuple[Variable, ...] = ()
+    inputs: tuple[FmuVariable, ...] = ()
     sources: Sources = ()
 
 
@@ -155,12 +155,12 @@ def _outputs(system: System, law: Function) -> dict[str, int]:
     return places
 
 
-def _inputs(law: Function) -> Iterator[Variable]:
+def _inputs(law: Function) -> Iterator[FmuVariable]:
     for k in range(3, law.n_in()):
         name, size, start = law.name_in(k), law.numel_in(k), law.default_in(k)
         for i in range(size):
             yield _input(name if size == 1 else f"{name}[{i + 1}]", start)
 
 
-def _input(name: str, start: float) -> Variable:
-    return Variable(name=name, start=start, description=f"input {name} of the controller")
+def _input(name: str, start: float) -> FmuVariable:
+    return FmuVariable(name=name, start=start, description=f"input {name} of the controller")

@@ -33,7 +33,7 @@ WITH_START: tuple[Kind, ...] = ("state", "input", "parameter", "dependent", "slo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Variable:
+class FmuVariable:
     """An input, an output, a parameter or a dependent coordinate of an FMU.
 
     Attributes:
@@ -63,7 +63,7 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State(Variable):
+class State(FmuVariable):
     """A continuous state and its derivative.
 
     Attributes:
@@ -96,7 +96,7 @@ class Jumps:
         names: (k) what each indicator watches, for messages.
     """
 
-    modes: tuple[Variable, ...]
+    modes: tuple[FmuVariable, ...]
     first: casadi.Function
     indicators: casadi.Function
     jump: casadi.Function
@@ -178,11 +178,11 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class FmuEntry:
     """A variable at its place: the value reference is the index in the table of entries."""
 
     kind: Kind
-    variable: Variable
+    variable: FmuVariable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,10 +246,10 @@ class FmuModel:
     description: str = ""
     origin: Origin = Origin()
     states: tuple[State, ...] = ()
-    inputs: tuple[Variable, ...] = ()
-    outputs: tuple[Variable, ...] = ()
-    parameters: tuple[Variable, ...] = ()
-    dependents: tuple[Variable, ...] = ()
+    inputs: tuple[FmuVariable, ...] = ()
+    outputs: tuple[FmuVariable, ...] = ()
+    parameters: tuple[FmuVariable, ...] = ()
+    dependents: tuple[FmuVariable, ...] = ()
     closure: casadi.Function | None = None
     slopes: casadi.Function | None = None
     passive: tuple[int, int, int] = (0, 0, 0)
@@ -302,12 +302,12 @@ class FmuModel:
         return text if text[:1].isalpha() else f"model_{text}"
 
     @property
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[FmuEntry, ...]:
         """Every variable in the order of the value references."""
         return tuple(_entries(self))
 
     @property
-    def modes(self) -> tuple[Variable, ...]:
+    def modes(self) -> tuple[FmuVariable, ...]:
         """The modes of its events."""
         return self.jumps.modes if self.jumps else ()
 
@@ -349,7 +349,7 @@ class FmuModel:
         return place
 
 
-def derivative_of(state: State) -> Variable:
+def derivative_of(state: State) -> FmuVariable:
     """The derivative of a state, as a variable.
 
     Args:
@@ -358,27 +358,27 @@ def derivative_of(state: State) -> Variable:
     Returns:
         its derivative, without start value.
     """
-    return Variable(
+    return FmuVariable(
         name=state.derivative or f"der({state.name})",
         unit=state.derivative_unit,
         description=state.derivative_description or f"derivative of {state.name}",
     )
 
 
-def _entries(model: FmuModel) -> Iterator[Entry]:
-    yield from (Entry("state", v) for v in model.states)
-    yield from (Entry("derivative", derivative_of(v)) for v in model.states)
-    yield from (Entry("input", v) for v in model.inputs)
-    yield from (Entry("output", v) for v in model.outputs)
-    yield from (Entry("parameter", v) for v in model.parameters)
-    yield from (Entry("mode", v) for v in model.modes)
-    yield from (Entry("dependent", v) for v in model.dependents)
+def _entries(model: FmuModel) -> Iterator[FmuEntry]:
+    yield from (FmuEntry("state", v) for v in model.states)
+    yield from (FmuEntry("derivative", derivative_of(v)) for v in model.states)
+    yield from (FmuEntry("input", v) for v in model.inputs)
+    yield from (FmuEntry("output", v) for v in model.outputs)
+    yield from (FmuEntry("parameter", v) for v in model.parameters)
+    yield from (FmuEntry("mode", v) for v in model.modes)
+    yield from (FmuEntry("dependent", v) for v in model.dependents)
     for name in model.jumps.names if model.jumps else ():
         text = f"positive between events: {name}"
         words = f"indicator.{name.replace(' ', '_')}"
-        yield Entry("indicator", Variable(name=words, description=text))
-    yield from (Entry("slot", v) for v in model.slots)
-    yield from (Entry("rate", derivative_of(v)) for v in model.slots)
+        yield FmuEntry("indicator", FmuVariable(name=words, description=text))
+    yield from (FmuEntry("slot", v) for v in model.slots)
+    yield from (FmuEntry("rate", derivative_of(v)) for v in model.slots)
     if model.charted:
         text = "positive while the present states serve"
-        yield Entry("chart", Variable(name="indicator.coordinates", description=text))
+        yield FmuEntry("chart", FmuVariable(name="indicator.coordinates", description=text))

@@ -5,12 +5,12 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable
 
-from mbs.export.fmu.about import Table
-from mbs.export.fmu.description import WITH_START, FmuModel, Kind, Variable
-from mbs.export.fmu.svg import svg
+from mbs.export.fmu.about import PageTable
+from mbs.export.fmu.description import WITH_START, FmuModel, FmuVariable, Kind
 from mbs.expressions import MORE_THAN_ZERO
 from mbs.operations import count
 from mbs.units import UNITS
+from mbs.view.drawing_files import svg
 
 _PAGE = """\
 <!DOCTYPE html>
@@ -67,6 +67,7 @@ _FUNCTIONS = {
     "derivatives and outputs": "rhs",
     "one step that closes the loops": "closure",
 }
+_KEY = {"active": "Orange: driven joints", "loop": "Red: joints that close loops"}
 _LICENCE = (
     "The headers fmi2*.h or fmi3*.h among the sources are those of the FMI standard, copyright"
     " Modelica Association, under the 2-clause BSD licence; the other C files but model.c are those"
@@ -99,20 +100,21 @@ def documentation(model: FmuModel) -> str:
 
 
 def _drawing(model: FmuModel) -> list[str]:
-    if model.about is None or model.about.figure is None:
+    if model.about is None or model.about.drawing is None:
         return []
-    figure = model.about.figure
-    caption = f"{model.name} at its start, {figure.caption}."
-    closing = any(stroke.style == "closing" for stroke in figure.strokes)
-    words = f"{caption} Orange: joints that close loops." if closing else caption
+    drawn = model.about.drawing
+    caption = f"{model.name} at its start, {drawn.caption}."
+    used = {stroke.colour for stroke in drawn.strokes}
+    key = [words for colour, words in _KEY.items() if colour in used]
+    words = f"{caption} {'; '.join(key)}." if key else caption
     return [
-        f"<figure>\n{svg(figure, caption)}",
+        f"<figure>\n{svg(drawn, caption)}",
         f"<figcaption>{html.escape(words)}</figcaption>",
         "</figure>",
     ]
 
 
-def _table(table: Table) -> str:
+def _table(table: PageTable) -> str:
     if not table.rows:
         return ""
     note = f'<p class="note">{html.escape(table.note)}</p>\n' if table.note else ""
@@ -128,18 +130,18 @@ def _row(tag: str, cells: Iterable[str]) -> str:
     return f"<tr>{''.join(f'<{tag}>{html.escape(cell)}</{tag}>' for cell in cells)}</tr>"
 
 
-def _variables(model: FmuModel) -> list[Table]:
+def _variables(model: FmuModel) -> list[PageTable]:
     tables = []
     for kind, title in _GROUPS:
         rows = [entry.variable for entry in model.entries if entry.kind == kind]
         starts = kind in WITH_START
         columns = ("name", "unit", *(("start",) if starts else ()), "what it is")
         lines = tuple((v.name, v.unit, *_start(v, starts), _words(v)) for v in rows)
-        tables.append(Table(title, columns, lines))
+        tables.append(PageTable(title, columns, lines))
     return tables
 
 
-def _start(v: Variable, shown: bool) -> tuple[str, ...]:
+def _start(v: FmuVariable, shown: bool) -> tuple[str, ...]:
     if not shown:
         return ()
     unit = UNITS[v.unit]
@@ -149,7 +151,7 @@ def _start(v: Variable, shown: bool) -> tuple[str, ...]:
     return (text,)
 
 
-def _words(v: Variable) -> str:
+def _words(v: FmuVariable) -> str:
     bounds = ""
     if v.min is not None or v.max is not None:
         low = "" if v.min is None else "more than 0" if v.min == MORE_THAN_ZERO else f"{v.min:g}"
@@ -158,7 +160,7 @@ def _words(v: Variable) -> str:
     return f"{v.description}{bounds}{', fixed' if v.fixed else ''}"
 
 
-def _simulation(model: FmuModel) -> Table:
+def _simulation(model: FmuModel) -> PageTable:
     step = f", steps of {model.internal_step:g} s" if model.solver == "rk4" else ""
     rows = (
         ("stop time", f"{model.stop_time:g} s"),
@@ -166,10 +168,10 @@ def _simulation(model: FmuModel) -> Table:
         ("relative tolerance", f"{model.tolerance:g}"),
         ("solver of co-simulation", f"{model.solver}{step}"),
     )
-    return Table("Default experiment", ("what", "value"), rows)
+    return PageTable("Default experiment", ("what", "value"), rows)
 
 
-def _operations(model: FmuModel) -> Table:
+def _operations(model: FmuModel) -> PageTable:
     """How many operations the equations take, where they are a graph of scalars."""
     rows = []
     for title, attribute in _FUNCTIONS.items():
@@ -180,4 +182,4 @@ def _operations(model: FmuModel) -> Table:
             rows.append((title, *(str(number) for number in numbers)))
     columns = ("function", "×", "+ −", "÷", "√", "sin, cos, ..", "others")
     note = "What depends on parameters alone is left out."
-    return Table("Operations of the equations", columns, tuple(rows), note)
+    return PageTable("Operations of the equations", columns, tuple(rows), note)

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import casadi
 
-from mbs.export.fmu.description import FmuModel, Jumps, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
 from mbs.models.tree_state import TreeState
 
 
@@ -214,7 +214,7 @@ def _steepness(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
     return casadi.norm_inf(casadi.vec(dz) / sizes)
 
 
-def _weights(variables: Sequence[Variable]) -> list[float]:
+def _weights(variables: Sequence[FmuVariable]) -> list[float]:
     """Unequal numbers about one, so that effects of the variables do not cancel."""
     return [1 + k / len(variables) for k in range(len(variables))]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbs.assembly import System
-from mbs.export.fmu.description import Jumps, Variable
+from mbs.export.fmu.description import FmuVariable, Jumps
 from mbs.models.contacts import contacts_of
 from mbs.models.minimal_contacts import element_names
 from mbs.models.minimal_state import MinimalState
@@ -26,7 +26,7 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
         if number >= len(stops):
             text = "direction of sliding, -1 or 1, and 0 where friction holds"
         described = f"of {name}, {text}"
-        modes.append(Variable(name=f"{name}.mode", min=-1, max=1, description=described))
+        modes.append(FmuVariable(name=f"{name}.mode", min=-1, max=1, description=described))
     return Jumps(
         modes=tuple(modes),
         first=events.first,

@@ -7,7 +7,7 @@ from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.xml_parts import (
     TOOL,
-    Structure,
+    ModelStructure,
     add_categories_and_experiment,
     add_units,
     integer_attributes,
@@ -86,7 +86,7 @@ def _interface(root: Element, tag: str, model: FmuModel, files: list[str]) -> No
         SubElement(listed, "File", name=name)
 
 
-def _structure(root: Element, model: FmuModel, found: Structure) -> None:
+def _structure(root: Element, model: FmuModel, found: ModelStructure) -> None:
     fixed = range(model.first("parameter"), model.first("mode"))
     time = len(model.entries)
     running = {ref: _without((*fixed, time), known) for ref, known in found.running.items()}

@@ -9,7 +9,7 @@ from mbs.export.fmu.description import FmuModel
 from mbs.export.fmu.description_checks import TIME
 from mbs.export.fmu.xml_parts import (
     TOOL,
-    Structure,
+    ModelStructure,
     add_categories_and_experiment,
     add_units,
     integer_attributes,
@@ -103,7 +103,7 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
     SubElement(root, tag, attributes)
 
 
-def _variables(root: Element, model: FmuModel, found: Structure) -> None:
+def _variables(root: Element, model: FmuModel, found: ModelStructure) -> None:
     variables, derived = SubElement(root, "ModelVariables"), model.derived
     reset = of_arrays(model, found.reset)
     for shown in listed(model):

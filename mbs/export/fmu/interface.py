@@ -9,12 +9,12 @@ from typing import Literal
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.export.fmu.controller import Controller
-from mbs.export.fmu.description import Member, Terminal, Variable
+from mbs.export.fmu.description import FmuVariable, Member, Terminal
 from mbs.export.fmu.names import once, structured
 from mbs.export.fmu.variables import POSE, WRENCH
 from mbs.messages import did_you_mean, quoted
 from mbs.models.geometry import terminal_frame
-from mbs.models.minimal_state import Drive
+from mbs.models.minimal_state import DriveInputs
 
 MOTION = tuple(f"{kind}{axis}" for kind in ("v", "w", "a", "wd") for axis in "xyz")
 """Elements of velocity, angular velocity and accelerations of a frame."""
@@ -34,10 +34,10 @@ class Interface:
     motions: tuple[tuple[str, Literal["q", "a"]], ...]
     flanges: tuple[str, ...]
 
-    def drive(self, system: System, controller: Controller) -> Drive:
+    def drive(self, system: System, controller: Controller) -> DriveInputs:
         """What drives the state equation."""
         frames = tuple(frame_of(system, label) for label in self.wrenches)
-        return Drive(
+        return DriveInputs(
             wrenches=frames,
             motions=self.motions,
             effort=controller.effort,
@@ -104,7 +104,7 @@ def _possible(system: System) -> Iterator[str]:
 
 
 def terminals(
-    system: System, interface: Interface, variables: Sequence[Variable]
+    system: System, interface: Interface, variables: Sequence[FmuVariable]
 ) -> tuple[Terminal, ...]:
     """A terminal for every joint with a drive, and for every flange.
 

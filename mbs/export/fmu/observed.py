@@ -11,7 +11,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.tree import Frame
 from mbs.errors import ModelError
-from mbs.export.fmu.description import Variable
+from mbs.export.fmu.description import FmuVariable
 from mbs.export.fmu.interface import MOTION, frame_of
 from mbs.export.fmu.names import once
 from mbs.export.fmu.variables import frame_text, pose
@@ -46,7 +46,7 @@ class Shown:
     """
 
     labels: Callable[[System], list[str]]
-    variables: Callable[[System, str], Iterator[Variable]]
+    variables: Callable[[System, str], Iterator[FmuVariable]]
     values: Callable[[System, Seen, Labels], list[SX]]
     group: str = ""
 
@@ -85,7 +85,7 @@ def requested(system: System, names: Sequence[str], flanges: Labels = ()) -> Req
     return {kind: list(labels) for kind, labels in wanted.items() if labels}
 
 
-def observed_variables(system: System, request: Request) -> tuple[Variable, ...]:
+def observed_variables(system: System, request: Request) -> tuple[FmuVariable, ...]:
     """The variables of a request."""
     return tuple(
         variable
@@ -128,11 +128,11 @@ def _sensors(system: System) -> list[str]:
     return [attached.sensor.name for attached in system.sensors]
 
 
-def _sensor_variables(system: System, label: str) -> Iterator[Variable]:
+def _sensor_variables(system: System, label: str) -> Iterator[FmuVariable]:
     for attached in system.sensors:
         if attached.sensor.name == label:
             for name, unit in attached.columns:
-                yield Variable(name=name, unit=unit, description=f"read by {label}")
+                yield FmuVariable(name=name, unit=unit, description=f"read by {label}")
 
 
 def _sensor_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
@@ -151,8 +151,8 @@ def _sensor_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
     return _loaded(system, seen, read)
 
 
-def _energy_variables(system: System, label: str) -> Iterator[Variable]:
-    yield Variable(name=f"energy.{label}", unit="J", description=f"{label} energy")
+def _energy_variables(system: System, label: str) -> Iterator[FmuVariable]:
+    yield FmuVariable(name=f"energy.{label}", unit="J", description=f"{label} energy")
 
 
 def _energy_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
@@ -163,9 +163,9 @@ def _energy_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
 _ENERGIES = ("kinetic", "potential")
 
 
-def _closure_variables(system: System, label: str) -> Iterator[Variable]:
+def _closure_variables(system: System, label: str) -> Iterator[FmuVariable]:
     text = "largest closure row of the loops, lengths in m and angles in rad"
-    yield Variable(name="closure", description=text)
+    yield FmuVariable(name="closure", description=text)
 
 
 def _closure_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
@@ -177,7 +177,7 @@ def _bodies(system: System) -> list[str]:
     return [body.name for body in system.bodies]
 
 
-def _pose_variables(system: System, label: str) -> Iterator[Variable]:
+def _pose_variables(system: System, label: str) -> Iterator[FmuVariable]:
     return pose(label, frame_text(frame_of(system, label)))
 
 
@@ -189,7 +189,7 @@ def _pose_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
     return values
 
 
-def _motion_variables(system: System, label: str) -> Iterator[Variable]:
+def _motion_variables(system: System, label: str) -> Iterator[FmuVariable]:
     kinds = {
         "v": ("m/s", "velocity"),
         "w": ("rad/s", "angular velocity"),
@@ -199,7 +199,7 @@ def _motion_variables(system: System, label: str) -> Iterator[Variable]:
     for element in MOTION:
         unit, noun = kinds[element[:-1]]
         text = f"{noun} of {label} along {element[-1]} of the base"
-        yield Variable(name=f"{label}.{element}", unit=unit, description=text)
+        yield FmuVariable(name=f"{label}.{element}", unit=unit, description=text)
 
 
 def _motion_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
@@ -223,11 +223,11 @@ def _joints(system: System) -> list[str]:
     return [joint.name for joint in system.joints]
 
 
-def _wrench_variables(system: System, label: str) -> Iterator[Variable]:
+def _wrench_variables(system: System, label: str) -> Iterator[FmuVariable]:
     for kind, unit, noun in (("f", "N", "force"), ("m", "N.m", "moment")):
         for axis in "xyz":
             text = f"{noun} that {label} transmits, along {axis} of its frame_b"
-            yield Variable(name=f"{label}.{kind}.{axis}", unit=unit, description=text)
+            yield FmuVariable(name=f"{label}.{kind}.{axis}", unit=unit, description=text)
 
 
 def _wrench_values(system: System, seen: Seen, labels: Labels) -> list[SX]:

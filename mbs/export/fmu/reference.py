@@ -19,7 +19,7 @@ import numpy.typing as npt
 from casadi import DM, MX, Function
 
 from mbs.errors import ExportError, SolverError
-from mbs.export.fmu.description import FmuModel, Variable
+from mbs.export.fmu.description import FmuModel, FmuVariable
 from mbs.export.fmu.xml_parts import text_of
 from mbs.solvers.events import Events
 from mbs.solvers.integrate import integrate, integrate_events
@@ -87,7 +87,7 @@ def reference_files(model: FmuModel) -> dict[str, bytes]:
     return {f"{FOLDER}/{name}": text.encode() for name, text in texts.items()}
 
 
-def _results(model: FmuModel, times: Array) -> tuple[list[Variable], Array]:
+def _results(model: FmuModel, times: Array) -> tuple[list[FmuVariable], Array]:
     """The outputs and their values, a row for each time."""
     states, modes = _motion(model, times)
     nx, count = len(model.states), len(times)
@@ -128,7 +128,7 @@ def _motion(model: FmuModel, times: Array) -> tuple[Array, Array]:
     return found.x, found.modes
 
 
-def _starts(variables: Sequence[Variable]) -> DM:
+def _starts(variables: Sequence[FmuVariable]) -> DM:
     return DM([v.start for v in variables]) if variables else DM(0, 1)
 
 
@@ -190,14 +190,14 @@ def _events(model: FmuModel, t: MX, x: MX, p: MX) -> Events:
     )
 
 
-def _csv(times: Array, variables: Sequence[Variable], table: Array) -> str:
+def _csv(times: Array, variables: Sequence[FmuVariable], table: Array) -> str:
     """A row of names and a row for each time, as in RFC 4180."""
     names = ",".join('"' + name.replace('"', '""') + '"' for name in _names(variables))
     rows = np.column_stack((times, table))
     return "\n".join([names, *(",".join(format(x, _DIGITS) for x in row) for row in rows)]) + "\n"
 
 
-def _names(variables: Sequence[Variable]) -> list[str]:
+def _names(variables: Sequence[FmuVariable]) -> list[str]:
     return ["time", *(v.name for v in variables)]
 
 

@@ -11,9 +11,9 @@ from mbs.assembly import System
 from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.tables import LinkRow
 from mbs.assembly.tree import Link
-from mbs.export.fmu.about import About, Table
-from mbs.export.fmu.drawing import figure
+from mbs.export.fmu.about import About, PageTable
 from mbs.spatial.inertia import TEN_PARAMETERS
+from mbs.view.drawing import drawing
 
 _LONGEST = 24
 """Letters of an expression that a cell of a table holds."""
@@ -32,11 +32,11 @@ def about(system: System) -> About:
         _bodies(system),
         _loops(system),
     )
-    return About(tuple(table for table in tables if table.rows), figure(system))
+    return About(tuple(table for table in tables if table.rows), drawing(system))
 
 
-def _joints(system: System) -> Table:
-    return Table(
+def _joints(system: System) -> PageTable:
+    return PageTable(
         "Joints",
         ("joint", "kind", "between", "coordinates", "driven", "limits"),
         tuple(_joint(system, row) for row in system.joints),
@@ -63,8 +63,8 @@ def _place(link: int) -> str:
     return "base" if link < 0 else f"link {link + 1}"
 
 
-def _geometry(system: System) -> Table:
-    return Table(
+def _geometry(system: System) -> PageTable:
+    return PageTable(
         "Placement of the links",
         ("link", "moved by", "on", "γ [rad]", "b [m]", "α [rad]", "d [m]", "θ [rad]", "r [m]"),
         tuple(placement for row in system.links for placement in _placements(system, row)),
@@ -85,8 +85,8 @@ def _placements(system: System, row: LinkRow) -> Iterator[tuple[str, ...]]:
     yield str(row.number), what, before, *_texts(system, (SX(x) for x in numbers))
 
 
-def _inertias(system: System) -> Table:
-    return Table(
+def _inertias(system: System) -> PageTable:
+    return PageTable(
         "Inertial parameters of the links",
         ("link", *TEN_PARAMETERS, "Ia", "Fv", "Fs"),
         tuple(_inertia(system, k, link) for k, link in enumerate(system.tree.links, start=1)),
@@ -100,15 +100,15 @@ def _inertia(system: System, number: int, link: Link) -> tuple[str, ...]:
     return (str(number), *_texts(system, (*ten, link.Ia, link.Fv, link.Fs)))
 
 
-def _bodies(system: System) -> Table:
+def _bodies(system: System) -> PageTable:
     rows = tuple(
         (row.name, _place(row.link - 1), "" if row.mass is None else f"{row.mass:.6g}")
         for row in system.bodies
     )
-    return Table("Bodies", ("body", "carried by", "mass [kg]"), rows)
+    return PageTable("Bodies", ("body", "carried by", "mass [kg]"), rows)
 
 
-def _loops(system: System) -> Table:
+def _loops(system: System) -> PageTable:
     rows = tuple(
         (
             row.name,
@@ -120,7 +120,7 @@ def _loops(system: System) -> Table:
         for row in system.loops
     )
     columns = ("closed at", "by", "through", "rows", "rows that depend on the others")
-    return Table("Loops", columns, rows)
+    return PageTable("Loops", columns, rows)
 
 
 def _texts(system: System, values: Iterable[SX]) -> list[str]:

@@ -20,7 +20,7 @@ def terminals_and_icons(model: FmuModel) -> str:
         its text.
     """
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
-    if model.about is not None and model.about.figure is not None:
+    if model.about is not None and model.about.drawing is not None:
         graphics = SubElement(root, "GraphicalRepresentation")
         SubElement(graphics, "CoordinateSystem", _EXTENT, suggestedScalingFactorTo_mm="0.1")
         SubElement(graphics, "Icon", _EXTENT)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
 from mbs.errors import ModelError
-from mbs.export.fmu.description import State, Variable
+from mbs.export.fmu.description import FmuVariable, State
 from mbs.export.fmu.names import once
 from mbs.messages import did_you_mean
 from mbs.models.geometry import terminal_frame
@@ -65,7 +65,9 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
     return (*positions, *velocities, *devices)
 
 
-def dependents(system: System, state: MinimalState, start: Sequence[float]) -> tuple[Variable, ...]:
+def dependents(
+    system: System, state: MinimalState, start: Sequence[float]
+) -> tuple[FmuVariable, ...]:
     """The positions that loops determine, whose starts are guesses."""
     return tuple(
         _position(system.coordinates[k], f"{system.coordinates[k].name}.solved", value)
@@ -73,7 +75,7 @@ def dependents(system: System, state: MinimalState, start: Sequence[float]) -> t
     )
 
 
-def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterator[Variable]:
+def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterator[FmuVariable]:
     """The elements of u but those of a controller; labels name the frames of the wrenches."""
     for k in state.inputs:
         name = system.speeds[k].name
@@ -81,17 +83,17 @@ def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterat
     for k in state.devices:
         device = system.devices[k]
         name, unit = device.input
-        yield Variable(name=name, unit=unit, description=f"input of {device.name}")
+        yield FmuVariable(name=name, unit=unit, description=f"input of {device.name}")
     for label in labels:
         for element in WRENCH:
             unit, noun = ("N", "force") if element[0] == "f" else ("N.m", "torque")
             text = f"{noun} on {label} along {element[1]} of the base"
-            yield Variable(name=f"{label}.{element}", unit=unit, description=text)
+            yield FmuVariable(name=f"{label}.{element}", unit=unit, description=text)
     for motion in state.motions:
         yield from _prescribed(system, motion)
 
 
-def _prescribed(system: System, motion: InputMotion) -> Iterator[Variable]:
+def _prescribed(system: System, motion: InputMotion) -> Iterator[FmuVariable]:
     speed = system.speeds[motion.velocity]
     if motion.position is not None:
         position, start = system.coordinates[motion.position], system.posture[motion.position]
@@ -100,7 +102,7 @@ def _prescribed(system: System, motion: InputMotion) -> Iterator[Variable]:
     yield _acceleration(speed, "prescribed ")
 
 
-def outputs(system: System, state: MinimalState) -> Iterator[Variable]:
+def outputs(system: System, state: MinimalState) -> Iterator[FmuVariable]:
     """The elements of y but those that are observed."""
     speeds = system.speeds
     yield from (_acceleration(speeds[k]) for k in state.accelerations)
@@ -111,21 +113,21 @@ def outputs(system: System, state: MinimalState) -> Iterator[Variable]:
     yield from pose("tool", frame_text(terminal_frame(system)))
     for device in system.devices:
         for name, unit in device.outputs:
-            yield Variable(name=name, unit=unit, description=f"of {device.name}")
+            yield FmuVariable(name=name, unit=unit, description=f"of {device.name}")
     for k in state.efforts:
         yield _effort(speeds[k], f"effort that drives {speeds[k].name}")
     for contact in state.contacts:
         text = f"effort of {contact.name.removesuffix('.effort')}"
-        yield Variable(name=contact.name, unit=contact.unit, description=text)
+        yield FmuVariable(name=contact.name, unit=contact.unit, description=text)
 
 
-def pose(label: str, where: str) -> Iterator[Variable]:
+def pose(label: str, where: str) -> Iterator[FmuVariable]:
     """Origin, and orientation by rows, of a frame in the base."""
     for name in POSE:
         text = f"{name} of {where} in the base frame"
         if name.startswith("R"):
             text = f"orientation of {where} in the base frame"
-        yield Variable(
+        yield FmuVariable(
             name=f"{label}.{name}", unit="1" if name.startswith("R") else "m", description=text
         )
 
@@ -135,7 +137,7 @@ def frame_text(frame: str | int) -> str:
     return f"link {frame}" if isinstance(frame, int) else frame
 
 
-def parameters(system: System, fixed: Sequence[str] = ()) -> Iterator[Variable]:
+def parameters(system: System, fixed: Sequence[str] = ()) -> Iterator[FmuVariable]:
     """Every symbol of the system, with a value.
 
     Args:
@@ -149,7 +151,7 @@ def parameters(system: System, fixed: Sequence[str] = ()) -> Iterator[Variable]:
     _check_known(system, kept)
     for parameter, start in zip(system.parameters, system.parameter_values(), strict=True):
         low, high = system.bounds.get(parameter.name, (None, None))
-        yield Variable(
+        yield FmuVariable(
             name=parameter.name,
             unit=parameter.unit,
             start=start,
@@ -185,8 +187,8 @@ def _limits(coordinate: Coordinate) -> str:
     return f", whose joint is limited to {low:g} .. {high:g} {coordinate.unit}"
 
 
-def _position(coordinate: Coordinate, name: str, start: float = 0.0, how: str = "") -> Variable:
-    return Variable(
+def _position(coordinate: Coordinate, name: str, start: float = 0.0, how: str = "") -> FmuVariable:
+    return FmuVariable(
         name=name,
         unit=coordinate.unit,
         start=start,
@@ -195,18 +197,18 @@ def _position(coordinate: Coordinate, name: str, start: float = 0.0, how: str = 
     )
 
 
-def _velocity(speed: Coordinate, how: str = "") -> Variable:
+def _velocity(speed: Coordinate, how: str = "") -> FmuVariable:
     text = f"{how}velocity of {speed.name}"
-    return Variable(name=f"{speed.name}.v", unit=speed.unit, description=text)
+    return FmuVariable(name=f"{speed.name}.v", unit=speed.unit, description=text)
 
 
-def _acceleration(speed: Coordinate, how: str = "") -> Variable:
-    return Variable(
+def _acceleration(speed: Coordinate, how: str = "") -> FmuVariable:
+    return FmuVariable(
         name=f"{speed.name}.a",
         unit=ACCELERATION_UNIT[speed.unit],
         description=f"{how}acceleration of {speed.name}",
     )
 
 
-def _effort(speed: Coordinate, text: str) -> Variable:
-    return Variable(name=f"{speed.name}.tau", unit=EFFORT_UNIT[speed.unit], description=text)
+def _effort(speed: Coordinate, text: str) -> FmuVariable:
+    return FmuVariable(name=f"{speed.name}.tau", unit=EFFORT_UNIT[speed.unit], description=text)

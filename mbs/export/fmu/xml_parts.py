@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from mbs.export.fmu.dependencies import Dependencies, Known, dependencies
-from mbs.export.fmu.description import WITH_START, Entry, FmuModel, State
+from mbs.export.fmu.description import WITH_START, FmuEntry, FmuModel, State
 from mbs.export.fmu.linearity import KINDS, DependencyKind
 from mbs.export.fmu.names import is_structured
 from mbs.units import UNITS
@@ -36,7 +36,7 @@ CATEGORIES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Structure:
+class ModelStructure:
     """Which calculated values there are, and what they depend on; all by value references.
 
     That of time is the number of entries.
@@ -61,7 +61,7 @@ class Structure:
     reset: list[int]
 
 
-def structure(model: FmuModel) -> Structure:
+def structure(model: FmuModel) -> ModelStructure:
     """The structure of a model."""
     found = dependencies(model)
     modes = range(model.first("mode"), model.first("dependent"))
@@ -82,7 +82,7 @@ def structure(model: FmuModel) -> Structure:
         starting |= _by_joints(model, found.running)
     calculated = [*range(model.first("output"), model.first("parameter")), *modes]
     derivatives = list(model.derived)
-    return Structure(
+    return ModelStructure(
         outputs=shown + calculated,
         derivatives=derivatives,
         indicators=[
@@ -149,7 +149,7 @@ def naming_convention(model: FmuModel) -> str:
     return "structured" if fits else "flat"
 
 
-def variable_attributes(reference: int, entry: Entry) -> dict[str, str]:
+def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
     """Name, reference, causality, variability, description and initial of a variable."""
     v = entry.variable
     attributes = {
@@ -167,7 +167,7 @@ def variable_attributes(reference: int, entry: Entry) -> dict[str, str]:
     return attributes
 
 
-def real_attributes(entry: Entry) -> dict[str, str]:
+def real_attributes(entry: FmuEntry) -> dict[str, str]:
     """Units, bounds, nominal and start of a variable."""
     v = entry.variable
     real = {"unit": v.unit}
@@ -183,7 +183,7 @@ def real_attributes(entry: Entry) -> dict[str, str]:
     return real
 
 
-def integer_attributes(entry: Entry) -> dict[str, str]:
+def integer_attributes(entry: FmuEntry) -> dict[str, str]:
     """Bounds of a mode, which is an integer."""
     bounds = (("min", entry.variable.min), ("max", entry.variable.max))
     return {name: str(int(bound)) for name, bound in bounds if bound is not None}

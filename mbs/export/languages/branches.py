@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from mbs.export.languages.unit import Line
+from mbs.export.languages.unit import CodeLine
 
 
 def branches(
-    line: Line,
+    line: CodeLine,
     printer: Any,
     words: tuple[str, str, str],
     statement: Callable[[str, str], list[str]],

@@ -12,17 +12,17 @@ from casadi import Function
 from mbs.export.languages.header import header, tables
 from mbs.export.languages.language import Language
 from mbs.export.languages.names import Names, spelled_names
-from mbs.export.languages.plan import LEAVES, Plan, arranged, plan_of
+from mbs.export.languages.plan import LEAVES, LinePlan, arranged, plan_of
 from mbs.export.languages.quantities import angle_names, element_names, elements_of, places
 from mbs.export.languages.signs import TURNED, turned
-from mbs.export.languages.symbolic import Writer, number_of, symbol
-from mbs.export.languages.unit import Argument, Expr, Load, Store, Unit
+from mbs.export.languages.symbolic import SympyWriter, number_of, symbol
+from mbs.export.languages.unit import Argument, CodeUnit, Expr, Load, Store
 from mbs.operations.graph import Graph, Port, graph_of
 
 _PARAMETERS = ("p",)
 
 
-def build(function: Function, language: Language, name: str) -> Unit:
+def build(function: Function, language: Language, name: str) -> CodeUnit:
     """The function in lines, named for a language and under a name of its own."""
     graph, given, reserved = _graph(function, name)
     inputs, outputs = (
@@ -44,8 +44,8 @@ def build(function: Function, language: Language, name: str) -> Unit:
         for name, port in zip(names.arguments, [*graph.inputs, *graph.outputs], strict=True)
     ]
     into, out_of = tuple(arguments[: len(inputs)]), tuple(arguments[len(inputs) :])
-    writer = Writer(plan, names.nodes, language.squares_as_products)
-    return Unit(
+    writer = SympyWriter(plan, names.nodes, language.squares_as_products)
+    return CodeUnit(
         names.function,
         header(function, graph, arguments, names.elements),
         tables(function),
@@ -114,7 +114,7 @@ def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tu
                 yield number, name
 
 
-def _line_names(plan: Plan, wanted: dict[int, str], reserved: set[str]) -> dict[int, str]:
+def _line_names(plan: LinePlan, wanted: dict[int, str], reserved: set[str]) -> dict[int, str]:
     """What every line is called; Z and a number where nothing names it."""
     names: dict[int, str] = {}
     taken = reserved.union(wanted.values())

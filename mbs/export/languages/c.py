@@ -17,7 +17,7 @@ from mbs.export.languages.language import (
     wrapped,
 )
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, Unit
+from mbs.export.languages.unit import Argument, CodeUnit
 
 _CHOICE = "({0}) ? {1} : {2}"
 _FORMS = {
@@ -44,7 +44,7 @@ class C(Language):
         """Whether C, its library or C++ uses the name."""
         return parameter_names([name], ["k"]) != [name]
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         yield "/*"
         yield from (f" * {line}".rstrip() for line in kept_inside(unit.header, in_c_comment))
@@ -64,7 +64,7 @@ class C(Language):
         yield from self._stores(unit, printer)
         yield "}"
 
-    def _stores(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):

@@ -10,7 +10,7 @@ from sympy.printing.fortran import FCodePrinter
 from mbs.export.languages.branches import branches
 from mbs.export.languages.language import Language, commented, sections, wrapped
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, Unit
+from mbs.export.languages.unit import Argument, CodeUnit
 
 _COLUMNS, _CONTINUED = 100, " &"
 _NAMES_A_LINE = 8
@@ -57,7 +57,7 @@ class Fortran(Language):
         signs = {"Unequality": "/="}
         return printer_of(FCodePrinter, self.title, _number, _FORMS, "{0}**{1}", signs, _JOINS)
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         yield from commented(unit.header, "!")
         arguments = [*unit.inputs, *unit.outputs]
@@ -80,7 +80,7 @@ class Fortran(Language):
         yield from self._stores(unit, printer)
         yield f"end subroutine {unit.name}"
 
-    def _stores(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):

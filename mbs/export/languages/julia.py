@@ -16,7 +16,7 @@ from mbs.export.languages.language import (
     wrapped,
 )
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, Unit
+from mbs.export.languages.unit import Argument, CodeUnit
 
 _CHOICE = "({0}) ? {1} : {2}"
 _FORMS = {
@@ -54,7 +54,7 @@ class Julia(Language):
         """A printer of sympy."""
         return printer_of(JuliaCodePrinter, self.title, repr, _FORMS, "{0}^{1}")
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         yield from commented(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
@@ -72,7 +72,7 @@ class Julia(Language):
         yield "end"
 
 
-def _output(unit: Unit, out: Argument, printer: Any) -> Iterator[str]:
+def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
     grid = grid_texts(unit, out, printer, "0.0")
     if not out.size:
         yield f"    {out.name} = zeros({out.rows}, {out.columns})"

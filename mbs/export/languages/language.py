@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from mbs.comments import in_line_comment
-from mbs.export.languages.unit import Argument, Line, Unit
+from mbs.export.languages.unit import Argument, CodeLine, CodeUnit
 
 WIDTH = 100
 """Columns of a line of text where the language sets no other limit."""
@@ -50,10 +50,10 @@ class Language(ABC):
         """A printer of sympy."""
 
     @abstractmethod
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
 
-    def text(self, unit: Unit) -> str:
+    def text(self, unit: CodeUnit) -> str:
         """The text of a function."""
         return "\n".join(self.lines(unit, self.printer())) + "\n"
 
@@ -65,14 +65,14 @@ class Language(ABC):
         inside = f"{row}" if argument.is_vector else f"{row}, {column}"
         return inside.join((argument.name + self.brackets[0], self.brackets[1]))
 
-    def loads(self, unit: Unit) -> Iterator[str]:
+    def loads(self, unit: CodeUnit) -> Iterator[str]:
         """`name = element` for the elements of inputs that are used."""
         for load in unit.loads:
             place = self.place(load.argument, load.row, load.column)
             if place != load.name:
                 yield f"{load.name} = {place}"
 
-    def stores(self, unit: Unit, out: Argument, printer: Any) -> Iterator[str]:
+    def stores(self, unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
         """`element = value` for the elements of an output that are not zero."""
         for store in unit.stores_of(out):
             place, value = self.place(out, store.row, store.column), printer.text(store.value)
@@ -153,7 +153,7 @@ def kept_inside(header: Sequence[str], rule: Callable[[str], str]) -> Iterator[s
         yield " " * (len(line) - len(text)) + rule(text)
 
 
-def value_text(line: Line, printer: Any, choice: str) -> str:
+def value_text(line: CodeLine, printer: Any, choice: str) -> str:
     """What a line assigns.
 
     Args:
@@ -167,7 +167,7 @@ def value_text(line: Line, printer: Any, choice: str) -> str:
     return choice.format(printer.text(line.condition), value, printer.text(line.otherwise))
 
 
-def sections(unit: Unit) -> Iterator[tuple[str, Sequence[Line]]]:
+def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
     """The lines in two groups, each with what to say about it."""
     if unit.fixed:
         yield "Parameters only: these may be computed once.", unit.fixed
@@ -176,6 +176,6 @@ def sections(unit: Unit) -> Iterator[tuple[str, Sequence[Line]]]:
         yield "", unit.changing
 
 
-def grid_texts(unit: Unit, out: Argument, printer: Any, zero: str) -> list[list[str]]:
+def grid_texts(unit: CodeUnit, out: Argument, printer: Any, zero: str) -> list[list[str]]:
     """The elements of an output as texts, row by row."""
     return [[zero if e is None else printer.text(e) for e in row] for row in unit.grid(out)]

@@ -9,7 +9,7 @@ from typing import Any
 from sympy.printing.latex import LatexPrinter
 
 from mbs.export.languages.language import Language, commented, plain_number, sections
-from mbs.export.languages.unit import Line, Unit
+from mbs.export.languages.unit import CodeLine, CodeUnit
 
 _ACCENTS = {"QP": r"\dot{q}", "QDP": r"\ddot{q}", "GAM": r"\Gamma"}
 _FORMS = {
@@ -65,7 +65,7 @@ class Latex(Language):
         """A printer of sympy."""
         return _Printer({"order": "none", "mul_symbol": r" \, ", "fold_short_frac": False})
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         yield from commented(unit.header, "%")
         yield from (r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks")
@@ -112,7 +112,7 @@ def _aligned(equations: Iterator[str]) -> Iterator[str]:
     yield r"\end{align*}"
 
 
-def _value(line: Line, printer: Any) -> str:
+def _value(line: CodeLine, printer: Any) -> str:
     value = printer.text(line.value)
     if line.condition is None:
         return str(value)

@@ -17,7 +17,7 @@ from mbs.export.languages.language import (
     wrapped,
 )
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, Unit
+from mbs.export.languages.unit import Argument, CodeUnit
 
 _JOINS = {"both": " and ", "either": " or "}
 _CHOICE = "piecewise({0}, {1}, {2})"
@@ -62,7 +62,7 @@ class Maple(Language):
             MapleCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs, _JOINS
         )
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         yield from commented(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
@@ -82,7 +82,7 @@ class Maple(Language):
         yield "end proc:"
 
 
-def _output(unit: Unit, out: Argument, printer: Any) -> Iterator[str]:
+def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
     grid = grid_texts(unit, out, printer, "0")
     if out.scalar:
         value = grid[0][0]

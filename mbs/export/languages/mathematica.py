@@ -19,7 +19,7 @@ from mbs.export.languages.language import (
     wrapped,
 )
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, Unit
+from mbs.export.languages.unit import Argument, CodeUnit
 
 _NAMES = {
     **{"sin": "Sin", "cos": "Cos", "tan": "Tan", "asin": "ArcSin", "acos": "ArcCos"},
@@ -65,7 +65,7 @@ class Mathematica(Language):
         parts = re.sub(r"(?<=\d)_(?=\d)", "x", super().legal(name)).split("_")
         return parts[0] + "".join(part[:1].upper() + part[1:] for part in parts[1:])
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         first, *others = kept_inside(unit.header, in_wolfram_comment)
         yield f"(* {first}"
@@ -93,7 +93,7 @@ def _number(value: float) -> str:
     return f"{mantissa}*^{int(exponent)}" if exponent else text
 
 
-def _output(unit: Unit, out: Argument, printer: Any) -> str:
+def _output(unit: CodeUnit, out: Argument, printer: Any) -> str:
     grid = grid_texts(unit, out, printer, "0")
     if out.scalar:
         return grid[0][0]

@@ -16,7 +16,7 @@ from mbs.export.languages.language import (
     wrapped,
 )
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Unit
+from mbs.export.languages.unit import CodeUnit
 
 _CONTINUED = " ..."
 _BRANCHES = "if {0}", "else", "end"
@@ -56,7 +56,7 @@ class Matlab(Language):
         signs = {"Unequality": "~="}
         return printer_of(OctaveCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs)
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         inside = ", ".join(argument.name for argument in unit.inputs)
         outside = ", ".join(argument.name for argument in unit.outputs)
@@ -73,7 +73,7 @@ class Matlab(Language):
         yield from self._stores(unit, printer)
         yield "end"
 
-    def _stores(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         for out in unit.outputs:
             yield ""
             if not out.scalar or unit.has_zeros(out):

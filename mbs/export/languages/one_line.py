@@ -8,9 +8,9 @@ import casadi
 from sympy.printing.pycode import PythonCodePrinter
 
 from mbs.export.languages.language import plain_number
-from mbs.export.languages.plan import Plan, arranged
+from mbs.export.languages.plan import LinePlan, arranged
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.symbolic import Writer
+from mbs.export.languages.symbolic import SympyWriter
 from mbs.operations.graph import Graph
 
 _FORMS = {
@@ -28,6 +28,6 @@ def one_line(graph: Graph, names: Sequence[str]) -> str:
         for number, node in enumerate(graph.nodes)
         if node.op == casadi.OP_INPUT
     }
-    writer = Writer(Plan(graph, (), (), {}), inputs, False)
+    writer = SympyWriter(LinePlan(graph, (), (), {}), inputs, False)
     printer = printer_of(PythonCodePrinter, "the grammar", plain_number, _FORMS, "{0}^{1}")
     return str(printer.text(writer.value(graph.results[0][0])))

@@ -41,7 +41,7 @@ class Choice(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class LinePlan:
     """A graph cut into lines.
 
     Attributes:
@@ -96,7 +96,7 @@ def arranged(graph: Graph, first: Iterable[int] = ()) -> tuple[Graph, dict[int, 
     return graph.with_nodes(nodes, [[new[k] for k in result] for result in graph.results]), new
 
 
-def plan_of(graph: Graph, named: Iterable[int], parameters: Iterable[str] = ("p",)) -> Plan:
+def plan_of(graph: Graph, named: Iterable[int], parameters: Iterable[str] = ("p",)) -> LinePlan:
     """Decide what is a line: what has a name, is used twice, is a choice, or grew too long.
 
     Args:
@@ -109,11 +109,11 @@ def plan_of(graph: Graph, named: Iterable[int], parameters: Iterable[str] = ("p"
     results = {number for result in graph.results for number in result}
     cuts = {n for n in (*named, *results) if graph.nodes[n].op not in LEAVES}
     fixed = graph.fixed_by(parameters)
-    draft = _Draft(graph, choices, fixed, cuts)
+    draft = _LinesSoFar(graph, choices, fixed, cuts)
     draft.count_uses(results)
     draft.shorten()
     lines = sorted(n for n in draft.cuts if draft.uses[n])
-    return Plan(
+    return LinePlan(
         graph,
         tuple(n for n in lines if fixed[n]),
         tuple(n for n in lines if not fixed[n]),
@@ -138,7 +138,7 @@ def _choice(graph: Graph, number: int) -> Choice | None:
 
 
 @dataclass(slots=True)
-class _Draft:
+class _LinesSoFar:
     """The lines found so far.
 
     Attributes:

@@ -18,7 +18,7 @@ from mbs.export.languages.language import (
     wrapped,
 )
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Unit
+from mbs.export.languages.unit import CodeUnit
 
 _NUMPY = {
     **{name: name for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},
@@ -56,7 +56,7 @@ class Python(Language):
             PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
         )
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         body = list(self._body(unit, printer))
         if any("math." in line for line in body):
@@ -71,7 +71,7 @@ class Python(Language):
         yield '    """'
         yield from body
 
-    def _body(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def _body(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         shapes = []
         for argument in unit.inputs:
             yield f"    {argument.name} = np.asarray({argument.name}, dtype=float)"
@@ -89,7 +89,7 @@ class Python(Language):
             yield from self._output(unit, out, printer)
         yield f"    return {', '.join(argument.name for argument in unit.outputs)}"
 
-    def _output(self, unit: Unit, out: Any, printer: Any) -> Iterator[str]:
+    def _output(self, unit: CodeUnit, out: Any, printer: Any) -> Iterator[str]:
         if not out.scalar:
             sizes = f"{out.rows}" if out.is_vector else f"{out.rows}, {out.columns}"
             yield f"    {out.name} = np.zeros(({sizes}, *shape))"

@@ -21,7 +21,7 @@ Elements = Sequence[tuple[str, str]]
 """Name and unit of every element of an input or output."""
 
 
-class Place(NamedTuple):
+class MatrixElement(NamedTuple):
     """An element of a matrix; rows and columns count from 0."""
 
     row: int
@@ -41,10 +41,10 @@ def elements_of(function: Function, name: str) -> Elements:
     return list(known(name)) if known is not None else []
 
 
-def places(port: Port) -> list[Place]:
+def places(port: Port) -> list[MatrixElement]:
     """Where the non-zero elements of an input or output are."""
     rows, columns = port.sparsity.get_triplet()
-    return [Place(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
+    return [MatrixElement(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
 
 
 def element_names(port: Port, elements: Elements) -> list[str]:

@@ -9,7 +9,7 @@ from sympy.printing.rust import RustCodePrinter
 
 from mbs.export.languages.language import Language, commented, sections, value_text, wrapped
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, Unit
+from mbs.export.languages.unit import Argument, CodeUnit
 
 _METHODS = {
     **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan")},
@@ -52,7 +52,7 @@ class Rust(Language):
         """An element of an input or output in the text."""
         return f"{argument.name}[{row + argument.rows * column}]"
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         # No `///`: examples in the documentation of Rust are compiled and run by its tests.
         yield from commented(unit.header, "//")

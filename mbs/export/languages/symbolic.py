@@ -12,42 +12,29 @@ import sympy
 from sympy import Add, Float, Integer, Mul, Pow, S, Symbol
 
 from mbs.errors import ModelError
-from mbs.export.languages.plan import CONDITIONS, Plan
-from mbs.export.languages.unit import Line
+from mbs.export.languages.plan import CONDITIONS, LinePlan
+from mbs.export.languages.unit import CodeLine
 from mbs.operations.graph import Node
+from mbs.operations.text import CODES, NAMES
 
 Expr = Any
 
 _SYMPY = {
-    casadi.OP_SIN: sympy.sin,
-    casadi.OP_COS: sympy.cos,
-    casadi.OP_TAN: sympy.tan,
-    casadi.OP_ASIN: sympy.asin,
-    casadi.OP_ACOS: sympy.acos,
-    casadi.OP_ATAN: sympy.atan,
-    casadi.OP_ATAN2: sympy.atan2,
-    casadi.OP_SINH: sympy.sinh,
-    casadi.OP_COSH: sympy.cosh,
-    casadi.OP_TANH: sympy.tanh,
-    casadi.OP_ASINH: sympy.asinh,
-    casadi.OP_ACOSH: sympy.acosh,
-    casadi.OP_ATANH: sympy.atanh,
-    casadi.OP_EXP: sympy.exp,
-    casadi.OP_LOG: sympy.log,
     casadi.OP_FABS: sympy.Abs,
-    casadi.OP_ERF: sympy.erf,
+    **{
+        CODES[name]: getattr(sympy, name)
+        for name in (
+            *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "erf"),
+            *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+        )
+    },
 }
 _OURS = {
-    casadi.OP_SIGN: "step",
-    casadi.OP_FLOOR: "floor_",
-    casadi.OP_CEIL: "ceil_",
-    casadi.OP_FMOD: "fmod",
-    casadi.OP_COPYSIGN: "copysign",
-    casadi.OP_FMIN: "fmin",
-    casadi.OP_FMAX: "fmax",
-    casadi.OP_HYPOT: "hypot",
-    casadi.OP_LOG1P: "log1p",
-    casadi.OP_EXPM1: "expm1",
+    **{casadi.OP_SIGN: "step", casadi.OP_FLOOR: "floor_", casadi.OP_CEIL: "ceil_"},
+    **{
+        CODES[name]: name
+        for name in ("fmod", "copysign", "fmin", "fmax", "hypot", "log1p", "expm1")
+    },
 }
 """Functions that sympy has under other meanings, or not at all; see `Forms`."""
 
@@ -79,7 +66,7 @@ _LARGEST_INTEGER_POWER = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Writer:
+class SympyWriter:
     """What writes the lines of a plan as expressions.
 
     Attributes:
@@ -88,20 +75,20 @@ class Writer:
         squares_as_products: whether x^2 is x*x.
     """
 
-    plan: Plan
+    plan: LinePlan
     names: Mapping[int, str]
     squares_as_products: bool
 
-    def line(self, number: int) -> Line:
+    def line(self, number: int) -> CodeLine:
         """The line of a node."""
         name, node = self.names[number], self.plan.graph.nodes[number]
         choice = self.plan.choices.get(number)
         if choice:
             other = number_of(0.0) if choice.otherwise is None else self.value(choice.otherwise)
-            return Line(name, self.value(choice.value), self.condition(choice.condition), other)
+            return CodeLine(name, self.value(choice.value), self.condition(choice.condition), other)
         if node.op in CONDITIONS:
-            return Line(name, number_of(1.0), self.condition(number), number_of(0.0))
-        return Line(name, self._operation(node))
+            return CodeLine(name, number_of(1.0), self.condition(number), number_of(0.0))
+        return CodeLine(name, self._operation(node))
 
     def value(self, number: int) -> Expr:
         """A node inside of an expression: its name where it has one."""
@@ -142,7 +129,7 @@ class Writer:
         if node.op in _OURS:
             return _UNDEFINED[_OURS[node.op]](*values)
         raise ModelError(
-            f"{self.plan.graph.name}: it has the operation {_operation_name(node.op)}, which has"
+            f"{self.plan.graph.name}: it has the operation {NAMES[node.op]}, which has"
             " no text; expand the Function and leave that operation out"
         )
 
@@ -258,11 +245,6 @@ def _power(base: Expr, exponent: Expr) -> Expr:
         positive = _pow(base, Integer(abs(int(exponent))))
         return positive if exponent > 0 else _inverse(positive)
     return _pow(base, exponent)
-
-
-def _operation_name(op: int) -> str:
-    names = (name for name, code in vars(casadi).items() if name.startswith("OP_") and code == op)
-    return next(names, str(op)).removeprefix("OP_").lower()
 
 
 _RULES: Mapping[int, Callable[..., Expr]] = {

@@ -17,7 +17,7 @@ from mbs.export.languages.language import (
     wrapped,
 )
 from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Unit
+from mbs.export.languages.unit import CodeUnit
 
 _SAME = "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf"
 _JOINS = {"both": " and ", "either": " or "}
@@ -48,7 +48,7 @@ class Symoro(Language):
             PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
         )
 
-    def lines(self, unit: Unit, printer: Any) -> Iterator[str]:
+    def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         first, *others = kept_inside(unit.header, in_bracket_comment)
         yield f"(* {first}"

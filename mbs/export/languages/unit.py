@@ -65,7 +65,7 @@ class Store:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class CodeLine:
     """name = value, or, under a condition, value where it holds and otherwise the other one."""
 
     name: str
@@ -75,7 +75,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
+class CodeUnit:
     """A function in lines.
 
     Attributes:
@@ -95,15 +95,15 @@ class Unit:
     inputs: tuple[Argument, ...]
     outputs: tuple[Argument, ...]
     loads: tuple[Load, ...]
-    fixed: tuple[Line, ...]
-    changing: tuple[Line, ...]
+    fixed: tuple[CodeLine, ...]
+    changing: tuple[CodeLine, ...]
     stores: tuple[Store, ...]
 
     @property
     def locals(self) -> list[str]:
         """The names that lines and elements of inputs give, arguments left out."""
         arguments = {argument.name for argument in (*self.inputs, *self.outputs)}
-        named: list[Load | Line] = [*self.loads, *self.fixed, *self.changing]
+        named: list[Load | CodeLine] = [*self.loads, *self.fixed, *self.changing]
         return [item.name for item in named if item.name not in arguments]
 
     def stores_of(self, argument: Argument) -> Sequence[Store]:

@@ -18,9 +18,9 @@ from mbs.identification.base.check import Check
 from mbs.identification.base.constant_symbols import deciding_symbols, with_constants
 from mbs.identification.base.elsewhere import checked_elsewhere, numbers_at
 from mbs.identification.base.grouping import Grouping, coefficients
-from mbs.identification.base.loops import Postures
+from mbs.identification.base.loops import ClosedPostures
 from mbs.identification.base.numeric import (
-    Sample,
+    RegressorSample,
     applied,
     checked,
     grouped_by_rank,
@@ -181,7 +181,9 @@ def base_parameters(
     if method == "numeric":
         # What is found at the defaults of these symbols holds there alone.
         system = with_constants(system, deciding)
-    sample = Sample.of(system, chosen, default_parameters(system), seed, base_moves=moving_base)
+    sample = RegressorSample.of(
+        system, chosen, default_parameters(system), seed, base_moves=moving_base
+    )
     if method == "numeric":
         grouping, check = grouped_by_rank(sample, preference)
         return _result(system, method, chosen, grouping, _at_constants(check, deciding))
@@ -209,7 +211,7 @@ def _at_constants(check: Check, names: Sequence[str]) -> Check:
 
 def _by_rules(
     system: System,
-    sample: Sample,
+    sample: RegressorSample,
     structure: Structure,
     order: Sequence[int],
     seed: int,
@@ -231,7 +233,12 @@ def _by_rules(
 
 
 def _completed(
-    sample: Sample, grouping: Grouping, check: Check, order: Sequence[int], *, symbolic: bool
+    sample: RegressorSample,
+    grouping: Grouping,
+    check: Check,
+    order: Sequence[int],
+    *,
+    symbolic: bool,
 ) -> tuple[Grouping, Check] | None:
     """The grouping with the relations that the rules missed, where they hold for all symbols."""
     if check.agrees:
@@ -246,7 +253,7 @@ def _completed(
     return found, replace(check, applied=True, text=told)
 
 
-def _postures(system: System, seed: int, *, symbolic: bool) -> list[Postures]:
+def _postures(system: System, seed: int, *, symbolic: bool) -> list[ClosedPostures]:
     """Closed postures at the defaults of the symbols, and at other values where there are any.
 
     They are others than those of the check.
@@ -255,7 +262,7 @@ def _postures(system: System, seed: int, *, symbolic: bool) -> list[Postures]:
         return []
     values = parameter_samples(system, system.p)[:2] if symbolic else [default_parameters(system)]
     count = postures_needed(system)
-    return [Postures(closed_positions(system, p, count, seed + 1), p) for p in values]
+    return [ClosedPostures(closed_positions(system, p, count, seed + 1), p) for p in values]
 
 
 def _result(

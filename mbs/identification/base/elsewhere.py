@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.identification.base.check import Check
 from mbs.identification.base.grouping import Grouping, coefficients
-from mbs.identification.base.numeric import Sample, checked
+from mbs.identification.base.numeric import RegressorSample, checked
 from mbs.identification.base.samples import parameter_samples
 from mbs.identification.base.structure import Structure
 from mbs.identification.regressors.columns import Column
@@ -49,7 +49,7 @@ def checked_elsewhere(
         structure: of its tree.
     """
     p = parameter_samples(system, system.p)[1]
-    sample = Sample.of(system, columns, p, _SEED, base_moves=structure.base_moves)
+    sample = RegressorSample.of(system, columns, p, _SEED, base_moves=structure.base_moves)
     check = checked(sample, grouping, numbers_at(system, columns, grouping, p), order)
     if check.agrees:
         return None

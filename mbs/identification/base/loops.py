@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Postures:
+class ClosedPostures:
     """Postures that close the loops.
 
     Attributes:
@@ -95,7 +95,7 @@ def _along(freedom: Freedom) -> Pose:
 
 
 def pair_relations(
-    system: System, postures: Sequence[Postures], *, base_moves: bool = False
+    system: System, postures: Sequence[ClosedPostures], *, base_moves: bool = False
 ) -> Iterator[Relation]:
     """Links whose orientations stay the same relative to each other or to the base.
 
@@ -132,7 +132,7 @@ def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
         yield {(b, name): SX(1), **(on_link(a, -through[:, k]) if a >= 0 else {})}
 
 
-def _link_poses(system: System, postures: Postures) -> tuple[Array, Array]:
+def _link_poses(system: System, postures: ClosedPostures) -> tuple[Array, Array]:
     """Orientations (1 + links, postures, 3, 3) and origins (.., 3) of the base and all links."""
     q = SX.sym("q", system.nq)
     poses = [Pose.identity(), *base_poses(system.tree, link_poses(system.tree, q))]

@@ -33,7 +33,7 @@ _PREFERRED = ("ZZ", "XX", "XY", "XZ", "YZ", "MX", "MY", "YY", "MZ", "M")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sample:
+class RegressorSample:
     """The regressor of a system in many random states.
 
     Attributes:
@@ -47,12 +47,12 @@ class Sample:
     @staticmethod
     def of(
         system: System, columns: Sequence[Column], p: Array, seed: int, *, base_moves: bool = False
-    ) -> Sample:
+    ) -> RegressorSample:
         """At least three rows for every column."""
         count = 8 + -(-3 * len(columns) // max(len(system.active), 1))
         states = random_states(system, p, count, seed)
         states = states.on_moving_base(seed) if base_moves else states
-        return Sample(tuple(columns), sampled_regressor(system, columns, states, p))
+        return RegressorSample(tuple(columns), sampled_regressor(system, columns, states, p))
 
 
 def preferred_order(columns: Sequence[Column], first: Sequence[int] = ()) -> list[int]:
@@ -66,7 +66,7 @@ def preferred_order(columns: Sequence[Column], first: Sequence[int] = ()) -> lis
     return [*first, *rest]
 
 
-def grouped_by_rank(sample: Sample, order: Sequence[int]) -> tuple[Grouping, Check]:
+def grouped_by_rank(sample: RegressorSample, order: Sequence[int]) -> tuple[Grouping, Check]:
     """The independent columns in this order, and the others in terms of them."""
     found = dependence(sample.W, order)
     grouping = applied(Grouping.none(len(sample.columns)), found)
@@ -96,7 +96,9 @@ def applied(
     return grouping
 
 
-def checked(sample: Sample, grouping: Grouping, beta: Array, order: Sequence[int]) -> Check:
+def checked(
+    sample: RegressorSample, grouping: Grouping, beta: Array, order: Sequence[int]
+) -> Check:
     """What random states say of a grouping.
 
     Args:
@@ -119,7 +121,7 @@ def checked(sample: Sample, grouping: Grouping, beta: Array, order: Sequence[int
     return Check(rank, agrees, relations, False, error, full.gap, _sentence(text + _gap(full)))
 
 
-def remainder(sample: Sample, grouping: Grouping, order: Sequence[int]) -> Dependence:
+def remainder(sample: RegressorSample, grouping: Grouping, order: Sequence[int]) -> Dependence:
     """The dependence of the kept columns."""
     kept = grouping.kept
     return dependence(sample.W[:, kept], [kept.index(k) for k in order if k in kept])

@@ -98,7 +98,7 @@ def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
     """
 
     def walked() -> Array:
-        walk, rng = _Walk.of(system, p), np.random.default_rng(seed)
+        walk, rng = _PostureWalk.of(system, p), np.random.default_rng(seed)
         q, postures = walk.start, list[Array]()
         for _ in range(count):
             q = walk.moved(q, rng)
@@ -110,7 +110,7 @@ def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Walk:
+class _PostureWalk:
     """What a walk on closed postures needs."""
 
     system: System
@@ -121,7 +121,7 @@ class _Walk:
     least: float
 
     @staticmethod
-    def of(system: System, p: Array) -> _Walk:
+    def of(system: System, p: Array) -> _PostureWalk:
         """From the assembled posture, closed again for these parameters."""
         closing = Closing(system, p)
         found = closing.nearest(np.array(system.posture))
@@ -134,7 +134,7 @@ class _Walk:
         values = dict(zip(names, p.tolist(), strict=True))
         leads = examine(system, found.q.tolist(), parameters=values).leads
         G = Function(reduction_matrix(system))
-        return _Walk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
+        return _PostureWalk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
 
     def moved(self, q: Array, rng: np.random.Generator) -> Array:
         """The posture after some steps in one direction, or back in the other."""

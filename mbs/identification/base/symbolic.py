@@ -9,7 +9,7 @@ from casadi import SX
 from mbs.assembly import System
 from mbs.identification.base.grouping import Grouping, Terms, related, without_zeros
 from mbs.identification.base.loops import (
-    Postures,
+    ClosedPostures,
     cut_relations,
     pair_relations,
 )
@@ -23,7 +23,7 @@ from mbs.identification.regressors.columns import Column
 def grouped_by_rules(
     system: System,
     columns: Sequence[Column],
-    postures: Sequence[Postures],
+    postures: Sequence[ClosedPostures],
     structure: Structure,
 ) -> Grouping:
     """What the rules find.

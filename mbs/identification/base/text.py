@@ -5,25 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import casadi
-from casadi import SX
+from casadi import SX, Function
 
-_SUM, _PRODUCT, _POWER = 1, 2, 3
-_INFIX = {
-    casadi.OP_ADD: (" + ", _SUM),
-    casadi.OP_SUB: (" - ", _SUM),
-    casadi.OP_MUL: ("*", _PRODUCT),
-    casadi.OP_DIV: ("/", _PRODUCT),
-    casadi.OP_POW: ("^", _POWER),
-    casadi.OP_CONSTPOW: ("^", _POWER),
-}
-_CALLS = {
-    casadi.OP_SIN: "sin",
-    casadi.OP_COS: "cos",
-    casadi.OP_TAN: "tan",
-    casadi.OP_SQRT: "sqrt",
-    casadi.OP_ATAN2: "atan2",
-    casadi.OP_FABS: "abs",
-}
+from mbs.operations.graph import graph_of
+from mbs.operations.text import PRODUCT, Infix
 
 
 def equation(name: str, terms: Mapping[str, SX]) -> str:
@@ -45,7 +30,7 @@ def equation(name: str, terms: Mapping[str, SX]) -> str:
 def _signed(coefficient: SX) -> tuple[str, str]:
     """The sign of a coefficient and the text of its size, a factor."""
     negative, size = _split(coefficient)
-    return "-" if negative else "+", _within(size, _PRODUCT)
+    return "-" if negative else "+", _factor(size)
 
 
 def _split(value: SX) -> tuple[bool, SX]:
@@ -61,45 +46,18 @@ def _split(value: SX) -> tuple[bool, SX]:
     return False, value
 
 
-def _number(value: float) -> str:
-    return f"{value:.12g}"
+class _FactorText(Infix):
+    """A factor, absolute values as in mathematics."""
+
+    def _called(self, op: int) -> str:
+        return "abs" if op == casadi.OP_FABS else super()._called(op)
 
 
-def scalar_text(value: SX) -> str:
-    """An expression of numbers and symbols as people write it."""
-    return _written(value)[0]
-
-
-def _within(value: SX, level: int) -> str:
-    text, own = _written(value)
-    return f"({text})" if own < level else text
-
-
-def _written(value: SX) -> tuple[str, int]:
-    """The text, and how tightly its outermost operation binds."""
-    if value.is_constant():
-        number = float(value)
-        return _number(number), _SUM if number < 0 else 4
-    if value.is_symbolic():
-        return value.name(), 4
-    parts = [value.dep(k) for k in range(value.n_dep())]
-    operation = value.op()
-    if operation in _INFIX:
-        sign, level = _INFIX[operation]
-        right = level if operation in (casadi.OP_ADD, casadi.OP_MUL) else level + 1
-        return f"{_within(parts[0], level)}{sign}{_within(parts[1], right)}", level
-    match operation:
-        case casadi.OP_NEG:
-            return f"-{_within(parts[0], _PRODUCT)}", _SUM
-        case casadi.OP_SQ:
-            return f"{_within(parts[0], 4)}^2", _POWER
-        case casadi.OP_TWICE:
-            return f"2*{_within(parts[0], _PRODUCT)}", _PRODUCT
-        case casadi.OP_INV:
-            return f"1/{_within(parts[0], _POWER)}", _PRODUCT
-    if operation in _CALLS:
-        return f"{_CALLS[operation]}({', '.join(map(scalar_text, parts))})", 4
-    return str(value), _SUM
+def _factor(value: SX) -> str:
+    """An expression of numbers and symbols, in brackets where it is a sum."""
+    symbols = casadi.symvar(value)
+    graph = graph_of(Function("value", [casadi.vertcat(SX(0, 1), *symbols)], [value], ["p"], ["y"]))
+    return _FactorText(graph, {"p": [s.name() for s in symbols]}).text(graph.results[0][0], PRODUCT)
 
 
 def table(rows: Sequence[tuple[str, str]]) -> Iterator[str]:

@@ -18,7 +18,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.tree import Link
-from mbs.identification.base.loops import Array, Postures, Relation
+from mbs.identification.base.loops import Array, ClosedPostures, Relation
 from mbs.identification.base.rank import dependence, plain
 from mbs.identification.base.rules import Key
 from mbs.loops.reduction import reduction_matrix
@@ -45,7 +45,7 @@ class Effect:
 
 
 def turning_relations(
-    system: System, postures: Sequence[Postures], *, base_moves: bool = False
+    system: System, postures: Sequence[ClosedPostures], *, base_moves: bool = False
 ) -> Iterator[Relation]:
     """What the rates of links and joints say.
 
@@ -78,14 +78,14 @@ def postures_needed(system: System) -> int:
     return max(12, -(-3 * effects // (m * (m + 1))))
 
 
-def _slopes(system: System, postures: Postures) -> Array:
+def _slopes(system: System, postures: ClosedPostures) -> Array:
     """(postures, nv, m) velocities of the tree from the independent ones."""
     at = reduction_matrix(system)
     p = [postures.p] if postures.p.size else []
     return np.array([np.array(at(position, *p)) for position in postures.q.T])
 
 
-def _angular(system: System, postures: Sequence[Postures], G: Array) -> Array:
+def _angular(system: System, postures: Sequence[ClosedPostures], G: Array) -> Array:
     """(links, postures, 3, m) angular velocities in the frames of the links."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     motions = link_velocities(system.tree, link_poses(system.tree, q), v)

@@ -22,7 +22,7 @@ from casadi import DM, SX
 from mbs.errors import ModelError, SolverError
 from mbs.identification.bodies.prior import Prior
 from mbs.identification.estimation.triangle import compressed
-from mbs.identification.follower import Follower, Watch
+from mbs.identification.follower import SolverFollower, Watch
 from mbs.identification.regressors.columns import INERTIAL, Column
 from mbs.spatial.inertia import Inertia
 from mbs.spatial.pseudo_inertia import PseudoInertia
@@ -129,13 +129,13 @@ def likeliest(
         ModelError: the guess is no consistent set, or the bounds do not fit.
         SolverError: the search did not end.
     """
-    problem = _Problem(misfit, tuple(columns), _guessed_roots(columns, prior.guess), prior)
+    problem = _PhysicalProblem(misfit, tuple(columns), _guessed_roots(columns, prior.guess), prior)
     values = problem.solved(watch)
     return values, _covariance(misfit, columns, values, prior.emphasis)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
+class _PhysicalProblem:
     """The non-linear programme in the logarithms of the roots."""
 
     misfit: Misfit
@@ -164,7 +164,7 @@ class _Problem:
     def _minimum(self, programme: dict[str, SX], own: list[Column], watch: Watch | None) -> DM:
         links = len(self.roots)
         total = [] if self.prior.total_mass is None else [self.prior.total_mass]
-        follower = Follower(programme, _ROUNDS, watch)
+        follower = SolverFollower(programme, _ROUNDS, watch)
         solver = casadi.nlpsol("physical", "ipopt", programme, follower.options | _OPTIONS)
         lower = [_SMALLEST_ROOT] * 4 + [-np.inf] * 6
         upper = [_LARGEST_ROOT] * 4 + [np.inf] * 6

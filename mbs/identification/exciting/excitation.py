@@ -18,9 +18,9 @@ from mbs.identification.exciting.criterion import CRITERIA
 from mbs.identification.exciting.instant import instant
 from mbs.identification.exciting.limits import (
     Bound,
-    Limit,
-    Limits,
     Margin,
+    MotionLimit,
+    MotionLimits,
     Plane,
     limits_of,
 )
@@ -212,7 +212,7 @@ def _measured(
     if limits.leading:
         values[1][-1] = leads_of(system, positions(system, rates[0]))
     quantities = [*np.hstack(rates).T, *values[1]]
-    names: list[Limit] = [*limits.of_rates, *limits.of_models]
+    names: list[MotionLimit] = [*limits.of_rates, *limits.of_models]
     margins = tuple(
         Margin(limit, float(row.min()), float(row.max()))
         for limit, row in zip(names, quantities, strict=True)
@@ -252,7 +252,7 @@ def _columns(
     return chosen
 
 
-def _smoothed(system: System, limits: Limits, form: Series) -> System:
+def _smoothed(system: System, limits: MotionLimits, form: Series) -> System:
     """The system with dry friction that changes sign over a part of the largest velocity."""
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)

@@ -9,7 +9,7 @@ from casadi import DM, MX, Function
 
 from mbs.assembly import System
 from mbs.errors import ModelError
-from mbs.identification.exciting.limits import Limits
+from mbs.identification.exciting.limits import MotionLimits
 from mbs.identification.leading import signed_leads
 from mbs.identification.postures import is_explicit, posture_of
 from mbs.identification.regressors.columns import Column
@@ -18,7 +18,7 @@ from mbs.models.geometry import transform
 from mbs.models.inverse_dynamics import inverse_dynamics
 
 
-def instant(system: System, columns: Sequence[Column], limits: Limits) -> Function:
+def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> Function:
     """``instant(q_a, v_a, a_a) -> D, bounded``: what one instant adds to the observations.
 
     Positions of the other joints of a closed system follow by its closed form, or by continuation
@@ -52,7 +52,7 @@ def instant(system: System, columns: Sequence[Column], limits: Limits) -> Functi
     return function.expand() if is_explicit(system) else function
 
 
-def _efforts(system: System, limits: Limits, q: MX, v_a: MX, a_a: MX) -> list[MX]:
+def _efforts(system: System, limits: MotionLimits, q: MX, v_a: MX, a_a: MX) -> list[MX]:
     if not any(limit.is_finite for limit in limits.effort):
         return [MX(0) for _ in limits.effort]
     if system.motors != system.active:

@@ -69,7 +69,7 @@ class Plane:
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class MotionLimit:
     """The range of one quantity during the motion.
 
     Attributes:
@@ -102,7 +102,7 @@ class Margin:
         highest: largest value of the quantity.
     """
 
-    limit: Limit
+    limit: MotionLimit
     lowest: float
     highest: float
 
@@ -119,7 +119,7 @@ class Margin:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class MotionLimits:
     """The limits of a motion.
 
     Attributes:
@@ -132,24 +132,25 @@ class Limits:
         leading: how well the independent joints of a closed system lead the others.
     """
 
-    position: tuple[Limit, ...]
-    velocity: tuple[Limit, ...]
-    acceleration: tuple[Limit, ...]
-    effort: tuple[Limit, ...]
-    passive: tuple[tuple[int, Limit], ...]
+    position: tuple[MotionLimit, ...]
+    velocity: tuple[MotionLimit, ...]
+    acceleration: tuple[MotionLimit, ...]
+    effort: tuple[MotionLimit, ...]
+    passive: tuple[tuple[int, MotionLimit], ...]
     planes: tuple[Plane, ...]
-    leading: tuple[Limit, ...] = ()
+    leading: tuple[MotionLimit, ...] = ()
 
     @property
-    def of_rates(self) -> tuple[Limit, ...]:
+    def of_rates(self) -> tuple[MotionLimit, ...]:
         """Of positions, velocities and accelerations, each in the order of the joints."""
         return (*self.position, *self.velocity, *self.acceleration)
 
     @property
-    def of_models(self) -> tuple[Limit, ...]:
+    def of_models(self) -> tuple[MotionLimit, ...]:
         """Of efforts, passive positions, planes and leading, in this order."""
         planes = (
-            Limit("plane", str(plane.frame), "m", plane.offset, np.inf) for plane in self.planes
+            MotionLimit("plane", str(plane.frame), "m", plane.offset, np.inf)
+            for plane in self.planes
         )
         return (*self.effort, *(limit for _, limit in self.passive), *planes, *self.leading)
 
@@ -162,7 +163,7 @@ def limits_of(
     acceleration: Bound = None,
     effort: Bound = None,
     planes: Sequence[Plane] = (),
-) -> Limits:
+) -> MotionLimits:
     """The limits of a motion of a system, those that its joints describe by default.
 
     Raises:
@@ -177,9 +178,9 @@ def limits_of(
 
     def rows(
         quantity: str, bound: Bound, units: Sequence[str], known: Mapping[str, Range] = free
-    ) -> tuple[Limit, ...]:
+    ) -> tuple[MotionLimit, ...]:
         pairs = _pairs(system, quantity, bound, known)
-        return tuple(Limit(quantity, *row) for row in _joined(list(known), units, pairs))
+        return tuple(MotionLimit(quantity, *row) for row in _joined(list(known), units, pairs))
 
     own, others = _positions(system, position, places)
     positions = rows("position", own, [joint.unit for joint in joints])
@@ -195,7 +196,7 @@ def limits_of(
                 f"{system.name}: the position of {limit.name} may go to {widest:.4g} rad, more than"
                 " two turns of a joint; convert degrees by numpy.radians"
             )
-    return Limits(
+    return MotionLimits(
         positions,
         rows("velocity", velocity, rates, {name: _known(motors[name].limits) for name in free}),
         rows("acceleration", acceleration, [ACCELERATION_UNIT[unit] for unit in rates]),
@@ -216,17 +217,17 @@ def _known(described: tuple[float, float] | None) -> Range:
     return None if described is None or np.isinf(described).all() else described
 
 
-def _leading(system: System) -> tuple[Limit, ...]:
+def _leading(system: System) -> tuple[MotionLimit, ...]:
     """The distance from singular postures; a robot that is assembled near one may come as near."""
     if not system.is_closed:
         return ()
     least = min(CLEAR, _SHARE * float(leads_of(system, np.array([system.posture]))[0]))
-    return (Limit("leading", system.name, "1", least, np.inf),)
+    return (MotionLimit("leading", system.name, "1", least, np.inf),)
 
 
 def _positions(
     system: System, bound: Bound, places: Sequence[int]
-) -> tuple[Bound, tuple[tuple[int, Limit], ...]]:
+) -> tuple[Bound, tuple[tuple[int, MotionLimit], ...]]:
     """Ranges of the independent joints, and limits of the others with their places in q."""
     ranges: dict[str, Range] = {c.name: c.limits for c in system.coordinates}
     known = [c.name for c in system.coordinates if c.unit in RATE_UNITS]
@@ -237,7 +238,7 @@ def _positions(
     for k, c in enumerate(system.coordinates):
         if k not in places and ranges[c.name] is not None:
             lower, upper = _pair(system, "position", ranges[c.name], c.name)
-            passive.append((k, Limit("position", c.name, c.unit, lower, upper)))
+            passive.append((k, MotionLimit("position", c.name, c.unit, lower, upper)))
     if bound is None or isinstance(bound, Mapping):
         bound = [ranges[system.coordinates[k].name] for k in places]
     return bound, tuple(passive)

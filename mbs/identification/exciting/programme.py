@@ -19,8 +19,8 @@ from mbs.identification.exciting.fourier_series import (
     harmonic_terms,
     resting_coefficients,
 )
-from mbs.identification.exciting.limits import Limit, Limits
-from mbs.identification.follower import Follower, Watch
+from mbs.identification.exciting.limits import MotionLimit, MotionLimits
+from mbs.identification.follower import SolverFollower, Watch
 
 Array = npt.NDArray[np.float64]
 
@@ -32,7 +32,7 @@ rounded to 1e-16, and the least of those that are not zero is far above 1e-6."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class SearchEnd:
     """How a search ended.
 
     Attributes:
@@ -71,7 +71,7 @@ class Programme:
     samples: int
     instant: Function
     criterion: Criterion
-    limits: Limits
+    limits: MotionLimits
 
     @property
     def joints(self) -> int:
@@ -115,7 +115,9 @@ class Programme:
         most = (np.abs(moved).max(axis=2) / room.reshape(3, m)).max(axis=0)
         return np.concatenate([middle, (filled * Y / most[:, None]).ravel()])
 
-    def improve(self, x: Array, tightened: Array, rounds: int, watch: Watch | None = None) -> Found:
+    def improve(
+        self, x: Array, tightened: Array, rounds: int, watch: Watch | None = None
+    ) -> SearchEnd:
         """Variables at a minimum of the criterion within the limits.
 
         Args:
@@ -136,13 +138,13 @@ class Programme:
         lower = np.concatenate([rates[1], np.tile(ends[:, 0], self.samples)]) / scale
         upper = np.concatenate([rates[2], np.tile(ends[:, 1], self.samples)]) / scale
         programme: dict[str, Any] = {"x": variables, "f": criterion(W @ W.T), "g": g / DM(scale)}
-        follower = Follower(programme, rounds, watch)
+        follower = SolverFollower(programme, rounds, watch)
         options = follower.options | _options(rounds)
         solver = casadi.nlpsol("excitation", "ipopt", programme, options)
         answer = solver(x0=x, lbg=lower, ubg=upper)
         status = solver.stats()
         reached = np.array(answer["g"]).ravel()
-        return Found(
+        return SearchEnd(
             np.array(answer["x"]).ravel(),
             float(answer["f"]),
             float(np.maximum(lower - reached, reached - upper).max()),
@@ -192,7 +194,7 @@ class Programme:
 
     def _bounded_models(self, tightened: Array) -> tuple[list[int], Array]:
         """Rows of the models' quantities that are limited, and (rows, 2) ends of their ranges."""
-        every: tuple[Limit, ...] = self.limits.of_models
+        every: tuple[MotionLimit, ...] = self.limits.of_models
         rows = [k for k, limit in enumerate(every) if limit.is_finite]
         ends = [(every[k].lower + tightened[k], every[k].upper - tightened[k]) for k in rows]
         return rows, np.array(ends).reshape(-1, 2)

@@ -13,7 +13,7 @@ from mbs.recursions.accelerations import Acceleration
 from mbs.recursions.joint_efforts import rotor_and_friction
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regressor import work
-from mbs.recursions.regressor_twists import Twist, path_twist_rates, path_twists
+from mbs.recursions.regressor_twists import PathTwist, path_twist_rates, path_twists
 from mbs.recursions.rotors import rotor_efforts, rotor_moments
 from mbs.recursions.velocities import Velocity, link_velocities
 from mbs.spatial import zeros
@@ -132,10 +132,10 @@ class JointColumns:
         carrier = self.velocities[rotor.carrier] if rotor.carrier >= 0 else self.base
         return SX(0) if carrier is None else SX(casadi.dot(rotor.momentum, carrier.w))
 
-    def _twists(self, carrier: int) -> list[Twist]:
+    def _twists(self, carrier: int) -> list[PathTwist]:
         return path_twists(self.tree, self.poses)[carrier]
 
-    def _along(self, twists: list[Twist], moment: SX) -> SX:
+    def _along(self, twists: list[PathTwist], moment: SX) -> SX:
         """(nv, 1) work of a moment in each of some velocities."""
         total = zeros(self.tree.nv)
         for twist in twists:

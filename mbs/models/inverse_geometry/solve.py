@@ -13,7 +13,7 @@ from mbs.errors import ModelError
 from mbs.models.inverse_geometry.answers.answer import Question, answer
 from mbs.models.inverse_geometry.answers.gathering import Gathered, further, gather
 from mbs.models.inverse_geometry.answers.limits import Given, bounds, leaves_out
-from mbs.models.inverse_geometry.answers.roots import Root, roots
+from mbs.models.inverse_geometry.answers.roots import ChainRoot, roots
 from mbs.models.inverse_geometry.answers.solutions import Solutions
 from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.answers.wishes import Wishes
@@ -75,7 +75,7 @@ def solve(
     return answer(question, found, used)
 
 
-def solved(question: Question, method: str) -> tuple[list[Root], str]:
+def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
     """The solutions of a chain, and the method that gave them.
 
     Args:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator
-from functools import partial
 from typing import NamedTuple
 
 import casadi
 
 from mbs.operations.graph import Graph
-from mbs.operations.polynomials import Algebra, Monomial, Polynomial, rewritten, without
-from mbs.operations.trigonometry import Pair, angle, angles_met, improved, multiplied_out
-
-_MOST_PAIRS = 24
+from mbs.operations.polynomials import Algebra, Monomial, Polynomial, without
+from mbs.operations.trigonometry import Pair, angle, improved, multiplied_out
 
 
 class _Meeting(NamedTuple):
@@ -31,19 +27,7 @@ def angles(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     Rotations of vectors, one after the other, are joined too. Each pair of angles is tried by
     itself and stays joined if the graph got cheaper.
     """
-    names = tuple(parameters)
-    pairs: Counter[Pair] = Counter()
-    rewritten(graph, names, partial(_noted, pairs))
-    most = (partial(_joined, pair) for pair, _ in pairs.most_common(_MOST_PAIRS))
-    return improved(graph, names, most)
-
-
-def _noted(pairs: Counter[Pair], algebra: Algebra, polynomial: Polynomial) -> int:
-    """Write a polynomial as it is and note the angles that could be joined in it."""
-    for pair in angles_met(algebra, polynomial):
-        if pair[0] != pair[1] and _joined(pair, algebra, polynomial) != polynomial:
-            pairs[pair] += 1
-    return algebra.plain(polynomial)
+    return improved(graph, parameters, _joined, lambda pair: pair[0] != pair[1])
 
 
 def _joined(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable
-from functools import partial
 
 import casadi
 
 from mbs.operations.graph import Graph
-from mbs.operations.polynomials import Algebra, Monomial, Polynomial, rewritten, without
-from mbs.operations.trigonometry import Pair, angle, angles_met, improved, multiplied_out
-
-_MOST_ANGLES = 24
+from mbs.operations.polynomials import Algebra, Monomial, Polynomial, without
+from mbs.operations.trigonometry import Pair, angle, improved, multiplied_out
 
 
 def pythagoras(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
@@ -22,19 +18,7 @@ def pythagoras(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     A vector turned to and fro is itself again. Each angle is tried by itself and stays so if the
     graph got cheaper.
     """
-    names = tuple(parameters)
-    found: Counter[Pair] = Counter()
-    rewritten(graph, names, partial(_noted, found))
-    most = (partial(_reduced, pair) for pair, _ in found.most_common(_MOST_ANGLES))
-    return improved(graph, names, most)
-
-
-def _noted(found: Counter[Pair], algebra: Algebra, polynomial: Polynomial) -> int:
-    """Write a polynomial as it is and note the angles whose squares cancel in it."""
-    for pair in angles_met(algebra, polynomial):
-        if pair[0] == pair[1] and _reduced(pair, algebra, polynomial) != polynomial:
-            found[pair] += 1
-    return algebra.plain(polynomial)
+    return improved(graph, parameters, _reduced, lambda pair: pair[0] == pair[1])
 
 
 def _reduced(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:

@@ -21,7 +21,7 @@ MISTAKES = [
     ("simulate four_bar -o none/m.csv", "folder none does not exist; create it"),
     ("sweep four_bar --over j1.q=0:1", "grid of j1.q: '0:1' is no range; write FROM:TO:STEP"),
     ("solve-ik rx90", "solve-ik: say the pose in one way: --pose, --xyz"),
-    ("solve-ik rx90 --xyz 0 0 a", "--xyz: 'a' is no number; write one, such as 0.3 or pi/2"),
+    ("solve-ik rx90 --xyz 0 0 a", "--xyz: 'a' is not a number; write one, such as 0.3 or pi/2"),
     ("identify rx90 none.csv", "record 'none.csv' cannot be read (No such file or directory)"),
     ("convert sr400 a.urdf", "a.urdf: files of this kind are not written; use one of .par, .toml"),
     ("convert stewart_platform a.par", "a .par file"),

@@ -137,7 +137,7 @@ def test_poses_from_text():
     ("text", "sentence"),
     [
         ("1 2 3", "has 3 numbers; write x y z roll pitch yaw"),
-        ("1 2 3 0 0 L2", "'L2' in a pose has no value"),
+        ("1 2 3 0 0 L2", "pose: 'L2' is not a number"),
         ("1 2 3 0 0 system(1)", "'system' is not a function here"),
         ("1/0 2 3 0 0 0", "pose: '1/0' is not a finite number"),
         ("1 " * 3000, "6000 characters"),

@@ -14,7 +14,7 @@ from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
 from mbs.identification.base.base_parameters import base_parameters
 from mbs.identification.exciting.excitation import Plane, Series, Trajectory, excitation
-from mbs.identification.exciting.limits import Limit, Margin, limits_of
+from mbs.identification.exciting.limits import Margin, MotionLimit, limits_of
 from mbs.identification.postures import active_places
 from mbs.loops.closing import Closing
 
@@ -139,9 +139,9 @@ def test_columns_may_have_the_names_of_base_parameters() -> None:
 
 
 def test_a_plane_through_the_origin_is_kept_as_any_other() -> None:
-    limit = Limit("plane", "2", "m", 0.0, np.inf)
+    limit = MotionLimit("plane", "2", "m", 0.0, np.inf)
     assert Margin(limit, -1e-9, 0.5).part == -1e-9
-    assert Margin(Limit("effort", "q1", "N.m", -2.0, 4.0), -1.0, 1.0).part == 0.25
+    assert Margin(MotionLimit("effort", "q1", "N.m", -2.0, 4.0), -1.0, 1.0).part == 0.25
 
 
 def test_same_seed_gives_the_same_motion() -> None:
@@ -325,7 +325,7 @@ def test_limits_that_joints_describe_are_those_by_default() -> None:
     m.connect(bars[0].at(0.3), Revolute("q2", axis="y", limits=(-1.0, 1.0), effort=np.inf), bars[1])
     system = m.assemble()
 
-    def ends(limits: tuple[Limit, ...]) -> list[tuple[float, float]]:
+    def ends(limits: tuple[MotionLimit, ...]) -> list[tuple[float, float]]:
         return [(row.lower, row.upper) for row in limits]
 
     free, taken = (-np.inf, np.inf), limits_of(system)

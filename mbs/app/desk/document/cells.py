@@ -8,7 +8,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from mbs.errors import DescriptionError
-from mbs.expressions import Number, Scalar, expression, to_float
+from mbs.expressions import Number, Scalar, expression
+from mbs.expressions import number as number_of
 from mbs.formats.rows import BODY_SCALARS, GEOMETRY, JOINTS, LOOP_JOINTS
 from mbs.messages import did_you_mean, quoted
 
@@ -126,10 +127,7 @@ def number(text: str, where: str) -> float:
     Raises:
         DescriptionError: it does.
     """
-    value = to_float(scalar(text, where))
-    if value is None:
-        raise DescriptionError(f"{where}: {quoted(text)} is not a number; write one, such as pi/2")
-    return value
+    return number_of(scalar(text, where), where)
 
 
 def integer(text: str, where: str) -> int:

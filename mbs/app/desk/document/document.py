@@ -30,7 +30,7 @@ _KEPT = 24
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class DocumentOrigin:
     """Where a mechanism comes from that its tables do not say.
 
     Attributes:
@@ -64,7 +64,7 @@ class Document:
     """
 
     tables: Tables
-    origin: Origin | None = None
+    origin: DocumentOrigin | None = None
 
     @staticmethod
     def of(table: RobotTable) -> Document:
@@ -87,7 +87,7 @@ class Document:
             raise DescriptionError(
                 f"there is no robot {name!r} in the catalogue; {did_you_mean(name, catalogue())}"
             )
-        return _of_mechanism(catalogue()[name](), Origin(name))
+        return _of_mechanism(catalogue()[name](), DocumentOrigin(name))
 
     @staticmethod
     def of_upload(content: bytes, suffix: str) -> Document:
@@ -99,7 +99,7 @@ class Document:
         made = read_upload(content, suffix)
         if isinstance(made, RobotTable):
             return Document.of(made)
-        return _of_mechanism(made, Origin("", content, suffix.lower()))
+        return _of_mechanism(made, DocumentOrigin("", content, suffix.lower()))
 
     @property
     def name(self) -> str:
@@ -235,7 +235,7 @@ class Document:
             return path.read_text(encoding="utf-8")
 
 
-def _of_mechanism(mechanism: Mechanism, origin: Origin) -> Document:
+def _of_mechanism(mechanism: Mechanism, origin: DocumentOrigin) -> Document:
     try:
         return Document.of(table_of(mechanism))
     except DescriptionError as error:

@@ -18,7 +18,7 @@ from mbs.app.desk.panels.layout import (
 )
 from mbs.app.desk.panels.optimizer_settings import passes_of
 from mbs.app.desk.panels.text_view import text_view
-from mbs.app.tasks.equations import EVERY_PASS, WORDS, Equations, entry, equations, languages
+from mbs.app.tasks.equations import EVERY_PASS, WORDS, WrittenEquations, entry, equations, languages
 from mbs.models.catalogue import Entry
 
 TITLES = {
@@ -57,12 +57,12 @@ async def open_equations(desk: Desk, key: str, language: str | None = None) -> N
     if refusal:
         desk.complain(refusal)
         return
-    panel = _Panel(desk, one)
+    panel = _EquationsPanel(desk, one)
     await panel.fill(language)
     await panel.write()
 
 
-class _Panel:
+class _EquationsPanel:
     """The form at the left, the text at the right."""
 
     def __init__(self, desk: Desk, one: Entry) -> None:
@@ -139,7 +139,7 @@ class _Panel:
             ui.label(_about(made)).classes("desk-note")
 
 
-def _show_counts(made: Equations) -> None:
+def _show_counts(made: WrittenEquations) -> None:
     if made.before is None or made.after is None:
         return
     counts = {"before": made.before, "after": made.after}
@@ -150,7 +150,7 @@ def _show_counts(made: Equations) -> None:
             steps_table(made.steps)
 
 
-def _about(made: Equations) -> str:
+def _about(made: WrittenEquations) -> str:
     chosen = ", ".join(f"{name} {_said(value)}" for name, value in made.choices)
     ends = f"{', '.join(made.inputs)} -> {', '.join(made.outputs)}" if made.inputs else ""
     told = "; ".join(part for part in (ends, chosen, f"{made.seconds:.2g} s") if part)

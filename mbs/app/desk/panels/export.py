@@ -12,7 +12,7 @@ from nicegui import ui
 
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.panels.export_fmu import FmuAsked, fmu_form
-from mbs.app.desk.panels.plots_fields import Look, several_field
+from mbs.app.desk.panels.plots_fields import FieldLook, several_field
 from mbs.app.desk.panels.plots_look import add_look
 from mbs.app.tasks import exporting
 from mbs.app.tasks.equations import entries
@@ -23,7 +23,7 @@ _NOTE = "export"
 
 
 @dataclass(slots=True)
-class _Asked:
+class _ExportAsked:
     """What the form holds."""
 
     models: list[str] = field(default_factory=lambda: list(exporting.MODELS))
@@ -39,7 +39,7 @@ def open_export(desk: Desk) -> None:
     system = desk.checked_system()
     if system is None:
         return
-    asked = deepcopy(cast(_Asked, desk.session.notes.get(_NOTE, _Asked())))
+    asked = deepcopy(cast(_ExportAsked, desk.session.notes.get(_NOTE, _ExportAsked())))
     desk.session.notes[_NOTE] = asked
     add_look()
     with desk.open("Export", key="export"), ui.element("div").classes("desk-cards"):
@@ -49,7 +49,7 @@ def open_export(desk: Desk) -> None:
             _files_card(desk)
 
 
-def _fmu_card(desk: Desk, system: System, asked: _Asked) -> None:
+def _fmu_card(desk: Desk, system: System, asked: _ExportAsked) -> None:
     with ui.element("div").classes("desk-card"):
         _head(
             "FMU",
@@ -64,7 +64,7 @@ def _fmu_card(desk: Desk, system: System, asked: _Asked) -> None:
         _button("Download FMU", "fmu", make)
 
 
-def _c_card(desk: Desk, system: System, asked: _Asked) -> None:
+def _c_card(desk: Desk, system: System, asked: _ExportAsked) -> None:
     with ui.element("div").classes("desk-card"):
         _head(
             "C library",
@@ -74,7 +74,7 @@ def _c_card(desk: Desk, system: System, asked: _Asked) -> None:
         models = _models(system)
         asked.models = [key for key in asked.models if key in models]
         several_field(
-            Look("Models", "100%", "models"),
+            FieldLook("Models", "100%", "models"),
             models,
             asked.models,
             partial(setattr, asked, "models"),

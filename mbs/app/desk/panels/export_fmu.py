@@ -9,7 +9,7 @@ from functools import partial
 
 from nicegui import ui
 
-from mbs.app.desk.panels.plots_fields import Look, choice_field, several_field, text_field
+from mbs.app.desk.panels.plots_fields import FieldLook, choice_field, several_field, text_field
 from mbs.app.tasks.exporting import SOLVERS, FmuSettings
 from mbs.assembly import System
 
@@ -66,17 +66,17 @@ def fmu_form(system: System, asked: FmuAsked) -> None:
     asked.outputs = [name for name in asked.outputs if name in offered]
     joint = system.speeds[system.active[0]].name if system.active else "j1"
     with ui.element("div").classes("desk-form"):
-        _choice(asked, {"2.0": "2.0", "3.0": "3.0"}, Look("FMI", "84px", "fmi"))
+        _choice(asked, {"2.0": "2.0", "3.0": "3.0"}, FieldLook("FMI", "84px", "fmi"))
         solvers = {name: _SOLVERS.get(name, name) for name in SOLVERS}
-        solver = _choice(asked, solvers, Look("Solver", "160px", "solver"))
+        solver = _choice(asked, solvers, FieldLook("Solver", "160px", "solver"))
         _input("Stop time [s]", asked, "stop_time", "100px")
         _input("Step [s]", asked, "step_size", "84px")
         _input("Tolerance", asked, "tolerance", "90px")
         inner = _input("Step of rk4 [s]", asked, "internal_step", "110px")
         inner.bind_visibility_from(solver, "value", value="rk4")
     beside = "Outputs beside the motion of joints and tool"
-    _several(asked, offered, Look(beside, "100%", "outputs"))
-    _several(asked, _PARAMETERS, Look("Numbers that become parameters", "100%", "parameters"))
+    _several(asked, offered, FieldLook(beside, "100%", "outputs"))
+    _several(asked, _PARAMETERS, FieldLook("Numbers that become parameters", "100%", "parameters"))
     with ui.element("div").classes("desk-form"):
         _input("More inputs", asked, "more_inputs", "150px").tooltip(
             f"such as {joint}.q, {joint}.a or tool.wrench; commas between them"
@@ -100,15 +100,15 @@ def _names(text: str) -> tuple[str, ...]:
 
 
 def _input(label: str, asked: FmuAsked, key: str, width: str) -> ui.input:
-    look = Look(label, width, key)
+    look = FieldLook(label, width, key)
     return text_field(look, getattr(asked, key), partial(setattr, asked, key))
 
 
-def _choice(asked: FmuAsked, options: dict[str, str], look: Look) -> ui.select:
+def _choice(asked: FmuAsked, options: dict[str, str], look: FieldLook) -> ui.select:
     key = look.marker
     return choice_field(look, options, getattr(asked, key), partial(setattr, asked, key))
 
 
-def _several(asked: FmuAsked, names: Sequence[str], look: Look) -> None:
+def _several(asked: FmuAsked, names: Sequence[str], look: FieldLook) -> None:
     key, options = look.marker, {name: name.replace("_", " ") for name in names}
     several_field(look, options, getattr(asked, key), partial(setattr, asked, key))

@@ -12,7 +12,7 @@ from nicegui import ui
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.panels.identification_results import show_results
 from mbs.app.desk.panels.layout import Asking, tell_of_changes
-from mbs.app.desk.panels.plots_fields import Look, choice_field, several_field, text_field
+from mbs.app.desk.panels.plots_fields import FieldLook, choice_field, several_field, text_field
 from mbs.app.desk.panels.plots_look import add_look, come_into_view
 from mbs.app.tasks.identification import (
     EQUATIONS,
@@ -34,7 +34,7 @@ _COLUMNS = {"rotors": "rotors", "offsets": "offsets"}
 
 
 @dataclass(slots=True)
-class _Asked:
+class _IdentificationAsked:
     """What the form holds."""
 
     content: bytes = b""
@@ -65,7 +65,9 @@ def open_identification(desk: Desk) -> None:
     system = desk.checked_system()
     if system is None:
         return
-    asked = deepcopy(cast(_Asked, desk.session.notes.get(_NOTE, _Asked())))
+    asked = deepcopy(
+        cast(_IdentificationAsked, desk.session.notes.get(_NOTE, _IdentificationAsked()))
+    )
     desk.session.notes[_NOTE] = asked
     add_look()
     with desk.open("Identify", key="identify"), ui.element("div").classes("desk-halves"):
@@ -90,7 +92,9 @@ def open_identification(desk: Desk) -> None:
     button.on_click(run)
 
 
-async def _run(desk: Desk, asked: _Asked, button: ui.button, shown: ui.element) -> None:
+async def _run(
+    desk: Desk, asked: _IdentificationAsked, button: ui.button, shown: ui.element
+) -> None:
     if not asked.content:
         desk.complain("there is no record yet; upload a file of comma-separated values first")
         return
@@ -121,7 +125,7 @@ def _explain(system: System) -> None:
     ).classes("desk-note")
 
 
-def _upload(desk: Desk, asked: _Asked) -> None:
+def _upload(desk: Desk, asked: _IdentificationAsked) -> None:
     async def uploaded(event: Any) -> None:
         upload.reset()
         if event.file.size() > LARGEST:
@@ -150,29 +154,29 @@ def _upload(desk: Desk, asked: _Asked) -> None:
         told = ui.label(_told(asked)).classes("desk-note").mark("record")
 
 
-def _told(asked: _Asked) -> str:
+def _told(asked: _IdentificationAsked) -> str:
     if not asked.content:
         return "No record yet."
     return f"{quoted(asked.file)[1:-1]}, {len(asked.content) / 1e3:.0f} kB"
 
 
-def _form(asked: _Asked) -> None:
+def _form(asked: _IdentificationAsked) -> None:
     with ui.element("div").classes("desk-form"):
-        look = Look("Bandwidth [Hz]", "120px", "bandwidth")
+        look = FieldLook("Bandwidth [Hz]", "120px", "bandwidth")
         field = text_field(look, asked.bandwidth, partial(setattr, asked, "bandwidth"))
         field.tooltip("of the filters; five to ten times the highest frequency of the motion")
-        _choice(asked, METHODS, Look("Method", "190px", "method"))
-        _choice(asked, EQUATIONS, Look("Equations", "120px", "equations"))
-        _choice(asked, VELOCITIES, Look("Velocities", "190px", "velocities"))
+        _choice(asked, METHODS, FieldLook("Method", "190px", "method"))
+        _choice(asked, EQUATIONS, FieldLook("Equations", "120px", "equations"))
+        _choice(asked, VELOCITIES, FieldLook("Velocities", "190px", "velocities"))
         several_field(
-            Look("Beside bodies and friction", "324px", "columns"),
+            FieldLook("Beside bodies and friction", "324px", "columns"),
             _COLUMNS,
             asked.columns,
             partial(setattr, asked, "columns"),
         )
 
 
-def _choice(asked: _Asked, names: tuple[str, ...], look: Look) -> None:
+def _choice(asked: _IdentificationAsked, names: tuple[str, ...], look: FieldLook) -> None:
     options = {name: name.replace("_", " ") for name in names}
     chosen = getattr(asked, look.marker)
     choice_field(look, options, chosen, partial(setattr, asked, look.marker))

@@ -15,7 +15,7 @@ Take = Callable[[Any], object]
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class FieldLook:
     """How a field looks, and what tests find it by.
 
     Attributes:
@@ -29,7 +29,7 @@ class Look:
     marker: str
 
 
-def text_field(look: Look, value: str, take: Take) -> ui.input:
+def text_field(look: FieldLook, value: str, take: Take) -> ui.input:
     """A line of text.
 
     Args:
@@ -43,7 +43,7 @@ def text_field(look: Look, value: str, take: Take) -> ui.input:
     return field
 
 
-def choice_field(look: Look, options: Mapping[str, str], value: str, take: Take) -> ui.select:
+def choice_field(look: FieldLook, options: Mapping[str, str], value: str, take: Take) -> ui.select:
     """One of some values.
 
     Args:
@@ -61,7 +61,7 @@ def choice_field(look: Look, options: Mapping[str, str], value: str, take: Take)
 
 
 def several_field(
-    look: Look, options: Mapping[str, str], value: Sequence[str], take: Take
+    look: FieldLook, options: Mapping[str, str], value: Sequence[str], take: Take
 ) -> ui.select:
     """Some of several values.
 
@@ -82,7 +82,7 @@ def several_field(
     return field
 
 
-def _named(field: ui.element, look: Look) -> None:
+def _named(field: ui.element, look: FieldLook) -> None:
     """A name for those who do not see the field, where it has no label."""
     if not look.label:
         field.props(f'aria-label="{look.marker}"')

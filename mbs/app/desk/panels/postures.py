@@ -46,13 +46,13 @@ async def open_postures(desk: Desk, key: str = "igm-general") -> None:
         key: of the model whose method is chosen at first.
     """
     try:
-        panel = _Panel(desk, key)
+        panel = _PosturesPanel(desk, key)
         await panel.take_present()
     except MbsError as error:
         desk.complain(error)
 
 
-class _Panel:
+class _PosturesPanel:
     """Frame, method and pose above, the postures below."""
 
     def __init__(self, desk: Desk, key: str) -> None:

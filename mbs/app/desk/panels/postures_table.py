@@ -12,14 +12,14 @@ from nicegui import events, ui
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.panels.count_table import column
 from mbs.app.desk.panels.layout import in_a_row
-from mbs.app.tasks.postures import Posture, Postures
+from mbs.app.tasks.postures import Posture, PostureList
 
 _PAGE = 32
 _DEGREES = 180 / math.pi
 RAD, DEG = "rad", "deg"
 
 
-def show_postures(desk: Desk, made: Postures) -> None:
+def show_postures(desk: Desk, made: PostureList) -> None:
     """The postures where the slot is, or why there are none.
 
     Args:
@@ -65,7 +65,7 @@ def show_postures(desk: Desk, made: Postures) -> None:
     ui.label(_MEANINGS).classes("desk-note")
 
 
-def csv_of(made: Postures) -> bytes:
+def csv_of(made: PostureList) -> bytes:
     """The postures as comma-separated values, a header first; positions in rad and m."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -99,7 +99,7 @@ _LIMITS = """
 """
 
 
-def _headline(made: Postures) -> str:
+def _headline(made: PostureList) -> str:
     count = len(made.rows)
     if not count:
         return f"{made.system}: no posture takes frame {made.frame} there"
@@ -111,7 +111,7 @@ def _headline(made: Postures) -> str:
     return told + (f"; {outside} outside of limits" if outside else "")
 
 
-def _nothing(desk: Desk, made: Postures) -> None:
+def _nothing(desk: Desk, made: PostureList) -> None:
     ui.label(made.reason[:1].upper() + made.reason[1:] + ".").mark("reason")
     near = made.nearest
     if near is None:
@@ -124,7 +124,7 @@ def _nothing(desk: Desk, made: Postures) -> None:
         ui.label(f"Its frame is {away}.").classes("desk-note")
 
 
-def _columns(made: Postures) -> list[dict[str, Any]]:
+def _columns(made: PostureList) -> list[dict[str, Any]]:
     heads = [("number", "", "right"), ("label", "which one", "left")]
     heads += [(f"q{k}", name, "right") for k, name in enumerate(made.names)]
     heads += [("residual", "residual", "right"), ("sigma", "sigma", "right")]
@@ -134,11 +134,11 @@ def _columns(made: Postures) -> list[dict[str, Any]]:
     return columns
 
 
-def _rows(made: Postures, unit: str) -> list[dict[str, Any]]:
+def _rows(made: PostureList, unit: str) -> list[dict[str, Any]]:
     return [_row(made, number, row, unit) for number, row in enumerate(made.rows, 1)]
 
 
-def _row(made: Postures, number: int, row: Posture, unit: str) -> dict[str, Any]:
+def _row(made: PostureList, number: int, row: Posture, unit: str) -> dict[str, Any]:
     factors = [_DEGREES if unit == DEG and u == "rad" else 1.0 for u in made.units]
     digits = 2 if unit == DEG else 4
     values = {

@@ -7,7 +7,7 @@ from functools import partial
 
 from nicegui import ui
 
-from mbs.app.desk.panels.plots_fields import Look, choice_field, text_field
+from mbs.app.desk.panels.plots_fields import FieldLook, choice_field, text_field
 from mbs.app.desk.panels.simulation_settings import KINDS, PICTURE, TYPED, Row, Texts, chosen_rows
 from mbs.assembly import System
 
@@ -70,12 +70,12 @@ def _joint(texts: Texts, start: ui.select, row: Row) -> None:
 
 
 def _text(texts: Texts, key: str, label: str = "", width: str = "100%") -> ui.input:
-    look = Look(label, width, key)
+    look = FieldLook(label, width, key)
     return text_field(look, texts.get(key, ""), partial(texts.__setitem__, key))
 
 
 def _choice(
     texts: Texts, key: str, options: Mapping[str, str], label: str = "", width: str = "100%"
 ) -> ui.select:
-    look = Look(label, width, key)
+    look = FieldLook(label, width, key)
     return choice_field(look, options, texts[key], partial(texts.__setitem__, key))

@@ -21,7 +21,7 @@ from mbs.app.desk.panels.layout import (
 )
 from mbs.app.desk.panels.text_view import text_view
 from mbs.app.tasks.equations import entry
-from mbs.app.tasks.singular import Factor, Singular, singular
+from mbs.app.tasks.singular import DeterminantFactor, Singular, singular
 
 KEY = "determinant"
 
@@ -41,7 +41,7 @@ async def open_singular(desk: Desk) -> None:
     with left:
         form = OptionForm(desk, one, given)
         with in_a_row():
-            button = main_button("Factor")
+            button = main_button("DeterminantFactor")
             act = partial(open_equations, desk, KEY, "c")
             side_button("Equations", act, "The determinant as a function, in any language")
     with shown:
@@ -69,7 +69,7 @@ def _show(desk: Desk, made: Singular) -> None:
         _factor(desk, number, one)
 
 
-def _factor(desk: Desk, number: int, one: Factor) -> None:
+def _factor(desk: Desk, number: int, one: DeterminantFactor) -> None:
     with in_a_row():
         show = ui.button("Show").props("flat no-caps dense").mark(f"show {number}")
         if one.posture is None:

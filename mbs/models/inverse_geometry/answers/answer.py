@@ -10,10 +10,10 @@ from mbs.models.inverse_geometry.answers.distinct import distinct
 from mbs.models.inverse_geometry.answers.families import Family
 from mbs.models.inverse_geometry.answers.labels import Anatomy, anatomy, labels
 from mbs.models.inverse_geometry.answers.reasons import unreachable
-from mbs.models.inverse_geometry.answers.roots import Place, Root
+from mbs.models.inverse_geometry.answers.roots import ChainPlace, ChainRoot
 from mbs.models.inverse_geometry.answers.solutions import Solutions
 from mbs.models.inverse_geometry.answers.target import Target
-from mbs.models.inverse_geometry.answers.wishes import Draft, Wishes
+from mbs.models.inverse_geometry.answers.wishes import RobotSolution, Wishes
 from mbs.models.inverse_geometry.arm import Array
 from mbs.models.inverse_geometry.chain import Chain
 from mbs.models.inverse_geometry.numeric.nearest import Nearest, nearest
@@ -39,9 +39,9 @@ class Question:
     wishes: Wishes
 
     @property
-    def place(self) -> Place:
+    def place(self) -> ChainPlace:
         """Where the chain stands in the robot."""
-        return Place(self.chain.places, self.whole)
+        return ChainPlace(self.chain.places, self.whole)
 
     def whole(self, q: Array) -> Array:
         """(nq,) the posture of the robot for that of its chain, (n,); NaN where loops stay open."""
@@ -58,7 +58,7 @@ class Question:
         return [ClosedPosture(whole, "", 0.0)]
 
 
-def answer(question: Question, found: list[Root], method: str) -> Solutions:
+def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions:
     """The solutions of the robot, or why there is none.
 
     Args:
@@ -76,13 +76,13 @@ def answer(question: Question, found: list[Root], method: str) -> Solutions:
     return question.wishes.solutions(drafts, method, "" if drafts else _NO_LOOP)
 
 
-def _drafts(question: Question, found: list[Root]) -> list[Draft]:
+def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
     """The solutions of the robot: several for one of the chain where its loops allow."""
     target = question.target
     q = np.array([root.q for root in found])
     residual, sigma = target.residual(q), target.singular_values(q)[:, -1]
     return [
-        Draft(
+        RobotSolution(
             posture.q,
             "; ".join(label for label in (root.label, posture.label) if label),
             max(float(residual[k]), posture.residual),
@@ -95,7 +95,7 @@ def _drafts(question: Question, found: list[Root]) -> list[Draft]:
     ]
 
 
-def _named(question: Question, found: list[Root]) -> list[Root]:
+def _named(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
     """With the names of shoulder, elbow and wrist where the arm has them, else a number."""
     way, arm = question.chain, question.target.arm
     key = ("anatomy", *way.key, question.p.tobytes())
@@ -111,9 +111,9 @@ def _named(question: Question, found: list[Root]) -> list[Root]:
     return result
 
 
-def _shown(question: Question, found: list[Root]) -> list[Root]:
+def _shown(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
     """With the postures that stand for self-motions; those that prove to be one are listed once."""
-    shown = list[Root]()
+    shown = list[ChainRoot]()
     for root in found:
         if root.family is None:
             shown.append(root)
@@ -124,7 +124,7 @@ def _shown(question: Question, found: list[Root]) -> list[Root]:
     return shown
 
 
-def _is_same(target: Target, other: Root, family: Family, q: Array) -> bool:
+def _is_same(target: Target, other: ChainRoot, family: Family, q: Array) -> bool:
     """Whether a root is a self-motion of the same joints through the same posture q, (n,)."""
     if other.family is None or other.family.moving != family.moving:
         return False

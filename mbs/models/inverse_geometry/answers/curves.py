@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbs.models.inverse_geometry.answers.multiplicity import Reduction
+from mbs.models.inverse_geometry.answers.multiplicity import TargetReduction
 from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.arm import Array
 
@@ -20,7 +20,7 @@ _INTEGER = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curve:
+class PostureCurve:
     """Postures through which an arm moves while its frame stays.
 
     Attributes:
@@ -35,7 +35,7 @@ class Curve:
     slope: Array
 
 
-def freedoms(reduced: Reduction) -> tuple[int, Array]:
+def freedoms(reduced: TargetReduction) -> tuple[int, Array]:
     """How many freedoms a self-motion through a solution has, and a direction of it.
 
     Args:
@@ -62,14 +62,14 @@ def _solves(target: Target, x: Array) -> bool:
     return bool(target.residual(x * target.unit) < target.tolerance)
 
 
-def _probe(reduced: Reduction, direction: Array) -> Array:
+def _probe(reduced: TargetReduction, direction: Array) -> Array:
     """The solution at a distance along the null space, if there is one."""
     h = _AWAY * direction
     start = reduced.x + reduced.null @ h
     return reduced.target.corrected(start, reduced.null.T, h + reduced.null.T @ reduced.x)
 
 
-def _nearest_on_sphere(reduced: Reduction, direction: Array) -> Array:
+def _nearest_on_sphere(reduced: TargetReduction, direction: Array) -> Array:
     """A solution at a distance from the centre in any direction of the null space."""
     x = reduced.x + _AWAY * (reduced.null @ direction)
     for _ in range(60):
@@ -87,7 +87,7 @@ def _nearest_on_sphere(reduced: Reduction, direction: Array) -> Array:
 
 def curve(
     target: Target, q: Array, direction: Array, dimension: int = 1, strictness: float = 0.1
-) -> Curve | None:
+) -> PostureCurve | None:
     """The self-motion through a posture; None where it soon ends.
 
     Args:
@@ -114,7 +114,7 @@ class _Way:
     limit: float
     most: int
 
-    def straight(self, x: Array, direction: Array) -> Curve | None:
+    def straight(self, x: Array, direction: Array) -> PostureCurve | None:
         """The self-motion whose joints move in constant proportions."""
         target = self.target
         slope = direction / direction[np.argmax(np.abs(direction))]
@@ -125,17 +125,17 @@ class _Way:
         samples = x + extent[:, None] * slope
         if np.max(target.residual(samples * target.unit)) > self.limit:
             return None
-        return Curve(samples, turns, slope)
+        return PostureCurve(samples, turns, slope)
 
-    def followed(self, x: Array, direction: Array) -> Curve | None:
+    def followed(self, x: Array, direction: Array) -> PostureCurve | None:
         """The self-motion by small steps, to where it closes or ends."""
         ahead, closed = self._walked(x, direction)
         if closed:
-            return Curve(np.array(ahead), True, np.zeros(0))
+            return PostureCurve(np.array(ahead), True, np.zeros(0))
         back, _ = self._walked(x, -direction)
         samples = np.array([*back[:0:-1], *ahead])
         length = float(np.sum(np.linalg.norm(np.diff(samples, axis=0), axis=1)))
-        return Curve(samples, False, np.zeros(0)) if length > _SHORTEST else None
+        return PostureCurve(samples, False, np.zeros(0)) if length > _SHORTEST else None
 
     def _walked(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
         """Postures from the start on, and whether they come back to it."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.answers.curves import Curve
+from mbs.models.inverse_geometry.answers.curves import PostureCurve
 from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.arm import Array
 
@@ -43,7 +43,7 @@ class Family:
     relations: tuple[str, ...]
     range: tuple[float, float] | None
     dimension: int
-    _motion: _Motion = field(repr=False)
+    _motion: _SelfMotion = field(repr=False)
 
     @property
     def samples(self) -> Array:
@@ -100,11 +100,11 @@ class Family:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Motion:
+class _SelfMotion:
     """What a family is computed from: the curve in the chain, and the chain in the system."""
 
     target: Target
-    curve: Curve
+    curve: PostureCurve
     free: int
     places: tuple[int, ...]
     whole: Whole
@@ -156,7 +156,7 @@ class _Motion:
 
 
 def family(
-    target: Target, curve: Curve, dimension: int, places: tuple[int, ...], whole: Whole
+    target: Target, curve: PostureCurve, dimension: int, places: tuple[int, ...], whole: Whole
 ) -> Family:
     """The description of a self-motion.
 
@@ -171,12 +171,12 @@ def family(
     free = _free_joint(curve, moves)
     names = target.arm.names
     moving = tuple(name for name, m in zip(names, moves, strict=True) if m)
-    motion = _Motion(target, curve, free, places, whole)
+    motion = _SelfMotion(target, curve, free, places, whole)
     relations = _relations(target, curve, free) if dimension == 1 else ()
     return Family(names[free], moving, relations, _range(target, curve, free), dimension, motion)
 
 
-def _free_joint(curve: Curve, moves: Array) -> int:
+def _free_joint(curve: PostureCurve, moves: Array) -> int:
     """The first joint that tells all postures apart, or moves as far as most of the others.
 
     Where every joint turns back, postures that share its position are told apart by the side from
@@ -188,7 +188,7 @@ def _free_joint(curve: Curve, moves: Array) -> int:
     return int(np.flatnonzero(span >= _COMPARABLE * np.max(span))[0])
 
 
-def _relations(target: Target, curve: Curve, free: int) -> tuple[str, ...]:
+def _relations(target: Target, curve: PostureCurve, free: int) -> tuple[str, ...]:
     """One equation for every joint that follows in proportion."""
     if not curve.slope.size:
         return ()
@@ -223,7 +223,7 @@ def _relation(
     return f"{name} {sign} {abs(factor):.6g} {free} = {constant:.6g}"
 
 
-def _range(target: Target, curve: Curve, free: int) -> tuple[float, float] | None:
+def _range(target: Target, curve: PostureCurve, free: int) -> tuple[float, float] | None:
     """Lowest and highest position of the free joint, None where nothing bounds it."""
     x, unit = curve.x[:, free], target.unit[free]
     whole_turn = curve.closed and abs(x[-1] - x[0]) > np.pi
@@ -234,7 +234,7 @@ def _range(target: Target, curve: Curve, free: int) -> tuple[float, float] | Non
     )
 
 
-def _end(target: Target, curve: Curve, free: int, sign: float) -> float:
+def _end(target: Target, curve: PostureCurve, free: int, sign: float) -> float:
     """The highest position of a joint along a curve, the lowest for the other sign.
 
     The highest sample is moved to the vertex of the parabola through it and its neighbours, again

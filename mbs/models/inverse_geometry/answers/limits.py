@@ -26,7 +26,7 @@ _MOST_WINDINGS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bounds:
+class CoordinateLimits:
     """Limits of every coordinate of a system.
 
     Attributes:
@@ -86,7 +86,7 @@ class Bounds:
 
 def bounds(
     system: System, given: bool | Given | None = None, turning: Iterable[int] | None = None
-) -> Bounds:
+) -> CoordinateLimits:
     """The limits of a system's coordinates, some of them replaced.
 
     Args:
@@ -112,7 +112,7 @@ def bounds(
     low, high = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
     places = set(range(len(names)) if turning is None else turning)
     turns = [c.kind == "revolute" and k in places for k, c in enumerate(system.coordinates)]
-    return Bounds(names, low, high, np.array(turns, dtype=bool))
+    return CoordinateLimits(names, low, high, np.array(turns, dtype=bool))
 
 
 def leaves_out(given: bool | Given | None) -> bool:

@@ -34,7 +34,7 @@ _SEED = 20260107
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reduction:
+class TargetReduction:
     """The equations of a target near a solution, split by the singular directions.
 
     Attributes:
@@ -83,17 +83,17 @@ def _solved(rows: Array, right: Array) -> Array:
     return np.clip(np.where(np.isfinite(step), step, 0.0), -0.5, 0.5)
 
 
-def reduction(target: Target, q: Array) -> Reduction:
+def reduction(target: Target, q: Array) -> TargetReduction:
     """The equations near the solution q, (n,) [rad or m]."""
     x = q / target.unit
     J = target.excess(x)[1]
     U, s, Vt = np.linalg.svd(J)
     rank = int(np.sum(s > SINGULAR))
     following = float(s[rank - 1]) if rank else 1.0
-    return Reduction(target, x, U[:, rank:], U[:, :rank], Vt[rank:].T, following)
+    return TargetReduction(target, x, U[:, rank:], U[:, :rank], Vt[rank:].T, following)
 
 
-def multiplicity(reduced: Reduction) -> tuple[int, Array]:
+def multiplicity(reduced: TargetReduction) -> tuple[int, Array]:
     """How many roots meet in an isolated solution, and where.
 
     Args:
@@ -109,7 +109,7 @@ def multiplicity(reduced: Reduction) -> tuple[int, Array]:
     return _dual_dimension(reduced), reduced.x * reduced.target.unit
 
 
-def _order(reduced: Reduction) -> tuple[int, Array]:
+def _order(reduced: TargetReduction) -> tuple[int, Array]:
     """The order of the root of g in one unknown, and the middle of the roots that meet.
 
     It is the highest k for which, about the middle of k roots, all terms below the k-th are
@@ -133,7 +133,7 @@ def _order(reduced: Reduction) -> tuple[int, Array]:
     return order, q if good else reduced.x * target.unit
 
 
-def _best(reduced: Reduction, steps: list[float]) -> Array:
+def _best(reduced: TargetReduction, steps: list[float]) -> Array:
     """The posture (n,) of least residual after one of several steps, or none."""
     x, _, _ = reduced.at(np.clip(np.array(steps)[:, None], -_FARTHEST, _FARTHEST))
     q = np.vstack([reduced.x, x]) * reduced.target.unit
@@ -163,7 +163,7 @@ def _shifted(g: Array, by: float) -> Array:
     )
 
 
-def _coefficients(reduced: Reduction) -> Array:
+def _coefficients(reduced: TargetReduction) -> Array:
     """(degree + 1, 6 - rank) Taylor coefficients of g in one unknown."""
     nodes = np.cos(np.pi * (np.arange(2 * _DEGREE + 1) + 0.5) / (2 * _DEGREE + 1))
     for radius in _RADII:
@@ -176,7 +176,7 @@ def _coefficients(reduced: Reduction) -> Array:
     return coefficients
 
 
-def _dual_dimension(reduced: Reduction) -> int:
+def _dual_dimension(reduced: TargetReduction) -> int:
     """The dimension of the dual space of g at h = 0, up to degree 5."""
     powers, columns = _taylor(reduced)
     before = 1
@@ -190,7 +190,7 @@ def _dual_dimension(reduced: Reduction) -> int:
     return before
 
 
-def _taylor(reduced: Reduction) -> tuple[list[tuple[int, ...]], Array]:
+def _taylor(reduced: TargetReduction) -> tuple[list[tuple[int, ...]], Array]:
     """Exponents of monomials, and their coefficients in g with h counted in units of the radius."""
     c = reduced.corank
     powers = _monomials(c, 6)

@@ -21,7 +21,7 @@ _REFINEMENTS, _SETTLED, _EXACT = 8, 1e-7, 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Root:
+class ChainRoot:
     """A solution of the chain.
 
     Attributes:
@@ -38,7 +38,7 @@ class Root:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class ChainPlace:
     """Where a chain stands in its system.
 
     Attributes:
@@ -50,7 +50,7 @@ class Place:
     whole: Callable[[Array], Array]
 
 
-def roots(target: Target, gathered: Gathered, place: Place) -> list[Root]:
+def roots(target: Target, gathered: Gathered, place: ChainPlace) -> list[ChainRoot]:
     """The distinct solutions, in the order in which they were gathered.
 
     Args:
@@ -83,23 +83,23 @@ def roots(target: Target, gathered: Gathered, place: Place) -> list[Root]:
     return _merged_again(target, [root for k, root in enumerate(found) if k not in dropped])
 
 
-def _merged(target: Target, gathered: Gathered) -> list[Root]:
+def _merged(target: Target, gathered: Gathered) -> list[ChainRoot]:
     residual = target.residual(gathered.q) if len(gathered.q) else np.zeros(0)
     found = []
     for group in distinct(target, gathered.q):
         best = min(group, key=lambda k: float(residual[k]))
         label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
-        found.append(Root(gathered.q[best], label, 1))
+        found.append(ChainRoot(gathered.q[best], label, 1))
     return found
 
 
-def _singular(target: Target, found: list[Root]) -> NDArray[np.bool_]:
+def _singular(target: Target, found: list[ChainRoot]) -> NDArray[np.bool_]:
     """Whether the Jacobian of each loses rank."""
     q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
     return np.asarray(target.singular_values(q)[:, -1] < SINGULAR)
 
 
-def _examined(target: Target, root: Root, place: Place) -> tuple[Root, bool]:
+def _examined(target: Target, root: ChainRoot, place: ChainPlace) -> tuple[ChainRoot, bool]:
     """With its multiplicity or its self-motion, and whether that is certain."""
     dimension, direction = freedoms(reduction(target, root.q))
     found = curve(target, root.q, direction, dimension) if dimension else None
@@ -109,7 +109,7 @@ def _examined(target: Target, root: Root, place: Place) -> tuple[Root, bool]:
     return replace(root, multiplicity=0, family=of), True
 
 
-def _nearly_moving(target: Target, root: Root, place: Place) -> Root | None:
+def _nearly_moving(target: Target, root: ChainRoot, place: ChainPlace) -> ChainRoot | None:
     """With the self-motion along which the pose is held within the tolerance of solutions.
 
     It is one of rounding: no posture on it can be told to be better than the others.
@@ -122,7 +122,7 @@ def _nearly_moving(target: Target, root: Root, place: Place) -> Root | None:
     return replace(root, multiplicity=0, family=of)
 
 
-def _isolated(target: Target, root: Root) -> tuple[Root, bool]:
+def _isolated(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
     """With its multiplicity, moved to where its roots meet, and whether it stays there."""
     q, count = root.q, 1
     for _ in range(_REFINEMENTS):
@@ -135,7 +135,7 @@ def _isolated(target: Target, root: Root) -> tuple[Root, bool]:
     return replace(root, q=q, multiplicity=count), False
 
 
-def _on(target: Target, found: list[Root], k: int, others: list[int]) -> set[int]:
+def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> set[int]:
     """Which of the others are postures of the self-motion of root k, if it has one."""
     of = found[k].family
     if of is None or not others:
@@ -145,7 +145,7 @@ def _on(target: Target, found: list[Root], k: int, others: list[int]) -> set[int
     return {m for m, met in zip(others, meets, strict=True) if met}
 
 
-def _merged_again(target: Target, found: list[Root]) -> list[Root]:
+def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
     """Without the copies of a multiple root that were moved to its middle."""
     q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
     return [found[group[0]] for group in distinct(target, q)]

@@ -11,7 +11,7 @@ import numpy as np
 from mbs.errors import ModelError
 from mbs.messages import quoted
 from mbs.models.inverse_geometry.answers.families import Family
-from mbs.models.inverse_geometry.answers.limits import Bounds
+from mbs.models.inverse_geometry.answers.limits import CoordinateLimits
 from mbs.models.inverse_geometry.arm import Array
 from mbs.models.inverse_geometry.numeric.nearest import Nearest
 
@@ -68,7 +68,7 @@ class Solutions(Sequence[Solution]):
     method: str
     reason: str
     nearest: Nearest | None
-    _bounds: Bounds = field(repr=False)
+    _bounds: CoordinateLimits = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.solutions)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.models.inverse_geometry.answers.families import Family
-from mbs.models.inverse_geometry.answers.limits import Bounds
+from mbs.models.inverse_geometry.answers.limits import CoordinateLimits
 from mbs.models.inverse_geometry.answers.reasons import excluded
 from mbs.models.inverse_geometry.answers.solutions import Solution, Solutions
 from mbs.models.inverse_geometry.arm import Array
@@ -17,7 +17,7 @@ from mbs.models.inverse_geometry.numeric.nearest import Nearest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Draft:
+class RobotSolution:
     """A solution of the whole robot before whole turns and limits are looked at; see `Solution`."""
 
     q: Array
@@ -43,12 +43,16 @@ class Wishes:
 
     system: System
     near: Array
-    bounds: Bounds
+    bounds: CoordinateLimits
     strict: bool
     seeded: bool
 
     def solutions(
-        self, drafts: Sequence[Draft], method: str, reason: str = "", nearest: Nearest | None = None
+        self,
+        drafts: Sequence[RobotSolution],
+        method: str,
+        reason: str = "",
+        nearest: Nearest | None = None,
     ) -> Solutions:
         """The answer.
 
@@ -67,7 +71,7 @@ class Wishes:
         names = tuple(coordinate.name for coordinate in self.system.coordinates)
         return Solutions(self.system.name, names, tuple(kept), method, reason, nearest, self.bounds)
 
-    def _solution(self, draft: Draft) -> Solution:
+    def _solution(self, draft: RobotSolution) -> Solution:
         q = self.bounds.wound(draft.q, self.near)
         windings = self.bounds.windings(q, self.near)
         return Solution(

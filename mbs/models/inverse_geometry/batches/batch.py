@@ -22,7 +22,7 @@ _MANY = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Batch:
+class PoseBatch:
     """What `all_branches` gives for N poses.
 
     Attributes:
@@ -37,7 +37,7 @@ class Batch:
     mark: Array
 
 
-def batch(chain: Chain, sequence: Sequence, p: NDArray[np.float64], T: Array) -> Batch:
+def batch(chain: Chain, sequence: Sequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
     """All branches at poses T, (N, 4, 4).
 
     Args:
@@ -63,17 +63,17 @@ def _machine_code(plain: Function) -> Function:
     return compiled(plain.map(_COLUMNS), derivatives=0, fast=True)
 
 
-def _interpreted(plain: Function, T: Array) -> Batch:
+def _interpreted(plain: Function, T: Array) -> PoseBatch:
     """By the interpreter, which needs no compiler first."""
     if not len(T):
         return _by_machine(plain, plain, T)
     columns = np.swapaxes(T, 1, 2).reshape(-1, 4).T
     n, branches = plain.size_out(0)
     q, *rows = (np.array(part) for part in plain.map(len(T))(columns))
-    return Batch(q.T.reshape(-1, branches, n), *(row.T for row in rows))
+    return PoseBatch(q.T.reshape(-1, branches, n), *(row.T for row in rows))
 
 
-def _by_machine(call: Any, plain: Function, T: Array) -> Batch:
+def _by_machine(call: Any, plain: Function, T: Array) -> PoseBatch:
     """By machine code for so many columns at a time, straight into the arrays."""
     n, branches = plain.size_out(0)
     count = len(T)
@@ -86,4 +86,4 @@ def _by_machine(call: Any, plain: Function, T: Array) -> Batch:
         part = slice(first, first + _COLUMNS)
         out = (q[part].reshape(-1, n).T, *(row[part].T for row in rows))
         call(columns[part].reshape(-1, 4).T, out=out)
-    return Batch(q[:count], *(row[:count] for row in rows))
+    return PoseBatch(q[:count], *(row[:count] for row in rows))

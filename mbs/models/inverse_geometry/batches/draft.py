@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mbs.loops.sequence import Sequence
 from mbs.models.inverse_geometry.answers.target import SOLVED
 from mbs.models.inverse_geometry.arm import Arm, Array
-from mbs.models.inverse_geometry.batches.batch import Batch, batch
+from mbs.models.inverse_geometry.batches.batch import PoseBatch, batch
 from mbs.models.inverse_geometry.chain import Chain
 from mbs.models.inverse_geometry.numeric.polish import polish
 
@@ -26,7 +26,7 @@ _ALIKE = 12 * _MEETING
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Draft:
+class BranchSolutions:
     """Solutions of N poses, a column for every branch.
 
     Attributes:
@@ -45,14 +45,14 @@ class Draft:
     searched: Booleans
 
 
-def nothing(arm: Arm, count: int) -> Draft:
+def nothing(arm: Arm, count: int) -> BranchSolutions:
     """So many poses without a closed form."""
     shape = count, 0
     empty = np.empty((*shape, arm.size)), np.zeros(shape, dtype=bool), np.empty(shape)
-    return Draft(*empty, (), np.ones(count, dtype=bool))
+    return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
 
 
-def drafted(chain: Chain, sequence: Sequence, p: Array, arm: Arm, T: Array) -> Draft:
+def drafted(chain: Chain, sequence: Sequence, p: Array, arm: Arm, T: Array) -> BranchSolutions:
     """The solutions by a closed form.
 
     Args:
@@ -73,10 +73,10 @@ def drafted(chain: Chain, sequence: Sequence, p: Array, arm: Arm, T: Array) -> D
     searched = np.any(doubtful | (every.regular < _DEGENERATE), axis=1)
     searched |= _merge(arm, every, valid)
     labels = tuple(sequence.label(b) for b in range(sequence.branches))
-    return Draft(every.q, valid, every.residual, labels, searched)
+    return BranchSolutions(every.q, valid, every.residual, labels, searched)
 
 
-def _polish(arm: Arm, T: Array, every: Batch, which: Booleans) -> Booleans:
+def _polish(arm: Arm, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
     """Improve some postures, (m,), and tell which of them moved far."""
     before = every.q[which]
     better = polish(arm, T[np.nonzero(which)[0]], before)
@@ -85,7 +85,7 @@ def _polish(arm: Arm, T: Array, every: Batch, which: Booleans) -> Booleans:
     return far
 
 
-def _merge(arm: Arm, every: Batch, valid: Booleans) -> Booleans:
+def _merge(arm: Arm, every: PoseBatch, valid: Booleans) -> Booleans:
     """Keep the first of equal solutions, and tell at which poses others are nearly equal."""
     marks = np.sort(np.where(valid, every.mark, np.inf), axis=1)
     with np.errstate(invalid="ignore"):
@@ -102,7 +102,7 @@ def _merge(arm: Arm, every: Batch, valid: Booleans) -> Booleans:
     return meeting
 
 
-def with_postures(draft: Draft, k: int, arm: Arm, q: Array, T: Array) -> Draft:
+def with_postures(draft: BranchSolutions, k: int, arm: Arm, q: Array, T: Array) -> BranchSolutions:
     """With other solutions of one pose, each in the column of the nearest branch.
 
     Args:
@@ -120,7 +120,7 @@ def with_postures(draft: Draft, k: int, arm: Arm, q: Array, T: Array) -> Draft:
     return draft
 
 
-def _widened(draft: Draft, columns: int) -> Draft:
+def _widened(draft: BranchSolutions, columns: int) -> BranchSolutions:
     """With so many columns at least."""
     more = columns - draft.valid.shape[1]
     if more <= 0:
@@ -128,7 +128,7 @@ def _widened(draft: Draft, columns: int) -> Draft:
     rows = (0, 0), (0, more)
     q, valid = np.pad(draft.q, (*rows, (0, 0))), np.pad(draft.valid, rows)
     residual = np.pad(draft.residual, rows, constant_values=np.inf)
-    return Draft(q, valid, residual, draft.labels + ("",) * more, draft.searched)
+    return BranchSolutions(q, valid, residual, draft.labels + ("",) * more, draft.searched)
 
 
 def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:

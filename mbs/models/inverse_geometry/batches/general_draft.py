@@ -7,7 +7,7 @@ import numpy as np
 from mbs.models.inverse_geometry.answers.gathering import general_ready
 from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.arm import Array
-from mbs.models.inverse_geometry.batches.draft import Draft
+from mbs.models.inverse_geometry.batches.draft import BranchSolutions
 from mbs.models.inverse_geometry.chain import Chain
 from mbs.models.inverse_geometry.numeric.general import General, general_many
 
@@ -22,7 +22,7 @@ def ready(chain: Chain, p: Array) -> General | None:
     return found if found and found.prepared.regularity >= _REGULAR else None
 
 
-def general_draft(general: General, T: Array) -> Draft:
+def general_draft(general: General, T: Array) -> BranchSolutions:
     """The solutions by the general method, in no order.
 
     Args:
@@ -41,4 +41,4 @@ def general_draft(general: General, T: Array) -> Draft:
     every[pose, column], valid[pose, column], residual[pose, column] = q, True, reached
     unsure = (least < _NEARLY_SINGULAR) | (reached > target.tolerance)
     searched[pose[unsure]] = True
-    return Draft(every, valid, residual, ("",) * shape[1], searched)
+    return BranchSolutions(every, valid, residual, ("",) * shape[1], searched)

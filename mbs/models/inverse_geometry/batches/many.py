@@ -14,12 +14,12 @@ from mbs.assembly.model_function import require_system
 from mbs.errors import NoClosedForm
 from mbs.loops.sequence import Sequence
 from mbs.models.inverse_geometry.answers.gathering import METHODS
-from mbs.models.inverse_geometry.answers.limits import Bounds, Given, bounds, leaves_out
+from mbs.models.inverse_geometry.answers.limits import CoordinateLimits, Given, bounds, leaves_out
 from mbs.models.inverse_geometry.answers.solutions import Solutions
 from mbs.models.inverse_geometry.arm import Arm, Array
 from mbs.models.inverse_geometry.batches.draft import (
     Booleans,
-    Draft,
+    BranchSolutions,
     drafted,
     nothing,
     with_postures,
@@ -146,7 +146,7 @@ class _Robot:
     sequence: Sequence | None
     general: General | None
 
-    def draft(self, T: Array) -> Draft:
+    def draft(self, T: Array) -> BranchSolutions:
         """The solutions by a closed form, else by the general method."""
         if self.sequence is not None:
             return drafted(self.way, self.sequence, self.p, self.arm, T)
@@ -197,7 +197,7 @@ def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
     return ManySolutions(q, valid, residual, ("",) * columns, np.ones(len(answers), dtype=bool))
 
 
-def _wound(allowed: Bounds, q: Array) -> tuple[Array, Booleans]:
+def _wound(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
     """Postures (N, branches, nq) changed by whole turns, and whether all is within limits."""
     low, high = allowed.low - _WITHIN, allowed.high + _WITHIN
     missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)

@@ -8,30 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import casadi
 
 from mbs.operations.graph import Graph, Node
+from mbs.operations.text import ATOM, NEGATIVE, PRODUCT, SUM, Infix
 
-_SUM, _NEGATIVE, _PRODUCT, _POWER, _ATOM = range(5)
 _SHORT = 14
 """Characters of an expression that is repeated rather than named."""
 
-_CALLS = {
-    getattr(casadi, f"OP_{name.upper()}"): name
-    for name in (
-        *("sqrt", "atan2", "fabs", "fmin", "fmax", "tan", "floor", "sign", "not"),
-        *("acos", "asin", "atan", "exp", "log", "fmod", "copysign", "hypot"),
-    )
-}
-_INFIX = {
-    casadi.OP_DIV: ("{}/{}", _PRODUCT),
-    casadi.OP_POW: ("{}^{}", _POWER),
-    casadi.OP_CONSTPOW: ("{}^{}", _POWER),
-    casadi.OP_SQ: ("{}^2", _POWER),
-    casadi.OP_INV: ("1/{}", _PRODUCT),
-    casadi.OP_LT: ("{} < {}", _SUM),
-    casadi.OP_LE: ("{} <= {}", _SUM),
-    casadi.OP_EQ: ("{} == {}", _SUM),
-    casadi.OP_NE: ("{} != {}", _SUM),
-    casadi.OP_IF_ELSE_ZERO: ("({})*{}", _PRODUCT),
-}
 _SUMS = {casadi.OP_ADD, casadi.OP_SUB}
 _PRODUCTS = {casadi.OP_MUL, casadi.OP_TWICE, casadi.OP_NEG}
 
@@ -47,13 +28,13 @@ def expression_lines(
         results: names of the elements of the output.
         prefix: with a number behind it, the name of what stands in several expressions.
     """
-    writer = _Writer(graph, inputs, prefix)
+    writer = _LineWriter(graph, inputs, prefix)
     texts = [writer.text(number) for number in graph.results[0]]
     written = [f"{name} = {text}" for name, text in zip(results, texts, strict=True)]
     return [*writer.lines, *written]
 
 
-class _Writer:
+class _LineWriter(Infix):
     """What writes the nodes of a graph.
 
     Attributes:
@@ -61,15 +42,11 @@ class _Writer:
     """
 
     def __init__(self, graph: Graph, inputs: Mapping[str, Sequence[str]], prefix: str) -> None:
+        super().__init__(graph, inputs)
         self.lines: list[str] = []
-        self._graph, self._inputs, self._prefix = graph, inputs, prefix
+        self._prefix = prefix
         self._uses = _uses(graph)
         self._known: dict[int, tuple[str, int]] = {}
-
-    def text(self, number: int, tightness: int = _SUM) -> str:
-        """A node, in brackets where it binds less than asked for."""
-        text, own = self._written(number)
-        return f"({text})" if own < tightness else text
 
     def _written(self, number: int) -> tuple[str, int]:
         if number not in self._known:
@@ -77,47 +54,30 @@ class _Writer:
             if self._uses[number] > 1 and len(text) > _SHORT:
                 name = f"{self._prefix}{len(self.lines) + 1}"
                 self.lines.append(f"{name} = {text}")
-                text, own = name, _ATOM
+                text, own = name, ATOM
             self._known[number] = text, own
         return self._known[number]
 
     def _expression(self, node: Node) -> tuple[str, int]:
-        if node.op == casadi.OP_CONST:
-            return f"{node.value:.12g}", _ATOM if node.value >= 0 else _NEGATIVE
-        if node.op == casadi.OP_INPUT:
-            return self._inputs[self._graph.inputs[node.args[0]].name][node.args[1]], _ATOM
-        if node.op == casadi.OP_ASSIGN:
-            return self._written(node.args[0])
         if node.op in _SUMS or self._is_opposite_sum(node):
             return self._sum(node)
         if node.op in _PRODUCTS:
             return self._product(node)
-        if node.op in _INFIX:
-            return self._infix(node)
-        operands = [self.text(k) for k in node.args]
         if node.op in (casadi.OP_SIN, casadi.OP_COS):
-            return _sine("S" if node.op == casadi.OP_SIN else "C", operands[0]), _ATOM
-        name = _CALLS.get(node.op, f"operation{node.op}")
-        return f"{name}({', '.join(operands)})", _ATOM
-
-    def _infix(self, node: Node) -> tuple[str, int]:
-        form, own = _INFIX[node.op]
-        first = self.text(node.args[0], own + (own == _POWER or len(node.args) == 1))
-        if len(node.args) == 1:
-            return form.format(first), own
-        return form.format(first, self.text(node.args[1], own + 1)), own
+            return _sine("S" if node.op == casadi.OP_SIN else "C", self.text(node.args[0])), ATOM
+        return super()._expression(node)
 
     def _product(self, node: Node) -> tuple[str, int]:
         """The product of all numbers, then the other factors in their order."""
         constant, numbers = self._factors(node)
-        factors = [self.text(number, _PRODUCT) for number in numbers]
+        factors = [self.text(number, PRODUCT) for number in numbers]
         if abs(constant) != 1 or not factors:
             factors.insert(0, f"{abs(constant):.12g}")
         text = "*".join(factors)
         if constant < 0:
-            return f"-{text}", _NEGATIVE
-        alone = self._written(numbers[0])[1] if numbers else _ATOM
-        return text, _PRODUCT if len(factors) > 1 else max(alone, _PRODUCT)
+            return f"-{text}", NEGATIVE
+        alone = self._written(numbers[0])[1] if numbers else ATOM
+        return text, PRODUCT if len(factors) > 1 else max(alone, PRODUCT)
 
     def _factors(self, node: Node) -> tuple[float, list[int]]:
         """A number and the nodes that a product multiplies, products in it taken apart."""
@@ -141,13 +101,13 @@ class _Writer:
             if self._graph.nodes[number].op == casadi.OP_CONST:
                 constant += sign * self._graph.nodes[number].value
                 continue
-            term = self.text(number, _NEGATIVE)
+            term = self.text(number, NEGATIVE)
             if term.startswith("-"):
                 sign, term = -sign, term[1:]
             text += _joined(text, sign, term)
         if constant or not text:
             text += _joined(text, -1 if constant < 0 else 1, f"{abs(constant):.12g}")
-        return text, _SUM
+        return text, SUM
 
     def _terms(self, node: Node, sign: int) -> Iterator[tuple[int, int]]:
         """Sign and number of what a sum adds up, sums in it taken apart."""

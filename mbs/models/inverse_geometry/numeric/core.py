@@ -47,7 +47,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 }
 
 
-class _Arm(ctypes.Structure):
+class _ArmStruct(ctypes.Structure):
     _fields_ = (
         ("n", ctypes.c_int),
         ("gaps", ctypes.c_void_p),
@@ -142,7 +142,7 @@ class Handed:
     def __init__(self, arm: Arm) -> None:
         self.gaps = np.ascontiguousarray(arm.gaps, dtype=float)
         self.slides = np.ascontiguousarray(arm.prismatic, dtype=np.uint8)
-        self.arm = _Arm(arm.size, self.gaps.ctypes.data, self.slides.ctypes.data, arm.length)
+        self.arm = _ArmStruct(arm.size, self.gaps.ctypes.data, self.slides.ctypes.data, arm.length)
         self.address = ctypes.addressof(self.arm)
 
 

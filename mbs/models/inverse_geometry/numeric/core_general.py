@@ -20,7 +20,7 @@ _CANDIDATES = 144  # ROTH_POSTURES: those of one pose, at most
 _int, _double = ctypes.c_int, ctypes.c_double
 
 
-class _Loop(ctypes.Structure):
+class _LoopStruct(ctypes.Structure):
     _fields_ = (
         ("order", _int * 6),
         ("sign", _int),
@@ -51,7 +51,7 @@ class HandedLoop:
         square = self.mix.shape[0] == self.mix.shape[1]
         parts = ("first", "second", "third", "fourth", "fifth")
         elements = [*elimination.elements.tolist(), *[0] * 15][:15]
-        self.loop = _Loop(
+        self.loop = _LoopStruct(
             (_int * 6)(*loop.order.tolist()),
             loop.sign,
             (_int * 6)(*map(int, loop.prismatic)),

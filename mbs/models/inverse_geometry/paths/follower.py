@@ -14,7 +14,7 @@ from mbs.loops.closed_form.known import held_beside, regular_posture
 from mbs.loops.closed_form.places import spin_places
 from mbs.loops.goal import Goal
 from mbs.messages import did_you_mean, quoted
-from mbs.models.inverse_geometry.answers.limits import Bounds, Given, bounds
+from mbs.models.inverse_geometry.answers.limits import CoordinateLimits, Given, bounds
 from mbs.models.inverse_geometry.arm import Arm, gap_to
 from mbs.models.inverse_geometry.chain import chain
 from mbs.models.inverse_geometry.paths.tracking import Rows, Tracker
@@ -45,7 +45,7 @@ class Follower:
     rows: Rows
     slack: int
     exact: bool
-    bounds: Bounds | None
+    bounds: CoordinateLimits | None
 
     @property
     def system(self) -> System:
@@ -126,7 +126,7 @@ def follower(
 
 
 def _closed_follower(
-    wanted: Goal, start: Array, locked: list[str], ends: Bounds | None
+    wanted: Goal, start: Array, locked: list[str], ends: CoordinateLimits | None
 ) -> Follower:
     """Every joint of the system, less those that stay where they are."""
     system = wanted.closing.system

@@ -53,7 +53,7 @@ class Tracker:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Point:
+class PathPoint:
     """A posture on the way.
 
     Attributes:
@@ -68,8 +68,8 @@ class Point:
 
 
 def carried(
-    tracker: Tracker, start: Point, pose: Callable[[float], Array], step: float
-) -> tuple[Point, float, float]:
+    tracker: Tracker, start: PathPoint, pose: Callable[[float], Array], step: float
+) -> tuple[PathPoint, float, float]:
     """The posture carried on from the pose at 0 towards the pose at 1.
 
     Args:
@@ -95,10 +95,10 @@ def carried(
     return point, at, step
 
 
-def point_at(tracker: Tracker, x: Array, T: Array) -> Point:
+def point_at(tracker: Tracker, x: Array, T: Array) -> PathPoint:
     """A posture and what is missing there to the pose T."""
     r, J = tracker.rows(x, T)
-    return Point(x, J, float(np.max(np.abs(r))))
+    return PathPoint(x, J, float(np.max(np.abs(r))))
 
 
 def smallest(tracker: Tracker, J: Array) -> float:
@@ -107,7 +107,7 @@ def smallest(tracker: Tracker, J: Array) -> float:
     return float(values[J.shape[1] - 1 - tracker.slack])
 
 
-def _stepped(tracker: Tracker, point: Point, T: Array) -> Point | None:
+def _stepped(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
     """The posture at the next pose; None where the step is too long."""
     back, _ = _pseudo_inverse(tracker, point.J)
     led = point.x + back @ tracker.rows(point.x, T)[0]
@@ -120,7 +120,7 @@ def _stepped(tracker: Tracker, point: Point, T: Array) -> Point | None:
     return found if near and change <= _CHANGE else None
 
 
-def _corrected(tracker: Tracker, x: Array, T: Array) -> Point | None:
+def _corrected(tracker: Tracker, x: Array, T: Array) -> PathPoint | None:
     """Newton's method; None where it does not contract, or leaves rows that should vanish."""
     before = np.inf
     r, J = tracker.rows(x, T)
@@ -135,7 +135,7 @@ def _corrected(tracker: Tracker, x: Array, T: Array) -> Point | None:
         if length < noise:
             break
     left = float(np.max(np.abs(r)))
-    return None if tracker.exact and left > _SMALL else Point(x, J, left)
+    return None if tracker.exact and left > _SMALL else PathPoint(x, J, left)
 
 
 def _pseudo_inverse(tracker: Tracker, J: Array) -> tuple[Array, float]:

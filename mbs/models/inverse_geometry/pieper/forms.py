@@ -18,7 +18,7 @@ from mbs.spatial import Pose, axis_turn, vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class PieperLoop:
     """The loop as Pieper sees it.
 
     Attributes:
@@ -69,7 +69,7 @@ class Scene:
         return self.problem.always_zero(values)
 
 
-def basis(scene: Scene, k: int) -> SX:
+def basis(scene: PieperLoop, k: int) -> SX:
     """(3, 1) what the factors of a form in joint k multiply."""
     x = scene.x(k)
     if scene.ring.joints[k].turns:

@@ -11,7 +11,7 @@ from casadi import SX
 
 from mbs.errors import NoClosedForm
 from mbs.loops.sequence import Problem, Sequence, Step
-from mbs.models.inverse_geometry.pieper.forms import Scene
+from mbs.models.inverse_geometry.pieper.forms import PieperLoop
 from mbs.models.inverse_geometry.pieper.orientation import three_turns
 from mbs.models.inverse_geometry.pieper.position import three_joints
 from mbs.models.inverse_geometry.pieper.slides import three_slides
@@ -41,7 +41,7 @@ def pieper(problem: Problem) -> Sequence:
             " takes six"
         )
     if sum(not joint.turns for joint in problem.ring.joints) == 3:
-        return Sequence(_JOINTS, three_slides(Scene(problem, problem.ring, _length(problem))))
+        return Sequence(_JOINTS, three_slides(PieperLoop(problem, problem.ring, _length(problem))))
     scenes = _arrangements(problem)
     if not scenes:
         raise NoClosedForm(_refusal(names))
@@ -57,7 +57,7 @@ def _cost(sequence: Sequence) -> tuple[int, int]:
     return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
 
 
-def _steps(scene: Scene) -> list[Step] | None:
+def _steps(scene: PieperLoop) -> list[Step] | None:
     """The steps where the axes of the last three joints meet; None where the first three differ."""
     ring = scene.ring
     first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
@@ -80,18 +80,18 @@ def _length(problem: Problem) -> SX:
     return SX(casadi.sqrt(sum(squares, SX(_TINY))))
 
 
-def _arrangements(problem: Problem) -> list[Scene]:
+def _arrangements(problem: Problem) -> list[PieperLoop]:
     """The loop begun and walked so that three axes that meet come last."""
     length = _length(problem)
-    found = list[Scene]()
+    found = list[PieperLoop]()
     for k in _concurrent(problem, length):
         forward = problem.ring.rotated((k + 3) % _JOINTS)
         backward = forward.reversed().rotated(3)
-        found += [Scene(problem, ring, length) for ring in (forward, backward)]
+        found += [PieperLoop(problem, ring, length) for ring in (forward, backward)]
     return sorted(found, key=_pose_comes_first)
 
 
-def _pose_comes_first(scene: Scene) -> bool:
+def _pose_comes_first(scene: PieperLoop) -> bool:
     """Whether the way with the most symbols, that of the pose, lies after the first joint."""
     counts = [len(casadi.symvar(gap.pose.matrix)) for gap in scene.ring.gaps]
     return counts[1] == max(counts)
@@ -148,7 +148,7 @@ def _refusal(names: list[str]) -> str:
     )
 
 
-def _degenerate(scenes: list[Scene]) -> str:
+def _degenerate(scenes: list[PieperLoop]) -> str:
     """Which joints do not determine where the axes meet."""
     joints = scenes[0].ring.joints
     first, last = (", ".join(joint.name for joint in part) for part in (joints[:3], joints[3:]))

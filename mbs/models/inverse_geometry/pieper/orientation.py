@@ -15,11 +15,11 @@ from casadi import SX
 from mbs.loops.sequence import Step, step
 from mbs.loops.sequence.step import Found
 from mbs.loops.sequence.two_roots import Root, cosine_root
-from mbs.models.inverse_geometry.pieper.forms import Scene
+from mbs.models.inverse_geometry.pieper.forms import PieperLoop
 from mbs.spatial import axis_turn
 
 
-def three_turns(scene: Scene, turns: tuple[int, int, int], A: SX, B: SX, G: SX) -> list[Step]:
+def three_turns(scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G: SX) -> list[Step]:
     """The steps of three joints that turn.
 
     Args:
@@ -40,11 +40,11 @@ def three_turns(scene: Scene, turns: tuple[int, int, int], A: SX, B: SX, G: SX) 
     ]
 
 
-def _turn(scene: Scene, k: int) -> SX:
+def _turn(scene: PieperLoop, k: int) -> SX:
     return SX(axis_turn("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
-def _middle(scene: Scene, k: int, row: SX, column: SX, G: SX) -> Step:
+def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> Step:
     """The joint in the middle, from row^T Z column = G_zz."""
     joint = scene.ring.joints[k]
     sign = SX.sym(joint.name)
@@ -72,12 +72,12 @@ def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
     return Root(SX(angle), SX(1), SX(1))
 
 
-def _outer(scene: Scene, k: int, start: SX, end: SX) -> Step:
+def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> Step:
     return turn_onto(scene, k, (start, end), 1.0)
 
 
 def turn_onto(
-    scene: Scene, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
+    scene: PieperLoop, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
 ) -> Step:
     """The turn of joint k that brings one vector of the plane onto the direction of another.
 

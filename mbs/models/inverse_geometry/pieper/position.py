@@ -16,7 +16,7 @@ from casadi import SX
 
 from mbs.loops.sequence import Step
 from mbs.models.inverse_geometry.pieper.forms import (
-    Scene,
+    PieperLoop,
     basis,
     constant,
     moved_point,
@@ -41,14 +41,14 @@ class Reach:
         p: (3, 1) the wanted position [m].
     """
 
-    scene: Scene
+    scene: PieperLoop
     way: Pose
     f: SX
     square: SX
     p: SX
 
 
-def three_joints(scene: Scene, point: SX, p: SX) -> list[Step] | None:
+def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[Step] | None:
     """The steps of joints 3, 2 and 1; None where these three cannot be found so.
 
     Args:

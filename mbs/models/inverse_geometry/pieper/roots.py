@@ -9,12 +9,12 @@ from mbs.loops.sequence import Step, step
 from mbs.loops.sequence.conics import real_quartic, trigonometric_quartic
 from mbs.loops.sequence.step import Found
 from mbs.loops.sequence.two_roots import Root, cosine_root, square_root
-from mbs.models.inverse_geometry.pieper.forms import Scene
+from mbs.models.inverse_geometry.pieper.forms import PieperLoop
 
 _TINY, _SMALL = 1e-280, 1e-30
 
 
-def root_of_form(scene: Scene, k: int, form: SX, unit: SX) -> Step | None:
+def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
     """Joint k from form = 0; None where the form does not depend on the joint.
 
     Args:
@@ -39,7 +39,7 @@ def root_of_form(scene: Scene, k: int, form: SX, unit: SX) -> Step | None:
     return step(scene.problem, "type 2", f"X{n} cos({q}) + Y{n} sin({q}) = Z{n}", {q: sign}, found)
 
 
-def root_of_square(scene: Scene, k: int, A: SX, unit: SX) -> Step | None:
+def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
     """Joint k from b^T A b = 0; None where it does not depend on the joint.
 
     Args:
@@ -66,7 +66,7 @@ def root_of_square(scene: Scene, k: int, A: SX, unit: SX) -> Step | None:
     return step(scene.problem, "quartic", text, signs, found)
 
 
-def linear(scene: Scene, k: int, factor: SX, value: SX, scale: SX | float = 1.0) -> Step:
+def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0) -> Step:
     """A joint that slides, from factor x = value.
 
     Args:
@@ -84,7 +84,7 @@ def linear(scene: Scene, k: int, factor: SX, value: SX, scale: SX | float = 1.0)
     return step(scene.problem, "type 1", f"X{n} {r} = Y{n}", {}, found)
 
 
-def _polynomial(scene: Scene, k: int, factors: list[SX], unit: SX) -> Step | None:
+def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Step | None:
     """A joint that slides, from a polynomial; factors from the highest power."""
     degree = len(factors) - 1
     while degree and scene.zero(factors[0] * scene.length**degree / unit):

@@ -12,14 +12,14 @@ from casadi import SX
 from mbs.errors import NoClosedForm
 from mbs.loops.sequence import Step, step
 from mbs.loops.sequence.step import Found
-from mbs.models.inverse_geometry.pieper.forms import Scene
+from mbs.models.inverse_geometry.pieper.forms import PieperLoop
 from mbs.models.inverse_geometry.pieper.orientation import three_turns
 from mbs.spatial import Pose
 
 _TINY = 1e-280
 
 
-def three_slides(scene: Scene) -> list[Step]:
+def three_slides(scene: PieperLoop) -> list[Step]:
     """The steps of a loop of three joints that turn and three that slide.
 
     Raises:
@@ -35,12 +35,12 @@ def three_slides(scene: Scene) -> list[Step]:
             " so that the turns are not determined"
         )
     first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in turns.gaps]))
-    begun = Scene(scene.problem, turns.rotated(first), scene.length)
+    begun = PieperLoop(scene.problem, turns.rotated(first), scene.length)
     A, B, G = begun.after(0).pose.R, begun.after(1).pose.R, begun.after(2).pose.R.T
     return [*three_turns(begun, (0, 1, 2), A, B, G), _slides(scene)]
 
 
-def _slides(scene: Scene) -> Step:
+def _slides(scene: PieperLoop) -> Step:
     """The joints that slide, from the sum of all ways around the loop."""
     way, places, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
@@ -78,7 +78,7 @@ def _named(M: SX, p: SX, ends: list[str]) -> dict[str, SX]:
     return named | {f"{axis}0": p[m] for m, axis in enumerate("XYZ")}
 
 
-def _text(scene: Scene, places: list[int], ends: list[str]) -> str:
+def _text(scene: PieperLoop, places: list[int], ends: list[str]) -> str:
     names = [scene.ring.joints[k].name for k in places]
     rows = (
         " + ".join(f"{axis}{end} {name}" for end, name in zip(ends, names, strict=True))

@@ -7,7 +7,7 @@ import numpy as np
 from mbs.loops.goal import goal
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.answers.solutions import Solutions
-from mbs.models.inverse_geometry.answers.wishes import Draft, Wishes
+from mbs.models.inverse_geometry.answers.wishes import RobotSolution, Wishes
 from mbs.models.inverse_geometry.arm import Array
 from mbs.models.inverse_geometry.whole_robots.closed_robot import ClosedPosture, posed, why_searched
 
@@ -37,8 +37,10 @@ def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Sol
     return wishes.solutions(drafts, method, "" if drafts else reason)
 
 
-def _draft(posture: ClosedPosture, slope: Array, number: int) -> Draft:
+def _draft(posture: ClosedPosture, slope: Array, number: int) -> RobotSolution:
     """A solution; its singular value is that of pose and loops together."""
     sigma = float(np.linalg.svd(slope, compute_uv=False)[-1])
     count = 1 if sigma > _SINGULAR else 0
-    return Draft(posture.q, posture.label or str(number + 1), posture.residual, sigma, count)
+    return RobotSolution(
+        posture.q, posture.label or str(number + 1), posture.residual, sigma, count
+    )

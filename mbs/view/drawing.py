@@ -1,0 +1,413 @@
+"""A scene as plain areas and lines in a plane: the drawing of documents and icons.
+
+The shapes are those of the scene, seen from far away; joints are drawn over the links that they
+join, so that each is seen.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbs.assembly import System
+from mbs.view.measures import plane_normal
+from mbs.view.mesh import BOX_CORNERS, BOX_FACES, turned_to
+from mbs.view.posed import Array, PosedLinks, posed
+from mbs.view.primitives import (
+    AxisShape,
+    BallShape,
+    BarShape,
+    BoxShape,
+    CylinderShape,
+    FrameShape,
+    PlateShape,
+    Primitive,
+    RingShape,
+    SpanShape,
+    SpringShape,
+    Vector,
+)
+from mbs.view.scene import HIDDEN, scene
+
+Point = tuple[float, float]
+
+LETTERS = 3.2
+"""Height of the letters, in units of the drawing."""
+
+_SIZE = 100.0
+_PARALLEL = 1e-6  # sine of the angle up to which axes are parallel: files hold six digits
+_ROUND = np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False)
+_CIRCLE = np.column_stack([np.cos(_ROUND), np.sin(_ROUND), np.zeros(32)])
+_LIGHT = np.array([0.08, 0.2, 0.1])
+"""How much lighter sides are that look to the right, upwards and at the eye."""
+
+_ORDER = ("base", "link", "force", "axis", "joint", "loop", "frame")
+"""Roles from back to front; joints and loops are one group."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """A line through points, closed into an area or not.
+
+    Attributes:
+        role: of the primitive that it draws, or "mass" for a centre of mass.
+        colour: name in the palette, or "axes.0" for the first colour of the axes.
+        points: in the plane, y upwards, in the unit of the drawing.
+        closed: the last point is joined to the first one.
+        opacity: of the area; 0 leaves it empty.
+        width: of the line, in the unit of the drawing.
+        bright: how light the area is, 1 as the palette has it.
+    """
+
+    role: str
+    colour: str
+    points: tuple[Point, ...]
+    closed: bool = False
+    opacity: float = 0.0
+    width: float = 0.5
+    bright: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A text beside a point, in a colour of the palette."""
+
+    colour: str
+    text: str
+    point: Point
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A mechanism in a plane; the longer side is about 100 units.
+
+    Attributes:
+        strokes: from back to front.
+        names: of joints, links, force elements and frames.
+        caption: how one looks at it.
+    """
+
+    strokes: tuple[Stroke, ...]
+    names: tuple[Name, ...] = ()
+    caption: str = ""
+
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, lower, right and upper end of the strokes; a unit square without any."""
+        points = [point for stroke in self.strokes for point in stroke.points]
+        if not points:
+            return 0.0, 0.0, 1.0, 1.0
+        x, y = zip(*points, strict=True)
+        return min(x), min(y), max(x), max(y)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Eye:
+    """An orthographic view of posed links.
+
+    Attributes:
+        axes: (3, 3) rows: unit vectors to the right, upwards, towards the eye.
+        caption: what one looks at, in words.
+        poses: (links + 1, 3, 4) of the base and every link.
+        scale: units of the drawing a metre.
+    """
+
+    axes: Array
+    caption: str
+    poses: Array
+    scale: float = 1.0
+
+    def seen(self, points: Array) -> Array:
+        """(..., 3) points of the base frame: right, up, near."""
+        return np.array(self.scale * (points @ self.axes.T))
+
+    def moved(self, link: int, points: Sequence[Vector] | Vector | Array) -> Array:
+        """(..., 3) points in the frame of a link: right, up, near."""
+        R, p = self.poses[link, :, :3], self.poses[link, :, 3]
+        return self.seen(np.array(points) @ R.T + p)
+
+
+def drawing(
+    system: System,
+    q: Mapping[str, float] | Sequence[float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Drawing:
+    """The drawing of a mechanism: in the plane of its motion if it has one, else from an angle.
+
+    Args:
+        system: open or closed; every symbol in its geometry has a value.
+        q: positions, as for `scene`.
+        parameters: values of symbols, the others at their defaults.
+
+    Raises:
+        ModelError: as for `scene`.
+    """
+    made = scene(system, q, parameters=parameters)
+    at = posed(system, made.q, made.parameters)
+    eye = _eye(at, np.array(made.views["iso"]))
+    shapes = [item for item in made.primitives if item.role not in HIDDEN]
+    flat = np.vstack([np.reshape(s.points, (-1, 2)) for s in _strokes(shapes, eye)])
+    extent = float(np.ptp(flat, axis=0).max())
+    eye = _Eye(eye.axes, eye.caption, eye.poses, _SIZE / extent)
+    strokes = [*_grounds(at, eye), *_strokes(shapes, eye), *_masses(at, eye)]
+    return Drawing(tuple(strokes), placed(_names(at, eye)), eye.caption)
+
+
+def _eye(at: PosedLinks, iso: Array) -> _Eye:
+    """Into the plane in which everything moves where there is one, right and up positive."""
+    normal = plane_normal(at)
+    slides = [
+        at.directions[axis.direction]
+        for joint in at.parts.joints
+        for axis in joint.axes
+        if axis.motion == "prismatic"
+    ]
+    if normal is None or any(abs(float(slide @ normal)) > _PARALLEL for slide in slides):
+        right = np.cross(at.up, iso) / np.linalg.norm(np.cross(at.up, iso))
+        axes = np.array([right, np.cross(iso, right), iso])
+        return _Eye(axes, "seen from above at an angle", at.poses)
+    up = at.up - normal * (at.up @ normal)
+    if np.linalg.norm(up) < _PARALLEL:  # the plane is level
+        up = np.eye(3)[1] if abs(normal[1]) < 0.5 else np.eye(3)[2]
+        up = up - normal * (up @ normal)
+    up = up / np.linalg.norm(up)
+    right = np.cross(up, normal)
+    right = right * np.sign(right[np.argmax(np.abs(right))])
+    axes = np.array([right, up, np.cross(right, up)])
+    return _Eye(axes, "in the plane of the motion", at.poses)
+
+
+def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
+    """What every shape looks like: by roles, and far ones first among those of one group."""
+    drawn = []
+    for item in shapes:
+        group = _ORDER.index("joint" if item.role == "loop" else item.role)
+        parts, depth = _parts(item, eye)
+        drawn.append((group, depth, parts))
+    for _, _, parts in sorted(drawn, key=lambda row: (row[0], row[1])):
+        yield from parts
+
+
+def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
+    """The strokes of a shape, and how near its middle is."""
+    if isinstance(item, (SpanShape, SpringShape)):
+        start, end = (eye.moved(k, at) for k, at in zip(item.links, item.ends, strict=True))
+        middle = float((start + end)[2]) / 2
+        if isinstance(item, SpringShape):
+            return [_coil(item, start, end, eye.scale * item.radius)], middle
+        return [_area(item, _capsule([start, end], eye.scale * item.radius))], middle
+    if isinstance(item, BarShape):
+        ends = list(eye.moved(item.link, (item.a, item.b)))
+        area = _area(item, _capsule(ends, eye.scale * item.radius))
+        return [area], float((ends[0] + ends[1])[2]) / 2
+    if isinstance(item, BallShape):
+        center = eye.moved(item.link, item.at)
+        ring = center[:2] + eye.scale * item.radius * _CIRCLE[:, :2]
+        return [_area(item, ring)], float(center[2])
+    if isinstance(item, CylinderShape):
+        return _cylinder(item, eye)
+    if isinstance(item, BoxShape):
+        return _box(item, eye)
+    if isinstance(item, PlateShape):
+        corners = eye.moved(item.link, item.points)
+        return [_area(item, corners[:, :2], item.opacity)], float(corners[:, 2].mean()) - _SIZE
+    if isinstance(item, RingShape):
+        around = item.radius * _CIRCLE @ turned_to(np.array(item.axis)).T + np.array(item.at)
+        points = eye.moved(item.link, around)
+        tube = 2 * eye.scale * item.tube
+        line = Stroke(item.role, item.colour, _path(points), closed=True, width=tube)
+        return [line], float(points[:, 2].mean())
+    if isinstance(item, FrameShape):
+        return _tripod(item, eye)
+    assert isinstance(item, AxisShape), f"{type(item).__name__} has no strokes"
+    ends = list(eye.moved(item.link, (item.a, item.b)))
+    line = Stroke(item.role, item.colour, _path(np.array(ends)), width=0.3)
+    long = math.dist(*line.points) > 0.01 * _SIZE  # none of an axis that is seen end on
+    return [line] * long, float((ends[0] + ends[1])[2]) / 2
+
+
+def _area(item: Primitive, points: Array, opacity: float = 1.0, bright: float = 1.0) -> Stroke:
+    path = _path(points)
+    return Stroke(item.role, item.colour, path, closed=True, opacity=opacity, bright=bright)
+
+
+def _capsule(ends: Sequence[Array], radius: float) -> Array:
+    return hull(np.vstack([end[:2] + radius * _CIRCLE[:, :2] for end in ends]))
+
+
+def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
+    """Its outline, the end that is seen, and the bore there."""
+    a, b = np.array(item.a), np.array(item.b)
+    across = _CIRCLE @ turned_to(b - a).T
+    rings = [eye.moved(item.link, end + item.radius * across) for end in (a, b)]
+    heads = [ring[:, 2].mean() for ring in rings]
+    near = int(heads[1] > heads[0])
+    parts = [_area(item, hull(np.vstack(rings)[:, :2]))]
+    if abs(heads[1] - heads[0]) > 0.05 * eye.scale * np.linalg.norm(b - a):
+        parts.append(_area(item, rings[near][:, :2], bright=1.12))
+        if item.bore > 0:
+            bore = eye.moved(item.link, (a, b)[near] + item.bore * across)
+            parts.append(_area(item, bore[:, :2], bright=0.5))
+    return parts, float(sum(heads)) / 2
+
+
+def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
+    """The sides that are seen."""
+    pose = np.array(item.pose).reshape(3, 4)
+    local = BOX_CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
+    corners = eye.moved(item.link, local)
+    parts = []
+    for side in BOX_FACES:
+        outside = np.cross(corners[side[2]] - corners[side[0]], corners[side[3]] - corners[side[1]])
+        size = float(np.linalg.norm(outside))
+        if outside[2] > 1e-3 * size:  # it looks at the eye
+            bright = round(0.9 + float(outside @ _LIGHT) / size, 2)
+            parts.append(_area(item, corners[list(side), :2], bright=bright))
+    return parts, float(corners[:, 2].mean())
+
+
+def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
+    """Its three axes, but one that points at the eye."""
+    pose = np.array(item.pose).reshape(3, 4)
+    ends = pose[:, 3] + item.length * pose[:, :3].T
+    points = eye.moved(item.link, np.vstack([pose[:, 3], ends]))
+    lines = [
+        Stroke(item.role, f"{item.colour}.{k}", _path(points[[0, k + 1]]), width=0.6)
+        for k in range(3)
+        if math.dist(points[0, :2], points[k + 1, :2]) > 0.05 * eye.scale * item.length
+    ]
+    return lines, float(points[0, 2])
+
+
+def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
+    """A zigzag; a line where its ends are one place on the drawing."""
+    start, along = start[:2], (end - start)[:2]
+    length = float(np.linalg.norm(along))
+    if length < 1e-9:
+        return Stroke(item.role, item.colour, _path(np.array([start, end[:2]])), width=0.8)
+    across = np.array([-along[1], along[0]]) / length
+    swing = [0.0, 0.0, *(radius * (-1.0) ** k for k in range(8)), 0.0, 0.0]
+    shares = [0.0, 0.15, *np.linspace(0.2, 0.8, 8), 0.85, 1.0]
+    points = [start + s * along + w * across for s, w in zip(shares, swing, strict=True)]
+    return Stroke(item.role, item.colour, _path(np.array(points)), width=0.8)
+
+
+def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
+    """A line with hatches under every end of a force element on the base."""
+    for force in at.parts.forces:
+        for link, column in zip(force.links, force.points, strict=True):
+            if link == 0:
+                x, y, _ = eye.seen(at.points[column])
+                yield Stroke("base", "base", ((x - 4, y), (x + 4, y)))
+                for head in (x - 3, x - 1, x + 1, x + 3):
+                    yield Stroke("base", "base", ((head, y), (head - 1.4, y - 1.8)))
+
+
+def _masses(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
+    for link in at.parts.links:
+        if link.mass_centre is not None:
+            dot = eye.seen(at.points[link.mass_centre])[:2] + 0.8 * _CIRCLE[:, :2]
+            yield Stroke("mass", "text", _path(dot), closed=True, opacity=1.0)
+
+
+def _names(at: PosedLinks, eye: _Eye) -> Iterator[Name]:
+    def name(colour: str, text: str, columns: Sequence[int]) -> Name:
+        middle = eye.seen(at.points[list(columns)].mean(axis=0))
+        return Name(colour, text, (float(middle[0]), float(middle[1])))
+
+    for joint in at.parts.joints:
+        if joint.kind not in ("free", "fixed"):
+            end = joint.points[1 if joint.kind == "rollingdisc" else 0]  # at the wheel
+            yield name("loop" if joint.cut else "text", joint.name, (end,))
+    for link in at.parts.links:
+        columns = [k for segment in link.segments for k in segment]
+        columns = columns or ([] if link.mass_centre is None else [link.mass_centre])
+        if columns and link.bodies:
+            yield name("axis", ", ".join(link.bodies), columns)
+    for frame in at.parts.frames:
+        if not frame.name.startswith("link "):
+            yield name("axes.2", frame.name, (frame.origin,))
+    for force in at.parts.forces:
+        yield name("force", force.name, force.points)
+
+
+# Names beside points, where they do not cover each other.
+
+_WIDTH = 0.58  # of a letter, in heights
+_Room = tuple[float, float, float, float]
+_SHIFTS = ((4.0, 2.4), (4.0, -5.0), (-4.0, 2.4), (-4.0, -5.0), (0.0, 5.4), (0.0, -8.0))
+_FURTHER = (1.0, 1.8, 2.8)
+_SIGN = 3.0  # half the side of a square about a joint
+
+
+def placed(names: Iterable[Name]) -> tuple[Name, ...]:
+    """Names where there is room beside their points; those of one colour at a point are one."""
+    groups: dict[tuple[str, Point], list[str]] = {}
+    for name in names:
+        key = name.colour, (round(name.point[0], 1), round(name.point[1], 1))
+        groups.setdefault(key, []).append(name.text)
+    taken: list[_Room] = [
+        (x - _SIGN, y - _SIGN, x + _SIGN, y + _SIGN)
+        for colour, (x, y) in groups
+        if colour in ("text", "loop")
+    ]
+    found = []
+    for (colour, point), texts in groups.items():
+        text = ", ".join(dict.fromkeys(texts))
+        corner, room = _free_room(text, point, taken)
+        taken.append(room)
+        found.append(Name(colour, text, corner))
+    return tuple(found)
+
+
+def _free_room(text: str, point: Point, taken: list[_Room]) -> tuple[Point, _Room]:
+    """The first room about the point that is free, else the first one."""
+    tried = [
+        _room(text, point, (dx * far, dy * far))
+        for far, (dx, dy) in itertools.product(_FURTHER, _SHIFTS)
+    ]
+    return next((t for t in tried if not any(_meet(t[1], room) for room in taken)), tried[0])
+
+
+def _room(text: str, point: Point, shift: Point) -> tuple[Point, _Room]:
+    width = _WIDTH * LETTERS * len(text)
+    x, y = point[0] + shift[0], point[1] + shift[1]
+    x -= width if shift[0] < 0 else width / 2 if shift[0] == 0 else 0.0
+    return (x, y), (x, y, x + width, y + LETTERS)
+
+
+def _meet(a: _Room, b: _Room) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+# Geometry of the plane.
+
+
+def _path(points: Array) -> tuple[Point, ...]:
+    return tuple((float(row[0]), float(row[1])) for row in points)
+
+
+def hull(points: Array) -> Array:
+    """The convex hull of (k, 2) points, counterclockwise.
+
+    Source: Andrew 1979, the monotone chain.
+    """
+    rows = sorted({(round(float(x), 9), round(float(y), 9)) for x, y in points})
+    lower, upper = _chain(rows), _chain(rows[::-1])
+    return np.array(lower[:-1] + upper[:-1] or rows)
+
+
+def _chain(rows: list[Point]) -> list[Point]:
+    chain: list[Point] = []
+    for row in rows:
+        while len(chain) > 1 and _turn(chain[-2], chain[-1], row) <= 0:
+            chain.pop()
+        chain.append(row)
+    return chain
+
+
+def _turn(a: Point, b: Point, c: Point) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -1,0 +1,215 @@
+"""A drawing as SVG text, and as a small PNG picture without names."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from html import escape
+
+import numpy as np
+
+from mbs.view.drawing import LETTERS, Drawing, Name, Point, Stroke
+from mbs.view.palette import Theme, rgb
+from mbs.view.posed import Array
+
+SIZE = 200
+"""Width and height of the PNG picture in pixels."""
+
+_LETTER = 0.6  # width of a letter in heights, for the room that names need
+_MARGIN = 4.0
+_LEAST = (80.0, 30.0)  # width and height of a drawing that holds little
+_EDGE = 0.62  # how bright the edge of an area is, beside the area
+
+_SHAPES = """\
+.drawing path { fill: none; stroke-linejoin: round; stroke-linecap: round; }
+.drawing .axis { stroke-dasharray: 1.4 0.8 0.3 0.8; }
+.drawing text { font: 3.2px sans-serif; }
+.drawing .halo { stroke-width: 0.9; stroke-linejoin: round; }
+"""
+
+
+def svg(drawing: Drawing, title: str, *themes: Theme) -> str:
+    """The element `svg` of a drawing.
+
+    Args:
+        drawing: what is shown.
+        title: what it is, for those who do not see it.
+        themes: "light" where nothing else is asked for; the drawing follows the choice of its
+            reader without any.
+    """
+    left, lower, right, upper = _room(drawing)
+    width, height = right - left, upper - lower
+    lines = [
+        f'<svg class="drawing" xmlns="http://www.w3.org/2000/svg" role="img"'
+        f' viewBox="0 0 {width:.2f} {height:.2f}">',
+        f"<title>{escape(title)}</title>",
+        f"<style>\n{_style(drawing, themes)}</style>",
+        *(_path(stroke, left, upper) for stroke in drawing.strokes),
+        *(_text(name, left, upper) for name in drawing.names),
+        "</svg>",
+    ]
+    return "\n".join(lines)
+
+
+def standalone(drawing: Drawing, title: str) -> str:
+    """A file of its own, without names, for an icon."""
+    bare = svg(Drawing(drawing.strokes), title, "light")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{bare}\n'
+
+
+def _style(drawing: Drawing, themes: tuple[Theme, ...]) -> str:
+    """Rules for the colours that are used."""
+    if themes:
+        return _SHAPES + "".join(_rules(drawing, theme) for theme in themes)
+    dark = "@media (prefers-color-scheme: dark) {\n" + _rules(drawing, "dark") + "}\n"
+    return _SHAPES + _rules(drawing, "light") + dark
+
+
+def _rules(drawing: Drawing, theme: Theme) -> str:
+    lines = {}
+    for stroke in drawing.strokes:
+        area = stroke.opacity > 0
+        line = f"stroke: {_hex(stroke.colour, theme, _EDGE if area else 1.0)}"
+        fill = f"; fill: {_hex(stroke.colour, theme, stroke.bright)}" if area else ""
+        lines[f"path.{_class(stroke)}"] = line + fill
+    for name in drawing.names:
+        lines[f"text.{_named(name.colour)}"] = f"fill: {_hex(name.colour, theme)}"
+    if drawing.names:
+        paper = _hex("background", theme)
+        lines["text.halo"] = f"fill: {paper}; stroke: {paper}"
+    return "".join(f".drawing {which} {{ {what}; }}\n" for which, what in lines.items())
+
+
+def _named(colour: str) -> str:
+    return colour.replace(".", "-")
+
+
+def _class(stroke: Stroke) -> str:
+    """One name for a colour, its brightness, and whether it is a line or an area."""
+    if not stroke.opacity:
+        return f"{_named(stroke.colour)}-line"
+    return f"{_named(stroke.colour)}-{100 * stroke.bright:.0f}"
+
+
+def _hex(colour: str, theme: Theme, bright: float = 1.0) -> str:
+    parts = np.clip(np.rint(bright * 255 * rgb(colour, theme)), 0, 255).astype(int)
+    return "#" + "".join(f"{part:02x}" for part in parts)
+
+
+def _room(drawing: Drawing) -> tuple[float, float, float, float]:
+    """The bounds of strokes and names, with a margin."""
+    left, lower, right, upper = drawing.bounds()
+    for name in drawing.names:
+        x, y = name.point
+        left, lower = min(left, x), min(lower, y - 0.3 * LETTERS)
+        right, upper = max(right, x + _LETTER * LETTERS * len(name.text)), max(upper, y + LETTERS)
+    wide = max(_MARGIN, (_LEAST[0] - right + left) / 2)
+    high = max(_MARGIN, (_LEAST[1] - upper + lower) / 2)
+    return left - wide, lower - high, right + wide, upper + high
+
+
+def _text(name: Name, left: float, upper: float) -> str:
+    """A name, on a halo that keeps it apart from the lines behind it."""
+    place = f'x="{name.point[0] - left:.2f}" y="{upper - name.point[1]:.2f}"'
+    text = escape(name.text)
+    halo = f'<text class="halo" aria-hidden="true" {place}>{text}</text>'
+    return f'{halo}<text class="{_named(name.colour)}" {place}>{text}</text>'
+
+
+def _path(stroke: Stroke, left: float, upper: float) -> str:
+    def place(point: Point) -> str:
+        return f"{point[0] - left:.2f} {upper - point[1]:.2f}"
+
+    corners = " L".join(place(point) for point in stroke.points)
+    clear = f' fill-opacity="{stroke.opacity:g}"' if 0 < stroke.opacity < 1 else ""
+    return (
+        f'<path class="{stroke.role} {_class(stroke)}" stroke-width="{stroke.width:.3g}"{clear}'
+        f' d="M{corners}{" Z" if stroke.closed else ""}"/>'
+    )
+
+
+# The PNG picture: areas and lines laid over each other, with smooth edges.
+
+_SPACE = 12.0
+_THIN = 1.5  # the least width of a line [pixels]
+_LEFT_OUT = ("axis", "frame", "mass")
+_GRID = np.stack(np.meshgrid(np.arange(SIZE) + 0.5, np.arange(SIZE) + 0.5), axis=-1)
+"""(SIZE, SIZE, 2) middle of each pixel, x to the right and y down."""
+
+
+def icon(drawing: Drawing) -> bytes:
+    """A PNG file of the drawing on a transparent ground, without frames, axes and names."""
+    image = np.zeros((SIZE, SIZE, 4))
+    shown = Drawing(tuple(s for s in drawing.strokes if s.role not in _LEFT_OUT))
+    left, lower, right, upper = shown.bounds()
+    scale = (SIZE - 2 * _SPACE) / max(right - left, upper - lower, 1e-9)
+    middle = np.array([left + right, lower + upper]) / 2
+    for stroke in shown.strokes:
+        points = (np.array(stroke.points) - middle) * (scale, -scale) + SIZE / 2
+        _paint(image, stroke, points, max(scale * stroke.width, _THIN))
+    return png(np.rint(255 * image).astype(np.uint8))
+
+
+def png(pixels: np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]) -> bytes:
+    """A PNG file of (rows, columns, 4) red, green, blue and opacity.
+
+    Source: W3C 2003, sections 5 and 7.
+    """
+    rows, columns = pixels.shape[:2]
+    head = struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)
+    lines = b"".join(b"\0" + pixels[row].tobytes() for row in range(rows))
+    parts = ((b"IHDR", head), (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*part) for part in parts)
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    check = zlib.crc32(kind + content)
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", check)
+
+
+def _paint(image: Array, stroke: Stroke, points: Array, width: float) -> None:
+    """Area first, then the line, over what is there; only in the window that the stroke needs."""
+    first = np.clip(np.floor(points.min(axis=0) - width), 0, SIZE).astype(int)
+    last = np.clip(np.ceil(points.max(axis=0) + width), 0, SIZE).astype(int)
+    window = slice(first[1], last[1]), slice(first[0], last[0])
+    part, grid = image[window], _GRID[window]
+    ends = np.roll(points, -1, axis=0) if stroke.closed else points[1:]
+    sides = list(zip(points, ends, strict=False))
+    colour, edge = rgb(stroke.colour, "light"), 1.0
+    if stroke.opacity > 0:
+        _cover(part, _inside(grid, sides) * stroke.opacity, np.clip(stroke.bright * colour, 0, 1))
+        edge = _EDGE
+    away = np.full(grid.shape[:2], np.inf)
+    for a, b in sides:
+        away = np.minimum(away, _distance(grid, a, b))
+    _cover(part, np.clip(width / 2 + 0.5 - away, 0, 1), edge * colour)
+
+
+def _cover(image: Array, opacity: Array, colour: Array) -> None:
+    """Lay a colour over the picture.
+
+    Source: Porter & Duff 1984, the operator over.
+    """
+    total = opacity + image[..., 3] * (1 - opacity)
+    share = np.where(total > 0, opacity / np.where(total > 0, total, 1), 0)[..., None]
+    image[..., :3] += share * (colour - image[..., :3])
+    image[..., 3] = total
+
+
+def _distance(grid: Array, a: Array, b: Array) -> Array:
+    """From each pixel to the line from a to b."""
+    along, length = b - a, float((b - a) @ (b - a))
+    share = np.clip((grid - a) @ along / length, 0, 1) if length > 0 else np.zeros(grid.shape[:2])
+    away: Array = np.linalg.norm(grid - a - share[..., None] * along, axis=-1)
+    return away
+
+
+def _inside(grid: Array, sides: list[tuple[Array, Array]]) -> Array:
+    """Whether the middle of each pixel is in the polygon: a ray crosses its sides oddly."""
+    odd = np.zeros(grid.shape[:2], dtype=bool)
+    x, y = grid[..., 0], grid[..., 1]
+    for (ax, ay), (bx, by) in sides:
+        if ay != by:
+            crossing = ax + (y - ay) / (by - ay) * (bx - ax)
+            odd ^= ((ay > y) != (by > y)) & (x < crossing)
+    return odd.astype(float)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import casadi
 import numpy as np
@@ -23,17 +23,23 @@ if TYPE_CHECKING:
 UNIT = 1e-5
 """How far the length of a quaternion may be from one: finite differences move it by 1e-6."""
 
+Kind = Literal["quaternion", "parameter", "open", "undetermined"]
+"""A quaternion not of unit length, a parameter out of its bounds, open loops, and independent joints
+that do not determine the others."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
     """A number of a configuration and parameters that must not be larger than its bound.
 
     Attributes:
+        kind: what is wrong where it is larger.
         name: what it tells.
         residual: (1, 1).
         bound: (1, 1) or a number.
     """
 
+    kind: Kind
     name: str
     residual: SX
     bound: SX | float
@@ -50,13 +56,13 @@ def plain_rows(system: System, q: SX) -> list[Row]:
     for part in quaternion_slices(system.tree):
         joint = system.coordinates[part.start].joint
         length = casadi.norm_2(q[part])
-        rows.append(Row(f"quaternion of {joint}", casadi.fabs(length - 1), UNIT))
+        rows.append(Row("quaternion", f"quaternion of {joint}", casadi.fabs(length - 1), UNIT))
     symbols = system.symbol_table
     for name, (low, high) in system.bounds.items():
         if low is not None:
-            rows.append(Row(f"least value of {name}", -symbols[name], -low))
+            rows.append(Row("parameter", f"least value of {name}", -symbols[name], -low))
         if high is not None:
-            rows.append(Row(f"greatest value of {name}", symbols[name], high))
+            rows.append(Row("parameter", f"greatest value of {name}", symbols[name], high))
     return rows
 
 

@@ -128,8 +128,8 @@ def loop_rows(system: System, q: SX) -> list[Row]:
     """
     _, leads, opening = posture_health(system)(q, system.p)
     return [
-        Row("opening of the loops", opening, OPEN),
-        Row("hold of the independent joints, negative", -leads, -_LED),
+        Row("open", "opening of the loops", opening, OPEN),
+        Row("undetermined", "hold of the independent joints, negative", -leads, -_LED),
     ]
 
 

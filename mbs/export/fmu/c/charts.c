@@ -27,7 +27,7 @@ typedef struct {
 static int by_joints(core *c, const double *x, found *f) {
     double z[NZ + 1];
     int i;
-    if (closure_solve(c, x, z) || core_call_rhs(c, c->m.time, x, z, f->rate, f->y)) return 1;
+    if (closure_solve(&c->loops, x, z) || core_call_rhs(c, c->m.time, x, z, f->rate, f->y)) return 1;
     for (i = 0; i < NX; i++) f->X[MODEL_TREE_STATES[i]] = x[i];
     for (i = 0; i < NZ; i++) f->X[MODEL_TREE_DEPENDENTS[i]] = z[i];
     for (i = 0; i < N_PASSIVE; i++) f->X[MODEL_TREE_PASSIVE[i]] = f->y[PASSIVE_V + i];

@@ -121,7 +121,7 @@ core_status core_step(core *c, double limit) {
 
 /* The arguments of a function of events; dependents of the states alone have to be found. */
 static int place(core *c, const double *t, const double *x) {
-    if (!ON_TREE(c) && closure_solve(c, x, c->z)) return 1;
+    if (!ON_TREE(c) && closure_solve(&c->loops, x, c->z)) return 1;
     core_point(c, t, x, c->z);
     return 0;
 }

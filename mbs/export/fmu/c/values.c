@@ -121,12 +121,8 @@ static void changed(core *c) {
 
 /* A guess equal to the start value in the model description says nothing: many hosts write all. */
 static void set_guess(core *c, unsigned ref, double value) {
-    int i;
     if (c->m.guess[ref - DEPENDENTS] == value) return;
     c->m.guess[ref - DEPENDENTS] = value;
-    c->m.guessed = 0;
-    for (i = 0; i < NZ; i++)
-        if (c->m.guess[i] != MODEL_START[DEPENDENTS + i]) c->m.guessed = 1;
     changed(c);
 }
 

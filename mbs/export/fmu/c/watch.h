@@ -11,12 +11,14 @@
 
 #include "closure.h"
 
+#ifndef WATCHED /* the header of a bare library has it */
 typedef struct {
     int on;
     real time;
     real sign[NB + 1];
     real v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
 } watched;
+#endif
 
 #define WATCH_WORK (NZ * NZ)
 

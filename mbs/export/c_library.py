@@ -63,7 +63,7 @@ _ROWS = """\
 """
 _HOLDS = """\
   static const unsigned char wrong[] = {{{statuses}}};
-  {real} holds[{count}];
+  {real} holds[{count}] = {{0}};
   int k;
 """
 _HELPERS = """\

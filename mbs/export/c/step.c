@@ -105,7 +105,7 @@ static int within_bounds(const real *p) {
 
 /* s->x and s->z are the posture from which the loops are closed. */
 static int begin(SYSTEM(state) *s, const real *x, const real *guess, real *w) {
-    equations e;
+    equations e = {0};
     real *z = w + NEXT_Z;
     int status;
     use(&e, s->x, s->z, guess, s->p, w);
@@ -176,7 +176,7 @@ static int advance(const SYSTEM(state) *s, equations *e, real end, real h, real 
 }
 
 int SYSTEM(step)(SYSTEM(state) *s, const real *u, real h, real *w) {
-    equations e;
+    equations e = {0};
 #if NB > 0
     watched now;
 #endif
@@ -204,7 +204,7 @@ int SYSTEM(step)(SYSTEM(state) *s, const real *u, real h, real *w) {
 }
 
 static int motion(const SYSTEM(state) *s, const real *u, real *q, real *v, real *a, real *w) {
-    equations e;
+    equations e = {0};
     real *x = w + POSTURE, *z = w + POSTURE + NX;
     int status;
     if (!all_finite(u, NU)) return MBS_NOT_FINITE;

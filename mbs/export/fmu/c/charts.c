@@ -147,9 +147,15 @@ static core_status begin(core *c) {
     return choose(c, 1.0);
 }
 
+/* The joints are the states outside. */
+static void show_joints(core *c) {
+    int i;
+    for (i = 0; i < NX; i++) c->m.values[SLOTS + i] = c->m.values[STATES + i];
+}
+
 core_status charts_start(core *c) {
     passage_start(c->passage);
-    memcpy(c->m.values + SLOTS, c->m.values + STATES, NX * sizeof(double));
+    show_joints(c);
     return begin(c);
 }
 
@@ -157,7 +163,7 @@ core_status charts_set(core *c) {
     core_status status = c->m.charts.tangent ? core_refresh(c) : CORE_OK;
     c->m.charts.tangent = 0;
     c->m.charts.loose = 1;
-    memcpy(c->m.values + SLOTS, c->m.values + STATES, NX * sizeof(double));
+    show_joints(c);
     return status;
 }
 

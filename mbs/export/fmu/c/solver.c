@@ -42,7 +42,7 @@ static int tree_rhs(void *user, double t, const double *x, double *xdot) {
 
 static int tree_project(void *user, double t, double *x) {
     core *c = user;
-    double moved[NT], residual;
+    double moved[NT], residual = HUGE_VAL;
     int k, i;
     if (!passage_project(c->passage, t, x)) return 0;
     for (k = 0; k < ITERATIONS; k++) {

@@ -24,8 +24,8 @@ UNIT = 1e-5
 """How far the length of a quaternion may be from one: finite differences move it by 1e-6."""
 
 Kind = Literal["quaternion", "parameter", "open", "undetermined"]
-"""A quaternion not of unit length, a parameter out of its bounds, open loops, and independent joints
-that do not determine the others."""
+"""A quaternion not of unit length, a parameter out of its bounds, open loops, and independent
+joints that do not determine the others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

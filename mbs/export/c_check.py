@@ -33,10 +33,10 @@ STATUS = """\
 typedef enum {
   MBS_OK = 0,           /* the outputs are the model */
   MBS_NOT_FINITE = 1,   /* an input is NaN or infinite, or a step is not positive */
-  MBS_QUATERNION = 2,   /* a quaternion does not have unit length, to 1e-5: divide it by its length */
+  MBS_QUATERNION = 2,   /* a quaternion is not of unit length, to 1e-5: divide it by its length */
   MBS_PARAMETER = 3,    /* a parameter lies out of its bounds, such as a mass below zero */
-  MBS_OPEN = 4,         /* the positions leave loops open, by more than 1e-6 (float: 1e-5) of the size
-                           of the mechanism */
+  MBS_OPEN = 4,         /* the positions leave loops open, by more than 1e-6 (float: 1e-5) of the
+                           size of the mechanism */
   MBS_UNDETERMINED = 5, /* the configuration is singular: there the independent joints do not
                            determine how the others move */
   MBS_NO_RESULT = 6     /* an output would not be a finite number: a singular matrix, or positions

@@ -124,20 +124,21 @@ def c_library(
     function once and prints its outputs. NAME is the name of the folder, made fit for C: `2r` gives
     models_2r, `math` gives math_models. Inputs named like a word of C get an underscore.
 
-    A call returns an `mbs_status`, which the header explains: MBS_OK, or why the model has no meaning
-    there; then all outputs are NaN. It refuses what a call in Python refuses: numbers that are not
-    finite, quaternions that are not of unit length, parameters out of their bounds, loops that are
-    open by more than the same part of the size of the mechanism, independent joints that do not
-    determine the others, and results that are not finite. A casadi.Function that is no model is
-    asked for finite inputs and outputs alone.
+    A call returns an `mbs_status`, which the header explains: MBS_OK, or why the model has no
+    meaning there; then all outputs are NaN. It refuses what a call in Python refuses: numbers that
+    are not finite, quaternions that are not of unit length, parameters out of their bounds, loops
+    that are open by more than the same part of the size of the mechanism, independent joints that
+    do not determine the others, and results that are not finite. A casadi.Function that is no model
+    is asked for finite inputs and outputs alone.
 
-    With target="bare" the code is for microcontrollers: C99 in scalar operations, without heap, files
-    and variables that change outside of functions; it needs math.h, memset and memcpy. A system among
-    the functions becomes its motion, in a file of its own: a state that the caller owns and
-    `SYSTEM_start`, `SYSTEM_step`, a step of the classical Runge-Kutta method with the loops closed
-    at every evaluation, and `SYSTEM_motion`, the positions, velocities and accelerations of all
-    joints. Compiled in double without fused multiplications (`-std=c99` or `-ffp-contract=off` of
-    GCC and clang) its numbers are those of `mbs.export.fmu(system, solver="rk4")`.
+    With target="bare" the code is for microcontrollers: C99 in scalar operations, without heap,
+    files and variables that change outside of functions; it needs math.h, memset and memcpy. A
+    system among the functions becomes its motion, in a file of its own: a state that the caller
+    owns and `SYSTEM_start`, `SYSTEM_step`, a step of the classical Runge-Kutta method with the
+    loops closed at every evaluation, and `SYSTEM_motion`, the positions, velocities and
+    accelerations of all joints. Compiled in double without fused multiplications (`-std=c99` or
+    `-ffp-contract=off` of GCC and clang) its numbers are those of
+    `mbs.export.fmu(system, solver="rk4")`.
 
     Args:
         functions: models of one or several systems with different names, or name in C to model;
@@ -145,8 +146,8 @@ def c_library(
         folder: where to write; it is made, with the folders above it. Files there that mbs wrote
             are replaced, others are not.
         target: "hosted", or "bare" for what has no operating system.
-        real: type of numbers of a bare library: "double" or "float". In single precision loops may be
-            open by 1e-5 of the size of the mechanism, since positions round to 6e-8.
+        real: type of numbers of a bare library: "double" or "float". In single precision loops may
+            be open by 1e-5 of the size of the mechanism, since positions round to 6e-8.
         checked: whether calls are checked. Without it they return 0 for any numbers, also where
             the model has no meaning; steps are checked always.
 
@@ -320,11 +321,11 @@ def _code(name: str, model: Function, check: Check | None) -> Function:
     if check is None and name == model.name() and all(pattern.is_dense() for pattern in patterns):
         return model
     scalar = model.is_a("SXFunction")
-    kind = SX if scalar else MX
+    kind: Any = SX if scalar else MX
     symbols = [kind.sym(f"x{k}", *model.size_in(k)) for k in range(model.n_in())]
     outputs = [casadi.densify(value) for value in Function.call(model, symbols)]
     if check is not None:
-        outputs.append(check.function(*symbols))
+        outputs += check.function.call(symbols)
     return Function(name, symbols, outputs, {"cse": scalar})
 
 
@@ -408,7 +409,7 @@ def _checked(entry: _Entry, library: _Library, call: str) -> str:
 
 
 def _all_finite(arrays: Iterable[tuple[str, int]], real: Real) -> str:
-    """Whether all are numbers: by one sum of them where they are few, which costs next to nothing."""
+    """Whether all are numbers: by one sum of them where they are few, which costs least."""
     given = [(name, n) for name, n in arrays if n]
     one_by_one = " && ".join(f"mbs__finite({name}, {n})" for name, n in given) or "1"
     if not 0 < sum(n for _, n in given) <= _FEW:
@@ -517,8 +518,8 @@ def _example_call(entry: _Entry, library: _Library) -> str:
 def example_input(model: Function, k: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """The numbers that the example program gives to input k, (rows, columns).
 
-    They are irregular, but positions are those of the assembled mechanism where loops, quaternions or
-    parameters ask for such, and parameters have their default values.
+    They are irregular, but positions are those of the assembled mechanism where loops, quaternions
+    or parameters ask for such, and parameters have their default values.
     """
     rows, columns = model.size_in(k)
     numbers = np.arange(rows * columns, dtype=float)

@@ -56,7 +56,8 @@ _HEADER = """\
  *  @param[in]  p      ({p_size}); NULL: default values
  *  @param      w      scratch memory of {upper}_STEP_SZ_W numbers
  */
-int {name}_start({name}_state *s, const {real} *x, const {real} *guess, const {real} *p, {real} *w);
+int {name}_start(
+    {name}_state *s, const {real} *x, const {real} *guess, const {real} *p, {real} *w);
 
 /** One step of length h [s], u held. The state stays where it is when the status is not MBS_OK.
  *
@@ -73,7 +74,8 @@ int {name}_step({name}_state *s, const {real} *u, {real} h, {real} *w);
  *  @param[out] v  ({nv})
  *  @param[out] a  ({nv})
  */
-int {name}_motion(const {name}_state *s, const {real} *u, {real} *q, {real} *v, {real} *a, {real} *w);
+int {name}_motion(
+    const {name}_state *s, const {real} *u, {real} *q, {real} *v, {real} *a, {real} *w);
 #define {upper}_STEP_SZ_W {sz_w}
 """
 
@@ -258,9 +260,7 @@ def _functions(system: System, state: MinimalState, variables: _Variables) -> li
     ]
 
 
-def _sizes(
-    system: System, state: MinimalState, variables: _Variables, work: int
-) -> dict[str, int]:
+def _sizes(system: System, state: MinimalState, variables: _Variables, work: int) -> dict[str, int]:
     nx, nz = len(variables.x), len(variables.z)
     return {
         "NX": nx,
@@ -342,9 +342,7 @@ def _head(sizes: dict[str, int], words: dict[str, str], real: Real) -> str:
     )
 
 
-def _tables(
-    system: System, state: MinimalState, variables: _Variables, real: Real
-) -> list[str]:
+def _tables(system: System, state: MinimalState, variables: _Variables, real: Real) -> list[str]:
     joints = (*variables.x, *variables.z)
     every = list(outputs(system, state))
     first = len(state.accelerations) + len(state.shown)

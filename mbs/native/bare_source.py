@@ -60,9 +60,9 @@ class FloatCode(BlockCode):
 def bare_source(functions: Iterable[Function], real: Real = "double") -> tuple[str, int]:
     """Functions in CasADi's calling convention, static, without a word on CasADi.
 
-    Each is ``static int NAME(const REAL **arg, REAL **res, long long *iw, REAL *w, int mem)``, where
-    no pointer in `arg` and `res` may be NULL and `iw` is not looked at. It calls the functions of
-    math.h and memset at most.
+    Each is ``static int NAME(const REAL **arg, REAL **res, long long *iw, REAL *w, int mem)``,
+    where no pointer in `arg` and `res` may be NULL and `iw` is not looked at. It calls the
+    functions of math.h and memset at most.
 
     Args:
         functions: made of scalar operations, or to be expanded to them, their inputs and outputs
@@ -119,7 +119,8 @@ def _function(function: Function, real: Real) -> tuple[str, int]:
     text = "\n".join(
         [
             *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
-            f"static int {name}(const {real} **arg, {real} **res, long long *iw, {real} *w, int mem)",
+            f"static int {name}(const {real} **arg, {real} **res, long long *iw, {real} *w,"
+            " int mem)",
             "{",
             "  (void)arg, (void)res, (void)iw, (void)w, (void)mem;",
             *(f"  {name}_part{k}(arg, res, w);" for k in range(len(pieces))),

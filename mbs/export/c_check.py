@@ -46,6 +46,14 @@ typedef enum {
 """
 
 
+NO_FAST_MATH = """\
+#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__ > 0)
+#error "compile without -ffast-math: the checks of this file need NaN and infinity"
+#endif
+
+"""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
     """What the inputs of a model must fulfil beside being numbers.

@@ -17,7 +17,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction
 from mbs.comments import in_c_comment
 from mbs.errors import ExportError, ModelError
-from mbs.export.c_check import STATUS, Check, check_of
+from mbs.export.c_check import NO_FAST_MATH, STATUS, Check, check_of
 from mbs.export.c_names import check_function_names, library_name, parameter_names
 from mbs.export.c_step import Step, step_texts
 from mbs.files import path_of, write_texts
@@ -67,10 +67,6 @@ _HOLDS = """\
   int k;
 """
 _HELPERS = """\
-#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__ > 0)
-#error "compile without -ffast-math: the checks of this file need NaN and infinity"
-#endif
-
 /* What is called where something is wrong stays out of the way. */
 #undef COLD
 #ifdef __GNUC__
@@ -358,7 +354,7 @@ def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
             raise ModelError(f"{where}: {problem}")
     if library.checked and entries:
         size, largest = _LARGEST[library.real]
-        parts.append(_HELPERS.format(real=library.type, abs=size, largest=largest))
+        parts.append(NO_FAST_MATH + _HELPERS.format(real=library.type, abs=size, largest=largest))
     return "\n".join([*parts, *(_wrapper(entry, library) for entry in entries)])
 
 

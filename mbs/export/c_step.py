@@ -17,6 +17,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT
 from mbs.assembly.validity import UNIT
 from mbs.comments import in_c_comment
 from mbs.errors import ModelError
+from mbs.export.c_check import NO_FAST_MATH
 from mbs.export.fmu.description import Variable
 from mbs.export.fmu.equations import steepness
 from mbs.export.fmu.tables import diagonal_blocks
@@ -95,7 +96,7 @@ _HEAD = """\
 #include <stddef.h>
 #include <string.h>
 
-typedef {library}_real real;
+{no_fast_math}typedef {library}_real real;
 #define REAL(number) ((real)(number))
 #define SHARED static
 #define NOT_A_NUMBER REAL(NAN)
@@ -335,6 +336,7 @@ def _head(sizes: dict[str, int], words: dict[str, str], real: Real) -> str:
         watched = f"#define WATCHED\ntypedef {words['name']}_watched watched;\n"
     return _HEAD.format(
         **words,
+        no_fast_math=NO_FAST_MATH,
         precision=_PRECISION[real],
         sizes="\n".join(f"#define {key} {n}" for key, n in sizes.items() if key != "SZ_W"),
         unit=repr(UNIT),

@@ -34,8 +34,13 @@ NOINLINE = """\
 #else
 #define NOINLINE
 #endif
+#if defined __cplusplus || (defined _MSC_VER && !defined __clang__)
+#undef restrict
+#define restrict __restrict
+#endif
 """
-"""What stands before such text: parts of long functions stay apart."""
+"""What stands before such text: parts of long functions stay apart, and compilers of C++ and old
+ones know `restrict` by another name."""
 
 
 class FloatCode(BlockCode):

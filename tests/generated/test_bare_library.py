@@ -106,6 +106,23 @@ def test_long_models_compile_without_warnings(tmp_path):
     assert compiled(sources(folder), tmp_path)[1] == [(0, 0)] * 2
 
 
+def test_what_drops_checks_is_refused(tmp_path):
+    folder = written(mbs.load("four_bar").assemble(), tmp_path / "lib")
+    for file in sources(folder):
+        command = [*find_compiler().command, "-ffast-math", "-fsyntax-only", str(file)]
+        answer = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert "compile without -ffast-math" in answer.stderr
+
+
+@pytest.mark.skipif(not shutil.which("g++"), reason="g++ is not installed")
+def test_compilers_of_cpp_take_it(tmp_path):
+    folder = written(mbs.load("four_bar").assemble(), tmp_path / "lib")
+    for file in sources(folder):
+        command = ["g++", "-x", "c++", "-Wall", "-Werror", "-fsyntax-only", str(file)]
+        answer = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert answer.stderr == ""
+
+
 def test_the_equations_of_an_fmu_are_bare(tmp_path):
     """model.c needs what a bare library needs; the rest of an FMU allocates and formats texts."""
     path = mbs.export.fmu(mbs.load("four_bar").assemble(), tmp_path / "m.fmu", solver="rk4")

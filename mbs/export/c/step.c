@@ -25,7 +25,7 @@ typedef char scratch_is_large_enough[W_SIZE <= STEP_SZ_W ? 1 : -1];
 typedef struct {
     const real *arg[5];
     real *res[3];
-    loops loops;
+    loops loop;
 } equations;
 
 static void copy(real *to, const real *from, int n) {
@@ -34,15 +34,16 @@ static void copy(real *to, const real *from, int n) {
 }
 
 static void use(equations *e, real *x, real *z, const real *guess, const real *p, real *w) {
-    loops l = {0};
+    loops l;
     l.x = x;
     l.z = z;
     l.guess = guess;
     l.p = p;
     l.arg = e->arg;
     l.res = e->res;
+    l.iw = NULL;
     l.w = w;
-    e->loops = l;
+    e->loop = l;
 }
 
 static void point(equations *e, const real *t, const real *x, const real *z, const real *u) {
@@ -50,7 +51,7 @@ static void point(equations *e, const real *t, const real *x, const real *z, con
     e->arg[1] = x;
     e->arg[2] = z;
     e->arg[3] = u;
-    e->arg[4] = e->loops.p;
+    e->arg[4] = e->loop.p;
 }
 
 static int status_of(int closure) {
@@ -60,11 +61,11 @@ static int status_of(int closure) {
 
 /* z and the derivative of x; what is no number, has no result. */
 static int rates(equations *e, real t, const real *x, real *z, const real *u, real *xdot) {
-    int status = status_of(closure_solve(&e->loops, x, z));
+    int status = status_of(closure_solve(&e->loop, x, z));
     if (status) return status;
     point(e, &t, x, z, u);
     e->res[0] = xdot;
-    (void)mbs_rates(e->arg, e->res, NULL, e->loops.w, 0);
+    (void)mbs_rates(e->arg, e->res, NULL, e->loop.w, 0);
     return all_finite(xdot, NX) ? MBS_OK : MBS_NO_RESULT;
 }
 
@@ -72,15 +73,15 @@ static int rates(equations *e, real t, const real *x, real *z, const real *u, re
 /* What is watched at an accepted posture. */
 static int look(equations *e, real t, const real *x, const real *u, watched *now, real *w) {
     real *z = w + POSTURE + NX;
-    int status = status_of(closure_solve(&e->loops, x, z));
+    int status = status_of(closure_solve(&e->loop, x, z));
     if (status) return status;
     now->on = 1;
     now->time = t;
-    if (watch_signs(&e->loops, x, z, now->sign, w + SLOPES)) return MBS_UNDETERMINED;
+    if (watch_signs(&e->loop, x, z, now->sign, w + SLOPES)) return MBS_UNDETERMINED;
     point(e, &t, x, z, u);
     e->res[0] = now->v;
     e->res[1] = now->a;
-    (void)mbs_passive(e->arg, e->res, NULL, e->loops.w, 0);
+    (void)mbs_passive(e->arg, e->res, NULL, e->loop.w, 0);
     return all_finite(now->v, N_PASSIVE) && all_finite(now->a, N_PASSIVE) ? MBS_OK
                                                                           : MBS_NO_RESULT;
 }
@@ -112,8 +113,8 @@ static int begin(SYSTEM(state) *s, const real *x, const real *guess, real *w) {
     if (!all_finite(x, NX) || !all_finite(guess, NZ) || !all_finite(s->p, NP)) return MBS_NOT_FINITE;
     if (!unit_quaternions(x)) return MBS_QUATERNION;
     if (!within_bounds(s->p)) return MBS_PARAMETER;
-    status = status_of(closure_start(&e.loops, x, z));
-    if (!status && closure_singular(&e.loops, x, z)) status = MBS_UNDETERMINED;
+    status = status_of(closure_start(&e.loop, x, z));
+    if (!status && closure_singular(&e.loop, x, z)) status = MBS_UNDETERMINED;
     copy(s->x, x, NX);
     copy(s->z, z, NZ);
     return status;
@@ -172,7 +173,7 @@ static int advance(const SYSTEM(state) *s, equations *e, real end, real h, real 
     if (!all_finite(y, NX)) return MBS_NO_RESULT;
     status = rates(e, end, y, z, s->u, slope);
     if (status) return status;
-    return closure_singular(&e->loops, y, z) ? MBS_UNDETERMINED : MBS_OK;
+    return closure_singular(&e->loop, y, z) ? MBS_UNDETERMINED : MBS_OK;
 }
 
 int SYSTEM(step)(SYSTEM(state) *s, const real *u, real h, real *w) {
@@ -212,7 +213,7 @@ static int motion(const SYSTEM(state) *s, const real *u, real *q, real *v, real 
     copy(x, s->x, NX);
     copy(z, s->z, NZ);
     use(&e, x, z, MODEL_START + DEPENDENTS, s->p, w);
-    status = status_of(closure_solve(&e.loops, x, w + NEXT_Z));
+    status = status_of(closure_solve(&e.loop, x, w + NEXT_Z));
     if (status) return status;
     point(&e, &s->t, x, w + NEXT_Z, u);
     e.res[0] = q;

@@ -162,7 +162,7 @@ core_status core_set(core *c, const unsigned *ref, size_t n, const double *value
         } else if (c->m.values[ref[i]] != values[i]) {
             if (joints_set(c, ref[i])) return CORE_ERROR;
             c->m.values[ref[i]] = values[i];
-            if (ref[i] < STATES + NS) c->m.values[SLOTS + ref[i]] = values[i];
+            if (among(ref[i], STATES, STATES + NS)) c->m.values[SLOTS + ref[i]] = values[i];
             changed(c);
         }
     }

@@ -77,6 +77,10 @@ SMALL = {
         "2 links: shooting - collocation": 1e-3,
         "4 links: shooting - collocation": 1e-2,
     },
+    "12_bare_c": {
+        "Status": 0.5,
+        "Difference from continuous control": 5e-3,
+    },
 }
 """What each example prints, and how large it may be."""
 
@@ -92,6 +96,7 @@ FILES = {
     "09_sr400_pick_and_place": ["sr400.png"],
     "10_quadruped_jump": ["quadruped.png"],
     "11_chain": ["chain.png"],
+    "12_bare_c": ["crank/crank.h", "crank/four_bar_step.c"],
 }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import casadi
 import numpy as np
@@ -27,18 +27,24 @@ Vector = NDArray[np.float64]
 UNIT = 1e-5
 """How far the length of a quaternion may be from one: finite differences move it by 1e-6."""
 
+Kind = Literal["quaternion", "parameter", "open", "undetermined"]
+"""A quaternion not of unit length, a parameter out of its bounds, open loops, and independent
+joints that do not determine the others."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
     """A number of a configuration and parameters that must not be larger than its bound.
 
     Attributes:
+        kind: what is wrong where it is larger.
         name: what it tells.
         residual: (1, 1).
         bound: (1, 1) or a number.
         sentence: what is wrong where it is larger, and what to do.
     """
 
+    kind: Kind
     name: str
     residual: SX
     bound: SX | float
@@ -69,7 +75,7 @@ def quaternion_rows(system: System, q: SX, parts: Iterable[slice]) -> list[Row]:
         joint = system.coordinates[part.start].joint
         away = casadi.fabs(casadi.norm_2(q[part]) - 1)
         wrong = f"the quaternion of {joint} is not of unit length; divide it by its length"
-        rows.append(Row(f"quaternion of {joint}", away, UNIT, wrong))
+        rows.append(Row("quaternion", f"quaternion of {joint}", away, UNIT, wrong))
     return rows
 
 
@@ -93,10 +99,10 @@ def _bound_rows(name: str, value: SX, bounds: Bounds) -> list[Row]:
     rows = []
     if low is not None:
         wrong = f"{name} is too small; {out_of_bounds(-math.inf, low, None)}"
-        rows.append(Row(f"least value of {name}", -value, -low, wrong))
+        rows.append(Row("parameter", f"least value of {name}", -value, -low, wrong))
     if high is not None:
         wrong = f"{name} is too large; {out_of_bounds(math.inf, None, high)}"
-        rows.append(Row(f"greatest value of {name}", value, high, wrong))
+        rows.append(Row("parameter", f"greatest value of {name}", value, high, wrong))
     return rows
 
 

@@ -53,7 +53,7 @@ example all clean test install help package edit_cache rebuild_cache m c dl rt p
 """)
 _SUFFIXES = _words("""
 eval alloc_mem init_mem free_mem checkout release incref decref n_in n_out name_in name_out
-default_in sparsity_in sparsity_out work work_bytes
+default_in sparsity_in sparsity_out work work_bytes check start step motion state watched
 """)
 _OF_CASADI = ("null", "jac", "hess")
 
@@ -90,7 +90,8 @@ def check_function_names(names: Sequence[str], where: str) -> None:
                 f"{where}: {name!r} is a name of C; give another one, as in"
                 f" {{'my_{name}': function}}"
             )
-        for made in (name, f"{name.upper()}_SZ_W", *(f"{name}_{suffix}" for suffix in _SUFFIXES)):
+        sizes = (f"{name.upper()}_SZ_W", f"{name.upper()}_STEP_SZ_W")
+        for made in (name, *sizes, *(f"{name}_{suffix}" for suffix in _SUFFIXES)):
             if made in owner:
                 raise ModelError(
                     f"{where}: functions {owner[made]!r} and {name!r} would both make {made} in C;"

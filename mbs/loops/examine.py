@@ -128,8 +128,14 @@ def loop_rows(system: System, q: SX) -> list[Row]:
     """
     _, leads, opening = posture_health(system)(q, system.p)
     return [
-        Row("opening of the loops", opening, OPEN, "the loops are open"),
-        Row("hold of the independent joints, negative", -leads, -_LED, "the posture is singular"),
+        Row("open", "opening of the loops", opening, OPEN, "the loops are open"),
+        Row(
+            "undetermined",
+            "hold of the independent joints, negative",
+            -leads,
+            -_LED,
+            "the independent joints do not determine the others",
+        ),
     ]
 
 

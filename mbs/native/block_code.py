@@ -33,6 +33,8 @@ class BlockCode:
     sincos: str
 
     kind: ClassVar[str] = "double"
+    scalar: ClassVar[str] = "double"
+    zero: ClassVar[str] = "0.0"
 
     def block(self, name: str, number: int, steps: Sequence[Step]) -> str:
         """A C function: loads what earlier ones left, computes, stores what later ones need."""
@@ -42,7 +44,7 @@ class BlockCode:
         outputs = (k for k in range(len(self.graph.outputs)) if f"o{k}" in used)
         head = [
             f"static {'NOINLINE ' if self.where.blocks > 1 else ''}void {name}"
-            f"(const double *const *in, {self.kind} *const *out, {self.kind} *restrict w)",
+            f"(const {self.scalar} *const *in, {self.kind} *const *out, {self.kind} *restrict w)",
             "{",
             "  (void)in, (void)out, (void)w;",
             *(f"  {self.input(k)};" for k in inputs),
@@ -71,7 +73,7 @@ class BlockCode:
 
     def input(self, number: int) -> str:
         """The declaration of an input."""
-        return f"const double *restrict i{number} = in[{number}]"
+        return f"const {self.scalar} *restrict i{number} = in[{number}]"
 
     def stored(self, number: int) -> str:
         """A node as an output takes it."""
@@ -98,8 +100,9 @@ class BlockCode:
             places = [element for _, element, _ in elements]
             for first, last in _runs(places):
                 target, length = f"o{k}[{first}]", last - first + 1
-                if text == "0.0" and length >= _MANY_ZEROS:
-                    lines.append(f"  memset(&{target}, 0, {length} * sizeof(double));")
+                if text == self.zero and length >= _MANY_ZEROS:
+                    size = f"{length} * sizeof({self.scalar})"
+                    lines.append(f"  memset(&{target}, 0, {size});")
                 else:
                     lines += [f"  o{k}[{place}] = {text};" for place in range(first, last + 1)]
         return lines

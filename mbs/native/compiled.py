@@ -116,13 +116,17 @@ def generated(functions: Iterable[casadi.Function], **options: Any) -> str:
     """
     generator = casadi.CodeGenerator("generated", options)
     for function in functions:
-        _check_names(function)
+        require_names(function)
         generator.add(function)
     return str(generator.dump())
 
 
-def _check_names(function: casadi.Function) -> None:
-    """CasADi writes names of inputs and outputs into comments and strings as they are."""
+def require_names(function: casadi.Function) -> None:
+    """Refuse names of inputs and outputs that comments and strings of C cannot hold as they are.
+
+    Raises:
+        ModelError: says which.
+    """
     for part in (function, *function.find_functions()):
         for name in (*part.name_in(), *part.name_out()):
             if name != in_c_comment(name) or '"' in name:

@@ -75,14 +75,27 @@ def expression(
     Raises:
         ModelError: the operation has no equivalent in C's library.
     """
+    write = written or operand
+    return form_of(graph, number).format(*(write(graph, n) for n in graph.operands(number)))
+
+
+def form_of(graph: Graph, number: int) -> str:
+    """The C expression of a node with places for its operands, as `str.format` takes it.
+
+    Args:
+        graph: has it.
+        number: of the node.
+
+    Raises:
+        ModelError: the operation has no equivalent in C's library.
+    """
     op = graph.nodes[number].op
     form = BINARY.get(op) or _UNARY.get(op)
     if form is None:
         raise ModelError(
             f"{graph.name}: operation {op} of CasADi has no C equivalent; compile without fast"
         )
-    write = written or operand
-    return form.format(*(write(graph, n) for n in graph.operands(number)))
+    return form
 
 
 def operand(graph: Graph, number: int) -> str:

@@ -49,7 +49,7 @@ def test_bytes_that_are_no_state_are_refused(fmu):
         v.valueReference for v in fmu.description.modelVariables if v.causality == "parameter"
     )
     wrong = [(flags, "=i", x) for x in (0, 3, 4, 8, 64, -1)]
-    wrong += [(flags + 4 * k, "=i", 2) for k in (2, 3, 4)]
+    wrong += [(flags + 4 * k, "=i", x) for k, x in ((2, 2), (3, 2), (4, 3))]
     wrong += [(time, "=d", np.nan), (tolerance, "=d", np.inf), (tolerance, "=d", 0.0)]
     wrong += [(at, "=d", np.nan), (parameter, "=d", -1.0)]
     n = fmu.description.numberOfContinuousStates  # the last are the slopes of the solver

@@ -250,7 +250,7 @@ def test_what_is_no_function(tmp_path, functions, message):
 
 
 def test_a_system_is_no_function(tmp_path):
-    with pytest.raises(ModelError, match="is not a Function; give"):
+    with pytest.raises(ModelError, match="four_bar is a System, whose motion bare libraries have"):
         mbs.export.c_library(mbs.load("four_bar").assemble(), tmp_path / "lib")
     with pytest.raises(ExportError, match="3 is not a path"):
         mbs.export.c_library(example(), 3)

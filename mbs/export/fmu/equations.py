@@ -42,7 +42,7 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
     if model.closure is not None:
         loop, whole = [x, z, _own(model, p)], [x, z, p]
         answers.append(casadi.Function("mbs_closure", whole, _dense(model.closure.call(loop))))
-        answers.append(casadi.Function("mbs_sensitivity", whole, [_steepness(model, loop)]))
+        answers.append(casadi.Function("mbs_sensitivity", whole, [_steep(model, loop)]))
         if model.slopes is not None:
             J = casadi.densify(model.slopes.call(loop)[0])
             answers.append(casadi.Function("mbs_slopes", whole, [J]))
@@ -198,19 +198,31 @@ def _own(model: FmuModel, p: casadi.MX) -> casadi.MX:
     return own
 
 
-def _steepness(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
+def _steep(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
+    assert model.closure is not None
+    return steepness(model.closure, loop, (model.states, model.parameters, model.dependents))
+
+
+def steepness(
+    closure: casadi.Function,
+    loop: list[casadi.MX],
+    variables: tuple[Sequence[FmuVariable], Sequence[FmuVariable], Sequence[FmuVariable]],
+) -> casadi.MX:
     """How many nominal sizes z moves when x and p change by about their own size.
 
     It is huge where rank is lost; p is there for postures where x and z lose it together.
+
+    Args:
+        closure: `closure(x, z, p)` as `FmuModel` has it.
+        loop: x, z and p.
+        variables: of x, p and z.
     """
-    assert model.closure is not None
     _, z, p = loop
-    dx = casadi.DM(
-        [v.nominal * w for v, w in zip(model.states, _weights(model.states), strict=True)]
-    )
-    dp = p * casadi.DM(_weights(model.parameters))
-    dz = _forward(model.closure, loop, [casadi.MX(dx), casadi.MX(z.numel(), 1), dp])[0]
-    sizes = casadi.DM([v.nominal for v in model.dependents])
+    states, parameters, dependents = variables
+    dx = casadi.DM([v.nominal * w for v, w in zip(states, _weights(states), strict=True)])
+    dp = p * casadi.DM(_weights(parameters))
+    dz = _forward(closure, loop, [casadi.MX(dx), casadi.MX(z.numel(), 1), dp])[0]
+    sizes = casadi.DM([v.nominal for v in dependents])
     return casadi.norm_inf(casadi.vec(dz) / sizes)
 
 

@@ -16,6 +16,7 @@ _CORE = (
     "inputs.c",
     "derivatives.c",
     "closure.c",
+    "watch.c",
     "guard.c",
     "charts.c",
     "solver.c",
@@ -24,7 +25,16 @@ _CORE = (
     "cosimulation.c",
     "saved.c",
 )
-_CORE_HEADERS = ("core.h", "internal.h", "closure.h", "guard.h", "charts.h", "solver.h")
+_CORE_HEADERS = (
+    "core.h",
+    "internal.h",
+    "real.h",
+    "closure.h",
+    "watch.h",
+    "guard.h",
+    "charts.h",
+    "solver.h",
+)
 _RUNTIME = ("stepper", "events", "dense", "passage")
 _TABLEAU = "dopri5"
 """What steps through singular configurations take, whichever the solver is."""

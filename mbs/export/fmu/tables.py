@@ -205,10 +205,14 @@ def _size_tables(model: FmuModel) -> list[str]:
 
 
 def _blocks(model: FmuModel) -> tuple[Block, ...]:
-    """The diagonal blocks of the slopes of the closure; none where they are not watched."""
-    if model.slopes is None:
+    return diagonal_blocks(model.slopes)
+
+
+def diagonal_blocks(slopes: casadi.Function | None) -> tuple[Block, ...]:
+    """The diagonal blocks of the slopes of a closure; none where they are not watched."""
+    if slopes is None:
         return ()
-    pattern = np.array(casadi.DM(model.slopes.sparsity_out(0), 1)) != 0
+    pattern = np.array(casadi.DM(slopes.sparsity_out(0), 1)) != 0
     return block_triangular(pattern) or ()
 
 

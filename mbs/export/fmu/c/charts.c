@@ -27,7 +27,7 @@ typedef struct {
 static int by_joints(core *c, const double *x, found *f) {
     double z[NZ + 1];
     int i;
-    if (closure_solve(c, x, z) || core_call_rhs(c, c->m.time, x, z, f->rate, f->y)) return 1;
+    if (closure_solve(&c->loops, x, z) || core_call_rhs(c, c->m.time, x, z, f->rate, f->y)) return 1;
     for (i = 0; i < NX; i++) f->X[MODEL_TREE_STATES[i]] = x[i];
     for (i = 0; i < NZ; i++) f->X[MODEL_TREE_DEPENDENTS[i]] = z[i];
     for (i = 0; i < N_PASSIVE; i++) f->X[MODEL_TREE_PASSIVE[i]] = f->y[PASSIVE_V + i];
@@ -147,9 +147,15 @@ static core_status begin(core *c) {
     return choose(c, 1.0);
 }
 
+/* The joints are the states outside. */
+static void show_joints(core *c) {
+    int i;
+    for (i = 0; i < NX; i++) c->m.values[SLOTS + i] = c->m.values[STATES + i];
+}
+
 core_status charts_start(core *c) {
     passage_start(c->passage);
-    memcpy(c->m.values + SLOTS, c->m.values + STATES, NX * sizeof(double));
+    show_joints(c);
     return begin(c);
 }
 
@@ -157,7 +163,7 @@ core_status charts_set(core *c) {
     core_status status = c->m.charts.tangent ? core_refresh(c) : CORE_OK;
     c->m.charts.tangent = 0;
     c->m.charts.loose = 1;
-    memcpy(c->m.values + SLOTS, c->m.values + STATES, NX * sizeof(double));
+    show_joints(c);
     return status;
 }
 

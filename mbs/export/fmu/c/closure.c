@@ -1,59 +1,68 @@
 #include "closure.h"
 
+#include "core.h"
+
 #include <math.h>
 #include <string.h>
 
 #if NZ > 0
 
-#define RESIDUAL 1e-12   /* largest closure row, for coordinates of size 1 */
-#define MOVE 1e-9        /* largest last Newton move: the next one would be its square */
-#define NEXT 1e-15       /* largest next Newton move, as the last two of them foretell it */
+#ifdef REAL_IS_FLOAT /* rows are sums of some ten roundings of 6e-8 */
+#define RESIDUAL REAL(2e-6)
+#define MOVE REAL(3e-4)
+#define NEXT REAL(1e-7)
+#else
+#define RESIDUAL REAL(1e-12) /* largest closure row, for coordinates of size 1 */
+#define MOVE REAL(1e-9)      /* largest last Newton move: the next one would be its square */
+#define NEXT REAL(1e-15)     /* largest next Newton move, as the last two of them foretell it */
+#endif
 #define ITERATIONS 30
-#define REACH 0.5        /* largest Newton move, in nominal sizes, that stays on the branch */
-#define SMALLEST (1.0 / 1024)
-#define STEEPEST 1e4     /* nominal sizes that dependents move for one nominal size of the states */
-#define TRIALS 64        /* postures from which a branch is looked for */
-#define RANGE 3.14159265358979 /* of them about the start values, in nominal sizes */
-#define ALIKE 1e-3       /* weight of the coordinates that were not guessed */
+#define REACH REAL(0.5) /* largest Newton move, in nominal sizes, that stays on the branch */
+#define SMALLEST REAL(0.0009765625)
+#define STEEPEST REAL(1e4) /* nominal sizes that dependents move for one of the states */
+#define TRIALS 64          /* postures from which a branch is looked for */
+#define RANGE REAL(3.14159265358979) /* of them about the start values, in nominal sizes */
+#define ALIKE REAL(1e-3)             /* weight of the coordinates that were not guessed */
+#define UNBOUNDED REAL(HUGE_VAL)
 
 /* Where a Newton iteration stands: largest row before its last move, and that move. */
 typedef struct {
-    double residual, move;
+    real residual, move;
 } progress;
 
 /* The closure holds; or rows and moves shrink together so fast that it does after this move. */
-static int converged(progress now, progress before, double size) {
-    double ratio = now.move / before.move;
+static int converged(progress now, progress before, real size) {
+    real ratio = now.move / before.move;
     if (now.residual < RESIDUAL * size && now.move < MOVE * size) return 1;
-    return now.residual < 10 * ratio * before.residual &&
+    return now.residual < REAL(10.0) * ratio * before.residual &&
            now.move * ratio * ratio < NEXT * size;
 }
 
 /* One Newton step at x, z to next. */
-static int newton_step(core *c, const double *x, const double *z, double *next, double *residual) {
-    c->arg[0] = x;
-    c->arg[1] = z;
-    c->arg[2] = c->m.values + PARAMETERS;
-    c->res[0] = next;
-    c->res[1] = residual;
-    return mbs_closure(c->arg, c->res, c->iw, c->w, 0) || !isfinite(*residual);
+static int newton_step(const loops *l, const real *x, const real *z, real *next, real *residual) {
+    l->arg[0] = x;
+    l->arg[1] = z;
+    l->arg[2] = l->p;
+    l->res[0] = next;
+    l->res[1] = residual;
+    return mbs_closure(l->arg, l->res, l->iw, l->w, 0) || !real_finite(*residual);
 }
 
 /* Newton steps at x from z. reach: largest move that is trusted, in nominal sizes. */
-static int newton(core *c, const double *x, double *z, double reach) {
-    progress before = {0.0, HUGE_VAL};
-    double next[NZ];
+static int newton(const loops *l, const real *x, real *z, real reach) {
+    progress before = {REAL(0.0), UNBOUNDED};
+    real next[NZ];
     int k, i;
     for (k = 0; k < ITERATIONS; k++) {
-        progress now = {0.0, 0.0};
-        double size = 1.0;
-        if (newton_step(c, x, z, next, &now.residual)) return CLOSURE_SINGULAR;
+        progress now = {REAL(0.0), REAL(0.0)};
+        real size = REAL(1.0);
+        if (newton_step(l, x, z, next, &now.residual)) return CLOSURE_SINGULAR;
         for (i = 0; i < NZ; i++) {
-            double step = fabs(next[i] - z[i]);
-            if (!isfinite(step)) return CLOSURE_SINGULAR;
+            real step = real_abs(next[i] - z[i]);
+            if (!real_finite(step)) return CLOSURE_SINGULAR;
             if (step > reach * MODEL_NOMINAL[DEPENDENTS + i]) return CLOSURE_OPEN;
-            size = fmax(size, fabs(next[i]));
-            now.move = fmax(now.move, step);
+            size = real_max(size, real_abs(next[i]));
+            now.move = real_max(now.move, step);
         }
         memcpy(z, next, sizeof next);
         if (converged(now, before, size)) return CLOSURE_OK;
@@ -63,22 +72,22 @@ static int newton(core *c, const double *x, double *z, double reach) {
 }
 
 /* From the accepted posture to x in one go, or along a straight line in shorter ones. */
-int closure_solve(core *c, const double *x, double *z) {
-    const double *from = c->m.posture_x;
-    double at[NX + 1], trial[NZ], done = 0.0, part = 1.0;
+SHARED int closure_solve(const loops *l, const real *x, real *z) {
+    const real *from = l->x;
+    real at[NX + 1], trial[NZ], done = REAL(0.0), part = REAL(1.0);
     int i, status;
-    memcpy(z, c->m.posture_z, sizeof trial);
-    while (done < 1.0) {
-        double to = fmin(1.0, done + part);
-        for (i = 0; i < NX; i++) at[i] = to < 1.0 ? from[i] + to * (x[i] - from[i]) : x[i];
+    memcpy(z, l->z, sizeof trial);
+    while (done < REAL(1.0)) {
+        real to = real_min(REAL(1.0), done + part);
+        for (i = 0; i < NX; i++) at[i] = to < REAL(1.0) ? from[i] + to * (x[i] - from[i]) : x[i];
         memcpy(trial, z, sizeof trial);
-        status = newton(c, at, trial, REACH);
+        status = newton(l, at, trial, REACH);
         if (status == CLOSURE_OK) {
             memcpy(z, trial, sizeof trial);
             done = to;
-            part *= 2;
+            part *= REAL(2.0);
         } else {
-            part /= 2;
+            part /= REAL(2.0);
             if (part < SMALLEST) return status;
         }
     }
@@ -86,36 +95,43 @@ int closure_solve(core *c, const double *x, double *z) {
 }
 
 /* z at x on the branch of the model's start values. */
-static int from_start(core *c, const double *x, double *z) {
-    const double *start = MODEL_START + DEPENDENTS;
+static int from_start(const loops *l, const real *x, real *z) {
+    const real *start = MODEL_START + DEPENDENTS;
     memcpy(z, start, NZ * sizeof *z);
-    if (newton(c, MODEL_START + STATES, z, HUGE_VAL) == CLOSURE_OK) {
-        memcpy(c->m.posture_x, MODEL_START + STATES, NX * sizeof *x);
-        memcpy(c->m.posture_z, z, NZ * sizeof *z);
-        if (closure_solve(c, x, z) == CLOSURE_OK) return CLOSURE_OK;
+    if (newton(l, MODEL_START + STATES, z, UNBOUNDED) == CLOSURE_OK) {
+        memcpy(l->x, MODEL_START + STATES, NX * sizeof *x);
+        memcpy(l->z, z, NZ * sizeof *z);
+        if (closure_solve(l, x, z) == CLOSURE_OK) return CLOSURE_OK;
     }
     memcpy(z, start, NZ * sizeof *z);
-    return newton(c, x, z, HUGE_VAL);
+    return newton(l, x, z, UNBOUNDED);
 }
 
-static int guessed(const core *c, int i) { return c->m.guess[i] != MODEL_START[DEPENDENTS + i]; }
+static int guessed(const loops *l, int i) { return l->guess[i] != MODEL_START[DEPENDENTS + i]; }
+
+static int any_guessed(const loops *l) {
+    int i;
+    for (i = 0; i < NZ; i++)
+        if (guessed(l, i)) return 1;
+    return 0;
+}
 
 /* How far z is from the guesses and, with little weight, from the start values of the others. */
-static double miss(const core *c, const double *z) {
-    double far = 0.0, unlike = 0.0;
+static real miss(const loops *l, const real *z) {
+    real far = REAL(0.0), unlike = REAL(0.0);
     int i;
     for (i = 0; i < NZ; i++) {
-        double d = fabs(z[i] - c->m.guess[i]) / MODEL_NOMINAL[DEPENDENTS + i];
-        if (guessed(c, i))
-            far = fmax(far, d);
+        real d = real_abs(z[i] - l->guess[i]) / MODEL_NOMINAL[DEPENDENTS + i];
+        if (guessed(l, i))
+            far = real_max(far, d);
         else
-            unlike = fmax(unlike, d);
+            unlike = real_max(unlike, d);
     }
     return far + ALIKE * unlike;
 }
 
 /* Numbers from -1 to 1, the same in every run. */
-static double scattered(unsigned k, unsigned i) {
+static real scattered(unsigned k, unsigned i) {
     unsigned s = (k * 7919u + i * 104729u + 1u) & 0xffffffffu;
     int turn;
     for (turn = 0; turn < 3; turn++) {
@@ -123,16 +139,16 @@ static double scattered(unsigned k, unsigned i) {
         s ^= s >> 17;
         s ^= (s << 5) & 0xffffffffu;
     }
-    return s / 2147483648.0 - 1.0;
+    return (real)s / REAL(2147483648.0) - REAL(1.0);
 }
 
 /* Where trial k starts: at the guesses; the other coordinates at the start values, near the posture
  * that continues them, or anywhere. */
-static void trial_start(const core *c, int k, const double *near, double *z) {
+static void trial_start(const loops *l, int k, const real *near, real *z) {
     int i;
     for (i = 0; i < NZ; i++) {
-        z[i] = c->m.guess[i];
-        if (guessed(c, i)) continue;
+        z[i] = l->guess[i];
+        if (guessed(l, i)) continue;
         if (k == 1) z[i] = near[i];
         if (k > 1)
             z[i] += RANGE * MODEL_NOMINAL[DEPENDENTS + i] * scattered((unsigned)k, (unsigned)i);
@@ -141,16 +157,16 @@ static void trial_start(const core *c, int k, const double *near, double *z) {
 
 /* Of the posture on the start values' branch and of those that Newton steps reach from other
  * places, the nearest to the guesses: a single guess is enough to choose a branch. */
-static int near_guesses(core *c, const double *x, double *z) {
-    double near[NZ], trial[NZ], best = HUGE_VAL;
-    int k, status = from_start(c, x, near);
+static int near_guesses(const loops *l, const real *x, real *z) {
+    real near[NZ], trial[NZ], best = UNBOUNDED;
+    int k, status = from_start(l, x, near);
     if (status) memcpy(near, MODEL_START + DEPENDENTS, sizeof near);
     memcpy(z, near, sizeof near);
-    if (status == CLOSURE_OK) best = miss(c, z);
+    if (status == CLOSURE_OK) best = miss(l, z);
     for (k = 0; k < TRIALS; k++) {
-        trial_start(c, k, near, trial);
-        if (newton(c, x, trial, HUGE_VAL) == CLOSURE_OK && miss(c, trial) < best) {
-            best = miss(c, trial);
+        trial_start(l, k, near, trial);
+        if (newton(l, x, trial, UNBOUNDED) == CLOSURE_OK && miss(l, trial) < best) {
+            best = miss(l, trial);
             memcpy(z, trial, sizeof trial);
             status = CLOSURE_OK;
         }
@@ -158,33 +174,33 @@ static int near_guesses(core *c, const double *x, double *z) {
     return status;
 }
 
-int closure_start(core *c, const double *x, double *z) {
-    return c->m.guessed ? near_guesses(c, x, z) : from_start(c, x, z);
+SHARED int closure_start(const loops *l, const real *x, real *z) {
+    return any_guessed(l) ? near_guesses(l, x, z) : from_start(l, x, z);
 }
 
-int closure_singular(core *c, const double *x, const double *z) {
-    double steepness = 0.0;
-    c->arg[0] = x;
-    c->arg[1] = z;
-    c->arg[2] = c->m.values + PARAMETERS;
-    c->res[0] = &steepness;
-    return mbs_sensitivity(c->arg, c->res, c->iw, c->w, 0) || !(steepness < STEEPEST);
+SHARED int closure_singular(const loops *l, const real *x, const real *z) {
+    real steepness = REAL(0.0);
+    l->arg[0] = x;
+    l->arg[1] = z;
+    l->arg[2] = l->p;
+    l->res[0] = &steepness;
+    return mbs_sensitivity(l->arg, l->res, l->iw, l->w, 0) || !(steepness < STEEPEST);
 }
 
 #else
 
-int closure_solve(core *c, const double *x, double *z) {
-    (void)c, (void)x, (void)z;
+SHARED int closure_solve(const loops *l, const real *x, real *z) {
+    (void)l, (void)x, (void)z;
     return CLOSURE_OK;
 }
 
-int closure_start(core *c, const double *x, double *z) {
-    (void)c, (void)x, (void)z;
+SHARED int closure_start(const loops *l, const real *x, real *z) {
+    (void)l, (void)x, (void)z;
     return CLOSURE_OK;
 }
 
-int closure_singular(core *c, const double *x, const double *z) {
-    (void)c, (void)x, (void)z;
+SHARED int closure_singular(const loops *l, const real *x, const real *z) {
+    (void)l, (void)x, (void)z;
     return 0;
 }
 

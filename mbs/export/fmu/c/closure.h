@@ -1,18 +1,34 @@
-/* Dependent coordinates of closed loops, by Newton steps from a known posture. */
+/* Dependent coordinates of closed loops, by Newton steps from a known posture.
+ *
+ * FMUs and bare C libraries share this file and watch.h: no heap, no stdio, nothing kept between
+ * calls, and numbers are `real`, see real.h.
+ */
 #ifndef MBS_CLOSURE_H
 #define MBS_CLOSURE_H
 
-#include "core.h"
+#include "model.h"
+#include "real.h"
 
 enum { CLOSURE_OK, CLOSURE_OPEN, CLOSURE_SINGULAR };
 
+/* What a run knows of its loops. */
+typedef struct {
+    real *x, *z;       /* the last accepted posture */
+    const real *guess; /* of z at the start; where it is not MODEL_START, it chooses the branch */
+    const real *p;     /* parameters */
+    const real **arg;  /* scratch of the generated functions */
+    real **res;
+    long long *iw;
+    real *w;
+} loops;
+
 /* z of the posture x, on the branch of the last accepted posture. */
-int closure_solve(core *c, const double *x, double *z);
+SHARED int closure_solve(const loops *l, const real *x, real *z);
 
 /* The first posture of a run: from the guesses, by way of the start values of the states. */
-int closure_start(core *c, const double *x, double *z);
+SHARED int closure_start(const loops *l, const real *x, real *z);
 
 /* 1 where a small change of the states moves the dependent coordinates almost without bound. */
-int closure_singular(core *c, const double *x, const double *z);
+SHARED int closure_singular(const loops *l, const real *x, const real *z);
 
 #endif

@@ -122,7 +122,7 @@ static core_status closure_failed(core *c, int status) {
 }
 
 core_status core_accept_posture(core *c, const double *x, const double *z) {
-    if (closure_singular(c, x, z)) return closure_failed(c, CLOSURE_SINGULAR);
+    if (closure_singular(&c->loops, x, z)) return closure_failed(c, CLOSURE_SINGULAR);
     memcpy(c->m.posture_x, x, NX * sizeof *x);
     memcpy(c->m.posture_z, z, NZ * sizeof *z);
     c->m.closed = 1;
@@ -131,7 +131,7 @@ core_status core_accept_posture(core *c, const double *x, const double *z) {
 
 core_status core_accept_states(core *c) {
     const double *x = c->m.values + STATES;
-    int status = closure_solve(c, x, c->z);
+    int status = closure_solve(&c->loops, x, c->z);
     return status ? closure_failed(c, status) : core_accept_posture(c, x, c->z);
 }
 
@@ -177,7 +177,7 @@ core_status core_refresh(core *c) {
         return show_joints(c);
     }
 #endif
-    status = c->m.closed ? closure_solve(c, x, c->z) : closure_start(c, x, c->z);
+    status = c->m.closed ? closure_solve(&c->loops, x, c->z) : closure_start(&c->loops, x, c->z);
     if (status) return closure_failed(c, status);
     if (c->m.mode == INITIALIZATION && core_first_modes(c)) return CORE_ERROR;
     if (core_call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
@@ -244,6 +244,12 @@ static void to_start(core *c) {
     memcpy(c->m.guess, MODEL_START + DEPENDENTS, NZ * sizeof *c->m.guess);
 }
 
+static void init_loops(core *c) {
+    loops l = {c->m.posture_x, c->m.posture_z, c->m.guess, c->m.values + PARAMETERS,
+               c->arg,         c->res,         c->iw,      c->w};
+    c->loops = l;
+}
+
 core *core_new(const char *name, int cosimulation, core_logger log, void *host) {
     core *c = calloc(1, sizeof *c);
     if (!c) return NULL;
@@ -262,6 +268,7 @@ core *core_new(const char *name, int cosimulation, core_logger log, void *host) 
         return NULL;
     }
     core_init_events(c);
+    init_loops(c);
     return c;
 }
 

@@ -9,8 +9,10 @@
 
 #include <stddef.h>
 
+#include "closure.h"
 #include "model.h"
 #include "solver.h"
+#include "watch.h"
 
 enum {
     STATES = 0,
@@ -71,14 +73,6 @@ typedef struct {
     int event, early; /* an event waits to be handled; the step ended before its end */
 } core_stop;
 
-/* What is watched between accepted configurations: guard.h. */
-typedef struct {
-    int on;
-    double time;
-    double sign[NB + 1];
-    double v[N_PASSIVE + 1], a[N_PASSIVE + 1]; /* of the dependent joints */
-} core_watched;
-
 #if MODEL_TREE_OUTSIDE
 /* Which coordinates the states are read in: charts.h. */
 typedef struct {
@@ -94,7 +88,6 @@ typedef struct {
     int mode, cosimulation;
     int stale;   /* the calculated values do not belong to the others any more */
     int closed;  /* a posture that closes the loops is known */
-    int guessed; /* the host gave guesses of the dependent coordinates, other than the start */
     int inputs;  /* a core_input_motion */
     double time, tolerance, stop; /* stop: the end of the experiment, HUGE_VAL where none is given */
     double values[N_VALUES + 1];
@@ -102,7 +95,7 @@ typedef struct {
     double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
     double input_time;                  /* to which the inputs and their derivatives belong */
     double slopes[INPUT_ORDERS * NU + 1]; /* first derivatives of all inputs, then second ones */
-    core_watched watched;
+    watched watched;
     double offset[NK + 1]; /* added to an indicator that has not left zero yet: hysteresis */
     double events[EVENTS_MEMORY(NK)];
 #ifdef MODEL_TREE
@@ -137,6 +130,7 @@ typedef struct {
     double **res;
     long long *iw;
     double *w;
+    loops loops; /* points into this instance */
 } core;
 
 typedef struct core_state core_state;

@@ -23,25 +23,29 @@ static int in_chart(const core *c) {
 #endif
 }
 
+/* Where a reference has its seed; the kinds of variables follow each other, some of them empty. */
 static double *known_of(const core *c, tangents *d, unsigned ref) {
-    if (ref < DERIVATIVES && !in_chart(c)) return d->dx + (ref - STATES);
-    if (ref >= SLOTS && ref < RATES) return d->dslot + (ref - SLOTS);
-    if (ref >= INPUTS && ref < OUTPUTS) return d->du + (ref - INPUTS);
-    if (ref >= PARAMETERS && ref < MODES) return d->dp + (ref - PARAMETERS);
     if (ref == TIME_REFERENCE && c->timed) return &d->dt;
-    return NULL;
+    if (ref < DERIVATIVES) return in_chart(c) ? NULL : d->dx + (ref - STATES);
+    if (ref < INPUTS) return NULL;
+    if (ref < OUTPUTS) return d->du + (ref - INPUTS);
+    if (ref < PARAMETERS) return NULL;
+    if (ref < MODES) return d->dp + (ref - PARAMETERS);
+    if (ref < SLOTS) return NULL;
+    return ref < RATES ? d->dslot + (ref - SLOTS) : NULL;
 }
 
 static double *unknown_of(tangents *d, unsigned ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref < INPUTS) return d->dxdot + (ref - DERIVATIVES);
-    if (ref >= OUTPUTS && ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
-    if (ref >= MODES && ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
-    if (ref >= DEPENDENTS && ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
-    if (ref >= INDICATORS && ref < SLOTS) return d->dg + (ref - INDICATORS);
-    if (ref >= SLOTS && ref < RATES) return d->dslot + (ref - SLOTS);
-    if (ref >= RATES && ref < CHART) return d->drate + (ref - RATES);
-    return NULL;
+    if (ref < OUTPUTS) return NULL;
+    if (ref < PARAMETERS) return d->dy + (ref - OUTPUTS);
+    if (ref < MODES) return NULL;
+    if (ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
+    if (ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
+    if (ref < SLOTS) return d->dg + (ref - INDICATORS);
+    if (ref < RATES) return d->dslot + (ref - SLOTS);
+    return ref < CHART ? d->drate + (ref - RATES) : NULL;
 }
 
 /* All references can be used, all seeds are finite, and the calculated values are up to date. */

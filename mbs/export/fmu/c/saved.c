@@ -113,7 +113,7 @@ static int sane_inputs(const core_memory *m) {
            isfinite(m->input_time) && all_finite(m->slopes, INPUT_ORDERS * NU);
 }
 
-static int sane_watch(const core_watched *w) {
+static int sane_watch(const watched *w) {
     int i;
     for (i = 0; i < NB; i++)
         if (w->on && w->sign[i] != 1.0 && w->sign[i] != -1.0) return 0;
@@ -142,8 +142,7 @@ static int sane_charts(const core_charts *m) {
 static int sane(const core_memory *m) {
     const double *v = m->values;
     int i;
-    if (!possible_mode(m) || !is_flag(m->stale) || !is_flag(m->closed) || !is_flag(m->guessed))
-        return 0;
+    if (!possible_mode(m) || !is_flag(m->stale) || !is_flag(m->closed)) return 0;
     if (!isfinite(m->time) || !isfinite(m->tolerance) || !(m->tolerance > 0.0)) return 0;
     if (isnan(m->stop)) return 0;
     if (!all_finite(v + STATES, NX) || !all_finite(v + INPUTS, NU)) return 0;

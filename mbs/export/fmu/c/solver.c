@@ -9,14 +9,14 @@
 
 static int rhs(void *user, double t, const double *x, double *xdot) {
     core *c = user;
-    return closure_solve(c, x, c->z) || core_call_rhs(c, t, x, c->z, xdot, NULL);
+    return closure_solve(&c->loops, x, c->z) || core_call_rhs(c, t, x, c->z, xdot, NULL);
 }
 
 #ifdef MODEL_RODAS
 static int jacobian(void *user, double t, const double *x, double *J, double *f_t) {
     core *c = user;
     double du[NU + 1];
-    if (closure_solve(c, x, c->z)) return 1;
+    if (closure_solve(&c->loops, x, c->z)) return 1;
     core_point(c, &t, x, c->z);
     core_input_rates(c, t, du);
     c->arg[5] = du;
@@ -42,7 +42,7 @@ static int tree_rhs(void *user, double t, const double *x, double *xdot) {
 
 static int tree_project(void *user, double t, double *x) {
     core *c = user;
-    double moved[NT], residual;
+    double moved[NT], residual = HUGE_VAL;
     int k, i;
     if (!passage_project(c->passage, t, x)) return 0;
     for (k = 0; k < ITERATIONS; k++) {

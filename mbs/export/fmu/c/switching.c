@@ -36,6 +36,7 @@ static core_status step_failed(core *c, int status) {
         "an event indicator has no value (unclosable or singular posture)",
         "a jump has no solution", "its jumps do not come to an end",
         "chattering, events follow each other and time stands still"};
+    const char *why = status < (int)(sizeof reason / sizeof *reason) ? reason[status] : "";
     char names[512] = "";
     size_t used = 0;
     int k;
@@ -45,9 +46,9 @@ static core_status step_failed(core *c, int status) {
                                      used ? ", " : "; it concerns ", MODEL_INDICATORS[k]);
     if (status >= EVENTS_JUMP_FAILED)
         return core_no_answer(c, "%s: the event at time %.9g cannot be handled: %s%s", c->name,
-                              c->m.time, reason[status], names);
+                              c->m.time, why, names);
     return core_no_answer(c, "%s: integration stopped at time %.9g with step %.3g: %s", c->name,
-                          c->m.time, stepper_wanted_step(&c->solver), reason[status]);
+                          c->m.time, stepper_wanted_step(&c->solver), why);
 }
 
 /* What moves: the coordinates of the tree, or the states. */
@@ -121,7 +122,7 @@ core_status core_step(core *c, double limit) {
 
 /* The arguments of a function of events; dependents of the states alone have to be found. */
 static int place(core *c, const double *t, const double *x) {
-    if (!ON_TREE(c) && closure_solve(c, x, c->z)) return 1;
+    if (!ON_TREE(c) && closure_solve(&c->loops, x, c->z)) return 1;
     core_point(c, t, x, c->z);
     return 0;
 }

@@ -15,13 +15,16 @@ static core_status known_reference(core *c, unsigned ref) {
                        (int)N_VALUES - 1);
 }
 
-static int is_mode(unsigned ref) { return ref >= MODES && ref < DEPENDENTS; }
+/* Whether a reference is one of a kind, of which there may be none. */
+static int among(unsigned ref, unsigned first, unsigned end) { return ref - first < end - first; }
+
+static int is_mode(unsigned ref) { return among(ref, MODES, DEPENDENTS); }
 
 /* 1 for what is there without calculation. */
 static int given(const core *c, unsigned ref) {
     if (ref < DERIVATIVES) return !NS || (c->m.mode & (INSTANTIATED | INITIALIZATION)) != 0;
-    if (ref >= INPUTS && ref < OUTPUTS) return 1;
-    if (ref >= SLOTS && ref < RATES) return !(c->m.mode & (INSTANTIATED | INITIALIZATION));
+    if (among(ref, INPUTS, OUTPUTS)) return 1;
+    if (among(ref, SLOTS, RATES)) return !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     return ref >= PARAMETERS && ref < (c->m.mode == INITIALIZATION ? MODES : DEPENDENTS);
 }
 
@@ -33,7 +36,7 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     for (i = 0; i < n && !status; i++) status = known_reference(c, ref[i]);
     for (i = 0; i < n && !status; i++) {
         unsigned r = ref[i];
-        if (r >= INDICATORS && r < SLOTS)
+        if (among(r, INDICATORS, SLOTS))
             status = core_show_indicators(c);
 #if MODEL_TREE_OUTSIDE
         else if (r == CHART)
@@ -41,8 +44,8 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
 #endif
         else if (!given(c, r))
             status = core_refresh(c);
-        values[i] = r >= INPUTS && r < OUTPUTS ? core_inputs(c, c->m.time)[r - INPUTS]
-                                               : c->m.values[r];
+        values[i] = among(r, INPUTS, OUTPUTS) ? core_inputs(c, c->m.time)[r - INPUTS]
+                                              : c->m.values[r];
     }
     return status;
 }
@@ -72,13 +75,13 @@ core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values) 
 static int settable(const core *c, unsigned ref) {
     int before = INSTANTIATED | INITIALIZATION;
     if (ref < DERIVATIVES && NS) return c->m.cosimulation ? before : before | EVENT;
-    if (ref < DERIVATIVES || (ref >= SLOTS && ref < RATES))
+    if (ref < DERIVATIVES || among(ref, SLOTS, RATES))
         return c->m.cosimulation ? before : before | EVENT | CONTINUOUS;
     if (ref < INPUTS) return 0;
     if (ref < OUTPUTS) return before | RUNNING;
     if (ref < PARAMETERS) return 0;
     if (ref < MODES) return MODEL_FIXED[ref] ? before : before | EVENT | STEP;
-    return ref >= DEPENDENTS && ref < INDICATORS ? before : 0;
+    return among(ref, DEPENDENTS, INDICATORS) ? before : 0;
 }
 
 /* The smallest normal number as a bound means more than zero. */
@@ -107,7 +110,7 @@ static core_status settable_value(core *c, unsigned ref, double value) {
         return core_refuse(c, "%s: %s cannot be set %s", c->name, name, core_mode_name(c->m.mode));
     if (!isfinite(value))
         return core_refuse(c, "%s: %s = %g is not finite", c->name, name, value);
-    return ref >= PARAMETERS && ref < MODES ? within_bounds(c, ref, value) : CORE_OK;
+    return among(ref, PARAMETERS, MODES) ? within_bounds(c, ref, value) : CORE_OK;
 }
 
 /* Something that the slopes depend on changed. */
@@ -121,12 +124,8 @@ static void changed(core *c) {
 
 /* A guess equal to the start value in the model description says nothing: many hosts write all. */
 static void set_guess(core *c, unsigned ref, double value) {
-    int i;
     if (c->m.guess[ref - DEPENDENTS] == value) return;
     c->m.guess[ref - DEPENDENTS] = value;
-    c->m.guessed = 0;
-    for (i = 0; i < NZ; i++)
-        if (c->m.guess[i] != MODEL_START[DEPENDENTS + i]) c->m.guessed = 1;
     changed(c);
 }
 
@@ -163,7 +162,7 @@ core_status core_set(core *c, const unsigned *ref, size_t n, const double *value
         } else if (c->m.values[ref[i]] != values[i]) {
             if (joints_set(c, ref[i])) return CORE_ERROR;
             c->m.values[ref[i]] = values[i];
-            if (ref[i] < DERIVATIVES && NS) c->m.values[SLOTS + ref[i]] = values[i];
+            if (among(ref[i], STATES, STATES + NS)) c->m.values[SLOTS + ref[i]] = values[i];
             changed(c);
         }
     }

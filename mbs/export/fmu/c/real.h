@@ -1,0 +1,15 @@
+/* The numbers of what FMUs and bare C libraries share; a bare library has its own text in its place. */
+#ifndef MBS_REAL_H
+#define MBS_REAL_H
+
+#include <math.h>
+
+typedef double real;
+#define REAL(number) number
+#define SHARED
+#define real_abs fabs
+#define real_max fmax
+#define real_min fmin
+#define real_finite isfinite
+
+#endif

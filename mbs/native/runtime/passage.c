@@ -652,7 +652,7 @@ static void error_of(const passage *g, double h, double *error) {
 static int chart_attempt(passage *g, const double *x, double h) {
     stepper *s = g->s;
     double t = stepper_time(s), a = 0.0, *candidate = stepper_candidate(s);
-    int nq = g->size.nq, nv = g->size.nv, ny, i, j, k, status = prepare(g, t, x);
+    int nq = g->size.nq, nv = g->size.nv, ny, begun, i, j, k, status = prepare(g, t, x);
     if (status) return status;
     ny = 2 * g->d + g->size.nz;
     g->sigma = HUGE_VAL;
@@ -667,7 +667,10 @@ static int chart_attempt(passage *g, const double *x, double h) {
         if (status) return status;
         for (i = 0; i < nv; i++) a = fmax(a, fabs(g->full[k][nq + i]));
     }
-    if (!s->cut && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
+    /* a step may end in the singular configuration at a limit, or where it began in one: a slow
+     * start leaves it in many steps */
+    begun = g->memory[BASE_TIME] != t || memcmp(g->memory + BASE, x, sizeof *x * (size_t)s->n);
+    if (!s->cut && !begun && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
         return STEPPER_ENDS_SINGULAR;
     for (i = 0; i < s->n; i++) { /* where the stages lead, without the rows */
         double sum = 0.0;

@@ -16,8 +16,8 @@ REASONS = {
     "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
     "around it; start elsewhere, or end the run before",
     "undetermined": "the motion starts in a singular configuration, where branches of motion meet, "
-    "and its velocities are those of none of them; give velocities of one branch to all joints, or "
-    "start beside it",
+    "and its velocities are those of no branch with the mobility of the mechanism; give velocities "
+    "of one branch to all joints, or start beside it",
     "finite": "a value is not finite; look for a singularity",
     "indicators": "an event indicator has no value there",
     "jump": "the jump of an event has no value there",

@@ -48,6 +48,9 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
  * from half of it, and so on. */
 #define BACK 0.05
 #define BACKS 6
+/* Part of its velocities by which such a start may miss those of the branch: what a mean of values
+ * beside it errs by is 1e-9, and what misses by more carries energy that the branch does not. */
+#define STRAY 1e-6
 #define MASSLESS 1e-10 /* part of the largest pivot of the inertia matrix below which one is none */
 
 /* places in memory */
@@ -585,10 +588,21 @@ static int coordinates_of(passage *g, double t, const double *x, double *y) {
     return 0;
 }
 
+/* 1 where velocities of a start are not those of the state on the branch. */
+static int strays(const passage *g, const double *x, const double *on) {
+    int first = g->size.nq, i;
+    double speed = 0.0, miss = 0.0;
+    for (i = first; i < first + g->size.nv; i++) {
+        speed = fmax(speed, fabs(x[i]));
+        miss = fmax(miss, fabs(x[i] - on[i]));
+    }
+    return !(miss <= STRAY * speed);
+}
+
 /* The chart at a state where it is regular, else at the last one that was; and the state in it. */
 static int prepare(passage *g, double t, const double *x) {
     double *m = g->memory, part;
-    int n = g->s->n;
+    int n = g->s->n, first = !(m[BASED] > 0.0);
     if (g->ready && t == g->ready_time && !memcmp(x, g->ready_x, sizeof(double) * (size_t)n))
         return STEPPER_OK;
     g->ready = 0;
@@ -600,7 +614,8 @@ static int prepare(passage *g, double t, const double *x) {
         m[BASED] = 1.0;
         m[BASE_TIME] = t;
         memcpy(m + BASE, x, sizeof(double) * (size_t)n);
-    } else if (!(m[BASED] > 0.0)) {
+        first = 0;
+    } else if (first) {
         if (base_behind(g, t, x)) return STEPPER_UNDETERMINED;
     } else if (evaluate(g, &g->base, m[BASE_TIME], m + BASE) || factor(g, &g->base)) {
         return STEPPER_SINGULAR;
@@ -608,6 +623,11 @@ static int prepare(passage *g, double t, const double *x) {
     if (coordinates_of_base(g)) return STEPPER_SINGULAR;
     if (g->size.moving) particular(g, &g->base, g->drift);
     if (coordinates_of(g, t, x, g->own)) return STEPPER_SINGULAR;
+    if (first) {
+        g->sigma = HUGE_VAL;
+        if (slope(g, t, g->own, g->at, g->full[0], g->slopes[0]) || strays(g, x, g->at))
+            return STEPPER_UNDETERMINED;
+    }
     memcpy(g->ready_x, x, sizeof(double) * (size_t)n);
     g->ready_time = t;
     g->ready = 1;

@@ -156,6 +156,48 @@ def test_a_start_in_a_singular_configuration_with_velocities_of_one_branch(syste
     assert np.abs(result["a0.q"] - result["a1.q"]).max() < 1e-8
 
 
+@pytest.mark.parametrize("speed", [1e-2, -1e-5])
+def test_a_slow_start_leaves_a_singular_configuration(systems, speed):
+    """Gravity turns the first one back through the configuration that it starts in."""
+    v0 = [speed, -speed, speed]
+    for tolerance in (1e-4, 1e-8):
+        result = mbs.simulate.run(
+            systems["parallelogram"], 1.0, q0=[0.0] * 3, v0=v0, tolerance=tolerance, quiet=True
+        )
+        assert result["a0.q"][-1] < -3.0
+        assert np.abs(result["a0.q"] - result["a1.q"]).max() < 1e-8
+        assert energy_error(result) < tolerance
+
+
+@pytest.mark.parametrize("speed", [2.0, -1e-2])
+@pytest.mark.parametrize(
+    ("name", "along"),
+    [
+        ("antiparallelogram", (1.0, -1.0, 1.0)),
+        ("antiparallelogram", (-3.0, 7.0, 7.0)),
+        ("kite", (0.0, 1.0, 1.0)),
+        ("kite", (11.0, -8.0, 8.0)),
+    ],
+)
+def test_either_branch_is_left_on_from_where_they_cross(systems, name, along, speed):
+    v0 = list(speed * np.array(along) / np.max(np.abs(along)))
+    for tolerance in (1e-4, 1e-9):
+        result = mbs.simulate.run(
+            systems[name], 1.0, q0=[0.0] * 3, v0=v0, tolerance=tolerance, quiet=True
+        )
+        assert result["j1.v"][0] == pytest.approx(v0[0], abs=1e-12)
+        assert energy_error(result) < tolerance
+
+
+@pytest.mark.parametrize("miss", [1e-2, 1e-4])
+def test_velocities_that_nearly_are_those_of_a_branch_are_refused(systems, miss):
+    """What misses carries energy, which would be lost in silence."""
+    with pytest.raises(SolverError, match=r"velocities of one branch.*hold b0"):
+        mbs.simulate.run(
+            systems["parallelogram"], 1.0, q0=[0.0] * 3, v0=[1, -1 - miss, 1 - miss], quiet=True
+        )
+
+
 @pytest.mark.parametrize("v0", [None, [1.0, -1.5, 0.5]], ids=["rest", "between branches"])
 def test_a_start_that_chooses_no_branch_is_refused(systems, v0):
     """The error names the configuration, the joint, and what would decide."""

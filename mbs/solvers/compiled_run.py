@@ -33,14 +33,15 @@ _REASONS = {
     6: "finite",
     7: "singular",
     8: "singular",
-    9: "singular",
-    10: "undetermined",
-    11: "indicators",
-    12: "jump",
-    13: "settle",
-    14: "standstill",
+    9: "near miss",
+    10: "singular",
+    11: "undetermined",
+    12: "indicators",
+    13: "jump",
+    14: "settle",
+    15: "standstill",
 }
-_CROWDED = (13, 14)
+_CROWDED = (14, 15)
 _RUNTIME = ("stepper", "dopri5")
 
 

@@ -15,6 +15,9 @@ REASONS = {
     "look for a singular posture",
     "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
     "around it; start elsewhere, or end the run before",
+    "near miss": "branches of motion come near each other and do not meet, by so little that what "
+    "turns there cannot be told from what goes on; make the branches meet, or miss by more, or ask "
+    "for a looser tolerance",
     "undetermined": "the motion starts in a singular configuration, where branches of motion meet, "
     "and its velocities are those of no branch with the mobility of the mechanism; give velocities "
     "of one branch to all joints, or start beside it",
@@ -32,7 +35,7 @@ class Failure(Exception):
     """An evaluation had no answer, so the step must be shortened."""
 
 
-_SINGULAR = ("singular", "undetermined", "projection")
+_SINGULAR = ("singular", "near miss", "undetermined", "projection")
 
 
 def failed(

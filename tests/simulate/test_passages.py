@@ -125,14 +125,28 @@ def test_output_times_do_not_change_the_motion(systems):
     assert energy_error(result) < 1e-4
 
 
-@pytest.mark.parametrize(("longer", "tolerance"), [(1e-7, 1e-7), (1e-7, 1e-9), (1e-9, 1e-5)])
-def test_near_misses_pass(longer, tolerance):
+@pytest.mark.parametrize("longer", [1e-5, -1e-5, 1e-7, -1e-7, 1e-8, -1e-8])
+def test_near_misses_turn_whatever_the_tolerance(longer):
     """Lengths that miss a + g = b + c by a little: the branches come near and do not meet."""
     system = linkage((0.4, 0.9, 0.7 + longer, 1.2), (1.0, -0.5, 1.5))
-    result = mbs.simulate.run(
-        system, 3.0, v0={"j1": 6.0}, tolerance=tolerance, step=0.05, quiet=True
-    )
-    assert energy_error(result) < 5 * tolerance
+    ends = []
+    for tolerance in (1e-3, 1e-5, 1e-7, 1e-9):
+        result = mbs.simulate.run(
+            system, 3.0, v0={"j1": 6.0}, tolerance=tolerance, step=0.05, quiet=True
+        )
+        assert energy_error(result) < 5 * tolerance
+        assert result["closure_residual"].max() < 1e-13
+        ends.append([result[f"{joint}.q"][-1] for joint in ("j1", "j2", "j4")])
+    assert np.ptp(ends, axis=0).max() < 5e-3
+
+
+@pytest.mark.parametrize("longer", [1e-9, -1e-11])
+def test_misses_that_rounding_hides_are_passed_or_named(longer):
+    system = linkage((0.4, 0.9, 0.7 + longer, 1.2), (1.0, -0.5, 1.5))
+    result = mbs.simulate.run(system, 3.0, v0={"j1": 6.0}, tolerance=1e-5, quiet=True)
+    assert energy_error(result) < 1e-5
+    with pytest.raises(SolverError, match=r"^linkage: .*come near each other.*configuration is j1"):
+        mbs.simulate.run(system, 3.0, v0={"j1": 6.0}, tolerance=1e-9, quiet=True)
 
 
 def test_a_prescribed_crank_passes_flat(systems):

@@ -48,6 +48,10 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
  * from half of it, and so on. */
 #define BACK 0.05
 #define BACKS 6
+#define HALVINGS 25 /* of a step, to where its rows become dependent: 3e-8 of it */
+/* Largest row there of branches that meet: more is a mechanism whose branches only come near each
+ * other. Positions are on the rows to 1e-13, and lengths have rounding of 1e-16. */
+#define APART 1e-13
 /* Part of its velocities by which such a start may miss those of the branch: what a mean of values
  * beside it errs by is 1e-9, and what misses by more carries energy that the branch does not. */
 #define STRAY 1e-6
@@ -86,10 +90,12 @@ struct passage {
     double *dense;        /* (5, n) */
     double *at, *side, *sum;       /* points (n,), a sum of them */
     double *K, *r, *y, *w, *G;     /* scratch */
+    double *across;       /* (5, n) of a step that is tried */
     double *ready_x;
     double ready_time, least, sigma, most;
     double turned; /* how far the tangents have turned from the chart: 1 at its origin, 0 across */
     int d, ready, charted, kept, watch, singular, lasting;
+    int missed; /* branches that come near each other were met since the last full step */
 };
 
 /* Solve L y = b, or L' y = b, in place; L (n, n) by columns. */
@@ -669,6 +675,116 @@ static void error_of(const passage *g, double h, double *error) {
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
 
+/* The dense output of the stages in the chart. */
+static void dense_of(const passage *g, const double *x, double h, double *dense) {
+    const double *y = stepper_candidate(g->s);
+    int n = g->s->n, i, j;
+    for (i = 0; i < n; i++) {
+        double rise = y[i] - x[i], bend = h * g->full[0][i] - rise, sum = 0.0;
+        for (j = 0; j < 7; j++) sum += DOPRI5_D[j] * g->full[j][i];
+        dense[i] = x[i];
+        dense[n + i] = rise;
+        dense[2 * n + i] = bend;
+        dense[3 * n + i] = rise - h * g->full[6][i] - bend;
+        dense[4 * n + i] = h * sum;
+    }
+}
+
+/* The rows of velocities that the base chose, and those of the coordinates: square, singular where
+ * the rows are dependent; transposed where asked for. */
+static void square(const passage *g, const passage_rows *rows, int transposed, double *K) {
+    int nq = g->size.nq, nv = g->size.nv, m = g->size.speeds, i, j, k;
+    for (j = 0; j < nv; j++)
+        for (k = 0; k < nv; k++) {
+            double value = 0.0;
+            if (k < g->base.rank)
+                value = rows->J[j * m + g->base.order[k]];
+            else
+                for (i = 0; i < nq; i++)
+                    value += g->C[i * g->d + k - g->base.rank] * rows->N[j * nq + i];
+            K[transposed ? k * nv + j : j * nv + k] = value;
+        }
+}
+
+/* The side of the singular configuration on which a point is, by the sign of a determinant. */
+static int side_of(const passage *g, const passage_rows *rows) {
+    double *A = g->K;
+    int n = g->size.nv, sign = 1, i, j, k;
+    square(g, rows, 0, A);
+    for (k = 0; k < n; k++) {
+        int pivot = k;
+        for (i = k + 1; i < n; i++)
+            if (fabs(A[k * n + i]) > fabs(A[k * n + pivot])) pivot = i;
+        if (!(fabs(A[k * n + pivot]) > 0.0)) return 0;
+        for (j = k; j < n && pivot != k; j++) {
+            double kept = A[j * n + k];
+            A[j * n + k] = A[j * n + pivot];
+            A[j * n + pivot] = kept;
+        }
+        if ((A[k * n + k] < 0.0) != (pivot != k)) sign = -sign;
+        for (i = k + 1; i < n; i++) {
+            double part = A[k * n + i] / A[k * n + k];
+            for (j = k + 1; j < n; j++) A[j * n + i] -= part * A[j * n + k];
+        }
+    }
+    return sign;
+}
+
+/* How far the rows are from holding where they are dependent: what of them no move of the positions
+ * changes there, zero where branches of motion meet. */
+static double gap_of(const passage *g, const passage_rows *rows) {
+    int n = g->size.nv, first = g->size.speeds - g->size.anchors, i, turn;
+    double *y = g->y, most = 0.0, sum = 0.0;
+    for (i = 0; i < n; i++) y[i] = 1.0;
+    for (turn = 0; turn < 2; turn++) { /* towards the null vectors on the right and on the left */
+        square(g, rows, turn, g->K);
+        if (solve(g->K, n, y, 1)) return 0.0;
+        for (most = 0.0, i = 0; i < n; i++) most = fmax(most, fabs(y[i]));
+        for (i = 0; i < n; i++) y[i] /= most;
+    }
+    for (most = 0.0, i = 0; i < g->base.rank; i++) {
+        int row = g->base.order[i], held = row >= first && row < g->size.speeds;
+        most = fmax(most, fabs(y[i]));
+        sum += y[i] * (rows->place[row] - (held ? g->base.rows.place[row] : 0.0));
+    }
+    return most > 0.0 ? fabs(sum) / most : 0.0;
+}
+
+/* 1 where a step goes across a singular configuration, though the branches there only come near
+ * each other and a motion that stays on its own turns. With f = gap + k s w, s along the one and w
+ * along the other, sigma is sqrt(2 k gap) where it turns; what is below AWAY floors is passed as if
+ * the branches met. */
+static int jumps(passage *g, const double *x, double h) {
+    double t = stepper_time(g->s), low = 0.0, high = 1.0, speed = 0.0, gap, *at = g->at;
+    double sigma = g->here.sigma;
+    int n = g->s->n, nq = g->size.nq, nv = g->size.nv, before, i, j, k;
+    const double *v = stepper_candidate(g->s) + nq;
+    if (g->base.rank == 0 || g->singular) return 0;
+    for (j = 0; j < nv; j++) { /* |v| in the metric of M = L L' */
+        double sum = 0.0;
+        for (i = j; i < nv; i++) sum += g->here.M[j * nv + i] * v[i];
+        speed += sum * sum;
+    }
+    before = side_of(g, &g->base.rows);
+    if (rows_at(g, t + h, stepper_candidate(g->s), &g->here.rows)) return 0;
+    if (before * side_of(g, &g->here.rows) >= 0) return 0;
+    dense_of(g, x, h, g->across);
+    for (k = 0; k < HALVINGS; k++) {
+        double middle = 0.5 * (low + high);
+        dopri5_interpolate(g->across, n, middle, at);
+        if (rows_at(g, t + middle * h, at, &g->here.rows)) return 0;
+        if (before * side_of(g, &g->here.rows) > 0)
+            low = middle;
+        else
+            high = middle;
+    }
+    gap = gap_of(g, &g->here.rows);
+    if (gap > APART) g->missed = 1;
+    if (!(speed > 0.0) || !(high < 1.0)) return 0;
+    gap *= 2.0 * sigma / ((1.0 - high) * h * sqrt(speed));
+    return sqrt(gap) > AWAY * FLOOR * g->memory[SIGMA];
+}
+
 static int chart_attempt(passage *g, const double *x, double h) {
     stepper *s = g->s;
     double t = stepper_time(s), a = 0.0, *candidate = stepper_candidate(s);
@@ -692,6 +808,7 @@ static int chart_attempt(passage *g, const double *x, double h) {
     begun = g->memory[BASE_TIME] != t || memcmp(g->memory + BASE, x, sizeof *x * (size_t)s->n);
     if (!s->cut && !begun && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
         return STEPPER_ENDS_SINGULAR;
+    if (jumps(g, x, h)) return STEPPER_CHART_LEFT;
     for (i = 0; i < s->n; i++) { /* where the stages lead, without the rows */
         double sum = 0.0;
         for (j = 0; j < 6; j++) sum += DOPRI5_A[6][j] * g->full[j][i];
@@ -731,16 +848,21 @@ static int attempt(stepper *s, const double *x, double h) {
         status = g->inner->attempt(s, x, h);
         g->watch = 0;
         if (!status) g->least = fmin(g->least, regularity_at(g, t + h, stepper_candidate(s)));
-        if (g->least >= on) return status;
+        if (g->least >= on) {
+            g->missed = 0;
+            return status;
+        }
     }
     g->charted = 1;
-    return chart_attempt(g, x, h);
+    status = chart_attempt(g, x, h);
+    if (g->missed && (status == STEPPER_SINGULAR || status == STEPPER_ENDS_SINGULAR))
+        return STEPPER_NEAR_MISS;
+    return status;
 }
 
 static void keep(stepper *s, const double *x, double h) {
     passage *g = s->passage;
     double *m = g->memory, t = stepper_time(s) + h, *y = stepper_candidate(s), value;
-    int n = s->n, i, j;
     value = regularity_at(g, t, y);
     m[RISE] = (value - m[REGULARITY]) / h;
     m[REGULARITY] = value;
@@ -750,15 +872,7 @@ static void keep(stepper *s, const double *x, double h) {
         g->inner->keep(s, x, h);
         return;
     }
-    for (i = 0; i < n; i++) {
-        double rise = y[i] - x[i], bend = h * g->full[0][i] - rise, sum = 0.0;
-        for (j = 0; j < 7; j++) sum += DOPRI5_D[j] * g->full[j][i];
-        g->dense[i] = x[i];
-        g->dense[n + i] = rise;
-        g->dense[2 * n + i] = bend;
-        g->dense[3 * n + i] = rise - h * g->full[6][i] - bend;
-        g->dense[4 * n + i] = h * sum;
-    }
+    dense_of(g, x, h, g->dense);
 }
 
 static int close(stepper *s, double t) {
@@ -809,7 +923,7 @@ void passage_start(passage *g) {
     passage_forget(g);
 }
 
-void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = g->lasting = 0; }
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = g->lasting = g->missed = 0; }
 
 /* The chart as memory tells it. */
 static int restored(passage *g) {
@@ -923,6 +1037,7 @@ static size_t lay(passage *g, double *block) {
     g->y = take(block, &used, ny);
     g->w = take(block, &used, ny);
     g->G = take(block, &used, nv * nv);
+    g->across = take(block, &used, 5 * n);
     g->ready_x = take(block, &used, n);
     return used;
 }

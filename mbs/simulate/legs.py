@@ -96,34 +96,36 @@ def integrated(
 
     Returns:
         the legs that were reached, one at least; None where they reach the last time, or else why
-        they do not: at a singular configuration the message says which one, and the joint that the
-        loops do not hold there.
+        they do not: the message says when and in which configuration, and at a singular one the
+        joint that the loops do not hold.
     """
     legs, stop = _integrated(system, equations, x0, times, p, **options)
-    if isinstance(stop, SolverError) and stop.singular and stop.state and system.is_closed:
+    if isinstance(stop, SolverError) and stop.state:
+        q = np.array(stop.state[: system.nq])
+        where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
+        lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
         stop = SolverError(
-            f"{system.name}: {stop}; {_lost(system, np.array(stop.state[: system.nq]), p)}",
+            f"{system.name}: {stop}; the configuration is {where}{lost}",
             state=stop.state,
-            singular=True,
+            singular=stop.singular,
             time=stop.time,
         )
     return legs, stop
 
 
 def _lost(system: System, q: Array, p: Sequence[float]) -> str:
-    """A configuration in words, and the joint that moves most in what the rows hold least there."""
-    where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
+    """The joint that moves most in what the rows hold least at a configuration, in words."""
     found = scales(system)
     J = np.array(constraint_jacobian(system)(q, np.array(p, dtype=float)))
     J = J * found.rows.reshape(-1, 1) * found.columns([speed.unit for speed in system.speeds])
     assert system.closure is not None
     rank = system.nv - system.closure.mobility
     if not rank or not np.isfinite(J).all():
-        return f"the configuration is {where}"
+        return ""
     free = np.linalg.svd(J)[2][rank - 1 :]  # as many directions as are free there, at the least
     moves = np.round(np.sum(free**2, axis=0), 6)  # the first of joints that move alike
     name = system.speeds[int(np.argmax(moves))].name
-    return f"the configuration is {where}, and the loops hardly hold {name} there"
+    return f", and the loops hardly hold {name} there"
 
 
 def _integrated(

@@ -22,7 +22,8 @@ REASONS = {
     "and its velocities are those of no branch with the mobility of the mechanism; give velocities "
     "of one branch to all joints, or start beside it",
     "finite": "a value is not finite; look for a singularity",
-    "indicators": "an event indicator has no value there",
+    "indicators": "an event indicator has no value there; look for efforts or laws that have none, "
+    "or a singular configuration",
     "jump": "the jump of an event has no value there",
     "settle": "the events there do not settle, each jump asks for another one; "
     "let the jump make the indicators positive, or zero and rising",

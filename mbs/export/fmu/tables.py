@@ -48,6 +48,8 @@ _HEADER = """\
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
+/* 1 for states that the dependents follow from */
+extern const char MODEL_LEADS[];
 {arrays}/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
 extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
 
@@ -140,6 +142,7 @@ def source(model: FmuModel, *, adjoint: bool) -> str:
         _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
         _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
+        *_lead_tables(model),
         *_size_tables(model),
         *_block_tables(_blocks(model)),
         *_tree_tables(model),
@@ -179,6 +182,14 @@ def _tree_tables(model: FmuModel) -> list[str]:
         _table("const int MODEL_TREE_HELD", map(str, tree.held)),
         _numbers("MODEL_TREE_UNITS", (1 / unit for unit in tree.units)),
     ]
+
+
+def _lead_tables(model: FmuModel) -> list[str]:
+    """Which states the dependents follow from: positions, and no velocities."""
+    if model.closure is None:
+        return []
+    leads = np.array(casadi.DM(model.closure.jac_sparsity(0, 0), 1)).any(axis=0)
+    return [_table("const char MODEL_LEADS", (str(int(one)) for one in leads))]
 
 
 def _size_tables(model: FmuModel) -> list[str]:

@@ -12,6 +12,13 @@
 #define REACH 0.5        /* largest Newton move, in nominal sizes, that stays on the branch */
 #define SMALLEST (1.0 / 1024)
 #define STEEPEST 1e4     /* nominal sizes that dependents move for one nominal size of the states */
+/* A start is followed from the start values in steps of this length at most, of the states that lead the
+ * dependents, in nominal sizes; the first one is shorter and tells the slope. */
+#define STRIDE 0.2
+#define FIRST 1e-3
+/* Part of a move by which the dependents may end beside where their slope leads: on another branch
+ * they differ by about the difference of the slopes, on the same one by half the step. */
+#define BENT 0.1
 #define TRIALS 64        /* postures from which a branch is looked for */
 #define RANGE 3.14159265358979 /* of them about the start values, in nominal sizes */
 #define ALIKE 1e-3       /* weight of the coordinates that were not guessed */
@@ -85,14 +92,49 @@ int closure_solve(core *c, const double *x, double *z) {
     return CLOSURE_OK;
 }
 
-/* z at x on the branch of the model's start values. */
+/* From the accepted posture to x along a straight line, on the branch that the slopes lead to: it also
+ * goes on where branches cross. */
+static int follow(core *c, const double *x, double *z) {
+    const double *from = c->m.posture_x, *size = MODEL_NOMINAL;
+    double at[NX + 1], trial[NZ], slope[NZ] = {0}, length = 0.0, largest, part, done = 0.0;
+    int i, known = 0, status;
+    for (i = 0; i < NX; i++)
+        if (MODEL_LEADS[i]) length = fmax(length, fabs(x[i] - from[i]) / size[STATES + i]);
+    largest = fmin(1.0, STRIDE / fmax(length, STRIDE));
+    part = length > 0.0 ? FIRST * largest : 1.0;
+    memcpy(z, c->m.posture_z, sizeof trial);
+    while (done < 1.0) {
+        double to = fmin(1.0, done + part);
+        for (i = 0; i < NX; i++) at[i] = to < 1.0 ? from[i] + to * (x[i] - from[i]) : x[i];
+        for (i = 0; i < NZ; i++) trial[i] = z[i] + (to - done) * slope[i];
+        status = newton(c, at, trial, REACH);
+        for (i = 0; i < NZ && status == CLOSURE_OK && known; i++) {
+            double off = fabs(trial[i] - z[i] - (to - done) * slope[i]);
+            double most = fmax(length * size[DEPENDENTS + i], fabs(slope[i]));
+            if (off > BENT * (to - done) * most) status = CLOSURE_OPEN;
+        }
+        if (status != CLOSURE_OK) {
+            part /= 2;
+            if (part < SMALLEST * FIRST * largest) return status;
+            continue;
+        }
+        for (i = 0; i < NZ; i++) slope[i] = (trial[i] - z[i]) / (to - done);
+        memcpy(z, trial, sizeof trial);
+        known = 1;
+        done = to;
+        part = fmin(2 * part, largest);
+    }
+    return CLOSURE_OK;
+}
+
+/* z at x on the branch of the model's start values; near them where parameters open the loops. */
 static int from_start(core *c, const double *x, double *z) {
     const double *start = MODEL_START + DEPENDENTS;
     memcpy(z, start, NZ * sizeof *z);
     if (newton(c, MODEL_START + STATES, z, HUGE_VAL) == CLOSURE_OK) {
         memcpy(c->m.posture_x, MODEL_START + STATES, NX * sizeof *x);
         memcpy(c->m.posture_z, z, NZ * sizeof *z);
-        if (closure_solve(c, x, z) == CLOSURE_OK) return CLOSURE_OK;
+        return follow(c, x, z);
     }
     memcpy(z, start, NZ * sizeof *z);
     return newton(c, x, z, HUGE_VAL);

@@ -141,9 +141,7 @@ def test_a_flat_sarrus_linkage_lifts_with_the_velocities_that_it_is_given(speed)
     system = sarrus()
     for tolerance in (1e-4, 1e-7, 1e-10):
         v0 = [speed * x for x in LIFT]
-        result = mbs.simulate.run(
-            system, 1.0, q0=[0.0] * 5, v0=v0, tolerance=tolerance, quiet=True
-        )
+        result = mbs.simulate.run(system, 1.0, q0=[0.0] * 5, v0=v0, tolerance=tolerance, quiet=True)
         energy = result["kinetic_energy"] + result["potential_energy"]
         assert np.ptp(energy) < tolerance * result["kinetic_energy"].max()
         assert result["x2.q"] == pytest.approx(-2 * result["x1.q"], abs=1e-9)

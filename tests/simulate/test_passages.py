@@ -1,33 +1,13 @@
 """Motions through configurations in which the rows of loops become dependent."""
 
+import casadi
 import numpy as np
 import pytest
+from support.change_points import GRAVITY, linkage, rod
 
 import mbs
 from mbs.components import Body, CoulombFriction, Prismatic, Revolute, RigidStop
 from mbs.errors import SolverError
-
-GRAVITY = (0, -9.81, 0)
-
-
-def rod(name, length):
-    inertia = length**3 / 12
-    return Body(name, mass=length, com=(length / 2, 0, 0), inertia=(0, inertia, inertia))
-
-
-def linkage(lengths, guess, more=()):
-    """Crank, coupler, rocker and ground of a four-bar linkage in the vertical plane."""
-    crank, coupler, rocker, ground = lengths
-    m = mbs.Mechanism("linkage", gravity=GRAVITY)
-    a, b, c = (m.add(rod(n, x)) for n, x in zip("abc", (crank, coupler, rocker), strict=True))
-    m.connect(m.world, Revolute("j1", actuated=True), a)
-    m.connect(a.at(crank), Revolute("j2"), b)
-    m.connect(m.world.at(ground), Revolute("j4"), c)
-    m.connect(b.at(coupler), closing := Revolute("j3"), c.at(rocker))
-    m.cut(closing)
-    for element in more:
-        m.add(element)
-    return m.assemble(guess=dict(zip(("j1", "j2", "j4"), guess, strict=True)))
 
 
 def coupling_rod():
@@ -243,3 +223,17 @@ def test_coulomb_friction_acts_through_passages():
     energy = fine["kinetic_energy"] + fine["potential_energy"]
     work = np.trapezoid(fine["dry.effort"] * fine["j1.v"], fine.time)
     assert energy[-1] - energy[0] == pytest.approx(work, abs=1e-3)
+
+
+def test_a_law_without_a_value_is_named_with_its_time_and_configuration():
+    """At the start it is an indicator that has no value, later a rate."""
+    dry = CoulombFriction("dry", joint="j1", sliding=0.3, sticking=0.4)
+    system = linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5), (dry,))
+    for sign, message in ((1, r"t = 0 s: an event indicator.*j1 = 1,"), (-1, r"t = 0\.5 s.*j1 = ")):
+        with pytest.raises(SolverError, match=rf"^linkage: integration stopped at {message}"):
+            mbs.simulate.run(
+                system,
+                1.0,
+                tau=lambda t, q, v, s=sign: casadi.vertcat(casadi.sqrt(s * (t - 0.5)), 0, 0),
+                quiet=True,
+            )

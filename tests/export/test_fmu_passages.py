@@ -109,3 +109,16 @@ def test_a_stop_names_the_system_the_time_and_the_configuration(tmp_path):
     message = r"linkage: integration stopped at time 0\.\d+ \(j1\.q = .*come near each other"
     with pytest.raises(SolverError, match=message):
         fmu(path, 3.0, start={"j1.v": 6.0}, tolerance=1e-11, step=0.5, quiet=True)
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_a_near_miss_turns(tmp_path, kind):
+    """Branches come near each other by 1e-8 and do not meet: a long step went across."""
+    system = linkage((0.4, 0.9, 0.7 + 1e-8, 1.2), (1.0, -0.5, 1.5))
+    path = mbs.export.fmu(system, tmp_path / "linkage.fmu")
+    rough, fine = (
+        fmu(path, 3.0, start={"j1.v": 6.0}, tolerance=x, kind=kind, step=0.02, quiet=True)
+        for x in (1e-6, 1e-9)
+    )
+    assert fine["j4.q"][-1] == pytest.approx(1.7526, abs=1e-3)
+    assert rough["j4.q"][-1] == pytest.approx(fine["j4.q"][-1], abs=0.01)

@@ -675,18 +675,17 @@ static void error_of(const passage *g, double h, double *error) {
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
 
-/* The dense output of the stages in the chart. */
-static void dense_of(const passage *g, const double *x, double h, double *dense) {
-    const double *y = stepper_candidate(g->s);
-    int n = g->s->n, i, j;
+/* The dense output of a step from x to y, with the slopes at its ends: cubic, but for the stages. */
+static void cubic(const passage *g, const double *x, const double *y, double h, const double *first,
+                  const double *last, double *dense) {
+    int n = g->s->n, i;
     for (i = 0; i < n; i++) {
-        double rise = y[i] - x[i], bend = h * g->full[0][i] - rise, sum = 0.0;
-        for (j = 0; j < 7; j++) sum += DOPRI5_D[j] * g->full[j][i];
+        double rise = y[i] - x[i], bend = h * first[i] - rise;
         dense[i] = x[i];
         dense[n + i] = rise;
         dense[2 * n + i] = bend;
-        dense[3 * n + i] = rise - h * g->full[6][i] - bend;
-        dense[4 * n + i] = h * sum;
+        dense[3 * n + i] = rise - h * last[i] - bend;
+        dense[4 * n + i] = 0.0;
     }
 }
 
@@ -754,21 +753,22 @@ static double gap_of(const passage *g, const passage_rows *rows) {
  * each other and a motion that stays on its own turns. With f = gap + k s w, s along the one and w
  * along the other, sigma is sqrt(2 k gap) where it turns; what is below AWAY floors is passed as if
  * the branches met. */
-static int jumps(passage *g, const double *x, double h) {
-    double t = stepper_time(g->s), low = 0.0, high = 1.0, speed = 0.0, gap, *at = g->at;
-    double sigma = g->here.sigma;
+static int jumps(passage *g, double t, const double *x, double h, const double *y,
+                 const double *first, const double *last) {
+    double low = 0.0, high = 1.0, speed = 0.0, gap, *at = g->at, sigma = g->here.sigma;
     int n = g->s->n, nq = g->size.nq, nv = g->size.nv, before, i, j, k;
-    const double *v = stepper_candidate(g->s) + nq;
+    const double *v = y + nq;
     if (g->base.rank == 0 || g->singular) return 0;
     for (j = 0; j < nv; j++) { /* |v| in the metric of M = L L' */
         double sum = 0.0;
         for (i = j; i < nv; i++) sum += g->here.M[j * nv + i] * v[i];
         speed += sum * sum;
     }
-    before = side_of(g, &g->base.rows);
-    if (rows_at(g, t + h, stepper_candidate(g->s), &g->here.rows)) return 0;
+    if (rows_at(g, t, x, &g->here.rows)) return 0;
+    before = side_of(g, &g->here.rows);
+    if (rows_at(g, t + h, y, &g->here.rows)) return 0;
     if (before * side_of(g, &g->here.rows) >= 0) return 0;
-    dense_of(g, x, h, g->across);
+    cubic(g, x, y, h, first, last, g->across);
     for (k = 0; k < HALVINGS; k++) {
         double middle = 0.5 * (low + high);
         dopri5_interpolate(g->across, n, middle, at);
@@ -808,7 +808,7 @@ static int chart_attempt(passage *g, const double *x, double h) {
     begun = g->memory[BASE_TIME] != t || memcmp(g->memory + BASE, x, sizeof *x * (size_t)s->n);
     if (!s->cut && !begun && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
         return STEPPER_ENDS_SINGULAR;
-    if (jumps(g, x, h)) return STEPPER_CHART_LEFT;
+    if (jumps(g, t, x, h, candidate, g->full[0], g->full[6])) return STEPPER_CHART_LEFT;
     for (i = 0; i < s->n; i++) { /* where the stages lead, without the rows */
         double sum = 0.0;
         for (j = 0; j < 6; j++) sum += DOPRI5_A[6][j] * g->full[j][i];
@@ -863,6 +863,7 @@ static int attempt(stepper *s, const double *x, double h) {
 static void keep(stepper *s, const double *x, double h) {
     passage *g = s->passage;
     double *m = g->memory, t = stepper_time(s) + h, *y = stepper_candidate(s), value;
+    int n = s->n, i, j;
     value = regularity_at(g, t, y);
     m[RISE] = (value - m[REGULARITY]) / h;
     m[REGULARITY] = value;
@@ -872,7 +873,12 @@ static void keep(stepper *s, const double *x, double h) {
         g->inner->keep(s, x, h);
         return;
     }
-    dense_of(g, x, h, g->dense);
+    cubic(g, x, y, h, g->full[0], g->full[6], g->dense);
+    for (i = 0; i < n; i++) {
+        double sum = 0.0;
+        for (j = 0; j < 7; j++) sum += DOPRI5_D[j] * g->full[j][i];
+        g->dense[4 * n + i] = h * sum;
+    }
 }
 
 static int close(stepper *s, double t) {
@@ -946,6 +952,11 @@ int passage_chart(passage *g, double t, const double *x) {
 
 int passage_coordinates(passage *g, double t, const double *x, double *y) {
     return restored(g) || coordinates_of(g, t, x, y) ? STEPPER_SINGULAR : STEPPER_OK;
+}
+
+int passage_jumps(passage *g, double t, const double *x, const double *first, double h,
+                  const double *y, const double *last) {
+    return jumps(g, t, x, h, y, first, last);
 }
 
 int passage_state(passage *g, double t, const double *y, const double *guide, double *x,

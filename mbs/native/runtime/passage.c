@@ -10,16 +10,12 @@
 
 /* The regularity is foreseen for this many steps, a little more than the next one. */
 #define AHEAD 1.2
-/* Stages of a full step are looked at where it is below this many times PASSAGE_ON at both ends. */
-#define WATCHED 3.0
 /* Part of the largest sigma below which values are means: rounding reaches u' as its inverse square,
  * 3e-16 / (3e-5)^2 = 3e-7, and beyond it nothing is left; a larger part misses what a motion does
  * beside the singular configuration, as that of a delta robot, whose legs pass one after another. */
 #define FLOOR 3e-5
 #define AWAY 2.0      /* floors from which on a state is regular */
 #define BESIDE 4.0    /* floors between neighbours in means: those next to the middle are regular */
-#define WIDEN 1.6     /* neighbours that are not regular are taken further apart, */
-#define WIDENINGS 8   /* this often: 1.6^8 = 43 times */
 /* Weights of neighbours 1, 2 and 3 on either side: what they give is exact for degree five. */
 static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* sigma_min(C N T), part of its value at the origin, below which the chart has turned too far from
@@ -27,7 +23,6 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define TURNED 0.2
 #define NEWTON 10       /* Newton steps onto the rows; quadratic convergence takes three or four */
 #define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
-#define OPEN 1e-8       /* largest row after that */
 /* Part of the way from the origin by which tangent and curvature may miss the branch: where it is
  * about one, the other branch is as near. */
 #define MISS 0.3
@@ -35,7 +30,6 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
  * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
  * on another branch velocities differ by about their own size. */
 #define BREAK 0.01
-#define SLOW 10.0 /* tolerances that velocities may differ by in any case */
 /* Rounding of u' for accelerations of size one and sigma one: it is added to the tolerance. */
 #define NOISE 3e-16
 /* Where a guide chooses the branch: the largest move from it onto the rows [rad or m], part of its
@@ -44,10 +38,8 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define REACH 0.1
 #define ASTRAY 0.1
 #define IDLE 1e-3
-/* A start in a singular configuration is seen from this far back along its velocity [rad or m], or
- * from half of it, and so on. */
-#define BACK 0.05
-#define BACKS 6
+/* A start in a singular configuration is seen from this far back along its velocity [rad or m]. */
+#define BACK 0.02
 #define HALVINGS 25 /* of a step, to where its rows become dependent: 3e-8 of it */
 /* Largest row there of branches that meet: more is a mechanism whose branches only come near each
  * other. Positions are on the rows to 1e-13, and lengths have rounding of 1e-16. */
@@ -92,9 +84,9 @@ struct passage {
     double *K, *r, *y, *w, *G;     /* scratch */
     double *across;       /* (5, n) of a step that is tried */
     double *ready_x;
-    double ready_time, least, sigma, most;
+    double ready_time, sigma;
     double turned; /* how far the tangents have turned from the chart: 1 at its origin, 0 across */
-    int d, ready, charted, kept, watch, singular, lasting;
+    int d, ready, charted, kept, singular, lasting;
     int missed; /* branches that come near each other were met since the last full step */
 };
 
@@ -419,7 +411,7 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     frame *p = &g->here;
     int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
     const double *u = y + d;
-    double way, moved, size = 0.0, open = 0.0, *v = x + nq, *a = xdot + nq;
+    double way, moved, size = 0.0, *v = x + nq, *a = xdot + nq;
     memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
     if (predict(g, t, y, x, &way)) return STEPPER_SINGULAR;
     memset(v, 0, sizeof(double) * (size_t)nv);
@@ -428,11 +420,6 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     if (moved > MISS * way + LAST_MOVE) return STEPPER_CHART_LEFT;
     if (evaluate(g, p, t, x) || factor(g, p)) return STEPPER_SINGULAR;
     if (p->rank != g->base.rank) return STEPPER_CHART_LEFT;
-    for (i = 0; i < g->size.places; i++) {
-        int held = i >= g->size.speeds - g->size.anchors && i < g->size.speeds;
-        open = fmax(open, fabs(p->rows.place[i] - (held ? g->base.rows.place[i] : 0.0)));
-    }
-    if (!(open < OPEN)) return STEPPER_SINGULAR;
     /* velocities: v = T (C N T)^-1 (u - C N v_p) + v_p */
     memset(v, 0, sizeof(double) * (size_t)nv);
     memcpy(g->w, u, sizeof(double) * (size_t)d);
@@ -527,13 +514,11 @@ static int slope(passage *g, double t, const double *y, double *x, double *xdot,
         if (!(speed > 0.0)) return STEPPER_SINGULAR;
         apart = BESIDE * FLOOR * sqrt(far) / (rho * sqrt(speed));
     }
-    for (i = 0; i < WIDENINGS && apart > 0.0; i++, apart *= WIDEN, shift *= WIDEN) {
-        if (mean_of(g, t, y, apart, along, shift, x, xdot, ydot)) continue;
-        memcpy(x + g->size.nq + g->size.nv, y + 2 * d, sizeof(double) * (size_t)g->size.nz);
-        g->sigma = fmin(g->sigma, FLOOR);
-        return STEPPER_OK;
-    }
-    return STEPPER_SINGULAR;
+    if (!(apart > 0.0) || mean_of(g, t, y, apart, along, shift, x, xdot, ydot))
+        return STEPPER_SINGULAR;
+    memcpy(x + g->size.nq + g->size.nv, y + 2 * d, sizeof(double) * (size_t)g->size.nz);
+    g->sigma = fmin(g->sigma, FLOOR);
+    return STEPPER_OK;
 }
 
 static double regularity_at(passage *g, double t, const double *x) {
@@ -545,40 +530,35 @@ static double regularity_at(passage *g, double t, const double *x) {
 
 /* A regular state behind a singular one, along its velocity; 1 where no branch has this velocity. */
 static int base_behind(passage *g, double t, const double *x) {
-    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, back, turn;
-    double *q = g->at, *v = g->w, speed = 0.0, part, *y = g->y;
+    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, turn;
+    double *q = g->at, *v = g->w, *y = g->y, speed = 0.0, total = 0.0, move = HUGE_VAL, behind, part;
     for (i = 0; i < nv; i++) speed = fmax(speed, fabs(x[nq + i]));
-    if (!(speed > 0.0)) return 1;
-    for (back = 0; back < BACKS; back++) {
-        double s = ldexp(BACK, -back), total = 0.0, behind = t - (g->size.moving ? s / speed : 0.0);
-        memcpy(q, x, sizeof(double) * (size_t)n);
-        if (evaluate(g, &g->here, t, x)) return 1;
-        for (i = 0; i < nv; i++) v[i] = -x[nq + i] * s / speed;
+    if (!(speed > 0.0) || evaluate(g, &g->here, t, x)) return 1;
+    behind = t - (g->size.moving ? BACK / speed : 0.0);
+    memcpy(q, x, sizeof(double) * (size_t)n);
+    for (i = 0; i < nv; i++) v[i] = -x[nq + i] * BACK / speed;
+    for (i = 0; i < nq; i++)
+        for (j = 0; j < nv; j++) q[i] += g->here.rows.N[j * nq + i] * v[j];
+    for (turn = 0; turn < NEWTON && !(move < LAST_MOVE); turn++) {
+        if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
+        memset(y, 0, sizeof(double) * (size_t)nv);
+        along_rows(g, &g->base, g->base.rows.place, y);
+        to_velocity(g, &g->base, y);
+        move = 0.0;
+        for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
         for (i = 0; i < nq; i++)
-            for (j = 0; j < nv; j++) q[i] += g->here.rows.N[j * nq + i] * v[j];
-        for (turn = 0; turn < NEWTON; turn++) {
-            double move = 0.0;
-            if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) break;
-            memset(y, 0, sizeof(double) * (size_t)nv);
-            along_rows(g, &g->base, g->base.rows.place, y);
-            to_velocity(g, &g->base, y);
-            for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
-            for (i = 0; i < nq; i++)
-                for (j = 0; j < nv; j++) q[i] -= g->base.rows.N[j * nq + i] * y[j];
-            total += move;
-            if (move < LAST_MOVE) break;
-        }
-        if (turn == NEWTON || !(total < MISS * s)) continue;
-        if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) continue;
-        part = regularity_at(g, behind, q) / g->memory[LARGEST];
-        if (!(part > AWAY * FLOOR)) continue;
-        g->memory[SIGMA] = g->base.sigma / fmin(part, 1.0);
-        g->memory[BASED] = 1.0;
-        g->memory[BASE_TIME] = behind;
-        memcpy(g->memory + BASE, q, sizeof(double) * (size_t)n);
-        return 0;
+            for (j = 0; j < nv; j++) q[i] -= g->base.rows.N[j * nq + i] * y[j];
+        total += move;
     }
-    return 1;
+    if (!(move < LAST_MOVE) || !(total < MISS * BACK)) return 1;
+    if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
+    part = regularity_at(g, behind, q) / g->memory[LARGEST];
+    if (!(part > AWAY * FLOOR)) return 1;
+    g->memory[SIGMA] = g->base.sigma / fmin(part, 1.0);
+    g->memory[BASED] = 1.0;
+    g->memory[BASE_TIME] = behind;
+    memcpy(g->memory + BASE, q, sizeof(double) * (size_t)n);
+    return 0;
 }
 
 /* y = (xi, u, z) of x */
@@ -644,7 +624,7 @@ static int prepare(passage *g, double t, const double *x) {
  * or a step of this length makes of them. */
 static int left_branch(const passage *g, const double *x, const double *along, double h, double a) {
     int nq = g->size.nq, nv = g->size.nv, i;
-    double v = h * a, move = 0.0, turn = 0.0, zero = SLOW * g->s->atol;
+    double v = h * a, move = 0.0, turn = 0.0, zero = g->s->atol; /* at rest */
     for (i = 0; i < nv; i++) {
         v = fmax(v, fmax(fabs(x[nq + i]), fabs(along[nq + i])));
         turn = fmax(turn, fabs(x[nq + i] - along[nq + i]));
@@ -821,10 +801,6 @@ static int chart_attempt(passage *g, const double *x, double h) {
     return STEPPER_OK;
 }
 
-void passage_look(passage *g, double t, const double *x) {
-    if (g->watch) g->least = fmin(g->least, regularity_at(g, t, x));
-}
-
 /* The least regularity that the next step of this length is thought to meet. */
 static double foreseen(passage *g, double t, const double *x, double h) {
     double *m = g->memory;
@@ -843,12 +819,8 @@ static int attempt(stepper *s, const double *x, double h) {
     g->charted = s->kept_closed = 0;
     s->noise = 0.0;
     if (ahead >= on) {
-        g->least = ahead;
-        g->watch = ahead < WATCHED * on;
         status = g->inner->attempt(s, x, h);
-        g->watch = 0;
-        if (!status) g->least = fmin(g->least, regularity_at(g, t + h, stepper_candidate(s)));
-        if (g->least >= on) {
+        if (status || regularity_at(g, t + h, stepper_candidate(s)) >= on) {
             g->missed = 0;
             return status;
         }
@@ -929,7 +901,7 @@ void passage_start(passage *g) {
     passage_forget(g);
 }
 
-void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = g->lasting = g->missed = 0; }
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = 0; }
 
 /* The chart as memory tells it. */
 static int restored(passage *g) {

@@ -101,7 +101,4 @@ int passage_grip(passage *g, double t, const double *x, const int *held, const d
 /* How independent the rows are, part of the largest value so far. */
 double passage_regularity(passage *g, double t, const double *x);
 
-/* The full step evaluates its right-hand side at x. */
-void passage_look(passage *g, double t, const double *x);
-
 #endif

@@ -23,9 +23,6 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define TURNED 0.2
 #define NEWTON 10       /* Newton steps onto the rows; quadratic convergence takes three or four */
 #define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
-/* Part of the way from the origin by which tangent and curvature may miss the branch: where it is
- * about one, the other branch is as near. */
-#define MISS 0.3
 /* Part of the velocities, or of what they make of a step, by which a state may differ from where the
  * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
  * on another branch velocities differ by about their own size. */
@@ -40,10 +37,10 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define IDLE 1e-3
 /* A start in a singular configuration is seen from this far back along its velocity [rad or m]. */
 #define BACK 0.02
-#define HALVINGS 25 /* of a step, to where its rows become dependent: 3e-8 of it */
-/* Largest row there of branches that meet: more is a mechanism whose branches only come near each
- * other. Positions are on the rows to 1e-13, and lengths have rounding of 1e-16. */
-#define APART 1e-13
+#define HALVINGS 10 /* of a step, to where its rows become dependent: a thousandth of it */
+/* Largest row there of branches that meet: what is more may be why a motion stops. Positions are on the
+ * rows to 1e-13. */
+#define APART 2e-13
 /* Part of its velocities by which such a start may miss those of the branch: what a mean of values
  * beside it errs by is 1e-9, and what misses by more carries energy that the branch does not. */
 #define STRAY 1e-6
@@ -358,16 +355,14 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
     return 1;
 }
 
-/* Positions by the guide, or by tangent and curvature from the base, which choose the branch; *way:
- * how far. */
-static int predict(passage *g, double t, const double *xi, double *x, double *way) {
+/* Positions by the guide, or by tangent and curvature from the base, which choose the branch. */
+static int predict(passage *g, double t, const double *xi, double *x) {
     const double *x0 = g->memory + BASE;
     int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, k;
     double dt = g->size.moving ? t - g->memory[BASE_TIME] : 1.0, *D = g->y, *bend = g->w;
     frame *p = &g->here;
     if (g->guide) {
         for (i = 0; i < nq; i++) x[i] = g->guide[i] + g->ahead * g->guided[i];
-        *way = REACH / MISS;
         return 0;
     }
     for (i = 0; i < nv; i++) {
@@ -382,11 +377,7 @@ static int predict(passage *g, double t, const double *xi, double *x, double *wa
         along_rows(g, &g->base, p->rows.c, bend);
         to_velocity(g, &g->base, bend);
     }
-    *way = 0.0;
-    for (j = 0; j < nv; j++) {
-        *way = fmax(*way, fabs(D[j]));
-        D[j] += 0.5 * bend[j] * dt * dt;
-    }
+    for (j = 0; j < nv; j++) D[j] += 0.5 * bend[j] * dt * dt;
     for (i = 0; i < nq; i++) {
         x[i] = x0[i];
         for (j = 0; j < nv; j++) x[i] += g->base.rows.N[j * nq + i] * D[j];
@@ -411,13 +402,13 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     frame *p = &g->here;
     int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
     const double *u = y + d;
-    double way, moved, size = 0.0, *v = x + nq, *a = xdot + nq;
+    double moved, size = 0.0, *v = x + nq, *a = xdot + nq;
     memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
-    if (predict(g, t, y, x, &way)) return STEPPER_SINGULAR;
+    if (predict(g, t, y, x)) return STEPPER_SINGULAR;
     memset(v, 0, sizeof(double) * (size_t)nv);
     memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
     if (onto_rows(g, t, y, x, &moved)) return STEPPER_SINGULAR;
-    if (moved > MISS * way + LAST_MOVE) return STEPPER_CHART_LEFT;
+    if (g->guide && moved > REACH) return STEPPER_CHART_LEFT;
     if (evaluate(g, p, t, x) || factor(g, p)) return STEPPER_SINGULAR;
     if (p->rank != g->base.rank) return STEPPER_CHART_LEFT;
     /* velocities: v = T (C N T)^-1 (u - C N v_p) + v_p */
@@ -531,7 +522,7 @@ static double regularity_at(passage *g, double t, const double *x) {
 /* A regular state behind a singular one, along its velocity; 1 where no branch has this velocity. */
 static int base_behind(passage *g, double t, const double *x) {
     int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, turn;
-    double *q = g->at, *v = g->w, *y = g->y, speed = 0.0, total = 0.0, move = HUGE_VAL, behind, part;
+    double *q = g->at, *v = g->w, *y = g->y, speed = 0.0, move = HUGE_VAL, behind, part;
     for (i = 0; i < nv; i++) speed = fmax(speed, fabs(x[nq + i]));
     if (!(speed > 0.0) || evaluate(g, &g->here, t, x)) return 1;
     behind = t - (g->size.moving ? BACK / speed : 0.0);
@@ -548,9 +539,8 @@ static int base_behind(passage *g, double t, const double *x) {
         for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
         for (i = 0; i < nq; i++)
             for (j = 0; j < nv; j++) q[i] -= g->base.rows.N[j * nq + i] * y[j];
-        total += move;
     }
-    if (!(move < LAST_MOVE) || !(total < MISS * BACK)) return 1;
+    if (!(move < LAST_MOVE)) return 1;
     if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
     part = regularity_at(g, behind, q) / g->memory[LARGEST];
     if (!(part > AWAY * FLOOR)) return 1;

@@ -25,8 +25,8 @@ RUNS = {
     "antiparallelogram": (ANTI, 1e-10, {"v0": {"j1": 6.0}}),
     "miss": (1e-8, 1e-9, {"v0": {"j1": 6.0}}),
     "start": (ANTI, 1e-8, {"q0": FLAT, "v0": [-6 / 7, 2.0, 2.0]}),
-    "start that misses by 3e-6": (PARALLELOGRAM, 1e-8, {"q0": FLAT, "v0": [1, -1 - 3e-6, 1 - 3e-6]}),
-    "start that misses by 3e-7": (PARALLELOGRAM, 1e-8, {"q0": FLAT, "v0": [1, -1 - 3e-7, 1 - 3e-7]}),
+    "miss of 3e-6": (PARALLELOGRAM, 1e-8, {"q0": FLAT, "v0": [1, -1 - 3e-6, 1 - 3e-6]}),
+    "miss of 3e-7": (PARALLELOGRAM, 1e-8, {"q0": FLAT, "v0": [1, -1 - 3e-7, 1 - 3e-7]}),
 }
 STOPS = 1e300
 MOVED = [  # constant, factor, run, parts of the tolerance that tell the one from the other
@@ -40,8 +40,8 @@ MOVED = [  # constant, factor, run, parts of the tolerance that tell the one fro
     ("LAST_MOVE", 10, "miss", 1.5),
     ("NOISE", 10, "miss", 3.0),
     ("BACK", 10, "start", 0.1),
-    ("STRAY", 10, "start that misses by 3e-6", STOPS),
-    ("STRAY", 0.1, "start that misses by 3e-7", STOPS),
+    ("STRAY", 10, "miss of 3e-6", STOPS),
+    ("STRAY", 0.1, "miss of 3e-7", STOPS),
 ]
 
 

@@ -188,8 +188,8 @@ def _lead_tables(model: FmuModel) -> list[str]:
     """Which states the dependents follow from: positions, and no velocities."""
     if model.closure is None:
         return []
-    leads = np.array(casadi.DM(model.closure.jac_sparsity(0, 0), 1)).any(axis=0)
-    return [_table("const char MODEL_LEADS", (str(int(one)) for one in leads))]
+    leads = np.sum(np.array(casadi.DM(model.closure.jac_sparsity(0, 0), 1)), axis=0) > 0
+    return [_table("const char MODEL_LEADS", map(str, leads.astype(int).tolist()))]
 
 
 def _size_tables(model: FmuModel) -> list[str]:

@@ -37,7 +37,7 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define IDLE 1e-3
 /* A start in a singular configuration is seen from this far back along its velocity [rad or m]. */
 #define BACK 0.02
-#define HALVINGS 10 /* of a step, to where its rows become dependent: a thousandth of it */
+#define HALVINGS 25 /* of a step, to where its rows become dependent: 3e-8 of it */
 /* Largest row there of branches that meet: what is more may be why a motion stops. Positions are on the
  * rows to 1e-13. */
 #define APART 2e-13

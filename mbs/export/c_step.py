@@ -20,7 +20,7 @@ from mbs.errors import ModelError
 from mbs.export.c_check import NO_FAST_MATH
 from mbs.export.fmu.description import FmuVariable
 from mbs.export.fmu.equations import steepness
-from mbs.export.fmu.tables import diagonal_blocks
+from mbs.export.fmu.tables import diagonal_blocks, leading_states
 from mbs.export.fmu.variables import dependents, inputs, outputs, parameters, states
 from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
 from mbs.native.bare_source import NOINLINE, Real, bare_source, literal
@@ -358,7 +358,9 @@ def _tables(system: System, state: MinimalState, variables: _Variables, real: Re
         _places("MODEL_QUATERNIONS", _quaternions(system, state)),
     ]
     if variables.z:
+        assert state.closure is not None
         made.append(_numbers("MODEL_NOMINAL", (v.nominal for v in joints), real))
+        made.append(_places("MODEL_LEADS", leading_states(state.closure)))
     if blocks := diagonal_blocks(state.slopes):
         made += [
             _numbers("MODEL_UNITS", (v.nominal for v in units), real),

@@ -51,7 +51,7 @@ def passage(
         inputs: u, where the functions are to take (t, x, z, u, p), z empty.
     """
     closure = system.closure
-    if closure is None or closure.slips or closure.varies:
+    if closure is None or closure.slips:
         return None
     driven = [motion.position for motion in motions if motion.position is not None]
     if len(driven) < len(motions):

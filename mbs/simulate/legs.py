@@ -1,8 +1,10 @@
-"""Integration in legs: over-constrained loops whose independent rows are chosen anew on the way.
+"""Integration in one leg, or in several: over-constrained loops whose independent rows change.
 
 In a loop such as Bennett's, which rows of the closing joint are independent changes with the
-posture: no choice holds all the way round. A leg ends where its rows have lost most of their
-independence, and the next one begins there with rows that are chosen for that posture.
+configuration: no choice holds all the way round. Steps in local tangent coordinates use all rows,
+and need no choice. Where there are none, as for laws that CasADi cannot write as C, a leg ends
+where its rows have lost most of their independence, and the next one begins there with rows that
+are chosen for that configuration.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from mbs.loops.velocity import constraint_jacobian
 from mbs.models.full_state import FullState
 from mbs.simulate.contacts import ContactMotion, first_modes
 from mbs.solvers import EventMotion, Events, integrate_events
+from mbs.solvers.compiled_run import is_compilable
 from mbs.solvers.failures import failed
 
 Array = NDArray[np.float64]
@@ -33,8 +36,7 @@ Array = NDArray[np.float64]
 _LOST = 0.05
 """Part of its independence at the start of a leg at which a leg ends."""
 _SINGULAR = 1e-6
-_REGAINED = 1e-3
-"""Independence below which a posture is singular for all rows, and above which it is passed."""
+"""Independence below which a configuration is singular for all rows: a thousandth, as a sine."""
 _FLAT = 1e-3
 """Sine of the angle between a rolling disc and its plane at which it counts as flat."""
 
@@ -94,34 +96,36 @@ def integrated(
 
     Returns:
         the legs that were reached, one at least; None where they reach the last time, or else why
-        they do not: at a singular configuration the message says which one, and the joint that the
-        loops do not hold there.
+        they do not: the message says when and in which configuration, and at a singular one the
+        joint that the loops do not hold.
     """
     legs, stop = _integrated(system, equations, x0, times, p, **options)
-    if isinstance(stop, SolverError) and stop.singular and stop.state and system.is_closed:
+    if isinstance(stop, SolverError) and stop.state:
+        q = np.array(stop.state[: system.nq])
+        where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
+        lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
         stop = SolverError(
-            f"{system.name}: {stop}; {_lost(system, np.array(stop.state[: system.nq]), p)}",
+            f"{system.name}: {stop}; the configuration is {where}{lost}",
             state=stop.state,
-            singular=True,
+            singular=stop.singular,
             time=stop.time,
         )
     return legs, stop
 
 
 def _lost(system: System, q: Array, p: Sequence[float]) -> str:
-    """A configuration in words, and the joint that moves most in what the rows hold least there."""
-    where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
+    """The joint that moves most in what the rows hold least at a configuration, in words."""
     found = scales(system)
     J = np.array(constraint_jacobian(system)(q, np.array(p, dtype=float)))
     J = J * found.rows.reshape(-1, 1) * found.columns([speed.unit for speed in system.speeds])
     assert system.closure is not None
     rank = system.nv - system.closure.mobility
     if not rank or not np.isfinite(J).all():
-        return f"the configuration is {where}"
+        return ""
     free = np.linalg.svd(J)[2][rank - 1 :]  # as many directions as are free there, at the least
     moves = np.round(np.sum(free**2, axis=0), 6)  # the first of joints that move alike
     name = system.speeds[int(np.argmax(moves))].name
-    return f"the configuration is {where}, and the loops hardly hold {name} there"
+    return f", and the loops hardly hold {name} there"
 
 
 def _integrated(
@@ -132,14 +136,18 @@ def _integrated(
     p: Sequence[float],
     **options: Any,
 ) -> tuple[list[Leg], Stop]:
-    if system.closure is not None and system.closure.varies:
-        return _with_other_rows(system, equations, x0, times, p, options)
     state = equations(system)
+    if system.closure is not None and system.closure.varies:
+        if state.passage is None or not is_compilable(state.rhs):
+            return _with_other_rows(system, equations, x0, times, p, options)
+        q, parameters = x0[: system.nq], np.array(p, dtype=float)
+        if float(row_independence(system)(q, parameters)) < _SINGULAR:
+            state = equations(rows_at(system, q, parameters))  # the start may be regular for others
     if state.events is not None:
         return _with_contacts(system, state, x0, times, p, options)
     discs = [disc.name for _, disc in rolling_discs(system)]
     if discs:
-        upright = Limit(least_upright(system), 1, _FLAT)
+        upright = Limit(least_upright(system), _FLAT)
         leg, motion = _leg(system, state, x0, times, p, upright, options)
         if not motion.events:
             return [leg], motion.stop
@@ -177,16 +185,14 @@ def _motion(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limit:
-    """Where a leg ends: a measure of the posture falls below a level, or rises above it.
+    """Where a leg ends: a measure of the configuration falls below a level.
 
     Attributes:
         measure: `measure(q, p)`.
-        sign: 1 for a fall, -1 for a rise.
         level: of the measure.
     """
 
     measure: Function
-    sign: int
     level: float
 
 
@@ -200,10 +206,13 @@ def _with_other_rows(
 ) -> tuple[list[Leg], Stop]:
     """Legs of an over-constrained system, each with rows that suit its first posture."""
     legs: list[Leg] = []
-    if _rests_between_branches(system, x0, np.array(p, dtype=float)):
-        start = Leg(equations(system), times[:1], x0.reshape(1, -1))
-        return [start], failed(float(times[0]), 0.0, "undetermined", state=x0.tolist())
-    left, limit = times, _limit(system, x0[: system.nq], np.array(p, dtype=float))
+    start = Leg(equations(system), times[:1], x0.reshape(1, -1))
+    system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
+    if limit is None:
+        moves = x0[system.nq : system.nq + system.nv].any()
+        reason = "singular" if moves else "undetermined"
+        return [start], failed(float(times[0]), 0.0, reason, state=x0.tolist())
+    left = times
     known: dict[tuple[int, ...], tuple[System, FullState]] = {}
     while True:
         assert system.closure is not None
@@ -221,6 +230,8 @@ def _with_other_rows(
             return legs, None
         left = np.concatenate([[end], left])
         system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
+        if limit is None:
+            return legs, failed(end, 0.0, "singular", state=x0.tolist())
 
 
 def _with_contacts(
@@ -259,7 +270,7 @@ def _leg(
     moved, residual = state.project(t, x, parameters)
     kept = [casadi.if_else(ended, x, moved), casadi.if_else(ended, 0, residual)]
     project = Function("project", [t, x, pm], kept)
-    left = limit.sign * (limit.measure(x[: system.nq], parameters) - limit.level)
+    left = limit.measure(x[: system.nq], parameters) - limit.level
     events = Events(
         Function("lost", [t, x, pm], [casadi.if_else(ended, 1, left)]),
         Function("end", [t, x, pm, fired], [x, SX(1)]),
@@ -271,22 +282,13 @@ def _leg(
     return Leg(state, reached[before], motion.x[before]), motion
 
 
-def _rests_between_branches(system: System, x: Array, p: Array) -> bool:
-    """Whether branches of motion meet at a state, and it has no velocity that chooses one."""
-    q, v = x[: system.nq], x[system.nq : system.nq + system.nv]
-    return not v.any() and float(row_independence(rows_at(system, q, p))(q, p)) < _SINGULAR
+def _next(system: System, q: Array, p: Array) -> tuple[System, Limit | None]:
+    """The system with rows that suit a configuration better, and where its leg ends.
 
-
-def _next(system: System, q: Array, p: Array) -> tuple[System, Limit]:
-    """The system with rows that suit a posture better, and where its leg ends."""
+    No leg begins where all rows are dependent.
+    """
     better = rows_at(system, q, p)
     old, new = (float(row_independence(one)(q, p)) for one in (system, better))
-    chosen = better if new > 2 * old else system
-    return chosen, _limit(chosen, q, p)
-
-
-def _limit(system: System, q: Array, p: Array) -> Limit:
-    """Where the rows have lost most of their independence, or, if all rows have, regained some."""
-    measure = row_independence(system)
-    now = float(measure(q, p))
-    return Limit(measure, -1, _REGAINED) if now < _SINGULAR else Limit(measure, 1, _LOST * now)
+    chosen, now = (better, new) if new > 2 * old else (system, old)
+    limit = Limit(row_independence(chosen), _LOST * now) if now >= _SINGULAR else None
+    return chosen, limit

@@ -8,11 +8,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import casadi
 import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import Interrupted, SolverError
-from mbs.native import cached_library
+from mbs.native import cached_library, compiler_found
 from mbs.native.compiled import calls_machine_code, generated, unwritten
 from mbs.native.compiler import flags_for
 from mbs.solvers.events import Event, EventMotion, fired_of
@@ -32,15 +33,30 @@ _REASONS = {
     6: "finite",
     7: "singular",
     8: "singular",
-    9: "singular",
-    10: "undetermined",
-    11: "indicators",
-    12: "jump",
-    13: "settle",
-    14: "standstill",
+    9: "near miss",
+    10: "singular",
+    11: "undetermined",
+    12: "indicators",
+    13: "jump",
+    14: "settle",
+    15: "standstill",
 }
-_CROWDED = (13, 14)
+_CROWDED = (14, 15)
 _RUNTIME = ("stepper", "dopri5")
+
+
+def is_compilable(function: casadi.Function) -> bool:
+    """Whether there is a compiler, and CasADi can write a Function as C.
+
+    Args:
+        function: any Function.
+    """
+    functions = [function]
+    return (
+        compiler_found()
+        and not calls_machine_code(functions)
+        and not unwritten(generated(functions))
+    )
 
 
 def library_of(equations: Equations) -> ctypes.CDLL | None:

@@ -63,7 +63,8 @@ class EventStepper:
             with np.errstate(all="ignore"):
                 self._judge()
         except Failure as failure:
-            raise failed(self.solver.t, self.solver.h, str(failure)) from failure
+            t, h, x = self.solver.t, self.solver.h, self.solver.x
+            raise failed(t, h, str(failure), state=x.tolist()) from failure
 
     def fill(self, table: Table, budget: int) -> bool:
         """Fill the next rows of a table, in about `budget` steps, at most to the next event.

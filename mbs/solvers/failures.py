@@ -15,11 +15,15 @@ REASONS = {
     "look for a singular posture",
     "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
     "around it; start elsewhere, or end the run before",
+    "near miss": "branches of motion come near each other and do not meet, by so little that what "
+    "turns there cannot be told from what goes on; make the branches meet, or miss by more, or ask "
+    "for a looser tolerance",
     "undetermined": "the motion starts in a singular configuration, where branches of motion meet, "
-    "and its velocities are those of none of them; give velocities of one branch to all joints, or "
-    "start beside it",
+    "and its velocities are those of no branch with the mobility of the mechanism; give velocities "
+    "of one branch to all joints, or start beside it",
     "finite": "a value is not finite; look for a singularity",
-    "indicators": "an event indicator has no value there",
+    "indicators": "an event indicator has no value there; look for efforts or laws that have none, "
+    "or a singular configuration",
     "jump": "the jump of an event has no value there",
     "settle": "the events there do not settle, each jump asks for another one; "
     "let the jump make the indicators positive, or zero and rising",
@@ -32,7 +36,7 @@ class Failure(Exception):
     """An evaluation had no answer, so the step must be shortened."""
 
 
-_SINGULAR = ("singular", "undetermined", "projection")
+_SINGULAR = ("singular", "near miss", "undetermined", "projection")
 
 
 def failed(

@@ -82,7 +82,7 @@ def _begun(solver: Stepper) -> Array:
     try:
         return solver.project(solver.t, solver.x)
     except Failure as failure:
-        raise failed(solver.t, 0.0, str(failure)) from failure
+        raise failed(solver.t, 0.0, str(failure), state=solver.x.tolist()) from failure
 
 
 def _projection(problem: Problem, p: Array) -> Projection | None:

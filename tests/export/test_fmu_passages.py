@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmu_instances import Fmu
+from support.change_points import linkage
 
 import mbs
+from mbs.errors import SolverError
 from mbs.simulate.fmu import fmu
 
 MECHANISMS = {
@@ -74,3 +76,49 @@ def test_a_state_saved_before_a_singular_configuration_goes_on_bit_for_bit(made,
     assert np.array_equal(five_bar.step(other, 40, begin=0.38), expected)
     for each in (instance, other):
         each.freeInstance()
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_a_start_beyond_where_branches_cross_is_on_the_branch_that_leads_there(made, kind):
+    """One long step from the start values landed on the branch whose rocker stands still."""
+    for start in (3.15, 4.0, 7.0, -0.5, -3.2):
+        result = fmu(
+            made["n_four_bar"], 1e-4, start={"a0.q": start}, step=1e-4, kind=kind, quiet=True
+        )
+        assert result["a1.q"][0] == pytest.approx(start, abs=1e-9)
+        assert result["b0.q"][0] == pytest.approx(-start, abs=1e-9)
+
+
+def test_errors_fall_with_the_tolerance_where_communication_steps_are_long(made):
+    """A short step ends every step of the solver: the errors are then those of the steps."""
+    found = {
+        step: [
+            energy(fmu(made["five_bar"], 3.0, tolerance=tolerance, step=step, quiet=True))
+            for tolerance in (1e-3, 1e-5, 1e-7)
+        ]
+        for step in (1e-3, 0.5)
+    }
+    assert found[1e-3][0] == found[1e-3][1]
+    assert found[0.5][0] > 10 * found[0.5][1] > 100 * found[0.5][2]
+
+
+def test_a_stop_names_the_system_the_time_and_the_configuration(tmp_path):
+    """Branches that come near each other by 1e-9 and do not meet."""
+    system = linkage((0.4, 0.9, 0.7 + 1e-9, 1.2), (1.0, -0.5, 1.5))
+    path = mbs.export.fmu(system, tmp_path / "linkage.fmu")
+    message = r"linkage: integration stopped at time 0\.\d+ \(j1\.q = .*come near each other"
+    with pytest.raises(SolverError, match=message):
+        fmu(path, 3.0, start={"j1.v": 6.0}, tolerance=1e-11, step=0.5, quiet=True)
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_a_near_miss_turns(tmp_path, kind):
+    """Branches come near each other by 1e-8 and do not meet: a long step went across."""
+    system = linkage((0.4, 0.9, 0.7 + 1e-8, 1.2), (1.0, -0.5, 1.5))
+    path = mbs.export.fmu(system, tmp_path / "linkage.fmu")
+    rough, fine = (
+        fmu(path, 3.0, start={"j1.v": 6.0}, tolerance=x, kind=kind, step=0.02, quiet=True)
+        for x in (1e-6, 1e-9)
+    )
+    assert fine["j4.q"][-1] == pytest.approx(1.7526, abs=1e-3)
+    assert rough["j4.q"][-1] == pytest.approx(fine["j4.q"][-1], abs=0.01)

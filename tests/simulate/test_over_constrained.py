@@ -120,8 +120,50 @@ def sarrus():
     return m.assemble(guess={"x1": -0.5, "x2": 1.0, "x3": -0.5, "y1": 0.5, "y2": -1.0})
 
 
-def test_a_sarrus_linkage_at_rest_where_it_is_flat_is_refused():
-    """Either chain may turn about its hinges there instead of lifting."""
+LIFT = [-1.0, 2.0, -1.0, 1.0, -2.0]
+
+
+@pytest.mark.parametrize(
+    "v0",
+    [None, {"x1": -1.0}, {"x1": -1.0, "y1": 1.0}, [1.0, 0.0, -1.0, 0.0, 0.0]],
+    ids=["rest", "crank", "cranks", "spin"],
+)
+def test_a_sarrus_linkage_that_starts_flat_and_does_not_lift_is_refused(v0):
+    """Either chain may turn about its hinges there instead of lifting, without end or energy."""
     message = r"sarrus.*velocities of one branch.*x1 = 0, x2 = 0.*hold \w1 there"
     with pytest.raises(SolverError, match=message):
-        mbs.simulate.run(sarrus(), 1.0, q0=[0.0] * 5, quiet=True)
+        mbs.simulate.run(sarrus(), 1.0, q0=[0.0] * 5, v0=v0, quiet=True)
+
+
+@pytest.mark.parametrize("speed", [1.0, -1e-3])
+def test_a_flat_sarrus_linkage_lifts_with_the_velocities_that_it_is_given(speed):
+    """Its energy moved by 1e-4 J, whatever the tolerance, as long as rows were chosen."""
+    system = sarrus()
+    for tolerance in (1e-4, 1e-7, 1e-10):
+        v0 = [speed * x for x in LIFT]
+        result = mbs.simulate.run(system, 1.0, q0=[0.0] * 5, v0=v0, tolerance=tolerance, quiet=True)
+        energy = result["kinetic_energy"] + result["potential_energy"]
+        assert np.ptp(energy) < tolerance * result["kinetic_energy"].max()
+        assert result["x2.q"] == pytest.approx(-2 * result["x1.q"], abs=1e-9)
+        assert result["y1.q"] == pytest.approx(-result["x1.q"], abs=1e-9)
+
+
+def test_a_sarrus_linkage_falls_through_its_flat_configuration():
+    system = sarrus()
+    for tolerance in (1e-5, 1e-9):
+        result = mbs.simulate.run(system, 2.0, v0={"x1": -5.0}, tolerance=tolerance, quiet=True)
+        energy = result["kinetic_energy"] + result["potential_energy"]
+        assert np.ptp(result["x1.q"]) > 3 * np.pi  # flat at every half of a turn
+        assert np.ptp(energy) < tolerance * result["kinetic_energy"].max()
+
+
+def test_legs_end_where_all_rows_are_dependent():
+    """A velocity that is prescribed has no position for coordinates along the motion."""
+    message = r"sarrus.*singular configuration is not passed.*configuration is x1 = "
+    with pytest.raises(SolverError, match=message):
+        mbs.simulate.run(sarrus(), 1.0, motion={"x1.v": 2.0}, quiet=True)
+    message = r"sarrus.*singular configuration is not passed.*configuration is x1 = 0"
+    with pytest.raises(SolverError, match=message):
+        mbs.simulate.run(
+            sarrus(), 1.0, q0=dict.fromkeys(("x1", "x2"), 0.0), motion={"x1.v": 2.0}, quiet=True
+        )

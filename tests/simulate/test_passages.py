@@ -1,33 +1,13 @@
 """Motions through configurations in which the rows of loops become dependent."""
 
+import casadi
 import numpy as np
 import pytest
+from support.change_points import GRAVITY, linkage, rod
 
 import mbs
 from mbs.components import Body, CoulombFriction, Prismatic, Revolute, RigidStop
 from mbs.errors import SolverError
-
-GRAVITY = (0, -9.81, 0)
-
-
-def rod(name, length):
-    inertia = length**3 / 12
-    return Body(name, mass=length, com=(length / 2, 0, 0), inertia=(0, inertia, inertia))
-
-
-def linkage(lengths, guess, more=()):
-    """Crank, coupler, rocker and ground of a four-bar linkage in the vertical plane."""
-    crank, coupler, rocker, ground = lengths
-    m = mbs.Mechanism("linkage", gravity=GRAVITY)
-    a, b, c = (m.add(rod(n, x)) for n, x in zip("abc", (crank, coupler, rocker), strict=True))
-    m.connect(m.world, Revolute("j1", actuated=True), a)
-    m.connect(a.at(crank), Revolute("j2"), b)
-    m.connect(m.world.at(ground), Revolute("j4"), c)
-    m.connect(b.at(coupler), closing := Revolute("j3"), c.at(rocker))
-    m.cut(closing)
-    for element in more:
-        m.add(element)
-    return m.assemble(guess=dict(zip(("j1", "j2", "j4"), guess, strict=True)))
 
 
 def coupling_rod():
@@ -125,14 +105,28 @@ def test_output_times_do_not_change_the_motion(systems):
     assert energy_error(result) < 1e-4
 
 
-@pytest.mark.parametrize(("longer", "tolerance"), [(1e-7, 1e-7), (1e-7, 1e-9), (1e-9, 1e-5)])
-def test_near_misses_pass(longer, tolerance):
+@pytest.mark.parametrize("longer", [1e-5, -1e-5, 1e-7, -1e-7, 1e-8, -1e-8])
+def test_near_misses_turn_whatever_the_tolerance(longer):
     """Lengths that miss a + g = b + c by a little: the branches come near and do not meet."""
     system = linkage((0.4, 0.9, 0.7 + longer, 1.2), (1.0, -0.5, 1.5))
-    result = mbs.simulate.run(
-        system, 3.0, v0={"j1": 6.0}, tolerance=tolerance, step=0.05, quiet=True
-    )
-    assert energy_error(result) < 5 * tolerance
+    ends = []
+    for tolerance in (1e-3, 1e-5, 1e-7, 1e-9):
+        result = mbs.simulate.run(
+            system, 3.0, v0={"j1": 6.0}, tolerance=tolerance, step=0.05, quiet=True
+        )
+        assert energy_error(result) < 5 * tolerance
+        assert result["closure_residual"].max() < 1e-13
+        ends.append([result[f"{joint}.q"][-1] for joint in ("j1", "j2", "j4")])
+    assert np.ptp(ends, axis=0).max() < 5e-3
+
+
+@pytest.mark.parametrize("longer", [1e-9, -1e-11])
+def test_misses_that_rounding_hides_are_passed_or_named(longer):
+    system = linkage((0.4, 0.9, 0.7 + longer, 1.2), (1.0, -0.5, 1.5))
+    result = mbs.simulate.run(system, 3.0, v0={"j1": 6.0}, tolerance=1e-5, quiet=True)
+    assert energy_error(result) < 1e-5
+    with pytest.raises(SolverError, match=r"^linkage: .*come near each other.*configuration is j1"):
+        mbs.simulate.run(system, 3.0, v0={"j1": 6.0}, tolerance=1e-9, quiet=True)
 
 
 def test_a_prescribed_crank_passes_flat(systems):
@@ -154,6 +148,48 @@ def test_a_start_in_a_singular_configuration_with_velocities_of_one_branch(syste
     assert energy_error(result) < 1e-7
     assert np.ptp(result["a0.q"]) > 1.0
     assert np.abs(result["a0.q"] - result["a1.q"]).max() < 1e-8
+
+
+@pytest.mark.parametrize("speed", [1e-2, -1e-5])
+def test_a_slow_start_leaves_a_singular_configuration(systems, speed):
+    """Gravity turns the first one back through the configuration that it starts in."""
+    v0 = [speed, -speed, speed]
+    for tolerance in (1e-4, 1e-8):
+        result = mbs.simulate.run(
+            systems["parallelogram"], 1.0, q0=[0.0] * 3, v0=v0, tolerance=tolerance, quiet=True
+        )
+        assert result["a0.q"][-1] < -3.0
+        assert np.abs(result["a0.q"] - result["a1.q"]).max() < 1e-8
+        assert energy_error(result) < tolerance
+
+
+@pytest.mark.parametrize("speed", [2.0, -1e-2])
+@pytest.mark.parametrize(
+    ("name", "along"),
+    [
+        ("antiparallelogram", (1.0, -1.0, 1.0)),
+        ("antiparallelogram", (-3.0, 7.0, 7.0)),
+        ("kite", (0.0, 1.0, 1.0)),
+        ("kite", (11.0, -8.0, 8.0)),
+    ],
+)
+def test_either_branch_is_left_on_from_where_they_cross(systems, name, along, speed):
+    v0 = list(speed * np.array(along) / np.max(np.abs(along)))
+    for tolerance in (1e-4, 1e-9):
+        result = mbs.simulate.run(
+            systems[name], 1.0, q0=[0.0] * 3, v0=v0, tolerance=tolerance, quiet=True
+        )
+        assert result["j1.v"][0] == pytest.approx(v0[0], abs=1e-12)
+        assert energy_error(result) < tolerance
+
+
+@pytest.mark.parametrize("miss", [1e-2, 1e-4])
+def test_velocities_that_nearly_are_those_of_a_branch_are_refused(systems, miss):
+    """What misses carries energy, which would be lost in silence."""
+    with pytest.raises(SolverError, match=r"velocities of one branch.*hold b0"):
+        mbs.simulate.run(
+            systems["parallelogram"], 1.0, q0=[0.0] * 3, v0=[1, -1 - miss, 1 - miss], quiet=True
+        )
 
 
 @pytest.mark.parametrize("v0", [None, [1.0, -1.5, 0.5]], ids=["rest", "between branches"])
@@ -187,3 +223,17 @@ def test_coulomb_friction_acts_through_passages():
     energy = fine["kinetic_energy"] + fine["potential_energy"]
     work = np.trapezoid(fine["dry.effort"] * fine["j1.v"], fine.time)
     assert energy[-1] - energy[0] == pytest.approx(work, abs=1e-3)
+
+
+def test_a_law_without_a_value_is_named_with_its_time_and_configuration():
+    """At the start it is an indicator that has no value, later a rate."""
+    dry = CoulombFriction("dry", joint="j1", sliding=0.3, sticking=0.4)
+    system = linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5), (dry,))
+    for sign, message in ((1, r"t = 0 s: an event indicator.*j1 = 1,"), (-1, r"t = 0\.5 s.*j1 = ")):
+        with pytest.raises(SolverError, match=rf"^linkage: integration stopped at {message}"):
+            mbs.simulate.run(
+                system,
+                1.0,
+                tau=lambda t, q, v, s=sign: casadi.vertcat(casadi.sqrt(s * (t - 0.5)), 0, 0),
+                quiet=True,
+            )

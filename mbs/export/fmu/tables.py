@@ -48,6 +48,8 @@ _HEADER = """\
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
+/* 1 for states that the dependents follow from */
+extern const int MODEL_LEADS[];
 {arrays}/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
 extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
 
@@ -146,6 +148,7 @@ def source(model: FmuModel, *, adjoint: bool) -> str:
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
         _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
         *_sentences(model),
+        *_lead_tables(model),
         *_size_tables(model),
         *_block_tables(_blocks(model)),
         *_tree_tables(model),
@@ -192,6 +195,22 @@ def _sentences(model: FmuModel) -> list[str]:
     if model.rules is None:
         return []
     return [_table("const char *const MODEL_SENTENCES", map(_quoted, model.rules.sentences))]
+
+
+def _lead_tables(model: FmuModel) -> list[str]:
+    if model.closure is None:
+        return []
+    return [_table("const int MODEL_LEADS", map(str, leading_states(model.closure)))]
+
+
+def leading_states(closure: casadi.Function) -> list[int]:
+    """1 for each state that dependents follow from, as positions do, 0 for the others.
+
+    Args:
+        closure: `closure(x, z, p)`, one Newton step of z.
+    """
+    pattern = np.array(casadi.DM(closure.jac_sparsity(0, 0), 1))
+    return [int(count > 0) for count in pattern.sum(axis=0)]
 
 
 def _size_tables(model: FmuModel) -> list[str]:

@@ -87,10 +87,6 @@ static int call(driver *d, value_of f, double t, const double *x, double *first,
 }
 
 static int rhs(void *user, double t, const double *x, double *xdot) {
-#ifdef MBS_PASSAGE
-    driver *d = user;
-    if (d->passage) passage_look(d->passage, t, x);
-#endif
     return call(user, mbs_rhs, t, x, xdot, NULL);
 }
 

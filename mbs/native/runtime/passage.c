@@ -10,16 +10,12 @@
 
 /* The regularity is foreseen for this many steps, a little more than the next one. */
 #define AHEAD 1.2
-/* Stages of a full step are looked at where it is below this many times PASSAGE_ON at both ends. */
-#define WATCHED 3.0
 /* Part of the largest sigma below which values are means: rounding reaches u' as its inverse square,
  * 3e-16 / (3e-5)^2 = 3e-7, and beyond it nothing is left; a larger part misses what a motion does
  * beside the singular configuration, as that of a delta robot, whose legs pass one after another. */
 #define FLOOR 3e-5
 #define AWAY 2.0      /* floors from which on a state is regular */
 #define BESIDE 4.0    /* floors between neighbours in means: those next to the middle are regular */
-#define WIDEN 1.6     /* neighbours that are not regular are taken further apart, */
-#define WIDENINGS 8   /* this often: 1.6^8 = 43 times */
 /* Weights of neighbours 1, 2 and 3 on either side: what they give is exact for degree five. */
 static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* sigma_min(C N T), part of its value at the origin, below which the chart has turned too far from
@@ -27,15 +23,10 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define TURNED 0.2
 #define NEWTON 10       /* Newton steps onto the rows; quadratic convergence takes three or four */
 #define LAST_MOVE 1e-9  /* after a move this small the next one is rounding */
-#define OPEN 1e-8       /* largest row after that */
-/* Part of the way from the origin by which tangent and curvature may miss the branch: where it is
- * about one, the other branch is as near. */
-#define MISS 0.3
 /* Part of the velocities, or of what they make of a step, by which a state may differ from where the
  * velocities and accelerations of the stages lead. What error control lets pass is a hundredth of it;
  * on another branch velocities differ by about their own size. */
 #define BREAK 0.01
-#define SLOW 10.0 /* tolerances that velocities may differ by in any case */
 /* Rounding of u' for accelerations of size one and sigma one: it is added to the tolerance. */
 #define NOISE 3e-16
 /* Where a guide chooses the branch: the largest move from it onto the rows [rad or m], part of its
@@ -44,10 +35,15 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define REACH 0.1
 #define ASTRAY 0.1
 #define IDLE 1e-3
-/* A start in a singular configuration is seen from this far back along its velocity [rad or m], or
- * from half of it, and so on. */
-#define BACK 0.05
-#define BACKS 6
+/* A start in a singular configuration is seen from this far back along its velocity [rad or m]. */
+#define BACK 0.02
+#define HALVINGS 25 /* of a step, to where its rows become dependent: 3e-8 of it */
+/* Largest row there of branches that meet: what is more may be why a motion stops. Positions are on the
+ * rows to 1e-13. */
+#define APART 2e-13
+/* Part of its velocities by which such a start may miss those of the branch: what a mean of values
+ * beside it errs by is 1e-9, and what misses by more carries energy that the branch does not. */
+#define STRAY 1e-6
 #define MASSLESS 1e-10 /* part of the largest pivot of the inertia matrix below which one is none */
 
 /* places in memory */
@@ -83,10 +79,12 @@ struct passage {
     double *dense;        /* (5, n) */
     double *at, *side, *sum;       /* points (n,), a sum of them */
     double *K, *r, *y, *w, *G;     /* scratch */
+    double *across;       /* (5, n) of a step that is tried */
     double *ready_x;
-    double ready_time, least, sigma, most;
+    double ready_time, sigma;
     double turned; /* how far the tangents have turned from the chart: 1 at its origin, 0 across */
-    int d, ready, charted, kept, watch, singular, lasting;
+    int d, ready, charted, kept, singular, lasting;
+    int missed; /* branches that come near each other were met since the last full step */
 };
 
 /* Solve L y = b, or L' y = b, in place; L (n, n) by columns. */
@@ -357,16 +355,14 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
     return 1;
 }
 
-/* Positions by the guide, or by tangent and curvature from the base, which choose the branch; *way:
- * how far. */
-static int predict(passage *g, double t, const double *xi, double *x, double *way) {
+/* Positions by the guide, or by tangent and curvature from the base, which choose the branch. */
+static int predict(passage *g, double t, const double *xi, double *x) {
     const double *x0 = g->memory + BASE;
     int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, k;
     double dt = g->size.moving ? t - g->memory[BASE_TIME] : 1.0, *D = g->y, *bend = g->w;
     frame *p = &g->here;
     if (g->guide) {
         for (i = 0; i < nq; i++) x[i] = g->guide[i] + g->ahead * g->guided[i];
-        *way = REACH / MISS;
         return 0;
     }
     for (i = 0; i < nv; i++) {
@@ -381,11 +377,7 @@ static int predict(passage *g, double t, const double *xi, double *x, double *wa
         along_rows(g, &g->base, p->rows.c, bend);
         to_velocity(g, &g->base, bend);
     }
-    *way = 0.0;
-    for (j = 0; j < nv; j++) {
-        *way = fmax(*way, fabs(D[j]));
-        D[j] += 0.5 * bend[j] * dt * dt;
-    }
+    for (j = 0; j < nv; j++) D[j] += 0.5 * bend[j] * dt * dt;
     for (i = 0; i < nq; i++) {
         x[i] = x0[i];
         for (j = 0; j < nv; j++) x[i] += g->base.rows.N[j * nq + i] * D[j];
@@ -410,20 +402,15 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     frame *p = &g->here;
     int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
     const double *u = y + d;
-    double way, moved, size = 0.0, open = 0.0, *v = x + nq, *a = xdot + nq;
+    double moved, size = 0.0, *v = x + nq, *a = xdot + nq;
     memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
-    if (predict(g, t, y, x, &way)) return STEPPER_SINGULAR;
+    if (predict(g, t, y, x)) return STEPPER_SINGULAR;
     memset(v, 0, sizeof(double) * (size_t)nv);
     memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
     if (onto_rows(g, t, y, x, &moved)) return STEPPER_SINGULAR;
-    if (moved > MISS * way + LAST_MOVE) return STEPPER_CHART_LEFT;
+    if (g->guide && moved > REACH) return STEPPER_CHART_LEFT;
     if (evaluate(g, p, t, x) || factor(g, p)) return STEPPER_SINGULAR;
     if (p->rank != g->base.rank) return STEPPER_CHART_LEFT;
-    for (i = 0; i < g->size.places; i++) {
-        int held = i >= g->size.speeds - g->size.anchors && i < g->size.speeds;
-        open = fmax(open, fabs(p->rows.place[i] - (held ? g->base.rows.place[i] : 0.0)));
-    }
-    if (!(open < OPEN)) return STEPPER_SINGULAR;
     /* velocities: v = T (C N T)^-1 (u - C N v_p) + v_p */
     memset(v, 0, sizeof(double) * (size_t)nv);
     memcpy(g->w, u, sizeof(double) * (size_t)d);
@@ -518,13 +505,11 @@ static int slope(passage *g, double t, const double *y, double *x, double *xdot,
         if (!(speed > 0.0)) return STEPPER_SINGULAR;
         apart = BESIDE * FLOOR * sqrt(far) / (rho * sqrt(speed));
     }
-    for (i = 0; i < WIDENINGS && apart > 0.0; i++, apart *= WIDEN, shift *= WIDEN) {
-        if (mean_of(g, t, y, apart, along, shift, x, xdot, ydot)) continue;
-        memcpy(x + g->size.nq + g->size.nv, y + 2 * d, sizeof(double) * (size_t)g->size.nz);
-        g->sigma = fmin(g->sigma, FLOOR);
-        return STEPPER_OK;
-    }
-    return STEPPER_SINGULAR;
+    if (!(apart > 0.0) || mean_of(g, t, y, apart, along, shift, x, xdot, ydot))
+        return STEPPER_SINGULAR;
+    memcpy(x + g->size.nq + g->size.nv, y + 2 * d, sizeof(double) * (size_t)g->size.nz);
+    g->sigma = fmin(g->sigma, FLOOR);
+    return STEPPER_OK;
 }
 
 static double regularity_at(passage *g, double t, const double *x) {
@@ -536,40 +521,34 @@ static double regularity_at(passage *g, double t, const double *x) {
 
 /* A regular state behind a singular one, along its velocity; 1 where no branch has this velocity. */
 static int base_behind(passage *g, double t, const double *x) {
-    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, back, turn;
-    double *q = g->at, *v = g->w, speed = 0.0, part, *y = g->y;
+    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, turn;
+    double *q = g->at, *v = g->w, *y = g->y, speed = 0.0, move = HUGE_VAL, behind, part;
     for (i = 0; i < nv; i++) speed = fmax(speed, fabs(x[nq + i]));
-    if (!(speed > 0.0)) return 1;
-    for (back = 0; back < BACKS; back++) {
-        double s = ldexp(BACK, -back), total = 0.0, behind = t - (g->size.moving ? s / speed : 0.0);
-        memcpy(q, x, sizeof(double) * (size_t)n);
-        if (evaluate(g, &g->here, t, x)) return 1;
-        for (i = 0; i < nv; i++) v[i] = -x[nq + i] * s / speed;
+    if (!(speed > 0.0) || evaluate(g, &g->here, t, x)) return 1;
+    behind = t - (g->size.moving ? BACK / speed : 0.0);
+    memcpy(q, x, sizeof(double) * (size_t)n);
+    for (i = 0; i < nv; i++) v[i] = -x[nq + i] * BACK / speed;
+    for (i = 0; i < nq; i++)
+        for (j = 0; j < nv; j++) q[i] += g->here.rows.N[j * nq + i] * v[j];
+    for (turn = 0; turn < NEWTON && !(move < LAST_MOVE); turn++) {
+        if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
+        memset(y, 0, sizeof(double) * (size_t)nv);
+        along_rows(g, &g->base, g->base.rows.place, y);
+        to_velocity(g, &g->base, y);
+        move = 0.0;
+        for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
         for (i = 0; i < nq; i++)
-            for (j = 0; j < nv; j++) q[i] += g->here.rows.N[j * nq + i] * v[j];
-        for (turn = 0; turn < NEWTON; turn++) {
-            double move = 0.0;
-            if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) break;
-            memset(y, 0, sizeof(double) * (size_t)nv);
-            along_rows(g, &g->base, g->base.rows.place, y);
-            to_velocity(g, &g->base, y);
-            for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
-            for (i = 0; i < nq; i++)
-                for (j = 0; j < nv; j++) q[i] -= g->base.rows.N[j * nq + i] * y[j];
-            total += move;
-            if (move < LAST_MOVE) break;
-        }
-        if (turn == NEWTON || !(total < MISS * s)) continue;
-        if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) continue;
-        part = regularity_at(g, behind, q) / g->memory[LARGEST];
-        if (!(part > AWAY * FLOOR)) continue;
-        g->memory[SIGMA] = g->base.sigma / fmin(part, 1.0);
-        g->memory[BASED] = 1.0;
-        g->memory[BASE_TIME] = behind;
-        memcpy(g->memory + BASE, q, sizeof(double) * (size_t)n);
-        return 0;
+            for (j = 0; j < nv; j++) q[i] -= g->base.rows.N[j * nq + i] * y[j];
     }
-    return 1;
+    if (!(move < LAST_MOVE)) return 1;
+    if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
+    part = regularity_at(g, behind, q) / g->memory[LARGEST];
+    if (!(part > AWAY * FLOOR)) return 1;
+    g->memory[SIGMA] = g->base.sigma / fmin(part, 1.0);
+    g->memory[BASED] = 1.0;
+    g->memory[BASE_TIME] = behind;
+    memcpy(g->memory + BASE, q, sizeof(double) * (size_t)n);
+    return 0;
 }
 
 /* y = (xi, u, z) of x */
@@ -585,10 +564,21 @@ static int coordinates_of(passage *g, double t, const double *x, double *y) {
     return 0;
 }
 
+/* 1 where velocities of a start are not those of the state on the branch. */
+static int strays(const passage *g, const double *x, const double *on) {
+    int first = g->size.nq, i;
+    double speed = 0.0, miss = 0.0;
+    for (i = first; i < first + g->size.nv; i++) {
+        speed = fmax(speed, fabs(x[i]));
+        miss = fmax(miss, fabs(x[i] - on[i]));
+    }
+    return !(miss <= STRAY * speed);
+}
+
 /* The chart at a state where it is regular, else at the last one that was; and the state in it. */
 static int prepare(passage *g, double t, const double *x) {
     double *m = g->memory, part;
-    int n = g->s->n;
+    int n = g->s->n, first = !(m[BASED] > 0.0);
     if (g->ready && t == g->ready_time && !memcmp(x, g->ready_x, sizeof(double) * (size_t)n))
         return STEPPER_OK;
     g->ready = 0;
@@ -600,7 +590,8 @@ static int prepare(passage *g, double t, const double *x) {
         m[BASED] = 1.0;
         m[BASE_TIME] = t;
         memcpy(m + BASE, x, sizeof(double) * (size_t)n);
-    } else if (!(m[BASED] > 0.0)) {
+        first = 0;
+    } else if (first) {
         if (base_behind(g, t, x)) return STEPPER_UNDETERMINED;
     } else if (evaluate(g, &g->base, m[BASE_TIME], m + BASE) || factor(g, &g->base)) {
         return STEPPER_SINGULAR;
@@ -608,6 +599,11 @@ static int prepare(passage *g, double t, const double *x) {
     if (coordinates_of_base(g)) return STEPPER_SINGULAR;
     if (g->size.moving) particular(g, &g->base, g->drift);
     if (coordinates_of(g, t, x, g->own)) return STEPPER_SINGULAR;
+    if (first) {
+        g->sigma = HUGE_VAL;
+        if (slope(g, t, g->own, g->at, g->full[0], g->slopes[0]) || strays(g, x, g->at))
+            return STEPPER_UNDETERMINED;
+    }
     memcpy(g->ready_x, x, sizeof(double) * (size_t)n);
     g->ready_time = t;
     g->ready = 1;
@@ -618,7 +614,7 @@ static int prepare(passage *g, double t, const double *x) {
  * or a step of this length makes of them. */
 static int left_branch(const passage *g, const double *x, const double *along, double h, double a) {
     int nq = g->size.nq, nv = g->size.nv, i;
-    double v = h * a, move = 0.0, turn = 0.0, zero = SLOW * g->s->atol;
+    double v = h * a, move = 0.0, turn = 0.0, zero = g->s->atol; /* at rest */
     for (i = 0; i < nv; i++) {
         v = fmax(v, fmax(fabs(x[nq + i]), fabs(along[nq + i])));
         turn = fmax(turn, fabs(x[nq + i] - along[nq + i]));
@@ -649,10 +645,120 @@ static void error_of(const passage *g, double h, double *error) {
     memcpy(error + nq + nv, e + 2 * d, sizeof(double) * (size_t)nz);
 }
 
+/* The dense output of a step from x to y, with the slopes at its ends: cubic, but for the stages. */
+static void cubic(const passage *g, const double *x, const double *y, double h, const double *first,
+                  const double *last, double *dense) {
+    int n = g->s->n, i;
+    for (i = 0; i < n; i++) {
+        double rise = y[i] - x[i], bend = h * first[i] - rise;
+        dense[i] = x[i];
+        dense[n + i] = rise;
+        dense[2 * n + i] = bend;
+        dense[3 * n + i] = rise - h * last[i] - bend;
+        dense[4 * n + i] = 0.0;
+    }
+}
+
+/* The rows of velocities that the base chose, and those of the coordinates: square, singular where
+ * the rows are dependent; transposed where asked for. */
+static void square(const passage *g, const passage_rows *rows, int transposed, double *K) {
+    int nq = g->size.nq, nv = g->size.nv, m = g->size.speeds, i, j, k;
+    for (j = 0; j < nv; j++)
+        for (k = 0; k < nv; k++) {
+            double value = 0.0;
+            if (k < g->base.rank)
+                value = rows->J[j * m + g->base.order[k]];
+            else
+                for (i = 0; i < nq; i++)
+                    value += g->C[i * g->d + k - g->base.rank] * rows->N[j * nq + i];
+            K[transposed ? k * nv + j : j * nv + k] = value;
+        }
+}
+
+/* The side of the singular configuration on which a point is, by the sign of a determinant. */
+static int side_of(const passage *g, const passage_rows *rows) {
+    double *A = g->K;
+    int n = g->size.nv, sign = 1, i, j, k;
+    square(g, rows, 0, A);
+    for (k = 0; k < n; k++) {
+        int pivot = k;
+        for (i = k + 1; i < n; i++)
+            if (fabs(A[k * n + i]) > fabs(A[k * n + pivot])) pivot = i;
+        if (!(fabs(A[k * n + pivot]) > 0.0)) return 0;
+        for (j = k; j < n && pivot != k; j++) {
+            double kept = A[j * n + k];
+            A[j * n + k] = A[j * n + pivot];
+            A[j * n + pivot] = kept;
+        }
+        if ((A[k * n + k] < 0.0) != (pivot != k)) sign = -sign;
+        for (i = k + 1; i < n; i++) {
+            double part = A[k * n + i] / A[k * n + k];
+            for (j = k + 1; j < n; j++) A[j * n + i] -= part * A[j * n + k];
+        }
+    }
+    return sign;
+}
+
+/* How far the rows are from holding where they are dependent: what of them no move of the positions
+ * changes there, zero where branches of motion meet. */
+static double gap_of(const passage *g, const passage_rows *rows) {
+    int n = g->size.nv, first = g->size.speeds - g->size.anchors, i, turn;
+    double *y = g->y, most = 0.0, sum = 0.0;
+    for (i = 0; i < n; i++) y[i] = 1.0;
+    for (turn = 0; turn < 2; turn++) { /* towards the null vectors on the right and on the left */
+        square(g, rows, turn, g->K);
+        if (solve(g->K, n, y, 1)) return 0.0;
+        for (most = 0.0, i = 0; i < n; i++) most = fmax(most, fabs(y[i]));
+        for (i = 0; i < n; i++) y[i] /= most;
+    }
+    for (most = 0.0, i = 0; i < g->base.rank; i++) {
+        int row = g->base.order[i], held = row >= first && row < g->size.speeds;
+        most = fmax(most, fabs(y[i]));
+        sum += y[i] * (rows->place[row] - (held ? g->base.rows.place[row] : 0.0));
+    }
+    return most > 0.0 ? fabs(sum) / most : 0.0;
+}
+
+/* 1 where a step goes across a singular configuration, though the branches there only come near
+ * each other and a motion that stays on its own turns. With f = gap + k s w, s along the one and w
+ * along the other, sigma is sqrt(2 k gap) where it turns; what is below AWAY floors is passed as if
+ * the branches met. */
+static int jumps(passage *g, double t, const double *x, double h, const double *y,
+                 const double *first, const double *last) {
+    double low = 0.0, high = 1.0, speed = 0.0, gap, *at = g->at, sigma = g->here.sigma;
+    int n = g->s->n, nq = g->size.nq, nv = g->size.nv, before, i, j, k;
+    const double *v = y + nq;
+    if (g->base.rank == 0 || g->singular) return 0;
+    for (j = 0; j < nv; j++) { /* |v| in the metric of M = L L' */
+        double sum = 0.0;
+        for (i = j; i < nv; i++) sum += g->here.M[j * nv + i] * v[i];
+        speed += sum * sum;
+    }
+    if (rows_at(g, t, x, &g->here.rows)) return 0;
+    before = side_of(g, &g->here.rows);
+    if (rows_at(g, t + h, y, &g->here.rows)) return 0;
+    if (before * side_of(g, &g->here.rows) >= 0) return 0;
+    cubic(g, x, y, h, first, last, g->across);
+    for (k = 0; k < HALVINGS; k++) {
+        double middle = 0.5 * (low + high);
+        dopri5_interpolate(g->across, n, middle, at);
+        if (rows_at(g, t + middle * h, at, &g->here.rows)) return 0;
+        if (before * side_of(g, &g->here.rows) > 0)
+            low = middle;
+        else
+            high = middle;
+    }
+    gap = gap_of(g, &g->here.rows);
+    if (gap > APART) g->missed = 1;
+    if (!(speed > 0.0) || !(high < 1.0)) return 0;
+    gap *= 2.0 * sigma / ((1.0 - high) * h * sqrt(speed));
+    return sqrt(gap) > AWAY * FLOOR * g->memory[SIGMA];
+}
+
 static int chart_attempt(passage *g, const double *x, double h) {
     stepper *s = g->s;
     double t = stepper_time(s), a = 0.0, *candidate = stepper_candidate(s);
-    int nq = g->size.nq, nv = g->size.nv, ny, i, j, k, status = prepare(g, t, x);
+    int nq = g->size.nq, nv = g->size.nv, ny, begun, i, j, k, status = prepare(g, t, x);
     if (status) return status;
     ny = 2 * g->d + g->size.nz;
     g->sigma = HUGE_VAL;
@@ -667,8 +773,12 @@ static int chart_attempt(passage *g, const double *x, double h) {
         if (status) return status;
         for (i = 0; i < nv; i++) a = fmax(a, fabs(g->full[k][nq + i]));
     }
-    if (!s->cut && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
+    /* a step may end in the singular configuration at a limit, or where it began in one: a slow
+     * start leaves it in many steps */
+    begun = g->memory[BASE_TIME] != t || memcmp(g->memory + BASE, x, sizeof *x * (size_t)s->n);
+    if (!s->cut && !begun && (g->singular || g->here.sigma < AWAY * FLOOR * g->memory[SIGMA]))
         return STEPPER_ENDS_SINGULAR;
+    if (jumps(g, t, x, h, candidate, g->full[0], g->full[6])) return STEPPER_CHART_LEFT;
     for (i = 0; i < s->n; i++) { /* where the stages lead, without the rows */
         double sum = 0.0;
         for (j = 0; j < 6; j++) sum += DOPRI5_A[6][j] * g->full[j][i];
@@ -679,10 +789,6 @@ static int chart_attempt(passage *g, const double *x, double h) {
     s->noise = NOISE * h * a / (g->sigma * g->sigma);
     s->kept_closed = 1;
     return STEPPER_OK;
-}
-
-void passage_look(passage *g, double t, const double *x) {
-    if (g->watch) g->least = fmin(g->least, regularity_at(g, t, x));
 }
 
 /* The least regularity that the next step of this length is thought to meet. */
@@ -703,15 +809,17 @@ static int attempt(stepper *s, const double *x, double h) {
     g->charted = s->kept_closed = 0;
     s->noise = 0.0;
     if (ahead >= on) {
-        g->least = ahead;
-        g->watch = ahead < WATCHED * on;
         status = g->inner->attempt(s, x, h);
-        g->watch = 0;
-        if (!status) g->least = fmin(g->least, regularity_at(g, t + h, stepper_candidate(s)));
-        if (g->least >= on) return status;
+        if (status || regularity_at(g, t + h, stepper_candidate(s)) >= on) {
+            g->missed = 0;
+            return status;
+        }
     }
     g->charted = 1;
-    return chart_attempt(g, x, h);
+    status = chart_attempt(g, x, h);
+    if (g->missed && (status == STEPPER_SINGULAR || status == STEPPER_ENDS_SINGULAR))
+        return STEPPER_NEAR_MISS;
+    return status;
 }
 
 static void keep(stepper *s, const double *x, double h) {
@@ -727,13 +835,10 @@ static void keep(stepper *s, const double *x, double h) {
         g->inner->keep(s, x, h);
         return;
     }
+    cubic(g, x, y, h, g->full[0], g->full[6], g->dense);
     for (i = 0; i < n; i++) {
-        double rise = y[i] - x[i], bend = h * g->full[0][i] - rise, sum = 0.0;
+        double sum = 0.0;
         for (j = 0; j < 7; j++) sum += DOPRI5_D[j] * g->full[j][i];
-        g->dense[i] = x[i];
-        g->dense[n + i] = rise;
-        g->dense[2 * n + i] = bend;
-        g->dense[3 * n + i] = rise - h * g->full[6][i] - bend;
         g->dense[4 * n + i] = h * sum;
     }
 }
@@ -786,7 +891,7 @@ void passage_start(passage *g) {
     passage_forget(g);
 }
 
-void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->watch = g->lasting = 0; }
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = 0; }
 
 /* The chart as memory tells it. */
 static int restored(passage *g) {
@@ -809,6 +914,11 @@ int passage_chart(passage *g, double t, const double *x) {
 
 int passage_coordinates(passage *g, double t, const double *x, double *y) {
     return restored(g) || coordinates_of(g, t, x, y) ? STEPPER_SINGULAR : STEPPER_OK;
+}
+
+int passage_jumps(passage *g, double t, const double *x, const double *first, double h,
+                  const double *y, const double *last) {
+    return jumps(g, t, x, h, y, first, last);
 }
 
 int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
@@ -900,6 +1010,7 @@ static size_t lay(passage *g, double *block) {
     g->y = take(block, &used, ny);
     g->w = take(block, &used, ny);
     g->G = take(block, &used, nv * nv);
+    g->across = take(block, &used, 5 * n);
     g->ready_x = take(block, &used, n);
     return used;
 }

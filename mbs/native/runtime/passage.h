@@ -88,6 +88,11 @@ int passage_coordinates(passage *g, double t, const double *x, double *y);
 int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
                   double *slope_x, double *slope_y, double *turned);
 
+/* Right after passage_state gave y and its slope at t + h: 1 where the way to it from a state x on the
+ * motion at t, with its slope, goes across branches that only come near each other. */
+int passage_jumps(passage *g, double t, const double *x, const double *first, double h,
+                  const double *y, const double *last);
+
 /* The inverse of how fast velocities, in their units (nv,), are at most where the held ones, as
  * many as the motion is free, have size one: zero where those determine nothing. 1: no answer. */
 int passage_grip(passage *g, double t, const double *x, const int *held, const double *unit,
@@ -95,8 +100,5 @@ int passage_grip(passage *g, double t, const double *x, const int *held, const d
 
 /* How independent the rows are, part of the largest value so far. */
 double passage_regularity(passage *g, double t, const double *x);
-
-/* The full step evaluates its right-hand side at x. */
-void passage_look(passage *g, double t, const double *x);
 
 #endif

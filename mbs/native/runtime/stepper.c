@@ -144,7 +144,7 @@ static int open_step(stepper *s, const double *x, double limit) {
 /* How a failed try is shortened: by what its reason asks for, which is known of singular
  * configurations; a quarter else. */
 static double shortened(int status) {
-    if (status == STEPPER_ENDS_SINGULAR || status == STEPPER_SINGULAR) return 0.83;
+    if (status >= STEPPER_SINGULAR && status <= STEPPER_NEAR_MISS) return 0.83;
     return status == STEPPER_CHART_LEFT ? 0.5 : 0.25;
 }
 

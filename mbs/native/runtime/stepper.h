@@ -23,8 +23,9 @@ enum {
     STEPPER_RHS_FAILED,        /* so did failures of the right-hand side */
     STEPPER_PROJECTION_FAILED, /* so did failures of the projection */
     STEPPER_NOT_FINITE,        /* so did values that are not finite */
-    STEPPER_SINGULAR,          /* so did a singular configuration, as in the next three cases */
+    STEPPER_SINGULAR,          /* so did a singular configuration, as in the next four cases */
     STEPPER_ENDS_SINGULAR,     /* the step ends in one: shorten it a little */
+    STEPPER_NEAR_MISS,         /* it does, or nearly: branches come near and do not meet */
     STEPPER_CHART_LEFT,        /* a stage lies beyond what the coordinates of the step describe */
     STEPPER_UNDETERMINED       /* the motion begins in one, and its velocities choose no branch */
 };

@@ -53,12 +53,15 @@ static void foretell(const core *c, double *guide) {
 /* Where the states are coordinates of a chart. */
 static int by_chart(core *c, const double *y, found *f) {
     static const passage_size size = MODEL_PASSAGE;
+    const core_charts *m = &c->m.charts;
     double guide[NT], none[NT];
     int i;
     foretell(c, guide);
     memset(f->rate, 0, sizeof f->rate);
     if (passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,
                       &c->m.charts.turned))
+        return 1;
+    if (passage_jumps(c->passage, m->time, m->X, m->slope, c->m.time - m->time, f->X, f->slope))
         return 1;
     if (core_call_tree(c, f->X, none, f->y)) return 1;
     /* near the singular configuration itself accelerations come from beside it */

@@ -20,7 +20,14 @@
 #define REACH REAL(0.5) /* largest Newton move, in nominal sizes, that stays on the branch */
 #define SMALLEST REAL(0.0009765625)
 #define STEEPEST REAL(1e4) /* nominal sizes that dependents move for one of the states */
-#define TRIALS 64          /* postures from which a branch is looked for */
+/* A start is followed from the start values in steps of this length at most, of the states that lead the
+ * dependents, in nominal sizes; the first one is shorter and tells the slope. */
+#define STRIDE REAL(0.2)
+#define FIRST REAL(1e-3)
+/* Part of a move by which the dependents may end beside where their slope leads: on another branch
+ * they differ by about the difference of the slopes, on the same one by half the step. */
+#define BENT REAL(0.1)
+#define TRIALS 64 /* postures from which a branch is looked for */
 #define RANGE REAL(3.14159265358979) /* of them about the start values, in nominal sizes */
 #define ALIKE REAL(1e-3)             /* weight of the coordinates that were not guessed */
 #define UNBOUNDED REAL(HUGE_VAL)
@@ -94,14 +101,51 @@ SHARED int closure_solve(const loops *l, const real *x, real *z) {
     return CLOSURE_OK;
 }
 
-/* z at x on the branch of the model's start values. */
+/* From the accepted posture to x along a straight line, on the branch that the slopes lead to: it also
+ * goes on where branches cross. */
+static int follow(const loops *l, const real *x, real *z) {
+    const real *from = l->x, *size = MODEL_NOMINAL;
+    real at[NX + 1], trial[NZ], slope[NZ], length = REAL(0.0), done = REAL(0.0), largest, part;
+    int i, known = 0, status;
+    for (i = 0; i < NZ; i++) slope[i] = REAL(0.0);
+    for (i = 0; i < NX; i++)
+        if (MODEL_LEADS[i])
+            length = real_max(length, real_abs(x[i] - from[i]) / size[STATES + i]);
+    largest = real_min(REAL(1.0), STRIDE / real_max(length, STRIDE));
+    part = length > REAL(0.0) ? FIRST * largest : REAL(1.0);
+    memcpy(z, l->z, sizeof trial);
+    while (done < REAL(1.0)) {
+        real to = real_min(REAL(1.0), done + part);
+        for (i = 0; i < NX; i++) at[i] = to < REAL(1.0) ? from[i] + to * (x[i] - from[i]) : x[i];
+        for (i = 0; i < NZ; i++) trial[i] = z[i] + (to - done) * slope[i];
+        status = newton(l, at, trial, REACH);
+        for (i = 0; i < NZ && status == CLOSURE_OK && known; i++) {
+            real off = real_abs(trial[i] - z[i] - (to - done) * slope[i]);
+            real most = real_max(length * size[DEPENDENTS + i], real_abs(slope[i]));
+            if (off > BENT * (to - done) * most) status = CLOSURE_OPEN;
+        }
+        if (status != CLOSURE_OK) {
+            part /= REAL(2.0);
+            if (part < SMALLEST * FIRST * largest) return status;
+            continue;
+        }
+        for (i = 0; i < NZ; i++) slope[i] = (trial[i] - z[i]) / (to - done);
+        memcpy(z, trial, sizeof trial);
+        known = 1;
+        done = to;
+        part = real_min(REAL(2.0) * part, largest);
+    }
+    return CLOSURE_OK;
+}
+
+/* z at x on the branch of the model's start values; near them where parameters open the loops. */
 static int from_start(const loops *l, const real *x, real *z) {
     const real *start = MODEL_START + DEPENDENTS;
     memcpy(z, start, NZ * sizeof *z);
     if (newton(l, MODEL_START + STATES, z, UNBOUNDED) == CLOSURE_OK) {
         memcpy(l->x, MODEL_START + STATES, NX * sizeof *x);
         memcpy(l->z, z, NZ * sizeof *z);
-        if (closure_solve(l, x, z) == CLOSURE_OK) return CLOSURE_OK;
+        return follow(l, x, z);
     }
     memcpy(z, start, NZ * sizeof *z);
     return newton(l, x, z, UNBOUNDED);

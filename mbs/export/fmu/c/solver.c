@@ -33,7 +33,6 @@ static int jacobian(void *user, double t, const double *x, double *J, double *f_
 
 static int tree_rhs(void *user, double t, const double *x, double *xdot) {
     core *c = user;
-    passage_look(c->passage, t, x);
     core_point(c, &t, x, c->z);
     c->res[0] = xdot;
     c->res[1] = NULL;

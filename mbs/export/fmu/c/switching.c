@@ -25,30 +25,39 @@
 #define ENDS_AT_HAND 1
 #endif
 
+#ifdef MODEL_TREE
+#define SHOW_TREE(c) (ON_TREE(c) ? core_show_tree(c) : (void)0)
+#else
+#define SHOW_TREE(c) ((void)0)
+#endif
+
 static core_status step_failed(core *c, int status) {
     static const char *const reason[] = {
         "", "", "too many steps", "the step size became too small",
         "the loops cannot be closed or the equations have no solution (unclosable or singular "
         "posture)", "the projection failed", "a derivative is not finite (singular posture?)",
         "a singular configuration is not passed", "a singular configuration is not passed",
+        "branches of motion come near each other and do not meet, by too little to tell what turns "
+        "from what goes on; make them meet, miss by more, or ask for a looser tolerance",
         "a singular configuration is not passed",
         "it starts in a singular configuration, and its velocities choose no branch of motion",
         "an event indicator has no value (unclosable or singular posture)",
         "a jump has no solution", "its jumps do not come to an end",
         "chattering, events follow each other and time stands still"};
     const char *why = status < (int)(sizeof reason / sizeof *reason) ? reason[status] : "";
-    char names[512] = "";
+    char names[512] = "", where[CORE_WHERE];
     size_t used = 0;
     int k;
+    SHOW_TREE(c); /* the last state that was accepted */
     for (k = 0; k < NK && status >= EVENTS_JUMP_FAILED && used < sizeof names; k++)
         if (events_fired(&c->events)[k] > 0.0)
             used += (size_t)snprintf(names + used, sizeof names - used, "%s%s",
                                      used ? ", " : "; it concerns ", MODEL_INDICATORS[k]);
     if (status >= EVENTS_JUMP_FAILED)
-        return core_no_answer(c, "%s: the event at time %.9g cannot be handled: %s%s", c->name,
-                              c->m.time, why, names);
-    return core_no_answer(c, "%s: integration stopped at time %.9g with step %.3g: %s", c->name,
-                          c->m.time, stepper_wanted_step(&c->solver), why);
+        return core_no_answer(c, "%s: the event at time %.9g (%s) cannot be handled: %s%s", c->name,
+                              c->m.time, core_where(c, where), why, names);
+    return core_no_answer(c, "%s: integration stopped at time %.9g (%s) with step %.3g: %s", c->name,
+                          c->m.time, core_where(c, where), stepper_wanted_step(&c->solver), why);
 }
 
 /* What moves: the coordinates of the tree, or the states. */
@@ -237,19 +246,20 @@ core_status core_settle(core *c, int *changed) {
 core_status core_show_indicators(core *c) {
     double *shown = c->m.values + INDICATORS;
     core_status status = core_refresh(c);
+    char where[CORE_WHERE];
     int k, tree = ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     if (status) return status;
     core_point(c, &c->m.time, tree ? moving(c) : c->m.values + STATES, c->m.values + DEPENDENTS);
     c->res[0] = shown;
     if (CALL(tree, indicators))
-        return core_no_answer(c, "%s: the event indicators have no value at time %.9g", c->name,
-                              c->m.time);
+        return core_no_answer(c, "%s: the event indicators have no value at time %.9g (%s)", c->name,
+                              c->m.time, core_where(c, where));
     for (k = 0; k < NK; k++) {
         shown[k] += c->m.offset[k];
         if (shown[k] == 0.0) shown[k] = -DBL_MIN;
         if (!isfinite(shown[k]))
-            return core_no_answer(c, "%s: %s is not finite at time %.9g", c->name,
-                                  MODEL_NAMES[INDICATORS + k], c->m.time);
+            return core_no_answer(c, "%s: %s is not finite at time %.9g (%s)", c->name,
+                                  MODEL_NAMES[INDICATORS + k], c->m.time, core_where(c, where));
     }
     return CORE_OK;
 }

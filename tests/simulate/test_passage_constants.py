@@ -1,0 +1,105 @@
+"""Constants of steps through singular configurations: what each tells apart, moved tenfold."""
+
+import re
+
+import numpy as np
+import pytest
+from support.change_points import linkage
+
+import mbs
+from mbs.errors import SolverError
+from mbs.solvers import compiled_run
+
+PARALLELOGRAM, MEETS, ANTI = "parallelogram", "a+g=b+c", "antiparallelogram"
+SYSTEMS = {
+    PARALLELOGRAM: lambda: mbs.robots.n_four_bar().assemble(active=["a0"]),
+    MEETS: lambda: linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5)),
+    ANTI: lambda: linkage((0.4, 1.0, 0.4, 1.0), (1.0, -1.8, -1.5)),
+    1e-8: lambda: linkage((0.4, 0.9, 0.7 + 1e-8, 1.2), (1.0, -0.5, 1.5)),
+    -1e-12: lambda: linkage((0.4, 0.9, 0.7 - 1e-12, 1.2), (1.0, -0.5, 1.5)),
+}
+FLAT = [0.0, 0.0, 0.0]
+RUNS = {
+    "parallelogram": (PARALLELOGRAM, 1e-4, {"v0": {"a0": -4.0}}),
+    "linkage": (MEETS, 1e-10, {"v0": {"j1": 6.0}}),
+    "antiparallelogram": (ANTI, 1e-10, {"v0": {"j1": 6.0}}),
+    "miss": (1e-8, 1e-9, {"v0": {"j1": 6.0}}),
+    "start": (ANTI, 1e-8, {"q0": FLAT, "v0": [-6 / 7, 2.0, 2.0]}),
+    "miss of 3e-6": (PARALLELOGRAM, 1e-8, {"q0": FLAT, "v0": [1, -1 - 3e-6, 1 - 3e-6]}),
+    "miss of 3e-7": (PARALLELOGRAM, 1e-8, {"q0": FLAT, "v0": [1, -1 - 3e-7, 1 - 3e-7]}),
+}
+STOPS = 1e300
+MOVED = [  # constant, factor, run, parts of the tolerance that tell the one from the other
+    ("PASSAGE_ON", 10, "antiparallelogram", 1.0),
+    ("AHEAD", 10, "linkage", 1.0),
+    ("FLOOR", 10, "miss", STOPS),
+    ("AWAY", 10, "miss", STOPS),
+    ("BESIDE", 0.1, "start", STOPS),
+    ("TURNED", 10, "parallelogram", STOPS),
+    ("NEWTON", 0.1, "start", STOPS),
+    ("LAST_MOVE", 10, "miss", 1.5),
+    ("NOISE", 10, "miss", 3.0),
+    ("BACK", 10, "start", 0.1),
+    ("STRAY", 10, "miss of 3e-6", STOPS),
+    ("STRAY", 0.1, "miss of 3e-7", STOPS),
+]
+
+
+@pytest.fixture(scope="module")
+def systems():
+    return {name: build() for name, build in SYSTEMS.items()}
+
+
+def scale(monkeypatch, constant, factor):
+    """Compile the steps with another value of a constant."""
+    given = compiled_run._runtime
+
+    def changed(names):
+        files, found = dict(given(names)), 0
+        for name in ("passage.h", "passage.c"):
+            text, count = re.subn(
+                rf"(#define {constant}) (\S+)",
+                lambda m: f"{m[1]} {type(eval(m[2]))(eval(m[2]) * factor)!r}",
+                files[name],
+            )
+            files[name], found = text, found + count
+        assert found == 1
+        return files
+
+    monkeypatch.setattr(compiled_run, "_runtime", changed)
+
+
+def outcome(systems, run):
+    """The energy error in tolerances; infinite where the motion stops."""
+    name, tolerance, start = RUNS[run]
+    duration = 1.0 if "q0" in start else 3.0
+    try:
+        result = mbs.simulate.run(
+            systems[name], duration, tolerance=tolerance, step=0.05, quiet=True, **start
+        )
+    except SolverError:
+        return np.inf
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    return np.ptp(energy) / result["kinetic_energy"].max() / tolerance
+
+
+@pytest.mark.parametrize(("constant", "factor", "run", "bound"), MOVED)
+def test_a_constant_that_is_moved_tenfold_is_told(
+    systems, monkeypatch, constant, factor, run, bound
+):
+    ours = outcome(systems, run)
+    scale(monkeypatch, constant, factor)
+    assert (ours < bound) != (outcome(systems, run) < bound)
+
+
+def test_a_miss_is_named_where_it_is_larger_than_rounding(systems, monkeypatch):
+    """`APART` only chooses the words of a stop."""
+
+    def words():
+        with pytest.raises(SolverError) as stop:
+            mbs.simulate.run(systems[-1e-12], 3.0, v0={"j1": 6.0}, tolerance=1e-10, quiet=True)
+        return str(stop.value)
+
+    assert "come near each other" in words()
+    scale(monkeypatch, "APART", 10)
+    assert "is not passed" in words()

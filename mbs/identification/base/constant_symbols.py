@@ -75,7 +75,8 @@ def with_constants(system: System, names: Sequence[str]) -> System:
     rest = [k for k, parameter in enumerate(system.parameters) if parameter.name not in values]
     parameters = tuple(system.parameters[k] for k in rest)
     changed: System = _changer(system.symbol_table, values)(replace(system, _cache={}))
-    return replace(changed, parameters=parameters, p=system.p[rest], _cache={})
+    bounds = {name: own for name, own in system.bounds.items() if name not in values}
+    return replace(changed, parameters=parameters, p=system.p[rest], bounds=bounds, _cache={})
 
 
 def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable[[Any], Any]:
@@ -89,10 +90,8 @@ def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable
             return casadi.substitute(value, before, after) if depends(value) else value
         if isinstance(value, Expression):
             return _with_numbers(value, values)
-        if (
-            id(value) not in done
-        ):  # what is shared is changed once; kept with the original, so that its id stays taken
-            # Kept with the original, so that no other object gets its id.
+        if id(value) not in done:  # what is shared is changed once
+            # kept with the original, so that no other object gets its id
             done[id(value)] = (value, inside(value))
         return done[id(value)][1]
 

@@ -55,7 +55,7 @@ NO_FAST_MATH = """\
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Check:
+class StatusCheck:
     """What the inputs of a model must fulfil beside being numbers.
 
     Attributes:
@@ -67,7 +67,7 @@ class Check:
     statuses: tuple[str, ...]
 
 
-def check_of(model: Function, real: Real) -> Check | None:
+def check_of(model: Function, real: Real) -> StatusCheck | None:
     """The rows of validity that a model asks for; None where it asks for numbers alone.
 
     Args:
@@ -95,7 +95,7 @@ def check_of(model: Function, real: Real) -> Check | None:
         for k in range(columns)
     ]
     function = Function("holds", inputs, [casadi.densify(casadi.vertcat(*holds))], {"cse": True})
-    return Check(function, tuple(STATUS_OF[row.kind] for row in rows) * columns)
+    return StatusCheck(function, tuple(STATUS_OF[row.kind] for row in rows) * columns)
 
 
 def _asks_for_loops(model: ModelFunction, q: SX) -> bool:

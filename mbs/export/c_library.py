@@ -17,7 +17,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction
 from mbs.comments import in_c_comment
 from mbs.errors import ExportError, ModelError
-from mbs.export.c_check import NO_FAST_MATH, STATUS, Check, check_of
+from mbs.export.c_check import NO_FAST_MATH, STATUS, StatusCheck, check_of
 from mbs.export.c_names import check_function_names, library_name, parameter_names
 from mbs.export.c_step import Step, step_texts
 from mbs.files import path_of, write_texts
@@ -307,7 +307,7 @@ def _entry(name: str, model: Function, library: _Library) -> _Entry:
     return _Entry(name, model, _code(name, model, check), statuses, inputs, outputs)
 
 
-def _code(name: str, model: Function, check: Check | None) -> Function:
+def _code(name: str, model: Function, check: StatusCheck | None) -> Function:
     """The function under a name, every input and output dense, and the check as its last output.
 
     They share what they have in common, such as the sines and cosines of a posture.

@@ -34,7 +34,7 @@ from timing import ALGORITHMS, STATES, Array, Contender, InLibrary, Peer, best_t
 import mbs
 import mbs.models
 from mbs.assembly import System
-from mbs.assembly.rates import quaternion_slices
+from mbs.assembly.tree import quaternion_slices
 from mbs.native import compiled
 from mbs.native.kernel import kernel_library
 from mbs.operations import count

@@ -27,7 +27,7 @@ from mbs.assembly import System
 from mbs.errors import MbsError
 from mbs.identification import base_parameters, regressor
 from mbs.loops import modes
-from mbs.loops.closed_form.plan import plan
+from mbs.loops.plan import plan
 from mbs.models import inverse_geometry
 from mbs.operations import count
 from mbs.robots import catalogue, n_four_bar

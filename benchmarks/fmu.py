@@ -24,7 +24,7 @@ import numpy as np
 
 import mbs
 from mbs.files import write_text
-from mbs.models.minimal_state import minimal_state
+from mbs.models.state.independent import minimal_state
 from mbs.native import find_compiler
 from mbs.solvers import integrate
 

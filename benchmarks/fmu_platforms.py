@@ -21,7 +21,7 @@ from elf_versions import glibc_versions
 from fmu_mechanisms import CASES
 
 import mbs
-from mbs.native.cross import PLATFORMS, cross_compiler
+from mbs.native.compiler import PLATFORMS, cross_compiler
 
 HERE = Path(__file__).parent
 STEPS, STEP = 100, 0.01

@@ -15,7 +15,7 @@ import time
 import mbs
 from mbs.assembly import System
 from mbs.identification import base_parameters, columns_of
-from mbs.identification.regressors.columns import ColumnChoice
+from mbs.identification.regressors import ColumnChoice
 from mbs.operations import count
 
 ROBOTS = (

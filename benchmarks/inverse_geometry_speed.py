@@ -20,8 +20,8 @@ from support.arm_search import plain_arm
 import mbs
 from mbs.assembly import System
 from mbs.models.inverse_geometry import solve
-from mbs.models.inverse_geometry.batches.many import solve_many
-from mbs.models.inverse_geometry.numeric.core import core
+from mbs.models.inverse_geometry.core import core
+from mbs.models.inverse_geometry.many import solve_many
 
 _SHARE = 0.03
 """Seconds that a contender takes in a round."""

@@ -16,13 +16,13 @@ from plain_mechanism import PlainMechanism, plain
 
 from mbs.assembly import System
 from mbs.components import Mechanism
-from mbs.loops.start import start
+from mbs.loops.configuration import start
 from mbs.models import transform
-from mbs.models.effort import effort_function
-from mbs.models.full_state import FullState, full_state
+from mbs.models.state.signals import effort_function
+from mbs.models.state.tree import FullState, full_state
 from mbs.robots import andrews_squeezer, bricard, flyball_governor, n_four_bar, simple_pendulum
 from mbs.simulate.run import step_tolerances
-from mbs.solvers.compiled_run import library_of, run_compiled
+from mbs.solvers.integrate import library_of, run_compiled
 from mbs.solvers.problem import equations, problem
 
 Array = np.ndarray[Any, Any]

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from mbs.assembly import System
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 
 _JOINTS = {
     Motion.REVOLUTE: pin.JointModelRZ,

@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 
 from mbs.assembly import System
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose
 

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import casadi
 import numpy as np
 
-from mbs.native.cache import cache_dir
+from mbs.native.compiler import cache_dir
 
 STATES = 64
 BLOCK_NS = 1.5e5

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.messages import quoted
+from mbs.text import quoted
 
 
 def doubles(value: Any) -> NDArray[np.float64] | str:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from mbs.errors import ExportError, ModelError
 from mbs.files import whole_file
-from mbs.messages import install_command
+from mbs.text import install_command
 
 Array = npt.NDArray[np.float64]
 

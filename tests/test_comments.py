@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mbs.comments import (
+from mbs.text import (
     ascii_line,
     in_bracket_comment,
     in_c_comment,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mbs.messages import DISTRIBUTION, install_command
+from mbs.text import DISTRIBUTION, install_command
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -48,7 +48,7 @@ def test_every_line_that_installs_names_an_extra_that_exists() -> None:
     found = 0
     for path in TEXTS:
         for name in wanted(path.read_text(encoding="utf-8")):
-            if name in OTHERS or (path.name == "messages.py" and "{" in name):
+            if name in OTHERS or (path.name == "text.py" and "{" in name):
                 continue
             own = _OWN.fullmatch(name)
             assert own, f"{path}: pip install {name}"

@@ -1,4 +1,4 @@
-from mbs.messages import did_you_mean, quoted
+from mbs.text import did_you_mean, quoted
 
 
 def test_the_nearest_names_come_first():

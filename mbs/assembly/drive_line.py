@@ -12,12 +12,15 @@ Source: Spong 1987, for this assumption.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from mbs.assembly.drive_rules import check_flanges, inertia_missing, ring_of_gears, same_shaft
+import casadi
+from casadi import SX
+
+from mbs.assembly.tables import Coordinate
 from mbs.components import (
     Component,
     Coupling,
@@ -28,12 +31,87 @@ from mbs.components import (
     Revolute,
     ShaftInertia,
 )
-from mbs.components.drive_elastic import ShaftForce
-from mbs.components.drive_flange import Flange, Flanged
-from mbs.components.drive_motor import Device
-from mbs.components.rigid_body import Mount
+from mbs.components.bodies import Mount
+from mbs.components.drives import Device, ElasticGear, Flange, Flanged, Quantity, ShaftForce
+from mbs.components.joints import Motion
 from mbs.errors import AssemblyError
-from mbs.expressions import Expression, Number, Scalar, expression, to_float
+from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
+
+# What is refused in a drive line, and how it is said.
+
+
+def check_flanges(mechanism: Mechanism, parts: Sequence[Flanged]) -> None:
+    """Refuse flanges that are connected to nothing, or to a joint that slides.
+
+    Raises:
+        AssemblyError: which flange, and what to connect.
+    """
+    joined: dict[Flange, list[Flange]] = {}
+    for a, b in mechanism.shafts:
+        joined.setdefault(a, []).append(b)
+        joined.setdefault(b, []).append(a)
+    for part in parts:
+        loose = [flange for flange in part.flanges if flange not in joined]
+        ends = isinstance(part, ShaftInertia) and len(loose) < len(part.flanges)
+        if loose and not ends:
+            raise AssemblyError(
+                f"{mechanism.name}: {loose[0]} of {type(part).__name__} {part.name!r} is connected"
+                " to nothing; connect it to another flange or leave the component out"
+            )
+    for flange in joined:
+        if _slides(flange):
+            _check_sliding(mechanism, flange, joined)
+
+
+def _slides(flange: Flange) -> bool:
+    joint = flange.owner
+    return isinstance(joint, Joint) and joint.freedoms[0].motion is Motion.PRISMATIC
+
+
+def _check_sliding(mechanism: Mechanism, start: Flange, joined: dict[Flange, list[Flange]]) -> None:
+    """Whatever is connected to a flange that slides must slide, or be the end of a gear."""
+    seen, queue = {start}, deque([start])
+    while queue:
+        for other in joined[queue.popleft()]:
+            if other in seen:
+                continue
+            geared = isinstance(other.owner, (IdealGear, ElasticGear)) and other.port == "b"
+            if not geared and not _slides(other):
+                raise AssemblyError(
+                    f"{mechanism.name}: {other} turns but joint {start.owner.name!r} slides; put an"
+                    " IdealGear or ElasticGear between them, its flange_b on the joint and its"
+                    " ratio in rad for 1 m"
+                )
+            seen.add(other)
+            queue.append(other)
+
+
+def ring_of_gears(
+    mechanism: Mechanism, key: tuple[str, str], first: Expression, second: Expression
+) -> AssemblyError:
+    """Gears that form a ring and do not agree."""
+    return AssemblyError(
+        f"{mechanism.name}: rigid gears drive {key[0]!r} in two ways, with the ratios {first} and"
+        f" {second}, so that nothing can turn; take one of them away or make it elastic"
+    )
+
+
+def inertia_missing(mechanism: Mechanism, flanges: Sequence[Flange]) -> AssemblyError:
+    """Flanges that turn without any inertia."""
+    names = ", ".join(str(flange) for flange in flanges)
+    return AssemblyError(
+        f"{mechanism.name}: {names} turn without any inertia and without a joint, so that their"
+        " acceleration is not determined; connect a ShaftInertia to them"
+    )
+
+
+def same_shaft(mechanism: Mechanism, part: ShaftForce) -> AssemblyError:
+    """An elastic part between flanges that are rigidly connected."""
+    return AssemblyError(
+        f"{mechanism.name}: both flanges of {type(part).__name__} {part.name!r} are on one rigid"
+        " shaft, which it cannot twist; connect one of them to another shaft"
+    )
+
 
 Key = tuple[str, str]
 """A flange, by the name of its component and its port."""
@@ -257,3 +335,141 @@ def _levers(
     if len({coordinate for coordinate, _ in levers}) < len(levers):
         raise same_shaft(mechanism, part)
     return tuple(levers)
+
+
+# The tables of drive lines: what every rigid part turns with, and the devices that drive.
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftRow:
+    """An inertia or a rigid gear of a drive line, and what it turns with.
+
+    Attributes:
+        name: of the component.
+        kind: ShaftInertia, IdealGear, or DCMotor where its rotor has a coordinate of its own.
+        coordinate: the coordinate that it turns with.
+        own: whether this coordinate is its own, and not that of a joint or another inertia.
+        factor: its angle, of a gear that of flange_a, is factor times the coordinate; a number,
+            or an expression where a symbol is in it.
+    """
+
+    name: str
+    kind: str
+    coordinate: str
+    own: bool
+    factor: float | SX
+
+    @property
+    def sentence(self) -> str:
+        """What it is and how it turns."""
+        if self.own:
+            return f"{self.kind} {self.name} has a coordinate of its own, {self.coordinate}."
+        turns = f"turns {_as_fast(self.factor, self.coordinate)}"
+        if self.kind == IdealGear.__name__:
+            return f"{self.kind} {self.name} is rigid: its flange_a {turns}."
+        return f"{self.kind} {self.name} {turns}, which has its inertia."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttachedDevice:
+    """A device that drives a shaft; z (n, 1) are its states, u (1, 1) its input.
+
+    Attributes:
+        device: its description.
+        coordinate: the coordinate that it turns.
+        velocity: number in v of this coordinate.
+        factor: speed of its flange for a unit velocity of the coordinate.
+        symbols: CasADi symbol of every parameter.
+    """
+
+    device: Device
+    coordinate: str
+    velocity: int
+    factor: SX
+    symbols: Mapping[str, SX]
+
+    @property
+    def name(self) -> str:
+        """The name of the component."""
+        return self.device.name
+
+    @property
+    def states(self) -> tuple[Quantity, ...]:
+        """Full name and unit of every state."""
+        return tuple((f"{self.name}.{state}", unit) for state, unit in self.device.states)
+
+    @property
+    def input(self) -> Quantity:
+        """Full name and unit of its input."""
+        name, unit = self.device.input
+        return f"{self.name}.{name}", unit
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Full name and unit of what else a result shows of it."""
+        z, u = SX.sym("z", len(self.states)), SX.sym("u")
+        shown = self.device.shown(z, u, SX.sym("w"), self.symbols)
+        return tuple((f"{self.name}.{name}", unit) for name, unit in shown)
+
+    def rate(self, z: SX, u: SX, v: SX) -> SX:
+        """(n, 1) time derivatives of its states; v (nv, 1) are the velocities."""
+        return self.device.rate(z, u, self._speed(v), self.symbols)
+
+    def effort(self, z: SX, u: SX, v: SX) -> SX:
+        """What it delivers at its coordinate [N m or N]."""
+        return self.factor * self.device.torque(z, u, self._speed(v), self.symbols)
+
+    def shown(self, z: SX, u: SX, v: SX) -> SX:
+        """The values of its outputs."""
+        return casadi.vertcat(*self.device.shown(z, u, self._speed(v), self.symbols).values())
+
+    @property
+    def sentence(self) -> str:
+        """What it is, what it drives and by which input."""
+        states = "".join(f", state {name} [{unit}]" for name, unit in self.states)
+        name, unit = self.input
+        turns = _as_fast(_number(self.factor), self.coordinate)
+        return (
+            f"{type(self.device).__name__} {self.name} drives {self.coordinate} and turns {turns}:"
+            f" input {name} [{unit}]{states}."
+        )
+
+    def _speed(self, v: SX) -> SX:
+        return self.factor * v[self.velocity]
+
+
+def shaft_rows(line: DriveLine, symbols: Mapping[str, SX]) -> tuple[ShaftRow, ...]:
+    """Every inertia and rigid gear, and motors whose rotor is a link, in the order added."""
+    rows = []
+    for part in line.parts:
+        turn = line.turns[part.flanges[0].key]
+        own = line.links.get(turn.coordinate) == part.name
+        if own or isinstance(part, (ShaftInertia, IdealGear)):
+            factor = _number(to_sx(turn.factor, symbols))
+            rows.append(ShaftRow(part.name, type(part).__name__, turn.coordinate, own, factor))
+    return tuple(rows)
+
+
+def attached_devices(
+    line: DriveLine, speeds: Sequence[Coordinate], symbols: Mapping[str, SX]
+) -> tuple[AttachedDevice, ...]:
+    """Every device with the coordinate that it turns, in the order added."""
+    numbers = {speed.name: number for number, speed in enumerate(speeds)}
+    rows = []
+    for part in line.parts:
+        if isinstance(part, Device):
+            turn = line.turns[part.flange.key]
+            where = turn.coordinate, numbers[turn.coordinate]
+            rows.append(AttachedDevice(part, *where, to_sx(turn.factor, symbols), symbols))
+    return tuple(rows)
+
+
+def _number(factor: SX) -> float | SX:
+    return float(factor) if factor.is_constant() else factor
+
+
+def _as_fast(factor: float | SX, coordinate: str) -> str:
+    if isinstance(factor, float) and factor == 1:
+        return f"with {coordinate}"
+    text = format(factor, "g") if isinstance(factor, float) else str(factor)
+    return f"{text} times as fast as {coordinate}"

@@ -18,11 +18,10 @@ from dataclasses import dataclass, field
 import casadi
 from casadi import DM, SX
 
-from mbs.assembly.graph import BodyGraph, Edge, inertia_of
-from mbs.assembly.spanning_tree import Branch, SpanningTree
+from mbs.assembly.graph import BodyGraph, Branch, Edge, SpanningTree, inertia_of
 from mbs.assembly.tree import CarriedRotor, Frame, Link, Tree
 from mbs.components import Mechanism
-from mbs.components.motion import Freedom, Motion
+from mbs.components.joints import Freedom, Motion
 from mbs.expressions import to_sx
 from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z, exact_product, placed
 

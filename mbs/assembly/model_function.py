@@ -5,23 +5,94 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi
 import numpy as np
 from casadi import DM, MX, SX, Function, Sparsity
 from numpy.typing import NDArray
 
-from mbs.assembly.function_table import function_table
-from mbs.assembly.rates import quaternion_slices
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import all_hold, plain_fault, plain_rows
 from mbs.errors import MbsError, ModelError
-from mbs.messages import quoted
 from mbs.native import compiled
 from mbs.numbers import doubles
-from mbs.operations.naming import names_found
+from mbs.operations.pipeline import names_found
+from mbs.text import quoted
+
+if TYPE_CHECKING:
+    from mbs.assembly.system import System
+
+
+# The table that says what each element of the inputs and outputs of a model is.
+
+
+_QUANTITIES = {
+    "q": "position",
+    "v": "velocity",
+    "a": "acceleration",
+    "tau": "effort",
+    "p": "parameter",
+    "z": "state of a device",
+    "u": "input of a device",
+    "y": "output of a device",
+}
+
+
+def function_table(function: ModelFunction) -> str:
+    """One line for each input and output, and one for each of its elements that has a name.
+
+    Args:
+        function: the model; q, v, a and tau are in the order of the coordinates of its system, and
+            those that end in _a are of the independent joints.
+
+    Returns:
+        Lines of index, name, quantity and unit; parameters with their defaults, and positions,
+        velocities and efforts with the limits that the joints describe.
+    """
+    lines = [f"{function.name()} of {function.system.name}"]
+    for way, names, shape in (
+        ("input", function.name_in(), function.size_in),
+        ("output", function.name_out(), function.size_out),
+    ):
+        for name in names:
+            lines += [
+                f"{way} {name} {shape(name)}",
+                *_rows_of_elements(function, name, shape(name)[0]),
+            ]
+    return "\n".join(lines)
+
+
+def _rows_of_elements(function: ModelFunction, name: str, size: int) -> list[str]:
+    rows = function.elements(name)
+    if len(rows) != size:
+        return []
+    quantity = _QUANTITIES.get(name.removesuffix("_a"), "")
+    defaults = function.system.parameter_values(needed=()) if name == "p" else []
+    limits = _limits(function.system, name.removesuffix("_a"))
+    width = max((len(element) for element, _ in rows), default=0)
+    return [
+        f"  {k:>3}  {element:<{width}}  {quantity} [{unit}]{limits.get(element, '')}"
+        + (f" = {defaults[k]:g}" if k < len(defaults) and defaults[k] == defaults[k] else "")
+        for k, (element, unit) in enumerate(rows)
+    ]
+
+
+def _limits(system: System, name: str) -> dict[str, str]:
+    """What to write of the limits of the elements of an input, by the name of the element."""
+    ranges = {
+        "q": [(row.name, row.limits) for row in system.coordinates],
+        "v": [(row.name, row.limits) for row in system.speeds],
+        "tau": [(row.name, row.effort) for row in system.speeds],
+    }
+    return {
+        element: f" {ends[0]:g} .. {ends[1]:g}"
+        for element, ends in ranges.get(name, [])
+        if ends is not None
+    }
+
 
 Named = Sequence[tuple[str, SX]]
 """Inputs or outputs of a model: name and value."""

@@ -7,29 +7,28 @@ from collections.abc import Collection, Mapping, Sequence
 import casadi
 from casadi import SX
 
-from mbs.assembly.attached import attached_forces, force_elements
-from mbs.assembly.coordinate_coupling import CoordinateCoupling
-from mbs.assembly.drive_line import drive_line
-from mbs.assembly.drive_tables import attached_devices, shaft_rows
-from mbs.assembly.graph import BodyGraph, connection_graph
-from mbs.assembly.joint_rows import joint_rows
+from mbs.assembly.drive_line import attached_devices, drive_line, shaft_rows
+from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
 from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
 from mbs.assembly.proof import prove
-from mbs.assembly.rates import zero_position
-from mbs.assembly.sensors import attached_sensors
-from mbs.assembly.spanning_tree import spanning_tree
 from mbs.assembly.system import System
 from mbs.assembly.tables import (
     BodyRow,
     Coordinate,
+    CoordinateCoupling,
     LoopRow,
     Places,
+    attached_forces,
+    attached_sensors,
+    force_elements,
+    joint_rows,
     position_coordinates,
     velocity_coordinates,
 )
+from mbs.assembly.tree import zero_position
 from mbs.components import Box, Component, Cylinder, Free, Joint, Mechanism
-from mbs.components.rigid_body import Mount
+from mbs.components.bodies import Mount
 from mbs.errors import AssemblyError
 from mbs.expressions import Parameter, expression, to_float, to_sx
 from mbs.spatial import Pose

@@ -22,11 +22,11 @@ from mbs.assembly.khalil_frames import Framed
 from mbs.assembly.tables import Places
 from mbs.assembly.tree import Frame, Tree
 from mbs.components import Mechanism
-from mbs.components.motion import Freedom, Motion
-from mbs.components.placement import KhalilStep, Oriented, Placement, Translation, Turned
+from mbs.components.component import KhalilStep, Oriented, Placement, Translation, Turned
+from mbs.components.joints import Freedom, Motion
 from mbs.errors import AssemblyError
 from mbs.expressions import Expression, Number, Operation, Parameter
-from mbs.expressions.arithmetic import arithmetic
+from mbs.expressions.expression import arithmetic
 
 Array = NDArray[np.float64]
 """(..., 4, 4) transforms, (samples, 4, 4) where symbols are in them."""

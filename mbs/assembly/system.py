@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import math
+import pickle
 import threading
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -12,27 +14,165 @@ import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
-from mbs.assembly.attached import AttachedForce
-from mbs.assembly.coordinate_coupling import CoordinateCoupling
-from mbs.assembly.drive_tables import AttachedDevice, ShaftRow
-from mbs.assembly.joint_rows import JointRow
+from mbs.assembly.drive_line import AttachedDevice, ShaftRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.parameter_bounds import BoundedField, Bounds
-from mbs.assembly.pickled import packed, unpacked
-from mbs.assembly.rates import position_rate
-from mbs.assembly.report import report
-from mbs.assembly.sensors import AttachedSensor
-from mbs.assembly.tables import BodyRow, Closure, Coordinate, LinkRow, LoopRow, link_rows
-from mbs.assembly.tree import Tree
+from mbs.assembly.tables import (
+    AttachedForce,
+    AttachedSensor,
+    BodyRow,
+    Closure,
+    Coordinate,
+    CoordinateCoupling,
+    JointRow,
+    LinkRow,
+    LoopRow,
+    link_rows,
+)
+from mbs.assembly.tree import Tree, position_rate
 from mbs.components import Component
 from mbs.errors import MbsError, ModelError
 from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
-from mbs.messages import did_you_mean, quoted
 from mbs.spatial import Pose
+from mbs.text import did_you_mean, quoted
 
 if TYPE_CHECKING:
     from mbs.view.diagram import Diagram
+
+
+# Pickles of what holds SX: graphs travel as one Function, all else as it is.
+
+
+def packed(state: Any) -> tuple[bytes, list[str], str]:
+    """Any object made of plain data, Functions and SX: its bytes, names of symbols, and graphs.
+
+    Args:
+        state: whatever `pickle` takes, SX among it.
+    """
+    buffer = io.BytesIO()
+    pickler = _Pickler(buffer)
+    pickler.dump(state)
+    graphs = pickler.graphs
+    # one symbol at least: without any, numbers would come back as DM
+    symbols = casadi.symvar(casadi.veccat(SX.sym("any"), *graphs))
+    names = [symbol.name() for symbol in symbols]
+    return buffer.getvalue(), names, Function("graphs", symbols, graphs).serialize()
+
+
+def unpacked(data: bytes, names: list[str], graphs: str) -> Any:
+    """What was packed, all that `packed` gave; symbols have their names and are new."""
+    found = Function.deserialize(graphs).call([SX.sym(name) for name in names])
+    return _Unpickler(io.BytesIO(data), found).load()
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, buffer: io.BytesIO) -> None:
+        super().__init__(buffer, protocol=pickle.HIGHEST_PROTOCOL)
+        self.graphs: list[SX] = []
+
+    def persistent_id(self, obj: Any) -> int | None:
+        if not isinstance(obj, SX):
+            return None
+        self.graphs.append(obj)
+        return len(self.graphs) - 1
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, buffer: io.BytesIO, graphs: list[SX]) -> None:
+        super().__init__(buffer)
+        self._graphs = graphs
+
+    def persistent_load(self, pid: Any) -> Any:
+        return self._graphs[pid]
+
+
+# What was assembled, in plain sentences.
+
+
+def report(system: System) -> str:
+    """Tree, cut joints, mobility, dropped rows, whether the cut forces are unique, what acts."""
+    every = [*_tree(system), *_loops(system), *_parameters(system), *_acting(system)]
+    return "\n".join(every)
+
+
+def _tree(system: System) -> list[str]:
+    links = system.tree.links
+    without = {row.coordinate: "a shaft of a drive line" for row in system.shafts if row.own}
+    lines = [
+        f"{system.name}: {_count(len(links), 'moving link')} in a tree,"
+        f" {_count(system.nq, 'position')} q and {_count(system.nv, 'velocity')} v."
+    ]
+    for number, link in enumerate(links, start=1):
+        carried = [row.name for row in system.bodies if row.link == number]
+        before = "the base" if link.antecedent < 0 else f"link {link.antecedent + 1}"
+        what = ", ".join(carried) if carried else without.get(link.name, "a frame without a body")
+        lines.append(
+            f"  link {number}: {link.motion.value} {link.name} from {before} carries {what}"
+        )
+    return lines
+
+
+def _loops(system: System) -> list[str]:
+    if system.closure is None:
+        return ["No loop: every coordinate is independent."]
+    closure = system.closure
+    lines = []
+    for loop in system.loops:
+        if loop.closing == "coupling":
+            lines.append(f"Coupling {loop.name}: {' follows '.join(loop.joints)}.")
+            continue
+        kept = len(loop.rows) - len(loop.dropped)
+        lines.append(
+            f"1 loop cut at {loop.name} ({loop.closing}), through {', '.join(loop.joints)}:"
+            f" {kept} of {len(loop.rows)} rows are independent."
+        )
+        if loop.dropped:
+            lines.append(
+                f"  Dropped, since the others imply them: {', '.join(loop.dropped)};"
+                " the cut forces along them are not unique."
+            )
+        else:
+            lines.append("  The cut forces are unique.")
+    active = ", ".join(system.speeds[k].name for k in closure.active) or "none"
+    lines.append(
+        f"Mobility {closure.mobility} (Gruebler-Kutzbach counts {closure.gruebler});"
+        f" independent: {active}."
+    )
+    if closure.motors != closure.active:
+        motors = ", ".join(system.speeds[k].name for k in closure.motors)
+        lines.append(f"Driven by {_count(len(closure.motors), 'effort')}: {motors}.")
+    if len(closure.motors) > closure.mobility:
+        lines.append("  They are more than the mobility: which of them carries a load is a choice.")
+    lines.append(f"The loops close to {closure.residual:.1e} at the assembled posture.")
+    return lines
+
+
+def _parameters(system: System) -> list[str]:
+    if not system.parameters:
+        return []
+    values = ", ".join(
+        f"{p.name} = {'no value' if p.default is None else format(p.default, 'g')}"
+        for p in system.parameters
+    )
+    return [f"Parameters: {values}."]
+
+
+def _acting(system: System) -> list[str]:
+    """Parts of drive lines, force elements, sensors: a sentence for each."""
+    driving = {device.name for device in system.devices}
+    return [
+        *(row.sentence for row in system.shafts if row.name not in driving),
+        *(force.sentence for force in system.forces),
+        *(device.sentence for device in system.devices),
+        *(sensor.sentence for sensor in system.sensors),
+    ]
+
+
+def _count(number: int, noun: str) -> str:
+    plural = noun[:-1] + "ies" if noun.endswith("y") else noun + "s"
+    return f"{number} {noun if number == 1 else plural}"
+
 
 _BUILDING = threading.RLock()
 """Two threads that ask for the same model get the same Function."""

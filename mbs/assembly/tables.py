@@ -2,15 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from casadi import SX
 
-from mbs.assembly.tree import Tree
-from mbs.components import Box, Cylinder, Joint
-from mbs.components.motion import Motion
-from mbs.spatial import Pose
+from mbs.assembly.graph import Port, is_weld
+from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.tree import Frame, Tree
+from mbs.components import (
+    Box,
+    Component,
+    Cylinder,
+    ForceElement,
+    Joint,
+    Mechanism,
+    Point,
+    RigidBody,
+)
+from mbs.components.forces import CoordinateForce
+from mbs.components.joints import Motion
+from mbs.components.sensors import (
+    AbsoluteSensor,
+    JointSensor,
+    OnJoint,
+    Quantity,
+    RelativeSensor,
+    Sensor,
+)
+from mbs.errors import AssemblyError
+from mbs.expressions import to_sx
+from mbs.spatial import Inertia, MatrixTurn, Pose
+from mbs.text import did_you_mean
 
 Places = Mapping[tuple[str, str], tuple[int, Pose]]
 """Link and pose of every body, by its name and "", and of the frames "a" and "b" of every joint."""
@@ -216,3 +241,439 @@ def _coordinates(
             bounded = interval if unit in ("rad", "m") and not suffix else None
             rows.append(Coordinate(full, kind, unit, joint.name, driven, cut, bounded))
     return tuple(rows)
+
+
+# The joints of a system: those of the tree, those that were cut, and those that weld.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WeldedPart:
+    """What a Fixed joint holds: the bodies of a link on one side of it.
+
+    Attributes:
+        ports: its bodies, by their names and "", and the frames "a" and "b" of joints on it.
+        inertia: of its bodies, about the origin of the link's frame and in its axes.
+        sign: 1 where it has the frame_b of the joint, -1 where it has frame_a.
+    """
+
+    ports: frozenset[Port]
+    inertia: Inertia
+    sign: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointRow:
+    """A joint or constraint between two bodies.
+
+    Attributes:
+        name: of the joint.
+        kind: of joint, in lower case.
+        cut: whether it was cut to open a loop.
+        frame_a, frame_b: link (-1 for the base) that carries the frame, and pose in the link's.
+        part: what a joint that welds two bodies into one link holds, None of all others.
+    """
+
+    name: str
+    kind: str
+    cut: bool
+    frame_a: Frame
+    frame_b: Frame
+    part: WeldedPart | None
+
+
+def joint_rows(
+    mechanism: Mechanism, places: Places, cuts: Sequence[Cut], symbols: Mapping[str, SX]
+) -> tuple[JointRow, ...]:
+    """Every joint in the order added, without those that close a ring of welds.
+
+    In such a ring rigid bodies do not determine what a joint transmits.
+
+    Args:
+        mechanism: the components.
+        places: where bodies and joints are.
+        cuts: the joints that were cut.
+        symbols: CasADi symbol of every parameter.
+    """
+    cut = {row.edge.joint.name for row in cuts}
+    rows = []
+    for joint in mechanism.joints():
+        part = _part(mechanism, joint, places, symbols) if is_weld(mechanism, joint) else None
+        if is_weld(mechanism, joint) and part is None:
+            continue
+        frames = places[joint.name, "a"], places[joint.name, "b"]
+        kind = type(joint).__name__.lower()
+        rows.append(JointRow(joint.name, kind, joint.name in cut, *frames, part))
+    return tuple(rows)
+
+
+def _part(
+    mechanism: Mechanism, joint: Joint, places: Places, symbols: Mapping[str, SX]
+) -> WeldedPart | None:
+    """The side of a weld that is not the world; None where both sides are welded elsewhere."""
+    sides = {port: _welded(mechanism, joint, port) for port in "ab"}
+    if (joint.name, "a") in sides["b"]:
+        return None
+    side, sign = ("a", -1) if (mechanism.world.name, "") in sides["b"] else ("b", 1)
+    inertia = Inertia.zero()
+    for name, _ in sides[side]:
+        component = mechanism.components[name]
+        if isinstance(component, RigidBody):
+            pose = places[name, ""][1]
+            inertia = inertia + component.inertial(symbols).seen_from(MatrixTurn(pose.R), pose.p)
+    return WeldedPart(frozenset(sides[side]), inertia, sign)
+
+
+def _welded(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:
+    """What is welded to one frame of a joint other than through the joint, in the order found."""
+    found: dict[Port, None] = {(joint.name, port): None}
+    queue = deque(found)
+    while queue:
+        here = queue.popleft()
+        for there in _neighbours(mechanism, joint, here):
+            if there not in found:
+                found[there] = None
+                queue.append(there)
+    return list(found)
+
+
+def _neighbours(mechanism: Mechanism, without: Joint, port: Port) -> Iterator[Port]:
+    for a, b in mechanism.connections:
+        ends = (a.owner.name, a.port), (b.owner.name, b.port)
+        if port in ends:
+            yield ends[0] if port == ends[1] else ends[1]
+    joint = mechanism.components[port[0]]
+    if isinstance(joint, Joint) and joint.name != without.name and is_weld(mechanism, joint):
+        yield joint.name, "b" if port[1] == "a" else "a"
+
+
+# A relation between two coordinates, such as a gear makes.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoordinateCoupling:
+    """driven = sum of c_k driver^k between two elements of q.
+
+    Attributes:
+        name: of the coupling.
+        driven, driver: numbers in q.
+        coefficients: c_0, c_1, ...
+    """
+
+    name: str
+    driven: int
+    driver: int
+    coefficients: tuple[SX, ...]
+
+    def value(self, driver: SX) -> SX:
+        """The driven coordinate for a position of the driver."""
+        return sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
+
+
+# What acts on the tree and constrains nothing: force elements on points and on coordinates.
+
+
+_Rows = Sequence[Coordinate]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lever:
+    """How much of a coordinate an element acts on.
+
+    Attributes:
+        position: number in q of the coordinate, None where it is no position.
+        velocity: number in v of the coordinate.
+        factor: what a unit of the coordinate contributes.
+    """
+
+    position: int | None
+    velocity: int
+    factor: SX
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttachedForce:
+    """A force element and where it acts.
+
+    Attributes:
+        element: its description.
+        frames: link (-1 for the base) and pose in the link's frame, of each of its points.
+        levers: the coordinates that it acts on; none where it acts on points.
+        symbols: CasADi symbol of every parameter.
+        where: the components that it acts on, in words.
+    """
+
+    element: ForceElement
+    frames: tuple[tuple[int, Pose], ...]
+    levers: tuple[Lever, ...]
+    symbols: Mapping[str, SX]
+    where: str
+
+    @property
+    def sentence(self) -> str:
+        """What it is and where it acts."""
+        kind, name = type(self.element).__name__, self.element.name
+        return f"{kind} {name} acts {self.where}{self.element.scope}."
+
+
+def force_elements(mechanism: Mechanism) -> list[ForceElement]:
+    """Every spring, damper and so on, in the order added."""
+    return [c for c in mechanism.components.values() if isinstance(c, ForceElement)]
+
+
+def attached_forces(
+    mechanism: Mechanism,
+    places: Places,
+    tables: tuple[_Rows, ...],
+    symbols: Mapping[str, SX],
+) -> tuple[AttachedForce, ...]:
+    """Every force element with the links of its points, or the numbers of its coordinates.
+
+    Args:
+        mechanism: the components.
+        places: where bodies and joints are.
+        tables: the coordinates of q, of v, and of cut joints.
+        symbols: CasADi symbol of every parameter.
+
+    Raises:
+        AssemblyError: one acts on nothing that is there, or on nothing that moves.
+    """
+    forces = force_elements(mechanism)
+    return tuple(_attached(mechanism, force, places, tables, symbols) for force in forces)
+
+
+def _attached(
+    mechanism: Mechanism,
+    force: ForceElement,
+    places: Places,
+    tables: tuple[_Rows, ...],
+    symbols: Mapping[str, SX],
+) -> AttachedForce:
+    if isinstance(force, CoordinateForce):
+        levers = tuple(
+            Lever(*_coordinate_of(force, name, *tables), to_sx(factor, symbols))
+            for name, factor in force.levers
+        )
+        return AttachedForce(force, (), levers, symbols, _where([n for n, _ in force.levers]))
+    frames = []
+    for point in force.points:
+        require_part(mechanism, force, point, "acts on")
+        link, pose = places[point.owner.name, point.port]
+        frames.append((link, pose @ point.placement.pose(symbols)))
+    links, names = {link for link, _ in frames}, [point.owner.name for point in force.points]
+    if links == {-1} or (len(links) == 1 and len(frames) > 1):
+        still = "does not move" if links == {-1} else "is one rigid body"
+        raise AssemblyError(
+            f"{force.name}: what it acts on, {' and '.join(names)}, {still}, so that the"
+            f" {type(force).__name__} does nothing; let it act on another body"
+        )
+    return AttachedForce(force, tuple(frames), (), symbols, _where(names))
+
+
+def _where(names: Sequence[str]) -> str:
+    return f"between {' and '.join(names)}" if len(names) > 1 else f"on {names[0]}"
+
+
+def require_part(mechanism: Mechanism, component: Component, point: Point, does: str) -> None:
+    """Refuse a point of something that is not in the mechanism.
+
+    Raises:
+        AssemblyError: what the component does, such as "acts on", it does to a stranger.
+    """
+    known, is_nested = mechanism.components.get(point.owner.name), type(point.owner) is Component
+    if known is None or not (is_nested or known is point.owner):
+        raise AssemblyError(
+            f"{component.name}: it {does} {point.owner.name!r}, which is not part of"
+            f" {mechanism.name}; add that component, or take a point of one that is in it"
+        )
+
+
+def _coordinate_of(
+    force: CoordinateForce, name: str, coordinates: _Rows, speeds: _Rows, cut: _Rows
+) -> tuple[int | None, int]:
+    """Where a coordinate of a force stands in q and in v."""
+    q, v = ([row.name for row in table] for table in (coordinates, speeds))
+    known = [speed for speed in v if speed in q or not force.needs_position]
+    if name not in known and name in [coordinate.name for coordinate in cut]:
+        raise AssemblyError(
+            f"{force.name}: the joint of {name!r} is cut to open a loop, so that a"
+            f" {type(force).__name__} cannot act on it; give that joint some friction Fv of its"
+            " own, which keeps it in the tree"
+        )
+    if name not in known:
+        raise AssemblyError(
+            f"{force.name}: there is no coordinate {name!r} in the tree that a"
+            f" {type(force).__name__} can act on; {did_you_mean(name, known)}"
+        )
+    return (q.index(name) if name in q else None), v.index(name)
+
+
+# Where the sensors of a mechanism are, and how what they read is named.
+
+
+_INPUTS = ("q_a", "v_a", "a_a", "tau_a")
+"""Names of inputs of models that could be those of a quantity as well."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttachedSensor:
+    """A sensor and where it is.
+
+    Attributes:
+        sensor: its description.
+        frames: link (-1 for the base) and pose in the link's frame, of each of its points, or of
+            frame_a and frame_b of its joint.
+        coordinate: name of the coordinate that it reads, or nothing.
+        joint: number of its joint in `system.joints`, None where it is on none.
+        quantities: what it reads.
+        where: the components that it is on, in words.
+    """
+
+    sensor: Sensor
+    frames: tuple[Frame, ...]
+    coordinate: str
+    joint: int | None
+    quantities: tuple[Quantity, ...]
+    where: str
+
+    @property
+    def sentence(self) -> str:
+        """What it is, what it reads and where."""
+        names = ", ".join(quantity.name for quantity in self.quantities)
+        return f"{type(self.sensor).__name__} {self.sensor.name} reads {names} of {self.where}."
+
+    @property
+    def outputs(self) -> tuple[tuple[str, Quantity], ...]:
+        """The name that each quantity has as an output of a Function: tip_p of the sensor tip.
+
+        What CasADi does not take in a name becomes an underscore, as the dot in arm.tip does.
+        """
+        stem = re.sub(r"[^A-Za-z0-9]+", "_", self.sensor.name).strip("_")
+        stem = stem if stem[:1].isalpha() else f"sensor_{stem}".rstrip("_")
+        return tuple((f"{stem}_{quantity.name}", quantity) for quantity in self.quantities)
+
+    @property
+    def columns(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of every element in a result: tip.p.x of the sensor tip."""
+        return tuple(
+            (".".join(filter(None, (self.sensor.name, quantity.name, element))), quantity.unit)
+            for quantity in self.quantities
+            for element in quantity.elements
+        )
+
+
+def sensors_of(mechanism: Mechanism) -> Iterator[Sensor]:
+    """Every sensor, in the order added."""
+    return (c for c in mechanism.components.values() if isinstance(c, Sensor))
+
+
+def attached_sensors(
+    mechanism: Mechanism,
+    places: Places,
+    joints: Sequence[JointRow],
+    tables: tuple[Sequence[Coordinate], ...],
+    symbols: Mapping[str, SX],
+) -> tuple[AttachedSensor, ...]:
+    """Every sensor with the links of its points, or its joint.
+
+    Args:
+        mechanism: the components.
+        places: where bodies and joints are.
+        joints: of the system.
+        tables: the coordinates of q, of v, and of cut joints.
+        symbols: CasADi symbol of every parameter.
+
+    Raises:
+        AssemblyError: one is on nothing that is there, or two readings have the same name.
+    """
+    found: list[AttachedSensor] = []
+    for sensor in sensors_of(mechanism):
+        if isinstance(sensor, JointSensor):
+            found.append(_on_coordinate(sensor, tables))
+        elif isinstance(sensor, OnJoint):
+            found.append(_on_joint(mechanism, sensor, joints))
+        else:
+            found.append(_on_points(mechanism, sensor, places, symbols))
+    _require_names(found, tables)
+    return tuple(found)
+
+
+def _on_points(
+    mechanism: Mechanism, sensor: Sensor, places: Places, symbols: Mapping[str, SX]
+) -> AttachedSensor:
+    frames = []
+    for point in sensor.points:
+        require_part(mechanism, sensor, point, "is on")
+        link, pose = places[point.owner.name, point.port]
+        frames.append((link, pose @ point.placement.pose(symbols)))
+    names = [point.owner.name for point in sensor.points]
+    if isinstance(sensor, AbsoluteSensor):
+        where = names[0]
+    elif isinstance(sensor, RelativeSensor):
+        where = f"{names[1]} seen from {names[0]}"
+    else:
+        where = " and ".join(names)
+    return AttachedSensor(sensor, tuple(frames), "", None, sensor.measured, where)
+
+
+def _on_joint(mechanism: Mechanism, sensor: OnJoint, joints: Sequence[JointRow]) -> AttachedSensor:
+    names = [row.name for row in joints]
+    if sensor.joint not in names:
+        known = {joint.name for joint in mechanism.joints()}
+        if sensor.joint in known:
+            raise AssemblyError(
+                f"{sensor.name}: joint {sensor.joint!r} closes a ring of welds, where rigid bodies"
+                " do not say what it transmits; take another weld of the ring away"
+            )
+        raise AssemblyError(
+            f"{sensor.name}: there is no joint {sensor.joint!r};"
+            f" {did_you_mean(sensor.joint, names)}"
+        )
+    number = names.index(sensor.joint)
+    frames = joints[number].frame_a, joints[number].frame_b
+    return AttachedSensor(sensor, frames, "", number, sensor.measured, sensor.joint)
+
+
+def _on_coordinate(sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...]) -> AttachedSensor:
+    q, v, cut = ({row.name: row for row in table} for table in tables)
+    name = sensor.joint
+    if name in cut and cut[name].kind not in ("revolute", "prismatic"):
+        raise AssemblyError(
+            f"{sensor.name}: the joint of {name!r} is cut to open a loop and turns in all"
+            " directions; put a RelativeSensor between its frame_a and frame_b"
+        )
+    if not any(name in table for table in (q, v, cut)):
+        known = dict.fromkeys([*q, *v, *cut])
+        raise AssemblyError(
+            f"{sensor.name}: there is no coordinate {name!r}; {did_you_mean(name, known)}"
+        )
+    quantities = [Quantity("q", table[name].unit) for table in (q, cut) if name in table]
+    rates = [v[name].unit] if name in v else [RATE_UNIT[cut[name].unit]] if name in cut else []
+    for unit in rates:
+        quantities += [Quantity("v", unit), Quantity("a", ACCELERATION_UNIT[unit])]
+    return AttachedSensor(sensor, (), name, None, tuple(quantities), name)
+
+
+def _require_names(
+    sensors: Sequence[AttachedSensor], tables: tuple[Sequence[Coordinate], ...]
+) -> None:
+    """Refuse two readings of one name, in Functions or in results."""
+    owners = dict.fromkeys(_INPUTS, "an input of the models")
+    columns = {
+        f"{row.name}.{kind}": f"coordinate {row.name}"
+        for table, kinds in zip(tables, (("q",), ("v", "a"), ()), strict=True)
+        for row in table
+        for kind in kinds
+    }
+    for attached in sensors:
+        name = attached.sensor.name
+        for known, names in (
+            (owners, [output for output, _ in attached.outputs]),
+            (columns, [column for column, _ in attached.columns]),
+        ):
+            taken = next((n for n in names if n in known), None)
+            if taken is not None:
+                raise AssemblyError(
+                    f"{name}: what it reads would be named {taken!r}, which is the name of"
+                    f" {known[taken]}; rename the {type(attached.sensor).__name__}"
+                )
+            known.update(dict.fromkeys(names, f"a reading of {name}"))

@@ -16,7 +16,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly.parameter_bounds import Bounds
-from mbs.assembly.rates import quaternion_slices
+from mbs.assembly.tree import quaternion_slices
 from mbs.expressions import out_of_bounds
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from casadi import SX, Function
 
 from mbs.bridges.explicit import require_dae
 from mbs.errors import ModelError
-from mbs.messages import quoted
 from mbs.models.dae import Dae
+from mbs.text import quoted
 
 _HIGHER = ("index2", "index3", "ggl")
 

@@ -18,8 +18,8 @@ from mbs.bridges.opti import (
     variable,
 )
 from mbs.errors import ModelError
-from mbs.messages import quoted
 from mbs.models.dae import Dae
+from mbs.text import quoted
 
 SCHEMES = ("radau", "legendre")
 

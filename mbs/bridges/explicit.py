@@ -7,8 +7,8 @@ from typing import Any
 from casadi import MX, SX, Function
 
 from mbs.errors import ModelError
-from mbs.messages import quoted
 from mbs.models.dae import Dae
+from mbs.text import quoted
 
 Model = Dae | Function
 """Equations: a `Dae`, or a Function of (x, u) or (x, u, p) that gives dx/dt."""

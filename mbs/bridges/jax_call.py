@@ -11,10 +11,10 @@ from casadi import Function, densify
 from numpy.typing import NDArray
 
 from mbs.errors import ModelError
-from mbs.messages import install_command
 from mbs.native import batch
 from mbs.native.batch import Batch
 from mbs.native.compiled import require_function
+from mbs.text import install_command
 
 _Outputs = Callable[..., tuple[Any, ...]]
 

@@ -10,8 +10,8 @@ from casadi import DM, MX
 from mbs.bridges.explicit import require_dae
 from mbs.bridges.opti import CODES, parameter_values
 from mbs.errors import ModelError
-from mbs.messages import quoted
 from mbs.models.dae import Dae
+from mbs.text import quoted
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,18 +2,159 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mbs.components.component import Component
-from mbs.components.inertia_rules import check_mass, check_tensor, six_of, tensor_matrix, three
-from mbs.components.placement import SymbolTable
-from mbs.components.rigid_body import RigidBody
-from mbs.expressions import Number, Scalar, to_float, to_sx
+from mbs.components.component import Component, Point, Rotation, SymbolTable
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
 from mbs.spatial import Inertia, vector
 from mbs.spatial.inertia import TEN_PARAMETERS
+from mbs.text import quoted
+
+# What masses and inertias a body may have, and the forms in which a user may write them.
+
+
+_TOLERANCE = 1e-6
+
+
+def check_mass(name: str, mass: Scalar) -> None:
+    """Refuse a mass that is a negative number."""
+    value = to_float(mass)
+    if value is not None and value < 0:
+        raise DescriptionError(f"{name}: mass is {value:g} kg; give zero or more")
+
+
+def check_tensor(name: str, six: Iterable[Scalar], scale: float = 0.0) -> None:
+    """Refuse moments of inertia about the centre of mass that no distribution of mass has.
+
+    Args:
+        name: the body, for the message.
+        six: Ixx Ixy Ixz Iyy Iyz Izz.
+        scale: size of the numbers that were subtracted to get these, which rounding comes from.
+    """
+    numbers = [value for value in map(to_float, six) if value is not None]
+    if len(numbers) < 6:
+        return
+    low, middle, high = np.linalg.eigvalsh(tensor_matrix(numbers))
+    slack = _TOLERANCE * max(abs(high), scale)
+    if low < -slack:
+        raise DescriptionError(
+            f"{name}: the inertia about the centre of mass has the negative principal moment"
+            f" {low:g} kg m^2; give a positive inertia tensor"
+        )
+    if low + middle < high - slack:
+        raise DescriptionError(
+            f"{name}: the principal moments {low:g}, {middle:g}, {high:g} kg m^2 break the triangle"
+            " inequality; the largest must not exceed the sum of the other two"
+        )
+
+
+def tensor_matrix(six: list[float]) -> Any:
+    """The (3, 3) symmetric matrix of Ixx Ixy Ixz Iyy Iyz Izz."""
+    XX, XY, XZ, YY, YZ, ZZ = six
+    return np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
+
+
+def three(values: Any, where: str) -> tuple[Expression, ...]:
+    """The three scalars (x, y, z) that a user wrote."""
+    try:
+        x, y, z = [] if isinstance(values, str) else list(values)
+    except (TypeError, ValueError):
+        raise DescriptionError(
+            f"{where}: {quoted(values)} has not three values; give (x, y, z)"
+        ) from None
+    return tuple(expression(v, f"{where}, {n}") for n, v in zip("xyz", (x, y, z), strict=True))
+
+
+def six_of(values: Any, where: str) -> tuple[Expression, ...]:
+    """Ixx Ixy Ixz Iyy Iyz Izz of an inertia that a user wrote in any of the accepted forms."""
+    flat: list[Any] = []
+    for value in values if hasattr(values, "__len__") and not isinstance(values, str) else [values]:
+        nested = hasattr(value, "__len__") and not isinstance(value, str)
+        flat.extend(value if nested else [value])
+    elements = [expression(value, where) for value in flat]
+    zero: Expression = Number(0.0)
+    if len(elements) == 3:
+        return elements[0], zero, zero, elements[1], zero, elements[2]
+    if len(elements) == 6:
+        return tuple(elements)
+    if len(elements) == 9 and all(_equal(elements[a], elements[b]) for a, b in _TWINS):
+        return tuple(elements[k] for k in (0, 1, 2, 4, 5, 8))
+    raise DescriptionError(
+        f"{where}: {quoted(values)} is not an inertia; give three principal moments,"
+        " Ixx Ixy Ixz Iyy Iyz Izz, or a symmetric (3, 3) matrix"
+    )
+
+
+_TWINS = ((1, 3), (2, 6), (5, 7))
+
+
+def _equal(a: Expression, b: Expression) -> bool:
+    """Whether two elements of a tensor are the same, up to the rounding of numbers."""
+    if isinstance(a, Number) and isinstance(b, Number):
+        return math.isclose(a.value, b.value, rel_tol=_TOLERANCE, abs_tol=1e-12)
+    return a == b
+
+
+# What every rigid body has, and the two bodies without inertia: the world and a mount.
+
+
+@dataclass(frozen=True, slots=True)
+class RigidBody(Component):
+    """A component with a reference frame on which other frames are placed."""
+
+    @property
+    def frame(self) -> Point:
+        """The reference frame."""
+        return Point(self)
+
+    def at(
+        self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
+    ) -> Point:
+        """The point (x, y, z) [m] of the reference frame, its axes turned by `rotation`."""
+        return self.frame.at(x, y, z, rotation=rotation)
+
+    def at_khalil(self, **parameters: Scalar) -> Point:
+        """The frame with these Khalil parameters gamma, b, alpha, d, theta, r."""
+        return self.frame.at_khalil(**parameters)
+
+    def inertial(self, symbols: SymbolTable) -> Inertia:
+        """Inertia about the origin of the reference frame, on CasADi symbols."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class World(RigidBody):
+    """The ground, the frame in which gravity is given.
+
+    Attributes:
+        gravity: gravity acceleration in the world frame [m/s^2].
+    """
+
+    name: str = "world"
+    gravity: tuple[Scalar, ...] = (0.0, 0.0, -9.81)
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        object.__setattr__(self, "gravity", three(self.gravity, f"{self.name}, gravity"))
+
+    def inertial(self, symbols: SymbolTable) -> Inertia:
+        """The ground does not move: no inertia."""
+        return Inertia.zero()
+
+
+@dataclass(frozen=True, slots=True)
+class Mount(RigidBody):
+    """A frame without mass: the ground of a nested mechanism, to be connected to something."""
+
+    def inertial(self, symbols: SymbolTable) -> Inertia:
+        """No inertia."""
+        return Inertia.zero()
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,3 +263,137 @@ class PointMass(RigidBody):
         """Inertia about the reference frame: only a mass."""
         zero = Inertia.zero()
         return Inertia(zero.J, zero.ms, to_sx(self.mass, symbols))
+
+
+# Homogeneous solids along x: their inertia follows from dimensions and density.
+
+
+@dataclass(frozen=True, slots=True)
+class _Bar(RigidBody):
+    """A solid that runs along x from its left to its right end; the reference frame is at the left.
+
+    Either a density or a mass is given; with neither the solid has no mass.
+    """
+
+    length: Scalar = 1.0
+
+    @property
+    def left(self) -> Point:
+        """The end where the solid starts: its reference frame."""
+        return self.frame
+
+    @property
+    def right(self) -> Point:
+        """The end at x = length."""
+        return self.at(self.length)
+
+    @property
+    def center(self) -> Point:
+        """The middle of the solid, its centre of mass."""
+        return self.at(expression(self.length) / 2)
+
+    def _check_solid(self, positive: Iterable[str]) -> None:
+        for name in positive:
+            value = to_float(getattr(self, name))
+            if value is not None and value <= 0:
+                raise DescriptionError(
+                    f"{self.name}: {name} is {value:g}; give a length above zero"
+                )
+
+    def _mass(self, mass: Scalar | None, density: Scalar | None, volume: Expression) -> Expression:
+        if mass is not None and density is not None:
+            raise DescriptionError(
+                f"{self.name}: both mass and density are given; give only one of them"
+            )
+        if mass is not None:
+            return expression(mass)
+        return expression(density) * volume if density is not None else Number(0.0)
+
+    def _solid_inertia(
+        self, symbols: SymbolTable, mass: Expression, radii: list[Expression]
+    ) -> Inertia:
+        com = vector([to_sx(expression(self.length) / 2, symbols), 0, 0])
+        Ixx, Iyy, Izz = (to_sx(mass * radius, symbols) for radius in radii)
+        tensor = Inertia.from_parameters(vector([Ixx, 0, 0, Iyy, 0, Izz, 0, 0, 0, 0])).J
+        return Inertia.about_com(to_sx(mass, symbols), com, tensor)
+
+
+@dataclass(frozen=True, slots=True)
+class Box(_Bar):
+    """A homogeneous cuboid along x.
+
+    Attributes:
+        length, width, height: along x, y and z [m]; the height is the width if not given.
+        density: [kg/m^3].
+        mass: [kg], instead of the density.
+    """
+
+    width: Scalar = 0.1
+    height: Scalar | None = None
+    density: Scalar | None = None
+    mass: Scalar | None = None
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        if self.height is None:
+            object.__setattr__(self, "height", self.width)
+        self._normalise(*_given(self, "length", "width", "height", "density", "mass"))
+        self._check_solid(("length", "width", "height"))
+        check_mass(self.name, self.solid_mass)
+
+    @property
+    def solid_mass(self) -> Expression:
+        """Mass of the solid [kg]."""
+        volume = expression(self.length) * self.width * expression(self.height or 0)
+        return self._mass(self.mass, self.density, volume)
+
+    def inertial(self, symbols: SymbolTable) -> Inertia:
+        """Inertia about the left end."""
+        l2, w2, h2 = (expression(side or 0) ** 2 for side in (self.length, self.width, self.height))
+        radii = [(w2 + h2) / 12, (l2 + h2) / 12, (l2 + w2) / 12]
+        return self._solid_inertia(symbols, self.solid_mass, radii)
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder(_Bar):
+    """A homogeneous round bar or tube along x.
+
+    Attributes:
+        length: along x [m].
+        radius: outer radius [m].
+        inner_radius: of the bore [m].
+        density: [kg/m^3].
+        mass: [kg], instead of the density.
+    """
+
+    radius: Scalar = 0.05
+    inner_radius: Scalar = 0.0
+    density: Scalar | None = None
+    mass: Scalar | None = None
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        self._normalise(*_given(self, "length", "radius", "inner_radius", "density", "mass"))
+        self._check_solid(("length", "radius"))
+        inner, outer = to_float(self.inner_radius), to_float(self.radius)
+        if inner is not None and (inner < 0 or (outer is not None and inner >= outer)):
+            raise DescriptionError(
+                f"{self.name}: inner_radius is {inner:g}; give 0 <= inner_radius < radius"
+            )
+        check_mass(self.name, self.solid_mass)
+
+    @property
+    def solid_mass(self) -> Expression:
+        """Mass of the solid [kg]."""
+        area = (expression(self.radius) ** 2 - expression(self.inner_radius) ** 2) * math.pi
+        return self._mass(self.mass, self.density, area * self.length)
+
+    def inertial(self, symbols: SymbolTable) -> Inertia:
+        """Inertia about the left end."""
+        squares = expression(self.radius) ** 2 + expression(self.inner_radius) ** 2
+        across = squares / 4 + expression(self.length) ** 2 / 12
+        return self._solid_inertia(symbols, self.solid_mass, [squares / 2, across, across])
+
+
+def _given(component: Component, *names: str) -> list[str]:
+    return [name for name in names if getattr(component, name) is not None]

@@ -2,29 +2,210 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from decimal import Decimal
 from typing import Any, TypeVar
 
-from mbs.comments import seen
-from mbs.components.placement import (
-    KhalilStep,
-    Placement,
-    Rotation,
-    angle_expression,
-    displacement,
-)
+import numpy as np
+from casadi import DM, SX
+from numpy.typing import NDArray
+
 from mbs.errors import DescriptionError
 from mbs.expressions import (
     Expression,
+    Number,
     Scalar,
     expression,
     parameters_of,
     renamed,
+    to_sx,
     with_values,
     without_defaults,
 )
+from mbs.spatial import Khalil, Pose, align_z, nearest_rotation, unit_vector, vector
+from mbs.text import quoted, seen
+
+# Where a point of a component is: a chain of displacements, kept as data.
+#
+# A placement is read from left to right: each step starts where the one before it ended.
+
+
+SymbolTable = Mapping[str, SX]
+"""The CasADi symbol of every parameter, by name."""
+
+_DIGITS = 11
+"""Significant digits from which on a number may be a multiple of pi/2 that was written down."""
+
+_WRITTEN = 6e-12
+"""How far the usual texts 1.5707963268 and 1.57079632679 are from pi/2, at most [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Translation:
+    """A displacement (x, y, z) [m]."""
+
+    x: Expression
+    y: Expression
+    z: Expression
+
+    def pose(self, symbols: SymbolTable) -> Pose:
+        """The displaced frame seen from the one before."""
+        return Pose.moved(vector(to_sx(value, symbols) for value in (self.x, self.y, self.z)))
+
+
+@dataclass(frozen=True, slots=True)
+class Turned:
+    """A rotation by an angle [rad] about the axis "x", "y" or "z"."""
+
+    axis: str
+    angle: Expression
+
+    def pose(self, symbols: SymbolTable) -> Pose:
+        """The turned frame seen from the one before."""
+        return Pose.about(self.axis, to_sx(self.angle, symbols))
+
+
+@dataclass(frozen=True, slots=True)
+class Oriented:
+    """A rotation given by its matrix, row by row."""
+
+    rows: tuple[tuple[float, float, float], ...]
+
+    def pose(self, symbols: SymbolTable) -> Pose:
+        """The turned frame seen from the one before."""
+        return Pose.turned(SX(DM(self.rows)))
+
+
+@dataclass(frozen=True, slots=True)
+class KhalilStep:
+    """The six parameters of a frame j with respect to its antecedent, kept as they were written."""
+
+    gamma: Expression
+    b: Expression
+    alpha: Expression
+    d: Expression
+    theta: Expression
+    r: Expression
+
+    def khalil(self, symbols: SymbolTable) -> Khalil:
+        """The parameters on CasADi symbols."""
+        return Khalil(*(to_sx(getattr(self, f.name), symbols) for f in fields(self)))
+
+    def pose(self, symbols: SymbolTable) -> Pose:
+        """Frame j seen from its antecedent."""
+        return self.khalil(symbols).pose()
+
+
+Step = Translation | Turned | Oriented | KhalilStep
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """A chain of displacements; empty means "here"."""
+
+    steps: tuple[Step, ...] = ()
+
+    def pose(self, symbols: SymbolTable) -> Pose:
+        """The placed frame seen from where the chain starts."""
+        pose = Pose.identity()
+        for step in self.steps:
+            pose = pose @ step.pose(symbols)
+        return pose
+
+    def then(self, *steps: Step) -> Placement:
+        """The placement with further steps at its end."""
+        return Placement(self.steps + steps)
+
+    def expressions(self) -> Iterator[Expression]:
+        """Every scalar in the placement."""
+        for step in self.steps:
+            for f in fields(step):
+                value = getattr(step, f.name)
+                if isinstance(value, Expression):
+                    yield value
+
+    def scoped(self, prefix: str) -> Placement:
+        """The placement with its parameters put in the scope of a nested mechanism."""
+        return Placement(tuple(_scoped(step, prefix) for step in self.steps))
+
+
+def _scoped(step: Step, prefix: str) -> Step:
+    changed: dict[str, Any] = {}
+    for f in fields(step):
+        value = getattr(step, f.name)
+        if isinstance(value, Expression):
+            changed[f.name] = renamed(value, prefix)
+    return replace(step, **changed)
+
+
+Rotation = tuple[str, Scalar] | Sequence[tuple[str, Scalar]] | Sequence[Sequence[float]]
+"""("z", "pi/2 + A"), a sequence of such turns, or a (3, 3) matrix."""
+
+
+def displacement(
+    where: str, x: Scalar, y: Scalar, z: Scalar, rotation: Rotation | None
+) -> tuple[Step, ...]:
+    """The steps of "at (x, y, z), then turned by `rotation`"."""
+    values = [
+        expression(value, f"{where}, {name}") for name, value in zip("xyz", (x, y, z), strict=True)
+    ]
+    steps: list[Step] = []
+    if any(str(value) != "0" for value in values):
+        steps.append(Translation(*values))
+    if rotation is not None:
+        steps.extend(_rotation_steps(where, rotation))
+    return tuple(steps)
+
+
+def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
+    if _is_turn(rotation):
+        return [_turn(where, *rotation)]
+    if isinstance(rotation, (list, tuple)) and all(map(_is_turn, rotation)):
+        return [_turn(where, *part) for part in rotation]
+    try:
+        R = np.asarray(rotation, dtype=float)
+    except (TypeError, ValueError):
+        R = np.zeros(0)
+    if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
+        raise DescriptionError(
+            f"{where}: rotation {quoted(rotation)} is not a rotation; give ('z', angle), a sequence"
+            " of such turns, or an orthonormal right-handed (3, 3) matrix"
+        )
+    return [Oriented(nearest_rotation(R.tolist()))]
+
+
+def _is_turn(part: Any) -> bool:
+    return isinstance(part, (list, tuple)) and len(part) == 2 and isinstance(part[0], str)
+
+
+def _turn(where: str, axis: str, angle: Scalar) -> Turned:
+    if axis not in ("x", "y", "z"):
+        raise DescriptionError(f"{where}: rotation axis {axis!r} is not 'x', 'y' or 'z'; use one")
+    return Turned(axis, angle_expression(angle, f"{where}, rotation about {axis}"))
+
+
+def angle_expression(angle: Scalar, where: str) -> Expression:
+    """An angle [rad]; a multiple of pi/2 that was written with 11 digits or more is exactly that.
+
+    1.57079632679 in a file means pi/2. Five units of 1e-12 would be a tilt that nobody meant, for
+    which every model pays in operations. A text with fewer digits is taken at its word.
+    """
+    value = expression(angle, where)
+    if not isinstance(value, Number):
+        return value
+    meant = round(value.value / (math.pi / 2)) * math.pi / 2
+    if not 0 < abs(value.value - meant) <= _WRITTEN:
+        return value
+    written = Decimal(repr(value.value)).as_tuple()
+    assert isinstance(written.exponent, int)
+    if meant == 0 or len(written.digits) < _DIGITS:
+        return value
+    last_digit = 10.0**written.exponent
+    return Number(meant) if abs(value.value - meant) < last_digit else value
+
 
 _NAME = re.compile(r"[^\s.'\"]+(?:\.[^\s.'\"]+)*")
 
@@ -154,3 +335,41 @@ def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
             value, **{f.name: _mapped(getattr(value, f.name), change) for f in fields(value)}
         )
     return value
+
+
+# Axes as users write them.
+
+
+_NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
+    """The unit vector of an axis that a user wrote as a letter or as three numbers."""
+    if isinstance(axis, str):
+        sign, letter = (-1.0, axis[1:]) if axis.startswith("-") else (1.0, axis)
+        if letter not in _NAMED_AXES:
+            raise DescriptionError(
+                f"{name}: axis {axis!r} is unknown; give 'x', 'y', 'z', '-x' .. or three numbers"
+            )
+        x, y, z = _NAMED_AXES[letter]
+        return sign * x, sign * y, sign * z
+    try:
+        values: NDArray[np.float64] = np.array([float(v) for v in axis])
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.shape != (3,) or not np.all(np.isfinite(values)):
+        raise DescriptionError(
+            f"{name}: axis {quoted(axis)} is not a direction; give three numbers"
+        )
+    if math.hypot(*values) < 1e-9:
+        raise DescriptionError(f"{name}: axis {quoted(axis)} has zero length; give a direction")
+    return unit_vector(values.tolist())
+
+
+def in_plane(
+    axis: tuple[float, float, float],
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Two unit vectors u, v with u x v = axis; x and y for the axis z."""
+    R = align_z(axis)
+    u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
+    return (u[0], u[1], u[2]), (v[0], v[1], v[2])

@@ -7,16 +7,18 @@ law is written once, on CasADi scalars; the recursions know where its points are
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import casadi
 from casadi import SX
 
-from mbs.components.component import Component
+from mbs.components.bodies import three
+from mbs.components.component import Component, Point, SymbolTable
 from mbs.components.on_points import OnPair, OnPoints
-from mbs.components.placement import SymbolTable
 from mbs.errors import DescriptionError
-from mbs.expressions import Number, Scalar, to_float
-from mbs.messages import quoted
+from mbs.expressions import Expression, Number, Scalar, to_float, to_sx
+from mbs.spatial import cross, vector, zeros
+from mbs.text import quoted
 
 J = TypeVar("J", bound="JointForce")
 
@@ -171,3 +173,535 @@ class JointForce(CoordinateForce):
     def scoped(self: J, prefix: str) -> J:
         """The same element inside a mechanism that is placed in another one."""
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
+
+
+# Constant forces and torques on a body.
+
+
+_AXES = ("world", "body")
+
+
+@dataclass(frozen=True, slots=True)
+class PointSource(ForceElement):
+    """Something constant that acts on one point.
+
+    Attributes:
+        point: of a body, or a body for its reference frame.
+    """
+
+    point: Any
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The one point."""
+        return (self.point,)
+
+    @property
+    def follows(self) -> bool:
+        """Whether its direction turns with the body."""
+        raise NotImplementedError
+
+    def wrench(self, R: SX, symbols: SymbolTable) -> tuple[SX, SX]:
+        """Force and moment on the body about the point, in its axes.
+
+        Args:
+            R: (3, 3) orientation of the point's frame in the world.
+            symbols: CasADi symbol of every parameter.
+        """
+        raise NotImplementedError
+
+    def _settle(self, name: str) -> None:
+        """Check what every source has; `name` is the field of its three components."""
+        Component.__post_init__(self)
+        self._take_point("point")
+        object.__setattr__(self, name, three(getattr(self, name), f"{self.name}, {name}"))
+        self._require_effect(name)
+        axes = getattr(self, "axes", None)
+        if axes not in _AXES:
+            raise DescriptionError(
+                f"{self.name}: axes is {quoted(axes)}; use 'world', or 'body' for those of the"
+                " point, which turn with it"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Force(PointSource):
+    """A constant force.
+
+    Attributes:
+        force: its three components [N].
+        axes: "world" for a direction fixed in space, "body" for one that turns with the point.
+    """
+
+    force: Any
+    axes: str = "world"
+
+    def __post_init__(self) -> None:
+        self._settle("force")
+
+    @property
+    def follows(self) -> bool:
+        """Whether its direction turns with the body."""
+        return self.axes == "body"
+
+    def wrench(self, R: SX, symbols: SymbolTable) -> tuple[SX, SX]:
+        """The force, without a moment about its point."""
+        return _turned(self.force, self.follows, R, symbols), zeros()
+
+
+@dataclass(frozen=True, slots=True)
+class Torque(PointSource):
+    """A constant torque.
+
+    Attributes:
+        torque: its three components [N m].
+        axes: "world" for a direction fixed in space, "body" for one that turns with the point.
+    """
+
+    torque: Any
+    axes: str = "world"
+
+    def __post_init__(self) -> None:
+        self._settle("torque")
+
+    @property
+    def follows(self) -> bool:
+        """Whether its direction turns with the body."""
+        return self.axes == "body"
+
+    def wrench(self, R: SX, symbols: SymbolTable) -> tuple[SX, SX]:
+        """The torque alone."""
+        return zeros(), _turned(self.torque, self.follows, R, symbols)
+
+
+def _turned(components: tuple[Expression, ...], follows: bool, R: SX, symbols: SymbolTable) -> SX:
+    value = vector(to_sx(component, symbols) for component in components)
+    return value if follows else casadi.densify(casadi.mtimes(R.T, value))
+
+
+# Forces along the line between two points: springs, dampers, attraction of two masses.
+#
+# Source: Haug 1989 for translational springs, dampers and actuators.
+
+
+SHORTEST = 1e-12
+"""Length [m] that is added to every distance as the root of a sum of squares."""
+
+
+@dataclass(frozen=True, slots=True)
+class LineForce(PairForce):
+    """A tension along the line from a to b, a function of the distance L and of its rate.
+
+    L is sqrt(d'd + (1e-12 m)^2), d being the vector from a to b: where the points coincide the
+    direction is not defined, and the force is zero there instead of not a number.
+    """
+
+    def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
+        """Force that draws the points together [N] at this distance [m] and rate [m/s]."""
+        raise NotImplementedError
+
+    def potential(self, length: SX, symbols: SymbolTable) -> SX:
+        """Energy [J] whose slope in the distance is the tension at rest."""
+        raise NotImplementedError
+
+    def pull(self, motion: RelativeMotion, symbols: SymbolTable) -> Pull:
+        """The tension, towards b."""
+        length = regular_length(motion.p)
+        along = motion.p / length
+        rate = casadi.dot(along, motion.V)
+        return Pull(along * self.tension(length, rate, symbols), zeros(), zeros())
+
+    def energy(self, motion: RelativeMotion, symbols: SymbolTable) -> SX:
+        """The potential of the distance."""
+        return self.potential(regular_length(motion.p), symbols)
+
+
+def regular_length(p: SX) -> SX:
+    """Length of a vector (3, 1), regular where it is zero."""
+    return casadi.sqrt(casadi.dot(p, p) + SHORTEST**2)
+
+
+@dataclass(frozen=True, slots=True)
+class Spring(LineForce):
+    """A spring, with a damper beside it: tension k (L - L0) + c dL/dt.
+
+    Attributes:
+        stiffness: k [N/m].
+        length: free length L0 [m].
+        damping: c [N s/m].
+    """
+
+    stiffness: Scalar
+    length: Scalar = 0.0
+    damping: Scalar = 0.0
+
+    def __post_init__(self) -> None:
+        PairForce.__post_init__(self)
+        self._normalise("stiffness", "length", "damping")
+        self._require_magnitudes("stiffness", "length", "damping")
+        self._require_effect("stiffness", "damping")
+
+    def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
+        """The stretch times the stiffness, and the damping times the rate."""
+        stretch = length - to_sx(self.length, symbols)
+        return to_sx(self.stiffness, symbols) * stretch + to_sx(self.damping, symbols) * rate
+
+    def potential(self, length: SX, symbols: SymbolTable) -> SX:
+        """Half the stiffness times the square of the stretch."""
+        stretch = length - to_sx(self.length, symbols)
+        return 0.5 * to_sx(self.stiffness, symbols) * stretch**2
+
+
+@dataclass(frozen=True, slots=True)
+class Damper(LineForce):
+    """A damper alone: tension c dL/dt.
+
+    Attributes:
+        damping: c [N s/m].
+    """
+
+    damping: Scalar
+
+    def __post_init__(self) -> None:
+        PairForce.__post_init__(self)
+        self._normalise("damping")
+        self._require_magnitudes("damping")
+        self._require_effect("damping")
+
+    def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
+        """The damping times the rate of the distance."""
+        return to_sx(self.damping, symbols) * rate
+
+    def potential(self, length: SX, symbols: SymbolTable) -> SX:
+        """A damper stores nothing."""
+        return SX(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Attraction(LineForce):
+    """Attraction by the inverse square of the distance: tension mu / L^2.
+
+    Central gravity of a body of mass m: mu = G M m, its points the two centres of mass.
+
+    Attributes:
+        strength: mu [N m^2]; below zero the points repel each other, as equal charges do.
+    """
+
+    strength: Scalar
+
+    def __post_init__(self) -> None:
+        PairForce.__post_init__(self)
+        self._normalise("strength")
+        self._require_effect("strength")
+
+    def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
+        """The strength over the square of the distance."""
+        return to_sx(self.strength, symbols) / length**2
+
+    def potential(self, length: SX, symbols: SymbolTable) -> SX:
+        """-mu / L, zero at infinity."""
+        return -to_sx(self.strength, symbols) / length
+
+
+# Bushings: elastic mounts between two frames.
+#
+# Source: Haug 1989 for forces between bodies; the angles are those of the unit quaternion.
+
+
+_HALF_TURN = 1e-12
+_STRENGTHS = ("stiffness", "damping", "angular_stiffness", "angular_damping")
+
+
+@dataclass(frozen=True, slots=True)
+class Bushing(PairForce):
+    """Springs and dampers along and about the three axes of frame a, at rest where a and b agree.
+
+    The displacement is p, the origin of b in frame a; the angles are phi = 2 sin(theta / 2) u for
+    a turn by theta about u, which is the vector of small rotations where theta is small. Forces
+    and moments are exact derivatives of the energy p' K p / 2 + phi' K_phi phi / 2 for any turn
+    of less than half a turn.
+
+    Attributes:
+        stiffness: K along the axes of a [N/m], three numbers, or one for all.
+        damping: [N s/m], likewise.
+        angular_stiffness: K_phi about the axes of a [N m/rad], likewise.
+        angular_damping: [N m s/rad], likewise.
+    """
+
+    stiffness: Any = 0.0
+    damping: Any = 0.0
+    angular_stiffness: Any = 0.0
+    angular_damping: Any = 0.0
+
+    def __post_init__(self) -> None:
+        PairForce.__post_init__(self)
+        for name in _STRENGTHS:
+            given = getattr(self, name)
+            alike = isinstance(given, str) or not hasattr(given, "__iter__")
+            values = three((given,) * 3 if alike else given, f"{self.name}, {name}")
+            object.__setattr__(self, name, values)
+        self._require_magnitudes(*_STRENGTHS)
+        self._require_effect(*_STRENGTHS)
+
+    def pull(self, motion: RelativeMotion, symbols: SymbolTable) -> Pull:
+        """Force and moment at the origin of b, carried to the origin of a."""
+        half, cosine = _half_turn(motion.R)
+        w = motion.w
+        rate = cosine * w + cross(w, half)
+        force = self._sum("stiffness", motion.p, "damping", motion.V, symbols)
+        torque = self._sum("angular_stiffness", 2 * half, "angular_damping", rate, symbols)
+        moment = cosine * torque + cross(half, torque)
+        return Pull(force, moment + cross(motion.p, force), -moment)
+
+    def energy(self, motion: RelativeMotion, symbols: SymbolTable) -> SX:
+        """The energy p' K p / 2 + phi' K_phi phi / 2."""
+        half, _ = _half_turn(motion.R)
+        total = SX(0)
+        for name, x in (("stiffness", motion.p), ("angular_stiffness", 2 * half)):
+            total += 0.5 * casadi.dot(x, self._vector(name, symbols) * x)
+        return total
+
+    def _sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
+        return self._vector(one, symbols) * x + self._vector(other, symbols) * rate
+
+    def _vector(self, name: str, symbols: SymbolTable) -> SX:
+        return vector(to_sx(value, symbols) for value in getattr(self, name))
+
+
+def _half_turn(R: SX) -> tuple[SX, SX]:
+    """sin(theta / 2) u and cos(theta / 2) of a rotation by theta about u."""
+    cosine = 0.5 * casadi.sqrt(1 + casadi.trace(R) + _HALF_TURN**2)
+    axis = vector([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return axis / (4 * cosine), cosine
+
+
+# The sign of a velocity, smoothed: the one law of dry friction without events.
+
+
+def smooth_sign(v: SX, width: SX) -> SX:
+    """tanh(v / width), and sign(v) for a width of zero; element by element.
+
+    Args:
+        v: velocities [rad/s or m/s].
+        width: (1, 1) velocity over which the sign changes, a number or an expression; zero in its
+            values needs no care, derivatives stay finite.
+    """
+    if width.is_zero():
+        return casadi.sign(v)
+    if width.is_constant():
+        return casadi.tanh(v / width)
+    vanishes = width == 0
+    return casadi.if_else(vanishes, casadi.sign(v), casadi.tanh(v / (width + vanishes)))
+
+
+# Forces along a coordinate of a joint: stops at its limits, friction that depends on velocity.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointStop(JointForce):
+    """Elastic stops: nothing between the limits, springs and dampers beyond them.
+
+    Over the first `width` beyond a limit the stiffness grows from zero to its full value, so that
+    the force and two derivatives of it are continuous.
+
+    Attributes:
+        lower: limit [rad or m]; None for no stop on that side.
+        upper: likewise.
+        stiffness: [N m/rad or N/m].
+        damping: [N m s/rad or N s/m], which grows over the same width.
+        width: [rad or m].
+    """
+
+    lower: Scalar | None = None
+    upper: Scalar | None = None
+    stiffness: Scalar
+    damping: Scalar = 0.0
+    width: Scalar
+
+    def __post_init__(self) -> None:
+        JointForce.__post_init__(self)
+        self._take_limits()
+        self._normalise("stiffness", "damping", "width")
+        self._require_magnitudes("damping")
+        self._require_positive("stiffness", "width")
+
+    @property
+    def needs_position(self) -> bool:
+        """A limit is one of a position."""
+        return True
+
+    def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
+        """Stiffness times the depth, and damping where the stop is touched."""
+        stiffness, damping = to_sx(self.stiffness, symbols), to_sx(self.damping, symbols)
+        total = SX(0)
+        for sign, depth, width in self._sides(q, symbols):
+            share, ramp, _ = _ramp(depth, width)
+            total += sign * stiffness * ramp + damping * share * v
+        return total
+
+    def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
+        """What the stops store."""
+        stiffness = to_sx(self.stiffness, symbols)
+        areas = (_ramp(depth, width)[2] for _, depth, width in self._sides(q, symbols))
+        return stiffness * sum(areas, SX(0))
+
+    def _sides(self, q: SX | None, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
+        """Direction, depth beyond the limit and width of every stop."""
+        assert q is not None
+        width = to_sx(self.width, symbols)
+        sides = []
+        if self.upper is not None:
+            sides.append((1.0, q - to_sx(self.upper, symbols), width))
+        if self.lower is not None:
+            sides.append((-1.0, to_sx(self.lower, symbols) - q, width))
+        return sides
+
+
+def _ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
+    """A slope that grows smoothly from 0 to 1 over a width, its integral, and that one's.
+
+    With u = depth / width between 0 and 1 the slope is 3 u^2 - 2 u^3; the integral is
+    depth - width / 2 from there on.
+    """
+    u = casadi.fmin(casadi.fmax(depth / width, 0), 1)
+    beyond = casadi.fmax(depth - width, 0)
+    slope = u**2 * (3 - 2 * u)
+    ramp = width * u**3 * (1 - u / 2) + beyond
+    area = width**2 * u**4 * (0.25 - 0.1 * u) + 0.5 * beyond * (beyond + width)
+    return slope, ramp, area
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointFriction(JointForce):
+    """Coulomb, Stribeck and viscous friction on a joint.
+
+    Effort (coulomb + stribeck exp(-(v / velocity)^2)) tanh(v / width) + viscous v.
+
+    Attributes:
+        coulomb: dry friction while it slides [N m or N].
+        stribeck: what dry friction has more than that at rest [N m or N].
+        velocity: over which this falls to 1/e [rad/s or m/s].
+        viscous: [N m s/rad or N s/m].
+        width: velocity over which dry friction changes sign [rad/s or m/s].
+    """
+
+    coulomb: Scalar = 0.0
+    stribeck: Scalar = 0.0
+    velocity: Scalar = 0.1
+    viscous: Scalar = 0.0
+    width: Scalar = 1e-3
+
+    def __post_init__(self) -> None:
+        JointForce.__post_init__(self)
+        self._normalise("coulomb", "stribeck", "velocity", "viscous", "width")
+        self._require_magnitudes("coulomb", "stribeck", "viscous")
+        self._require_positive("velocity", "width")
+        self._require_effect("coulomb", "stribeck", "viscous")
+
+    def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
+        """Dry friction that falls from rest to sliding, and viscous friction."""
+        dry = to_sx(self.coulomb, symbols)
+        if self.stribeck != Number(0.0):
+            falling = casadi.exp(-((v / to_sx(self.velocity, symbols)) ** 2))
+            dry = dry + to_sx(self.stribeck, symbols) * falling
+        total = to_sx(self.viscous, symbols) * v
+        return total + dry * smooth_sign(v, to_sx(self.width, symbols))
+
+    def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
+        """Friction stores nothing."""
+        return SX(0)
+
+
+# Contacts along a coordinate of a joint: rigid stops and dry friction that really sticks.
+#
+# They hold the coordinate at times and let it go at others. Simulations change between the two at
+# events; smooth models, such as the inverse dynamic one, leave contacts out.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointContact(JointForce):
+    """What may hold a coordinate of a joint at rest, in simulations alone."""
+
+    @property
+    def scope(self) -> str:
+        """Which models know it."""
+        return ", in simulations; the other models leave it out"
+
+    def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
+        """Nothing in smooth models."""
+        return SX(0)
+
+    def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
+        """A contact stores nothing."""
+        return SX(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigidStop(JointContact):
+    """Rigid limits of a coordinate, with impacts and contact.
+
+    The velocity v of an impact becomes -restitution v. Where that is slower than `rest_speed` the
+    coordinate stays at the limit until something pulls it off.
+
+    Attributes:
+        lower: limit [rad or m]; None for no stop on that side.
+        upper: likewise.
+        restitution: Newton's, between 0 and 1.
+        rest_speed: of the slowest rebound [rad/s or m/s].
+    """
+
+    lower: Scalar | None = None
+    upper: Scalar | None = None
+    restitution: Scalar = 0.0
+    rest_speed: Scalar = 1e-4
+
+    def __post_init__(self) -> None:
+        JointForce.__post_init__(self)
+        self._take_limits()
+        self._normalise("restitution", "rest_speed")
+        self._require_magnitudes("restitution")
+        self._require_positive("rest_speed")
+        restitution = to_float(self.restitution)
+        if restitution is not None and restitution > 1:
+            raise DescriptionError(
+                f"{self.name}: restitution is {restitution:g}, an impact that gives energy; give a"
+                " number between 0 and 1"
+            )
+
+    @property
+    def needs_position(self) -> bool:
+        """A limit is one of a position."""
+        return True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoulombFriction(JointContact):
+    """Dry friction that holds a coordinate at rest up to an effort and brakes it when it slides.
+
+    Attributes:
+        sliding: friction while it slides [N m or N].
+        sticking: the largest effort that holds it at rest, at least `sliding`, and as large when
+            left out [N m or N].
+    """
+
+    sliding: Scalar
+    sticking: Scalar | None = None
+
+    def __post_init__(self) -> None:
+        JointForce.__post_init__(self)
+        if self.sticking is None:
+            object.__setattr__(self, "sticking", self.sliding)
+        self._normalise("sliding", "sticking")
+        self._require_magnitudes("sliding", "sticking")
+        assert self.sticking is not None
+        low, high = to_float(self.sliding), to_float(self.sticking)
+        if low is not None and high is not None and high < low:
+            raise DescriptionError(
+                f"{self.name}: sticking is {high:g} and sliding is {low:g}; at rest dry friction"
+                " holds at least as much, so give sticking >= sliding"
+            )
+        if self.sticking == Number(0.0):
+            raise DescriptionError(
+                f"{self.name}: sliding and sticking are zero, so that the CoulombFriction does"
+                " nothing; give a strength or leave it out"
+            )

@@ -7,21 +7,172 @@ frame_b. The rows that close a loop through a cut joint follow from the same des
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
 
-from mbs.components.axes import in_plane, unit_axis
-from mbs.components.component import Component, Point
-from mbs.components.drive_flange import Flange
-from mbs.components.joint_limits import limits_by_suffix, motor_range
-from mbs.components.motion import Freedom, Motion
-from mbs.components.rotor import Rotor
+from mbs.components.component import Component, Point, in_plane, unit_axis
+from mbs.components.drives import Flange
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar, expression, to_float
-from mbs.messages import quoted
+from mbs.text import quoted
+
+# Elementary motions of a frame, of which every joint is made.
+
+
+class Motion(Enum):
+    """An elementary motion of a frame: about or along its z axis, or free."""
+
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+    SPHERICAL = "spherical"
+    FREE = "free"
+
+    @property
+    def nq(self) -> int:
+        """Number of position coordinates."""
+        return {"spherical": 4, "free": 7}.get(self.value, 1)
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return {"spherical": 3, "free": 6}.get(self.value, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Freedom:
+    """One elementary motion of a joint.
+
+    Attributes:
+        motion: what moves.
+        axis: unit vector of the axis in frame_a at the zero posture (z where none is special).
+        suffix: what distinguishes its coordinates from the others of the same joint.
+    """
+
+    motion: Motion
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    suffix: str = ""
+
+    def coordinate_of(self, joint: str) -> str:
+        """Name of its coordinate in a joint of this name, which has a suffix beside others."""
+        return f"{joint}.{self.suffix}" if self.suffix else joint
+
+
+# Rotors of motors that turn with a joint, faster than it.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rotor:
+    """A balanced rotor on the link of a joint's frame_a, which a gear ties to the joint.
+
+    Relative to that link it spins at `ratio` times the velocity of the joint. The mass of the
+    rotor and its whole inertia, locked, belong to the body that carries it.
+
+    Attributes:
+        inertia: about its own axis [kg m^2].
+        ratio: turns of the rotor for a turn of the joint, or rad for 1 m of a prismatic one; less
+            than zero when it turns the other way.
+        axis: of the rotor, in frame_a, as a letter or three numbers; that of the joint when None.
+    """
+
+    inertia: Scalar
+    ratio: Scalar = 1.0
+    axis: Any = None
+
+    def __post_init__(self) -> None:
+        for name in ("inertia", "ratio"):
+            value = expression(getattr(self, name), f"rotor, {name}")
+            object.__setattr__(self, name, value)
+        if self.axis is not None:
+            object.__setattr__(self, "axis", unit_axis("rotor", self.axis))
+
+
+# Limits of joints: ranges of positions, of the velocity and of the effort of the motor.
+
+
+Range = tuple[float, float]
+
+
+def limits_by_suffix(
+    name: str, suffixes: Iterable[str], limits: Any
+) -> tuple[tuple[str, Range], ...]:
+    """The ranges of positions of a joint by the suffix of the coordinate.
+
+    Args:
+        name: of the joint, for errors.
+        suffixes: of its coordinates of one number.
+        limits: None, a pair for a joint with one coordinate, or a mapping from suffixes to pairs.
+
+    Raises:
+        DescriptionError: a range names no coordinate, or is not (lower, upper).
+    """
+    if limits is None:
+        return ()
+    known = set(suffixes)
+    items: list[tuple[Any, Any]] = [("" if known == {""} else None, limits)]
+    if isinstance(limits, Mapping):
+        items = list(limits.items())
+    elif isinstance(limits, tuple) and all(_is_named_interval(item) for item in limits):
+        items = list(limits)
+    return tuple((suffix, _interval(name, suffix, pair, known)) for suffix, pair in items)
+
+
+def motor_range(where: str, quantity: str, given: Any) -> Range | None:
+    """The range of a velocity or an effort: (-x, x) where one number x is given.
+
+    Args:
+        where: it is described, for errors.
+        quantity: "velocity" or "effort".
+        given: None, a number above zero, or (lower, upper) with zero between them.
+
+    Raises:
+        DescriptionError: it is something else.
+    """
+    if given is None:
+        return None
+    lower, upper = _pair(given) if np.ndim(given) else _both(given)
+    if not lower < upper or lower > 0 or upper < 0:
+        raise DescriptionError(
+            f"{where}: {quantity} is {quoted(given)}; give the largest one, above zero, or"
+            " (lower, upper) with zero between them"
+        )
+    return lower, upper
+
+
+def _both(given: Any) -> Range:
+    largest = math.nan if isinstance(given, bool) else _pair((given, given))[0]
+    return -largest, largest
+
+
+def _pair(pair: Any) -> Range:
+    """Two numbers, NaN where there are not two."""
+    try:
+        low, high = (float(value) for value in pair)
+    except (TypeError, ValueError):
+        return math.nan, math.nan
+    return low, high
+
+
+def _interval(name: str, suffix: Any, pair: Any, known: set[str]) -> Range:
+    if suffix not in known:
+        raise DescriptionError(
+            f"{name}: limits {quoted(pair)} name no coordinate of one number; "
+            + (f"give a mapping from {sorted(known)}" if known else "leave them out")
+        )
+    low, high = _pair(pair)
+    if not low < high:
+        raise DescriptionError(
+            f"{name}: limits {quoted(pair)} are not (lower, upper); give two numbers in order"
+        )
+    return low, high
+
+
+def _is_named_interval(item: Any) -> bool:
+    return isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], str)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

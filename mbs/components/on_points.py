@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
+from mbs.components.bodies import RigidBody
 from mbs.components.component import Component, Point
-from mbs.components.rigid_body import RigidBody
 from mbs.errors import DescriptionError
-from mbs.messages import quoted
+from mbs.text import quoted
 
 P = TypeVar("P", bound="OnPoints")
 

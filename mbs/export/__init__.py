@@ -2,7 +2,7 @@
 
 from mbs.export.c_library import c_library
 from mbs.export.code import code
-from mbs.export.fmu.c_law import CController
+from mbs.export.fmu.controller import CController
 from mbs.export.fmu.system_fmu import fmu
 from mbs.export.par import par
 from mbs.export.ssp import ssp

@@ -12,18 +12,17 @@ import casadi
 from casadi import MX, Function
 
 from mbs.assembly import System
-from mbs.assembly.rates import quaternion_slices
 from mbs.assembly.tables import ACCELERATION_UNIT
+from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import UNIT
-from mbs.comments import in_c_comment
 from mbs.errors import ModelError
 from mbs.export.c_check import NO_FAST_MATH
 from mbs.export.fmu.description import FmuVariable
-from mbs.export.fmu.equations import steepness
-from mbs.export.fmu.tables import diagonal_blocks, leading_states
+from mbs.export.fmu.source import diagonal_blocks, leading_states, steepness
 from mbs.export.fmu.variables import dependents, inputs, outputs, parameters, states
-from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
+from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.native.bare_source import NOINLINE, Real, bare_source, literal
+from mbs.text import in_c_comment
 
 _HEADER = """\
 /** {title}: its motion in steps of the classical Runge-Kutta method of order 4.

@@ -14,15 +14,15 @@ from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.tree import Link
 from mbs.components import Mechanism
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.files import path_of
 from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable, write_par
-from mbs.formats.rows import BODY_SCALARS, GEOMETRY
-from mbs.messages import quoted
+from mbs.formats.table import BODY_SCALARS, GEOMETRY
 from mbs.operations.graph import graph_of
 from mbs.spatial import Khalil, Pose, align_z, placed
 from mbs.spatial.inertia import TEN_PARAMETERS
+from mbs.text import quoted
 
 Text = Callable[[SX], str]
 """What writes a scalar of numbers and symbols in the grammar of expressions."""

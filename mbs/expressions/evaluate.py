@@ -10,13 +10,14 @@ from typing import TypeVar
 import casadi
 from casadi import SX
 
-from mbs.expressions.arithmetic import apply_float, arithmetic
 from mbs.expressions.expression import (
     Expression,
     Number,
     Operation,
     Parameter,
     Scalar,
+    apply_float,
+    arithmetic,
     expression,
     operation,
 )

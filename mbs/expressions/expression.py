@@ -3,16 +3,78 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from mbs.errors import ExpressionError
-from mbs.expressions.arithmetic import apply_float
-from mbs.expressions.grammar import TOKEN, is_reserved
-from mbs.messages import quoted
+from mbs.text import quoted
 from mbs.units import UNITS
+
+# The operators of the grammar on numbers, or on anything that adds and multiplies.
+
+
+_ROUNDING = 4e-16
+"""Functions of quarter turns miss -1, 0 and 1 by this much; they are put exactly there."""
+
+
+def apply_float(operator: str, values: list[float]) -> float:
+    """The result of an operator or function on numbers, NaN where there is none."""
+    try:
+        with np.errstate(all="ignore"):
+            result = arithmetic(operator, [np.float64(v) for v in values])
+        if result is None:
+            result = getattr(math, operator)(*values)
+            nearest = round(result)
+            result = nearest if abs(result - nearest) < _ROUNDING else result
+        return float(result)
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+def arithmetic(operator: str, values: list[Any]) -> Any:
+    """The result of an operator, None for a function."""
+    first, *rest = values
+    match operator:
+        case "+":
+            return first + rest[0]
+        case "-":
+            return first - rest[0]
+        case "*":
+            return first * rest[0]
+        case "/":
+            return first / rest[0]
+        case "^":
+            return first ** rest[0]
+        case "negate":
+            return -first
+    return None
+
+
+# Words of the grammar: names, functions and constants.
+
+
+FUNCTIONS = {"sin": 1, "cos": 1, "tan": 1, "sqrt": 1, "atan2": 2}
+CONSTANTS = {"pi": math.pi, "Pi": math.pi}
+NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+"""Pattern of a number without its sign."""
+
+TOKEN = re.compile(
+    rf"\s*(?:(?P<number>{NUMBER})"
+    r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*)"
+    r"|(?P<mark>\*\*|[-+*/^(),]))",
+    re.ASCII,
+)
+_NOT_NUMBERS = ("nan", "inf", "infinity")
+
+
+def is_reserved(name: str) -> bool:
+    """Whether the name means something else than a symbol."""
+    return name in (*FUNCTIONS, *CONSTANTS) or name.lower() in _NOT_NUMBERS
+
 
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "negate": 3, "^": 4}
 _LONGEST_CHAIN = 200

@@ -11,9 +11,8 @@ import re
 
 from mbs.errors import ExpressionError
 from mbs.expressions.evaluate import to_float
-from mbs.expressions.expression import Expression, Scalar, expression
-from mbs.expressions.grammar import NUMBER
-from mbs.messages import quoted
+from mbs.expressions.expression import NUMBER, Expression, Scalar, expression
+from mbs.text import quoted
 
 _PLAIN = re.compile(rf"[-+]?{NUMBER}", re.ASCII)
 

@@ -8,14 +8,17 @@ from typing import NoReturn
 
 from mbs.errors import ExpressionError
 from mbs.expressions.expression import (
+    CONSTANTS,
+    FUNCTIONS,
+    TOKEN,
     Expression,
     Number,
     Parameter,
     finite,
+    is_reserved,
     operation,
 )
-from mbs.expressions.grammar import CONSTANTS, FUNCTIONS, TOKEN, is_reserved
-from mbs.messages import quoted
+from mbs.text import quoted
 
 _DEEPEST_NESTING = 100
 

@@ -1,11 +1,9 @@
 """Robot files: tables of frames (TOML, dict, .par), URDF and MJCF, read as mechanisms."""
 
-from mbs.formats.mujoco_spec import read_mjcf
+from mbs.formats.mjcf import read_mjcf
 from mbs.formats.par import read_par
 from mbs.formats.par_write import write_par
-from mbs.formats.rows import CutRow, FrameRow, InertiaRow
-from mbs.formats.table import RobotTable
-from mbs.formats.table_mechanism import to_mechanism
+from mbs.formats.table import CutRow, FrameRow, InertiaRow, RobotTable, to_mechanism
 from mbs.formats.toml import from_dict, read_toml, to_dict, write_toml
 from mbs.formats.urdf import read_urdf
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from mbs.comments import seen
 from mbs.errors import DescriptionError
-from mbs.messages import quoted
+from mbs.text import quoted, seen
 
 _NOT_IN_NAMES = re.compile(r"[\s.'\"]+")
 

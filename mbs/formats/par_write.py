@@ -6,11 +6,10 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from mbs.comments import in_bracket_comment
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar, expression, parameters_of, to_float
 from mbs.files import write_text
-from mbs.formats.par_file import (
+from mbs.formats.par import (
     BASE_EXTRAS,
     BODY_KEYS,
     FLEXIBLE,
@@ -18,8 +17,8 @@ from mbs.formats.par_file import (
     LINK_EXTRAS,
     STIFFNESS,
 )
-from mbs.formats.rows import FrameRow, InertiaRow
-from mbs.formats.table import RobotTable, require_table
+from mbs.formats.table import FrameRow, InertiaRow, RobotTable, require_table
+from mbs.text import in_bracket_comment
 
 _GEOMETRY = ("b", "d", "r", "gamma", "alpha", "theta")
 _VARIABLE = {0: ("theta", "th"), 1: ("r", "r")}

@@ -12,20 +12,154 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mbs.components import Rotor
-from mbs.components.joint_limits import motor_range
-from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Scalar, expression, number, parameters_of, to_float
-from mbs.formats.rows import (
-    BODY_SCALARS,
-    GEOMETRY,
-    LOOP_JOINTS,
-    CutRow,
-    FrameRow,
-    InertiaRow,
+from mbs.components import (
+    Cylindrical,
+    Fixed,
+    Joint,
+    KhalilBody,
+    Mechanism,
+    Planar,
+    Prismatic,
+    Revolute,
+    RigidBody,
+    Rotor,
+    Spherical,
+    Universal,
 )
-from mbs.messages import did_you_mean, quoted
+from mbs.components.joints import motor_range
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Number, Scalar, expression, number, parameters_of, to_float
+from mbs.formats.files import component_name
 from mbs.spatial.inertia import TEN_PARAMETERS
+from mbs.text import did_you_mean, quoted
+
+# Rows of a table of frames: plain data, checked by `mbs.formats.table.RobotTable`.
+
+
+GEOMETRY = ("gamma", "b", "alpha", "d", "theta", "r")
+"""The six parameters of a frame, in the order in which the displacements are made."""
+
+DRIVE = ("Ia", "Fv", "Fs", "stiffness")
+"""Rotor inertia, friction and spring of the joint of a body row, zero where there are none."""
+
+BODY_SCALARS = (*TEN_PARAMETERS, *DRIVE, "Fs_width", "rest")
+"""The scalars of a body row."""
+
+JOINTS = ("revolute", "prismatic", "fixed")
+"""Names of the joint types sigma = 0, 1, 2."""
+
+LOOP_JOINTS = (*JOINTS, "cylindrical", "universal", "spherical", "planar")
+"""Names of the joint types that may close a loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRow:
+    """Frame j and the joint that moves it with respect to its antecedent.
+
+    Attributes:
+        antecedent: number of the frame it is placed on, 0 for the base.
+        sigma: 0 revolute, 1 prismatic, 2 fixed.
+        actuated: whether a motor drives the joint (mu); None leaves the choice to the assembly.
+        gamma, b, alpha, d, theta, r: Khalil parameters [rad, m]; the joint variable is added to
+            theta of a revolute joint and to r of a prismatic one.
+        limits: (lower, upper) of the joint variable [rad or m].
+        name: of the joint, q<j> when empty.
+        velocity: (lower, upper) of its rate, or the largest in both directions [rad/s or m/s].
+        effort: likewise of its motor [N m or N].
+    """
+
+    antecedent: int
+    sigma: int = 0
+    actuated: bool | None = None
+    gamma: Scalar = 0.0
+    b: Scalar = 0.0
+    alpha: Scalar = 0.0
+    d: Scalar = 0.0
+    theta: Scalar = 0.0
+    r: Scalar = 0.0
+    limits: tuple[float, float] | None = None
+    name: str = ""
+    velocity: tuple[float, float] | float | None = None
+    effort: tuple[float, float] | float | None = None
+
+    @property
+    def geometry(self) -> dict[str, Scalar]:
+        """The six Khalil parameters by name."""
+        return {key: getattr(self, key) for key in GEOMETRY}
+
+
+@dataclass(frozen=True, slots=True)
+class InertiaRow:
+    """The body fixed on frame j and the drive of joint j.
+
+    Attributes:
+        frame: number of the frame.
+        XX, XY, XZ, YY, YZ, ZZ: inertia about the origin of the frame, in its axes [kg m^2].
+        MX, MY, MZ: first moments [kg m].
+        M: mass [kg].
+        Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
+        Fv, Fs: viscous [N m s/rad or N s/m] and dry friction [N m or N].
+        Fs_width: velocity over which dry friction changes sign [rad/s or m/s], 0 for a step.
+        stiffness: of the spring of the joint [N m/rad or N/m].
+        rest: position at which the spring is at rest [rad or m].
+        rotor: that spins with the joint, on the antecedent of the frame; its axis, where given,
+            is in the axes of frame j at the zero position.
+        name: of the body, link<j> when empty.
+        grouped: the values are base parameters, which need not belong to a single body.
+    """
+
+    frame: int
+    XX: Scalar = 0.0
+    XY: Scalar = 0.0
+    XZ: Scalar = 0.0
+    YY: Scalar = 0.0
+    YZ: Scalar = 0.0
+    ZZ: Scalar = 0.0
+    MX: Scalar = 0.0
+    MY: Scalar = 0.0
+    MZ: Scalar = 0.0
+    M: Scalar = 0.0
+    Ia: Scalar = 0.0
+    Fv: Scalar = 0.0
+    Fs: Scalar = 0.0
+    Fs_width: Scalar = 1e-3
+    stiffness: Scalar = 0.0
+    rest: Scalar = 0.0
+    rotor: Rotor | None = None
+    name: str = ""
+    grouped: bool = False
+
+    @property
+    def is_body(self) -> bool:
+        """Whether its inertial parameters are those of a body; symbols leave it open."""
+        values: dict[str, Any] = {name: expression(getattr(self, name)) for name in TEN_PARAMETERS}
+        if not all(isinstance(value, Number) for value in values.values()):
+            return False
+        try:
+            KhalilBody("body", **values)
+        except DescriptionError:
+            return False
+        return True
+
+    @property
+    def drive(self) -> list[str]:
+        """Names of what acts on the joint and is not zero."""
+        given = [name for name in DRIVE if to_float(expression(getattr(self, name))) != 0]
+        return [*given, *(["rotor"] if self.rotor is not None else [])]
+
+
+@dataclass(frozen=True, slots=True)
+class CutRow:
+    """A loop that is opened at a joint, which then has a frame on either side.
+
+    Attributes:
+        cut: (k, k+B): frame k carries the variable of the cut joint, frame k+B is fixed on the
+            other side; they coincide when the loop is closed.
+        joint: type of the cut joint.
+    """
+
+    cut: tuple[int, int]
+    joint: str = "revolute"
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,3 +428,102 @@ def _has_inertia(body: InertiaRow) -> bool:
 
 def _is_int(value: object) -> bool:
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
+# The mechanism that a table of frames describes.
+
+
+_MOVING = (Revolute, Prismatic)
+_CLOSING: dict[str, type[Joint]] = {
+    "revolute": Revolute,
+    "prismatic": Prismatic,
+    "fixed": Fixed,
+    "cylindrical": Cylindrical,
+    "universal": Universal,
+    "spherical": Spherical,
+    "planar": Planar,
+}
+_BASE_MOTION = ("W0", "WP0", "V0", "VP0")
+
+
+def to_mechanism(table: RobotTable) -> Mechanism:
+    """The bodies and joints of a table, numbered as its frames are.
+
+    Joint j is named q<j> and body j link<j>, unless the rows name them. A fixed frame is a body
+    that is welded to its antecedent. The two frames of a cut become one passive joint, between
+    the links that carry them, where the loop is then opened.
+
+    Raises:
+        DescriptionError: a body is impossible, two names are equal, or the base moves.
+    """
+    require_table(table)
+    _check_base(table)
+    mechanism = Mechanism(
+        component_name(table.name),
+        gravity=table.gravity,
+        parameters=table.parameters,
+        source=table.source,
+        keep_order=True,
+        guess=table.guess,
+    )
+    rows = {row.frame: row for row in table.bodies}
+    links: dict[int, RigidBody] = {0: mechanism.world}
+    for j, frame in enumerate(table.frames, 1):
+        if j in table.cut_frames:
+            continue
+        row = rows.get(j, InertiaRow(j))
+        links[j] = mechanism.add(_body(j, row))
+        point = links[frame.antecedent].at_khalil(**frame.geometry)
+        if frame.sigma == 2:
+            mechanism.connect(point, links[j])
+        else:
+            joint = _MOVING[frame.sigma](**_joint(table, j, row, _actuated(table, frame)))
+            mechanism.connect(point, joint, links[j])
+    for loop in table.loops:
+        _close(mechanism, table, loop, links, rows.get(loop.cut[0], InertiaRow(loop.cut[0])))
+    return mechanism
+
+
+def _close(
+    mechanism: Mechanism,
+    table: RobotTable,
+    loop: CutRow,
+    links: dict[int, RigidBody],
+    row: InertiaRow,
+) -> None:
+    moving, fixed = (table.frames[k - 1] for k in loop.cut)
+    scalars = _joint(table, loop.cut[0], row, bool(moving.actuated))
+    joint = _CLOSING[loop.joint](**scalars)
+    mechanism.connect(
+        links[moving.antecedent].at_khalil(**moving.geometry),
+        joint,
+        links[fixed.antecedent].at_khalil(**fixed.geometry),
+    )
+    mechanism.cut(joint)
+
+
+def _actuated(table: RobotTable, frame: FrameRow) -> bool | None:
+    return True if frame.actuated is None and not table.loops else frame.actuated
+
+
+def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) -> dict[str, Any]:
+    return {
+        "name": table.joint_name(j),
+        "actuated": actuated,
+        **{name: getattr(table.frames[j - 1], name) for name in ("limits", "velocity", "effort")},
+        **{name: getattr(row, name) for name in (*DRIVE, "Fs_width", "rest", "rotor")},
+    }
+
+
+def _body(j: int, row: InertiaRow) -> KhalilBody:
+    ten: dict[str, Any] = {name: getattr(row, name) for name in TEN_PARAMETERS}
+    return KhalilBody(row.name or f"link{j}", grouped=row.grouped, **ten)
+
+
+def _check_base(table: RobotTable) -> None:
+    for key in _BASE_MOTION:
+        if any(to_float(expression(text)) != 0 for text in table.extras.get(key, ())):
+            raise DescriptionError(
+                f"{table.name}: {key} is {list(table.extras[key])}, but the base of a table does"
+                " not move; set it to zero and put a free joint under the robot instead"
+            )

@@ -15,9 +15,17 @@ from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar
 from mbs.files import write_text
 from mbs.formats.files import read_text
-from mbs.formats.rows import BODY_SCALARS, GEOMETRY, JOINTS, CutRow, FrameRow, InertiaRow
-from mbs.formats.table import RobotTable, require_table
-from mbs.messages import did_you_mean
+from mbs.formats.table import (
+    BODY_SCALARS,
+    GEOMETRY,
+    JOINTS,
+    CutRow,
+    FrameRow,
+    InertiaRow,
+    RobotTable,
+    require_table,
+)
+from mbs.text import did_you_mean
 
 _TOP = ("name", "gravity", "parameters", "frame", "body", "loop", "source", "guess", "extras")
 _MOTOR = ("velocity", "effort")

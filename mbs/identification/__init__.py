@@ -1,34 +1,60 @@
 """Base inertial parameters and identification."""
 
-from mbs.identification.base.base_parameters import BaseParameters, base_parameters
-from mbs.identification.bodies.consistent import consistent, consistent_weighted
-from mbs.identification.bodies.physical_set import consistent_links
-from mbs.identification.bodies.prior import Prior
-from mbs.identification.bodies.recovery import recovered
-from mbs.identification.estimation.essential import Essential, essential
-from mbs.identification.estimation.estimate import Estimate, cross_validated, held_out
-from mbs.identification.estimation.instrumental import instrumental
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.estimation.residual_plot import plot_residuals
-from mbs.identification.estimation.residuals import Residuals
-from mbs.identification.estimation.robust import robust
-from mbs.identification.estimation.simulated_motion import simulated_motion
-from mbs.identification.estimation.weighted import reweighted, weighted
-from mbs.identification.exciting.excitation import Series, excitation
-from mbs.identification.exciting.limits import Plane
-from mbs.identification.exciting.trajectory import Trajectory
-from mbs.identification.identify import Identification, identify
-from mbs.identification.observations.energy import observe_energy
-from mbs.identification.observations.momentum import observe_momentum
-from mbs.identification.observations.observations import Observations, observe, observe_filtered
-from mbs.identification.observations.quality import excitation_quality
-from mbs.identification.records.filters import Samples, resampled, smoothed, smoothed_with_velocity
-from mbs.identification.records.record import Record, joint_side
-from mbs.identification.regressors.columns import Column, columns_of, numbers_of, values_of
-from mbs.identification.regressors.dynamic import Regressor, known_efforts, regressor
-from mbs.identification.regressors.energy import energy_regressor, power_regressor
-from mbs.identification.regressors.filtered import filtered_regressor
-from mbs.identification.report import report
+from mbs.identification.base_parameters import BaseParameters, base_parameters
+from mbs.identification.bodies import (
+    Prior,
+    consistent,
+    consistent_links,
+    consistent_weighted,
+    recovered,
+)
+from mbs.identification.estimate import (
+    Estimate,
+    Residuals,
+    cross_validated,
+    held_out,
+    plot_residuals,
+)
+from mbs.identification.excitation import Series, excitation
+from mbs.identification.identify import Identification, identify, report
+from mbs.identification.least_squares import (
+    instrumental,
+    least_squares,
+    reweighted,
+    robust,
+    simulated_motion,
+    weighted,
+)
+from mbs.identification.methods import Essential, essential
+from mbs.identification.observations import (
+    Observations,
+    excitation_quality,
+    observe,
+    observe_energy,
+    observe_filtered,
+    observe_momentum,
+)
+from mbs.identification.record import (
+    Record,
+    Samples,
+    joint_side,
+    resampled,
+    smoothed,
+    smoothed_with_velocity,
+)
+from mbs.identification.regressors import (
+    Column,
+    Regressor,
+    columns_of,
+    energy_regressor,
+    filtered_regressor,
+    known_efforts,
+    numbers_of,
+    power_regressor,
+    regressor,
+    values_of,
+)
+from mbs.identification.trajectory import Plane, Trajectory
 
 __all__ = [
     "BaseParameters",

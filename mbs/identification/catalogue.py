@@ -5,12 +5,10 @@ from __future__ import annotations
 from casadi import Function
 
 from mbs.assembly import System
-from mbs.identification.base.base_parameters import METHODS, base_parameters
-from mbs.identification.regressors.dynamic import regressor
-from mbs.identification.regressors.energy import energy_regressor
-from mbs.identification.regressors.filtered import filtered_regressor
+from mbs.identification.base_parameters import METHODS, base_parameters
+from mbs.identification.regressors import energy_regressor, filtered_regressor, regressor
 from mbs.models.catalogue import Entry
-from mbs.models.catalogue.options import MOVING_BASE, choice
+from mbs.models.catalogue.entry import MOVING_BASE, choice
 
 
 def entries() -> tuple[Entry, ...]:

@@ -1,14 +1,13 @@
 """Closed loops: closure equations, their independent rows, postures, reduction."""
 
 from mbs.loops.closure import closure
+from mbs.loops.configuration import solve
 from mbs.loops.examine import PostureState, examine
 from mbs.loops.function import function
-from mbs.loops.modes import Mode, modes
+from mbs.loops.modes import Mode, WorkingMode, modes, working_modes
 from mbs.loops.pose import solve_pose
-from mbs.loops.posture import solve
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
-from mbs.loops.working_modes import WorkingMode, working_modes
 
 __all__ = [
     "Mode",

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from mbs.assembly import Closure, Coordinate, LoopRow, System
 from mbs.errors import AssemblyError, Unclosable
-from mbs.loops.closing import Closing, closure_parameters
-from mbs.loops.closure import row_labels
-from mbs.loops.posture import closed_posture
-from mbs.loops.rolling import SLIPS, rolling_discs
-from mbs.loops.sizes import constraint_sizes, mechanism_size
+from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
+from mbs.loops.closure import SLIPS, rolling_discs, row_labels
+from mbs.loops.configuration import closed_posture
 from mbs.loops.velocity import constraint_jacobian
 from mbs.solvers.rank import independent_rows, null_space_of, rank
 

@@ -10,7 +10,7 @@ from mbs.assembly.open_system import open_system
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError
 from mbs.loops.analysis import analysed
-from mbs.messages import did_you_mean
+from mbs.text import did_you_mean
 
 
 def assemble(

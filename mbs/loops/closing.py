@@ -11,10 +11,93 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.rates import norm_rows
-from mbs.loops.closure import closure_rows, facing, row_labels
-from mbs.loops.sizes import mechanism_size, row_sizes
-from mbs.solvers.gauss_newton import gauss_newton
+from mbs.assembly.tree import norm_rows, quaternion_slices
+from mbs.errors import Unclosable
+from mbs.loops.closure import SLIPS, closure_rows, facing, rolling_discs, row_labels
+from mbs.solvers.least_squares import gauss_newton
+
+# What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
+#
+# How far a loop is open says nothing by itself: 1e-6 m is nothing for a crane, and 1 % of a link
+# of 100 um.
+
+
+_ROUNDING = 1e-9
+"""Length [m] below which levers are rounding, which is 1e-13 of a mechanism of 1 km."""
+_SAMPLES, _SEED = 3, 20260201
+"""Postures at which levers are measured, the zero posture among them."""
+
+
+def mechanism_size(system: System) -> SX:
+    """The longest lever by which an angle moves the ends of a loop, or their largest distance [m].
+
+    It is taken at some postures, always the same and open as a rule, so that it is known before a
+    loop is closed; 1 m where nothing tells a small mechanism from a large one.
+
+    Returns:
+        (1, 1) expression of the parameters p.
+    """
+
+    def build() -> SX:
+        places = [k for k, is_length in enumerate(_lengths(system)) if is_length]
+        if not places:
+            return SX(1)
+        q = SX.sym("q", system.nq)
+        rows = closure_rows(system, q)[places]
+        turns = [k for k, c in enumerate(system.coordinates) if not c.unit.startswith("m")]
+        levers = casadi.jacobian(rows, q)[:, turns]
+        lengths = casadi.vertcat(rows, casadi.vec(levers.nz[:])) if levers.nnz() else rows
+        found = Function("lengths", [q, system.p], [lengths])
+        every = casadi.vertcat(*(found(posture, system.p) for posture in _postures(system)))
+        size = SX(casadi.mmax(casadi.fabs(every)))
+        # around the centre of a sphere levers are rounding
+        return SX(casadi.if_else(size > _ROUNDING, size, 1))
+
+    size: SX = system.cached("mechanism size", build)
+    return size
+
+
+def row_sizes(system: System) -> SX:
+    """(m, 1) what each closure row is measured by [m or 1], as a function of p."""
+    size = mechanism_size(system)
+    return casadi.vertcat(SX(0, 1), *(size if own else SX(1) for own in _lengths(system)))
+
+
+def constraint_sizes(system: System) -> SX:
+    """(m, 1) the same of the rows of J: those of the closure, then slips of discs [m or 1]."""
+    slips = len(SLIPS) * sum(1 for _ in rolling_discs(system))
+    return casadi.vertcat(row_sizes(system), *(mechanism_size(system) for _ in range(slips)))
+
+
+def relative_rows(system: System, q: SX) -> SX:
+    """(m + k, 1) closure rows as parts of what they are measured by, then norms of quaternions."""
+    return casadi.vertcat(closure_rows(system, q) / row_sizes(system), norm_rows(system.tree, q))
+
+
+def _lengths(system: System) -> list[bool]:
+    """Whether each closure row is a length."""
+    driven = iter(system.coordinates[coupling.driven].unit for coupling in system.couplings)
+    return [
+        next(driven).startswith("m") if label == "coordinate" else label.startswith("force")
+        for _, labels in row_labels(system)
+        for label in labels
+    ]
+
+
+def _postures(system: System) -> list[list[float]]:
+    """The zero posture and random ones; displacements are zero, quaternions of unit length."""
+    rng, postures = np.random.default_rng(_SEED), list[list[float]]()
+    for number in range(_SAMPLES):
+        reach = np.pi if number else 0.0
+        q = [
+            0.0 if c.unit.startswith("m") else float(rng.uniform(-reach, reach))
+            for c in system.coordinates
+        ]
+        for part in quaternion_slices(system.tree):
+            q[part] = [1.0, 0.0, 0.0, 0.0]
+        postures.append(q)
+    return postures
+
 
 Vector = NDArray[np.float64]
 
@@ -170,3 +253,84 @@ def _replaced(q: Vector, places: Sequence[int], values: Vector) -> Vector:
     result = q.copy()
     result[list(places)] = values
     return result
+
+
+# When two postures are the same: up to whole turns, and to the sign of quaternions.
+
+
+def difference(system: System, q: Vector, other: Vector) -> Vector:
+    """(nq,) difference of two postures: angles to the nearest whole turn, quaternions to a sign."""
+    gap = within_half_turn(system, q - other)
+    for part in quaternion_slices(system.tree):
+        opposite = q[part] + other[part]
+        gap[part] = min(q[part] - other[part], opposite, key=lambda x: float(np.abs(x).max()))
+    return gap
+
+
+def within_half_turn(system: System, q: Vector) -> Vector:
+    """(nq,) the positions, or differences of them, with angles within half a turn of zero."""
+    turned = np.array(q, dtype=float)
+    turns = [coordinate.unit == "rad" for coordinate in system.coordinates]
+    turned[turns] = np.remainder(turned[turns] + np.pi, 2 * np.pi) - np.pi
+    return turned
+
+
+# Moving a closed posture along a line in small steps, so that it stays on its branch.
+
+
+_LARGEST_STEP = 0.2
+"""Of a held position in one step [rad or m]."""
+LARGEST_MOVE = 0.3
+"""Of any other position from where its slope led; more may be another branch [rad or m]."""
+_LONGEST_LINE = 400.0
+"""Of a held position, in all [rad or m]."""
+_SMALLEST_PART = 1e-4
+"""Of the whole line, below which it is said to end."""
+
+
+def followed_posture(system: System, target: Vector, held: tuple[int, ...], p: Vector) -> Vector:
+    """The posture reached from the assembled one as its held positions, and p, move to theirs.
+
+    Args:
+        system: with loops; its posture is where the line starts.
+        target: (nq,) of which the held positions count.
+        held: numbers in q.
+        p: (np,) values of the parameters at the end of the line.
+
+    Returns:
+        q (nq,), its held positions equal to the target's.
+
+    Raises:
+        Unclosable: the line leaves what this branch can reach; the message says where.
+    """
+    start, p_start = np.array(system.posture), closure_parameters(system)
+    places, free = list(held), [k for k in range(system.nq) if k not in held]
+    way = target[places] - start[places]
+    length = float(np.max(np.abs(way), initial=0.0))
+    if length > _LONGEST_LINE:
+        raise Unclosable(
+            f"{system.name}: a position is {length:.3g} rad or m away from the assembled posture;"
+            f" give one less than {_LONGEST_LINE:g} away"
+        )
+    largest = min(1.0, _LARGEST_STEP / max(length, 1e-12))
+    q, slope, done, part = start, np.zeros(len(free)), 0.0, largest
+    while done < 1.0:
+        to = min(1.0, done + part)
+        trial = q.copy()
+        trial[places] = target[places] if to == 1.0 else start[places] + to * way
+        trial[free] += (to - done) * slope
+        closing = Closing(system, p if to == 1.0 else p_start + to * (p - p_start), held)
+        found = closing.nearest(trial)
+        if found.is_closed and np.max(np.abs(found.q - trial), initial=0.0) < LARGEST_MOVE:
+            slope = (found.q[free] - q[free]) / (to - done)
+            q, done, part = found.q, to, min(2 * part, largest)
+        else:
+            part, slope = part / 2, slope if part > 8 * _SMALLEST_PART else np.zeros(len(free))
+            if part < _SMALLEST_PART:
+                raise Unclosable(
+                    f"{system.name}: {closing.held_positions(target) or 'the posture'} cannot be"
+                    " reached from the assembled posture, whose branch ends near"
+                    f" {closing.held_positions(q) or 'it'}; give a guess of other joints to choose"
+                    " another branch, or other positions"
+                )
+    return q

@@ -14,15 +14,14 @@ from mbs.assembly import System
 from mbs.assembly.model_function import PostureCheck, require_system
 from mbs.assembly.validity import Row, all_hold, plain_rows
 from mbs.errors import ModelError, SingularPosture, Unclosable
-from mbs.loops.closing import OPEN, closure_parameters
+from mbs.loops.closing import OPEN, closure_parameters, row_sizes
 from mbs.loops.closure import closure_rows
-from mbs.loops.scales import scales
-from mbs.loops.sizes import row_sizes
 from mbs.loops.velocity import (
     constraint_jacobian,
     determining_rows,
     independent_constraint_rows,
     kept_rows,
+    scales,
 )
 from mbs.solvers.rank import rank
 

@@ -2,26 +2,160 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import casadi
 import numpy as np
-from casadi import DM, SX, Function
+from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function
-from mbs.errors import ModelError, Unclosable
-from mbs.loops.closed_form.places import extent, independent_places
-from mbs.loops.closed_form.plan import plan
-from mbs.loops.closed_form.stage import Stage
-from mbs.loops.closing import Vector, closure_parameters
-from mbs.loops.independent import (
-    Given,
-    independent_names,
-    independent_positions,
-)
-from mbs.loops.reach import reachable
-from mbs.messages import did_you_mean, quoted
+from mbs.closed_forms.ring import extent, independent_places
+from mbs.errors import ModelError, NoClosedForm, Unclosable
+from mbs.loops.closing import LARGEST_MOVE, Vector, closure_parameters, relative_rows, row_sizes
+from mbs.loops.closure import facing, square_closure
+from mbs.loops.plan import Stage, plan
+from mbs.text import did_you_mean, quoted
+
+# Positions as a user gives them: by name, or in the order of the independent joints.
+
+
+Given = Mapping[str, float] | Sequence[float] | None
+
+
+def independent_names(system: System) -> list[str]:
+    """The independent joints in the order of `system.free`."""
+    return [system.speeds[k].name for k in system.free]
+
+
+def fixed_positions(system: System, values: Given) -> dict[str, float]:
+    """The given positions by name.
+
+    Raises:
+        ModelError: a sequence does not fit the independent joints.
+    """
+    names = independent_names(system)
+    if values is None or isinstance(values, Mapping):
+        return dict(values or {})
+    try:
+        given = [float(x) for x in values]
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"{system.name}: q_active is {quoted(values)}; give numbers for {', '.join(names)}"
+        ) from None
+    if len(given) != len(names):
+        raise ModelError(
+            f"{system.name}: q_active has {len(given)} values, the independent joints are"
+            f" {len(names)}: {', '.join(names)}"
+        )
+    return dict(zip(names, given, strict=True))
+
+
+def independent_positions(system: System, values: Given) -> list[float]:
+    """The positions of the independent joints, those left out as in the assembled posture.
+
+    Raises:
+        ModelError: another joint is named, or a value is not finite.
+    """
+    fixed, names = fixed_positions(system, values), independent_names(system)
+    places = dict(zip(names, independent_places(system), strict=True))
+    spins = {name: x for name, x in fixed.items() if places.get(name, 0) >= system.nq}
+    whole = system.position({name: x for name, x in fixed.items() if name not in spins})
+    spun = system.velocity(spins)
+    for name in fixed:
+        if name not in names:
+            raise ModelError(
+                f"{system.name}: {name} follows from the loops once a branch is named; give"
+                f" positions of the independent joints {', '.join(names)}"
+            )
+    return [
+        whole[place] if place < system.nq else spun[k]
+        for k, place in zip(system.free, places.values(), strict=True)
+    ]
+
+
+# What positions an independent joint can reach on a branch, the others held.
+
+
+_POINTS = 721
+_HALVINGS = 40
+_LEAST_STROKE = 1.0
+_DOUBLINGS = 10
+
+
+def reachable(system: System, loops: Function, q_a: Vector, p: Vector) -> str:
+    """The reachable ranges of the independent joints, each with the others as given, in words.
+
+    Args:
+        system: of the loops.
+        loops: a closed form, q from q_a and p.
+        q_a: (m,) positions that cannot be reached.
+        p: (np,) parameters.
+    """
+    texts = []
+    for number, k in enumerate(independent_places(system)):
+        if k >= system.nq:
+            continue
+        is_reached = _test(loops, q_a, p, number)
+        intervals = _intervals(is_reached, *_span(system, k, q_a[number], is_reached))
+        unit = system.coordinates[k].unit
+        if intervals:
+            ranges = " or ".join(f"{low:.4g} to {high:.4g}" for low, high in intervals)
+            texts.append(f"{system.coordinates[k].name} can be {ranges} {unit}")
+    held = ", the other positions as they are" if texts and len(system.free) > 1 else ""
+    return "; ".join(texts) + held if texts else "change several positions, the branch or lengths"
+
+
+def _test(loops: Function, q_a: Vector, p: Vector, number: int) -> Callable[[float], bool]:
+    arguments = [p] if p.size else []
+
+    def is_reached(value: float) -> bool:
+        trial = q_a.copy()
+        trial[number] = value
+        return bool(np.all(np.isfinite(np.array(loops.call([trial, *arguments])[0]))))
+
+    return is_reached
+
+
+def _span(
+    system: System, k: int, value: float, is_reached: Callable[[float], bool]
+) -> tuple[float, float]:
+    """Where to look: a whole turn, or a stroke about the assembled position that ends outside."""
+    if system.coordinates[k].unit == "rad":
+        return -np.pi, np.pi
+    middle = system.posture[k]
+    stroke = max(_LEAST_STROKE, abs(value - middle))
+    for _ in range(_DOUBLINGS):
+        if not is_reached(middle - stroke) and not is_reached(middle + stroke):
+            break
+        stroke *= 2
+    return middle - stroke, middle + stroke
+
+
+def _intervals(
+    is_reached: Callable[[float], bool], low: float, high: float
+) -> list[tuple[float, float]]:
+    """The intervals between low and high in which positions are reached."""
+    points = np.linspace(low, high, _POINTS)
+    inside = np.array([is_reached(float(x)) for x in points])
+    changes = np.flatnonzero(inside[1:] != inside[:-1])
+    edges = [_edge(is_reached, float(points[k]), float(points[k + 1])) for k in changes]
+    edges = [low] * bool(inside[0]) + edges + [high] * bool(inside[-1])
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _edge(is_reached: Callable[[float], bool], low: float, high: float) -> float:
+    """Where reaching begins or ends between two positions."""
+    first = is_reached(low)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        if is_reached(middle) == first:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
 
 Branch = str | Sequence[str] | None
 """Labels such as "j3:+", in one text with commas or as a sequence; None for the assembled one."""
@@ -159,3 +293,98 @@ def _way(system: System, stage: Stage, labels: Sequence[str]) -> int:
             f" the loop of {stage.name}; name one"
         )
     return named[0] if named else stage.chosen
+
+
+# Positions of the whole tree from those of the independent joints, as a CasADi graph.
+
+
+_STAGES = 128
+_OPEN = 1e-9
+"""Sum of all rows, in parts of the size of the mechanism, where Newton's method ended: it leaves
+1e-13, or has missed by far."""
+
+
+def follow_active(system: System) -> Function:
+    """``follow(q_a, p) -> q``: the posture reached from the assembled one along a straight line.
+
+    The independent positions, and the parameters from their defaults, are moved in small equal
+    stages, each closed by Newton's method from where the slope led: the branch of the assembled
+    posture is kept, and the Function is differentiable (implicit function theorem). Where the
+    line leaves what the mechanism can reach, q is NaN.
+
+    Returns:
+        Function of q_a (m, 1) and p (np, 1); q (nq, 1).
+
+    Raises:
+        NoClosedForm: an independent velocity belongs to a quaternion, so that no position of q
+            stands for it.
+    """
+
+    def build() -> Function:
+        active = independent_places(system)
+        if any(place >= system.nq for place in active):
+            raise NoClosedForm(
+                f"{system.name}: a rod spins about its line, which no position of q follows; use a"
+                " posture of mbs.loops.solve"
+            )
+        passive = [k for k in range(system.nq) if k not in active]
+        q_a, p = MX.sym("q_a", len(active)), MX.sym("p", system.p.numel())
+        q_start = DM([system.posture[k] for k in active])
+        p_start = DM(closure_parameters(system))
+        stage = _stage(system, active, passive)
+        z = before = MX(DM([system.posture[k] for k in passive]))
+        good: MX = MX(1)
+        for number in range(1, _STAGES + 1):
+            part = number / _STAGES
+            q_k, p_k = q_start + part * (q_a - q_start), p_start + part * (p - p_start)
+            led = 2 * z - before
+            before = z
+            z, closed = stage(led, q_k, p_k)
+            good = good * closed
+        q = _merged(system, active, passive)(z, q_a)
+        return Function("follow", [q_a, p], [casadi.if_else(good, q, DM.nan(system.nq))])
+
+    function: Function = system.cached("follow", build)
+    return function
+
+
+def _merged(system: System, active: list[int], passive: list[int]) -> Function:
+    z, q_a = SX.sym("z", len(passive)), SX.sym("q_a", len(active))
+    q = SX.zeros(system.nq)
+    q[passive], q[active] = z, q_a
+    return Function("merged", [z, q_a], [q])
+
+
+def _newton(system: System, active: list[int], passive: list[int]) -> Function:
+    q, z, q_a = (
+        SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
+    )
+    merged = _merged(system, active, passive)(z, q_a)
+    rows = square_closure(system, q, passive)
+    if system.closure is not None and not system.closure.varies:
+        own = row_sizes(system)[list(system.closure.rows)]
+        rows = casadi.vertcat(rows[: own.numel(), 0] / own, rows[own.numel() :, 0])
+    residual = casadi.substitute(rows, q, merged)
+    equations = Function("phi", [z, q_a, system.p], [residual])
+    options = {"abstol": 1e-13, "max_iter": 30, "error_on_fail": False}
+    return casadi.rootfinder("newton", "fast_newton", equations, options)
+
+
+def _stage(system: System, active: list[int], passive: list[int]) -> Function:
+    """``stage(led, q_a, p) -> z, good``: closed by Newton's method from the prediction."""
+    led, q_a = MX.sym("led", len(passive)), MX.sym("q_a", len(active))
+    p = MX.sym("p", system.p.numel())
+    z = _newton(system, active, passive)(led, q_a, p)
+    q = _merged(system, active, passive)(z, q_a)
+    near = casadi.norm_inf(z - led) < LARGEST_MOVE
+    good = casadi.logic_and(_closed(system)(q, p), near)
+    return Function("stage", [led, q_a, p], [z, good])
+
+
+def _closed(system: System) -> Function:
+    """1 where every row is closed and no axis is opposed, else 0; NaN counts as open."""
+    q = SX.sym("q", system.nq)
+    openness = casadi.sum1(casadi.fabs(relative_rows(system, q)))  # a maximum would drop NaN
+    cosines = facing(system, q)
+    faces = casadi.mmin(cosines) > 0 if cosines.numel() else SX(1)
+    return Function("closed", [q, system.p], [casadi.logic_and(openness < _OPEN, faces)])

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from mbs.assembly import System
-from mbs.errors import LoopError
-from mbs.loops.closed_form.places import extent, independent_places
-from mbs.loops.closed_form.plan import plan
-from mbs.loops.closed_form.stage import every_posture
-from mbs.loops.closing import CLOSED, Closing, Vector, closure_parameters
-from mbs.loops.independent import Given, independent_positions
+from mbs.assembly.tree import quaternion_slices
+from mbs.closed_forms.ring import extent, independent_places
+from mbs.errors import LoopError, ModelError
+from mbs.loops.closing import (
+    CLOSED,
+    OPEN,
+    Closing,
+    Vector,
+    closure_parameters,
+    difference,
+    within_half_turn,
+)
+from mbs.loops.function import Given, independent_positions
+from mbs.loops.plan import every_posture, plan
+from mbs.loops.pose import Goal, goal
+from mbs.solvers.rank import rank
+from mbs.text import quoted
 
 _SAME = 1e-9
 _MOST = 4096
@@ -88,3 +100,194 @@ def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> M
 
 def _same(mode: Mode, other: Mode) -> bool:
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
+
+
+# The postures that bring a frame to one pose, as far as random starts lead to them.
+
+
+_TRIES, _LEAST, _SEED = 500, 60, 20260103
+_SAME_WORKING_MODE = 1e-6
+_LOOSE = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class WorkingMode:
+    """A posture that closes the loops and brings a frame to a pose.
+
+    Attributes:
+        q: (nq) the posture [rad or m], angles within half a turn of zero, the first element of a
+            quaternion not negative.
+        residual: largest row of the loops and of the pose there.
+        hits: how many starts led to it; where some mode has one alone, others are likely missing.
+    """
+
+    q: tuple[float, ...]
+    residual: float
+    hits: int
+
+
+def working_modes(
+    system: System,
+    frame: str | int,
+    T: Any,
+    *,
+    rows: Sequence[str] | None = None,
+    guess: Mapping[str, float] | Sequence[float] | None = None,
+    reach: float = np.pi,
+    tries: int = _TRIES,
+    parameters: Mapping[str, float] | None = None,
+) -> list[WorkingMode]:
+    """The postures with closed loops and this pose of a frame to which random starts lead.
+
+    Nothing proves that the list is complete; `hits` tells how well it was searched. The starts are
+    the same at every call. The search ends early after at least 60 of them, once the last three
+    quarters led to nothing new and every mode was met twice.
+
+    Args:
+        system: as for `solve_pose`, and so are frame, T, rows and parameters.
+        frame: likewise.
+        T: likewise.
+        rows: likewise.
+        guess: about which posture the starts are taken, the assembled one when left out.
+        reach: largest difference of a position between a start and the guess [rad or m]; smaller
+            than half a turn, postures near the guess are looked for.
+        tries: largest number of starts.
+        parameters: likewise.
+
+    Returns:
+        The postures found, those near the guess first; empty when none was found.
+
+    Raises:
+        LoopError: in a posture found the joints can move while the frame stays, so that there may
+            be postures without number.
+        ModelError: as for `solve_pose`; or reach or tries is not above zero.
+    """
+    wanted = goal(system, frame, T, rows, parameters)
+    if not (isinstance(tries, int) and tries >= 1 and isinstance(reach, int | float) and reach > 0):
+        raise ModelError(
+            f"{system.name}: reach is {quoted(reach)} and tries {quoted(tries)}; give a reach above"
+            " zero and at least one try"
+        )
+    middle = np.array(system.position(guess))
+    found: list[WorkingMode] = []
+    newest = 0
+    for number, start in enumerate(_starts(system, middle, reach, tries), start=1):
+        posture, known = wanted.nearest(start), len(found)
+        if posture.is_closed:
+            _add(wanted, found, _tidy(wanted, posture.q))
+        newest = number if len(found) > known else newest
+        if number >= max(_LEAST, 4 * newest) and all(mode.hits > 1 for mode in found):
+            break
+    return sorted(found, key=lambda mode: _distance(system, np.array(mode.q), middle))
+
+
+def _starts(system: System, middle: Vector, reach: float, tries: int) -> list[Vector]:
+    rng = np.random.default_rng(_SEED)
+    drawn = [middle, *(middle + rng.uniform(-reach, reach, middle.shape) for _ in range(tries - 1))]
+    for q in drawn:
+        for part in quaternion_slices(system.tree):
+            q[part] /= np.linalg.norm(q[part])
+    return drawn
+
+
+def _add(wanted: Goal, found: list[WorkingMode], q: Vector) -> None:
+    system = wanted.closing.system
+    for number, mode in enumerate(found):
+        if _distance(system, np.array(mode.q), q) < _SAME_WORKING_MODE:
+            found[number] = replace(mode, hits=mode.hits + 1)
+            return
+    _require_isolated(wanted, q)
+    residual = float(np.max(np.abs(wanted.residual(q)[0])))
+    found.append(WorkingMode(tuple(float(x) for x in q), residual, 1))
+
+
+def _distance(system: System, q: Vector, other: Vector) -> float:
+    return float(np.max(np.abs(difference(system, q, other)), initial=0.0))
+
+
+def _tidy(wanted: Goal, q: Vector) -> Vector:
+    """The posture with small angles where that is the same one: not so across a gear."""
+    system = wanted.closing.system
+    tidy = within_half_turn(system, q)
+    for part in quaternion_slices(system.tree):
+        tidy[part] *= -1.0 if tidy[part.start] < 0 else 1.0
+    return tidy if wanted.openness(tidy) < CLOSED else q
+
+
+def _require_isolated(wanted: Goal, q: Vector) -> None:
+    """Refuse a posture that can move, at least to first order, while the frame stays.
+
+    Raises:
+        LoopError: names the joints that move most.
+    """
+    system = wanted.closing.system
+    slope = wanted.residual(q)[1]
+    if rank(slope, _LOOSE) == system.nq:
+        return
+    motion = np.abs(np.linalg.svd(slope)[2][-1])
+    names = [c.name for k, c in enumerate(system.coordinates) if motion[k] > motion.max() / 10]
+    raise LoopError(
+        f"{system.name}: {', '.join(names)} can move while frame {quoted(wanted.frame)} stays at"
+        " this pose, so postures cannot be counted; take another pose, name more rows, or use"
+        " mbs.loops.solve_pose for one posture"
+    )
+
+
+# Postures that close the loops with some positions held, as far as random starts lead there.
+
+
+_START_TRIES, _LEAST_STARTS, _START_SEED = 300, 40, 20260107
+_REACH = np.pi
+_SAME_START = 1e-6
+
+
+def closed_postures(closing: Closing, start: Vector) -> list[Vector]:
+    """Postures found by Gauss-Newton from random starts, always the same ones.
+
+    The search ends early after at least 40 starts, once the last three quarters led to nothing new
+    and every posture was met twice.
+
+    Args:
+        closing: the rows, and the positions that are held.
+        start: (nq,) of which the held positions count; the starts are taken about the others.
+
+    Returns:
+        Postures (nq,) with angles within half a turn of zero; nothing proves that these are all.
+    """
+    rng = np.random.default_rng(_START_SEED)
+    found, hits, newest = list[Vector](), list[int](), 0
+    for number in range(1, _START_TRIES + 1):
+        closed = closing.nearest(_moved(closing, start, rng) if number > 1 else start)
+        if closed.is_closed:
+            q = _tidy_start(closing, closed.q)
+            met = [
+                k
+                for k, other in enumerate(found)
+                if _start_distance(closing, q, other) < _SAME_START
+            ]
+            for k in met[:1]:
+                hits[k] += 1
+            if not met:
+                found, hits, newest = [*found, q], [*hits, 1], number
+        if number >= max(_LEAST_STARTS, 4 * newest) and all(count > 1 for count in hits):
+            break
+    return found
+
+
+def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
+    q = start.copy()
+    q[closing.free] += rng.uniform(-_REACH, _REACH, len(closing.free))
+    for part in quaternion_slices(closing.system.tree):
+        q[part] /= np.linalg.norm(q[part])
+    return q
+
+
+def _tidy_start(closing: Closing, q: Vector) -> Vector:
+    """The posture with small angles where that is the same one: not so across a gear."""
+    tidy = within_half_turn(closing.system, q)
+    tidy[list(closing.held)] = q[list(closing.held)]
+    return tidy if closing.openness(tidy) < OPEN else q
+
+
+def _start_distance(closing: Closing, q: Vector, other: Vector) -> float:
+    return float(np.max(np.abs(difference(closing.system, q, other)), initial=0.0))

@@ -14,7 +14,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.loops.examine import LED
 from mbs.loops.velocity import acceleration_bias, determining_rows
-from mbs.solvers.small_linear import solve_square
+from mbs.solvers.linear import solve_square
 from mbs.spatial import zeros
 
 

@@ -7,16 +7,29 @@ Source: Khalil & Creusot 1997, eq. 11 and 14.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi
+import numpy as np
 from casadi import DM, SX, Function
+from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.assembly.rates import position_rate
-from mbs.loops.closure import closure_rows, independent_closure, row_labels
-from mbs.loops.rolling import slip_rows
+from mbs.assembly.tree import position_rate
+from mbs.loops.closure import (
+    closure_rows,
+    contact,
+    independent_closure,
+    pose_on_plane,
+    radius_of,
+    rolling_discs,
+    row_labels,
+    slip_rows,
+)
+from mbs.recursions.force_elements import summed
+from mbs.recursions.route import relative_pose
+from mbs.spatial import Pose, Wrench, add_wrenches, carried, cross, skew, vector
 
 
 def closure_jacobian(system: System) -> Function:
@@ -105,3 +118,129 @@ def velocity_rows(system: System, q: SX, phi: SX) -> SX:
 def acceleration_bias(system: System, q: SX, v: SX, J: SX) -> SX:
     """Psi = dJ/dt v, (m, 1), for J that depends on the symbols q."""
     return casadi.jtimes(casadi.mtimes(J, v), q, position_rate(system.tree, q, v))
+
+
+# The wrenches of cut joints: what the efforts of their closure rows are between two bodies.
+#
+# A small displacement of frame_b that the tree does not make, by x and by the turn y in its own
+# axes, opens the rows by d phi; the rows do the work lam' d phi = F' x + M' y, whatever they are
+# made of.
+#
+# Source: Haug 1989, for reactions from the efforts of rows.
+
+
+def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
+    """For every cut joint the wrench on the body of frame_b, about and in frame_b.
+
+    Args:
+        system: with closed loops.
+        q: (nq, 1) symbols of positions that close the loops.
+        lam: (m, 1) efforts of all rows, those of rolling discs last.
+    """
+    small = [SX.sym(cut.edge.joint.name, 6) for cut in system.cuts]
+    moved = tuple(
+        replace(cut, pose_b=cut.pose_b @ _displaced(d))
+        for cut, d in zip(system.cuts, small, strict=True)
+    )
+    rows = closure_rows(replace(system, cuts=moved, _cache={}), q)
+    positions = rows.numel()
+    work = casadi.dot(lam[:positions], rows)
+    every = casadi.vertcat(*small) if small else SX(0, 1)
+    slopes = casadi.substitute(casadi.gradient(work, every), every, SX.zeros(every.numel()))
+    parts = casadi.vertsplit(casadi.densify(slopes), 6) if small else []
+    result = {
+        cut.edge.joint.name: (part[:3], part[3:])
+        for cut, part in zip(system.cuts, parts, strict=True)
+    }
+    for name, wrench in _against_slip(system, q, lam[positions:]).items():
+        result[name] = add_wrenches(result[name], wrench)
+    return result
+
+
+def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wrench]:
+    """For some links the wrench that they exert on cut joints, about and in their frames.
+
+    Args:
+        system: with closed loops.
+        q: (nq, 1) positions.
+        wrenches: as `cut_wrenches` gives them.
+    """
+    exerted: list[dict[int, Wrench]] = []
+    for cut in system.cuts:
+        for link, sign in ((cut.link_a, 1), (cut.link_b, -1)):
+            if link >= 0:
+                T = relative_pose(system.tree, q, (link, Pose.identity()), cut.frames[1])
+                f, m = carried(T, wrenches[cut.edge.joint.name])
+                exerted.append({link: (sign * f, sign * m)})
+    return summed(*exerted)
+
+
+def _displaced(d: SX) -> Pose:
+    """A frame moved by d[:3] and turned by d[3:], both small."""
+    return Pose(SX(DM.eye(3)) + skew(d[3:]), d[:3])
+
+
+def _against_slip(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
+    """What the rows of rolling discs, which bind velocities alone, do to the disc."""
+    result: dict[str, Wrench] = {}
+    for number, (cut, disc) in enumerate(rolling_discs(system)):
+        along = [lam[2 * number], lam[2 * number + 1]]
+        pose = pose_on_plane(system, q, cut, disc)
+        f = vector([*along, 0])
+        m = cross(contact(pose, disc, radius_of(system, disc)).point, f)
+        result[disc.name] = casadi.mtimes(pose.R.T, f), casadi.mtimes(pose.R.T, m)
+    return result
+
+
+# Sizes of the rows and columns of the constraints, so that nothing depends on units.
+#
+# Rows are lengths or cosines, columns belong to angles or displacements. A displacement is
+# measured by the length that an angle moves the rows of positions, and a row by its own size at
+# the assembled posture.
+
+
+_VANISHING = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scales:
+    """What rows are multiplied by, and columns: D J E has rows of about unit length.
+
+    Attributes:
+        rows: (m,) for every constraint row, rows of positions first [1/m or 1].
+        length: for displacements [m]; angles count as they are.
+    """
+
+    rows: NDArray[np.float64]
+    length: float
+
+    def columns(self, units: list[str]) -> NDArray[np.float64]:
+        """For coordinates of these units."""
+        return np.array([self.length if unit.startswith("m") else 1.0 for unit in units])
+
+
+def scales(system: System) -> Scales:
+    """The scales of a system; ones where a symbol has no value, and no rows in an open chain."""
+
+    def build() -> Scales:
+        J = np.array(constraint_jacobian(system)(list(system.posture), system.p_default))
+        if J.size == 0 or not np.all(np.isfinite(J)):
+            return Scales(np.ones(len(J)), 1.0)
+        units = [speed.unit for speed in system.speeds]
+        labels = [label for _, loop in row_labels(system) for label in loop]
+        length = _length(J, labels, units)
+        sizes = np.linalg.norm(J * Scales(np.ones(0), length).columns(units), axis=1)
+        usual = float(np.median(sizes[sizes > 0])) if np.any(sizes > 0) else 1.0
+        return Scales(1 / np.where(sizes > _VANISHING * usual, sizes, usual), length)
+
+    found: Scales = system.cached("constraint scales", build)
+    return found
+
+
+def _length(J: NDArray[np.float64], labels: list[str], units: list[str]) -> float:
+    """How far an angle moves the rows of positions, the largest of them."""
+    turns = [k for k, unit in enumerate(units) if unit.startswith("rad")]
+    places = [k for k, label in enumerate(labels) if label.startswith("force")]
+    moved = np.abs(J[np.ix_(places, turns)])
+    largest = float(np.max(moved, initial=0.0))
+    return largest if largest > 0 else 1.0

@@ -3,28 +3,31 @@
 from mbs.models import catalogue, inverse_geometry
 from mbs.models.actuation import actuation_matrix, actuation_null_space
 from mbs.models.contact_phases import ContactPhases, contact_phases
-from mbs.models.contact_points import ContactPoint
 from mbs.models.dae import Dae, dae
+from mbs.models.dae_phases import ContactPoint
 from mbs.models.derivatives import (
     direct_dynamics_derivatives,
     inverse_dynamics_derivatives,
+    with_implicit_jacobian,
 )
-from mbs.models.devices import devices
-from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
+from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics, inertia_matrix
 from mbs.models.energy import energy
 from mbs.models.geometry import direct_geometry, transform
-from mbs.models.hybrid_dynamics import hybrid_dynamics
-from mbs.models.implicit_jacobian import with_implicit_jacobian
 from mbs.models.inverse_dynamics import bias, gravity_effort, inverse_dynamics
 from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, jacobian_determinant
 from mbs.models.joint_wrenches import joint_wrenches
-from mbs.models.kinematics import jacobian
+from mbs.models.kinematics import (
+    jacobian,
+    jacobian_dot_velocity,
+    link_accelerations,
+    link_velocities,
+)
 from mbs.models.lagrange import lagrange
 from mbs.models.limits import Limits, limits
-from mbs.models.link_motion import jacobian_dot_velocity, link_accelerations, link_velocities
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
 from mbs.models.measurements import measurements
 from mbs.models.singularities import singularities
+from mbs.models.symbols import devices
 from mbs.models.validity import validity, validity_rows
 
 __all__ = [

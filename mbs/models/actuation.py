@@ -18,8 +18,8 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.loops.closing import closure_parameters
 from mbs.loops.velocity import constraint_jacobian
 from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
+from mbs.solvers.linear import solve_square
 from mbs.solvers.rank import independent_rows, null_space_of
-from mbs.solvers.small_linear import solve_square
 from mbs.spatial import zeros
 
 

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import Link
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.surroundings import Surroundings
-from mbs.models.symbols import ModelSymbols
+from mbs.models.symbols import ModelSymbols, Surroundings
 from mbs.recursions.composite_body import inertia_matrix
-from mbs.solvers.saddle import solve_saddle
+from mbs.solvers.linear import solve_saddle
 
 _ROUNDING = 1e-9
 

@@ -17,26 +17,27 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.start import Values
+from mbs.loops.configuration import Values
 from mbs.models.constrained_accelerations import inertia_size, loop_rows
-from mbs.models.contact_points import (
+from mbs.models.contacts import require_no_contacts
+from mbs.models.dae_phases import (
     ContactPoint,
+    PhaseDae,
+    PhaseStart,
     PointRows,
+    Standing,
     Touching,
     checked_points,
     friction_cone,
     held_elements,
+    phase_dae,
     point_rows,
     ways_of,
 )
-from mbs.models.contacts import require_no_contacts
-from mbs.models.dae_phases import PhaseDae, phase_dae
-from mbs.models.dae_standing import PhaseStart, Standing
 from mbs.models.inverse_dynamics import tree_efforts
-from mbs.models.surroundings import surroundings
-from mbs.models.symbols import ModelSymbols, symbols_of
+from mbs.models.symbols import ModelSymbols, surroundings, symbols_of
 from mbs.recursions.composite_body import inertia_matrix
-from mbs.solvers.saddle import solve_saddle
+from mbs.solvers.linear import solve_saddle
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,26 +13,349 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.assembly.pickled import packed, unpacked
+from mbs.assembly.system import packed, unpacked
+from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT
+from mbs.assembly.tree import norm_rows, position_rate, quaternion_slices
 from mbs.errors import ModelError, NoClosedForm, Unclosable
-from mbs.loops.closed_form.plan import plan
-from mbs.loops.closed_form.stage import ways_at
-from mbs.loops.start import Values, start
-from mbs.messages import quoted
+from mbs.loops.closure import SLIPS, independent_closure
+from mbs.loops.configuration import Values, start
+from mbs.loops.function import function
+from mbs.loops.plan import plan, ways_at
+from mbs.loops.reduction import reduction_matrix
+from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.contacts import require_no_contacts
-from mbs.models.dae_forms import (
-    FORMS,
-    DaeEquations,
-    carried_positions,
-    closed_form,
-    implicit,
-    motors,
-    open_chain,
-)
-from mbs.models.dae_names import Elements, elements_of
-from mbs.models.direct_dynamics import direct_dynamics
-from mbs.models.inverse_dynamics import own_efforts
-from mbs.models.symbols import symbols_of
+from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
+from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
+from mbs.models.symbols import ModelSymbols, outputs_of, symbols_of
+from mbs.text import quoted
+
+# What loops ask of a motion, on the levels of positions, velocities and accelerations.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """The independent rows of a system; all are zero along every motion.
+
+    Attributes:
+        J: (r, nv), the efforts of the rows act along its lines; those of rows that bind positions
+            come first.
+        positions: (s, 1) rows phi(q) that bind positions, s <= r [m or 1].
+        velocities: (r, 1) J v.
+        accelerations: (r, 1) J a + dJ/dt v.
+        norms: one element a quaternion, its squared length less one.
+    """
+
+    J: SX
+    positions: SX
+    velocities: SX
+    accelerations: SX
+    norms: SX
+
+    @property
+    def deepest(self) -> SX:
+        """(r, 1) every row on the lowest level that it has: positions, else velocities."""
+        return casadi.vertcat(self.positions, self.velocities[self.positions.numel() :])
+
+    @property
+    def J_positions(self) -> SX:
+        """(s, nv) the lines of J that belong to rows that bind positions."""
+        return self.J[: self.positions.numel(), :]
+
+    def joined(self, other: Rows) -> Rows:
+        """These rows and others of the same system; of each kind these come first."""
+        s, t = self.positions.numel(), other.positions.numel()
+
+        def both(mine: SX, theirs: SX) -> SX:
+            return casadi.vertcat(mine[:s, :], theirs[:t, :], mine[s:, :], theirs[t:, :])
+
+        return Rows(
+            J=both(self.J, other.J),
+            positions=casadi.vertcat(self.positions, other.positions),
+            velocities=both(self.velocities, other.velocities),
+            accelerations=both(self.accelerations, other.accelerations),
+            norms=self.norms,
+        )
+
+
+def rows_of(system: System, q: SX, v: SX, a: SX) -> Rows:
+    """The independent rows at the symbols q (nq, 1), v (nv, 1), a (nv, 1)."""
+    phi, J = SX(0, 1), SX(0, system.nv)
+    if system.is_closed:
+        phi, J = independent_closure(system, q), independent_constraint_rows(system, q)
+    return Rows(
+        J=J,
+        positions=phi,
+        velocities=casadi.mtimes(J, v),
+        accelerations=casadi.mtimes(J, a) + acceleration_bias(system, q, v, J),
+        norms=norm_rows(system.tree, q),
+    )
+
+
+# Equations of motion as differential-algebraic equations, in the forms that solvers take.
+#
+# With loops, positions q and velocities v of the whole tree follow from A a + H = tau + J' lam
+# and one of phi(q) = 0, J v = 0 or J a + psi = 0; or both of the first two, the positions then
+# being moved onto the loops by multipliers mu. Or the loops are solved for, and nothing is left
+# of them.
+#
+# Source: Gear, Leimkuhler and Gupta 1985 for the form "ggl"; Brenan, Campbell and Petzold 1996
+# for the index of the others.
+
+
+Held = Callable[[ModelSymbols, SX], Rows]
+"""Rows at the symbols of the tree and its accelerations a (nv, 1)."""
+
+FORMS = ("reduced", "index1", "index2", "index3", "ggl")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DaeEquations:
+    """dx/dt = ode(x, z, u, p), 0 = alg(x, z, u, p), on symbols x, z, u, p.
+
+    Attributes:
+        x: differential states.
+        z: algebraic states; (0, 1) where there are none.
+        u: efforts of the motors, in the order of the actuated `system.speeds`.
+        p: parameters, in the order of `system.parameters`.
+        ode: rates of x.
+        alg: as many rows as z has elements.
+        invariants: of x and p; zero along every motion, so zero at every start.
+        q: (nq, 1) positions of the tree that belong to x.
+        v: (nv, 1) velocities of the tree that belong to x.
+    """
+
+    x: SX
+    z: SX
+    u: SX
+    p: SX
+    ode: SX
+    alg: SX
+    invariants: SX
+    q: SX
+    v: SX
+
+
+def motors(system: System) -> list[int]:
+    """Numbers of the actuated speeds."""
+    return [k for k, speed in enumerate(system.speeds) if speed.actuated]
+
+
+def implicit(system: System, form: str, held: Held | None = None) -> DaeEquations:
+    """The forms with x = [q; v] and z = [a; lam], or [a; lam; mu]; the mass stays implicit.
+
+    No inertia matrix is built or factorised: the rows of a are the inverse dynamic model, which
+    also serves links without mass.
+
+    Args:
+        system: open or closed.
+        form: "index1", "index2", "index3" or "ggl".
+        held: rows besides those of the loops, such as points that stand.
+    """
+    s = symbols_of(system, "tree")
+    q, v, a = s.q, s.v, SX.sym("a", system.nv)
+    rows = rows_of(system, q, v, a)
+    if held is not None:
+        rows = rows.joined(held(s, a))
+    lam, mu = SX.sym("lam", rows.J.shape[0]), SX(0, 1)
+    u, tau = motor_efforts(system)
+    (needed,) = outputs_of(system, inverse_dynamics(system, "tree"), q, v, a)
+    speed = v
+    if form == "ggl":
+        mu = SX.sym("mu", rows.positions.numel())
+        speed = v + casadi.mtimes(rows.J_positions.T, mu)
+    return equations(
+        system,
+        states=(casadi.vertcat(q, v), casadi.vertcat(a, lam, mu), u),
+        ode=casadi.vertcat(position_rate(system.tree, q, speed), a),
+        alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _kept(rows, form)),
+        invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),
+        motion=(q, v),
+    )
+
+
+def _kept(rows: Rows, form: str) -> SX:
+    """What the algebraic equations of a form ask of the loops."""
+    match form:
+        case "index1":
+            return rows.accelerations
+        case "index2":
+            return rows.velocities
+        case "index3":
+            return rows.deepest
+    return casadi.vertcat(rows.positions, rows.velocities)
+
+
+def open_chain(system: System) -> DaeEquations:
+    """Open chains, x = [q; v] and no z: the accelerations are those of the direct dynamic model."""
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    u, tau = motor_efforts(system)
+    (a,) = outputs_of(system, direct_dynamics(system), q, v, tau)
+    return equations(
+        system,
+        states=(casadi.vertcat(q, v), SX(0, 1), u),
+        ode=casadi.vertcat(position_rate(system.tree, q, v), a),
+        alg=SX(0, 1),
+        invariants=norm_rows(system.tree, q),
+        motion=(q, v),
+    )
+
+
+def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
+    """Closed forms, x = [q_a; v_a] and no z: q is an explicit function of q_a on one branch.
+
+    Raises:
+        NoClosedForm: a loop is solved by iteration only.
+    """
+    active = list(system.active)
+    q_a, v_a = SX.sym("q_a", len(active)), SX.sym("v_a", len(active))
+    (q,) = outputs_of(system, function(system, branch), q_a)
+    u, v, a = _independent_motion(system, q, v_a)
+    return equations(
+        system,
+        states=(casadi.vertcat(q_a, v_a), SX(0, 1), u),
+        ode=casadi.vertcat(v_a, a),
+        alg=SX(0, 1),
+        invariants=SX(0, 1),
+        motion=(q, v),
+    )
+
+
+def carried_positions(system: System) -> DaeEquations:
+    """Other loops, x = [q; v_a] and no z: all positions are integrated, phi(q) is an invariant."""
+    q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.active))
+    u, v, a = _independent_motion(system, q, v_a)
+    return equations(
+        system,
+        states=(casadi.vertcat(q, v_a), SX(0, 1), u),
+        ode=casadi.vertcat(position_rate(system.tree, q, v), a),
+        alg=SX(0, 1),
+        invariants=casadi.vertcat(independent_closure(system, q), norm_rows(system.tree, q)),
+        motion=(q, v),
+    )
+
+
+def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX]:
+    """Symbols u, velocities of the tree, and accelerations of the independent joints."""
+    u, tau = motor_efforts(system)
+    (G,) = outputs_of(system, reduction_matrix(system), q)
+    pushed = casadi.mtimes(G.T, tau) if system.motors != system.active else tau[list(system.active)]
+    (a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
+    return u, casadi.mtimes(G, v_a), a
+
+
+def motor_efforts(system: System) -> tuple[SX, SX]:
+    """Symbols u, and the efforts tau (nv, 1) that they are."""
+    driven = motors(system)
+    u, tau = SX.sym("u", len(driven)), SX.zeros(system.nv)
+    tau[driven] = u
+    return u, tau
+
+
+def equations(
+    system: System,
+    states: tuple[SX, SX, SX],
+    ode: SX,
+    alg: SX,
+    invariants: SX,
+    motion: tuple[SX, SX],
+) -> DaeEquations:
+    """The expressions with their common parts shared."""
+    shared = casadi.cse([casadi.densify(e) for e in (ode, alg, invariants, *motion)])
+    return DaeEquations(*states, system.p, *(SX(e) for e in shared))
+
+
+# Name and unit of every element of differential-algebraic equations.
+
+
+Elements = tuple[tuple[str, str], ...]
+"""Name and unit of each element of a vector."""
+
+_RATE_OF_RATE = {"m": "m/s2", "rad": "rad/s2", "1": "1/s2"}
+_EFFORT = {"m": "N", "rad": "N.m", "1": "N.m"}
+
+
+def elements_of(
+    system: System, form: str, standing: tuple[Elements, Elements] = ((), ())
+) -> Mapping[str, Elements]:
+    """For x, z, u, p, alg and invariants of a form, the name and unit of each element.
+
+    Args:
+        system: open or closed.
+        form: "open", "closed form" or "carried" for the three kinds of "reduced", "phase" for that
+            of a contact phase, else as in `mbs.models.dae`.
+        standing: of points that touch, the rows that bind positions and those that bind velocities
+            alone.
+    """
+    q, v, a, tau = _coordinates(system)
+    norms = tuple(
+        (f"{system.coordinates[part.start].joint}: unit quaternion", "1")
+        for part in quaternion_slices(system.tree)
+    )
+    fixed = {
+        "u": tuple(tau[k] for k in motors(system)),
+        "p": tuple((parameter.name, parameter.unit) for parameter in system.parameters),
+    }
+    v_a = tuple(v[k] for k in system.active)
+    phi, slips = (a + b for a, b in zip(_rows(system), standing, strict=True))
+    rows = phi + slips
+    speeds = _of("der", rows, RATE_UNIT)
+    explicit = {
+        "open": (q + v, norms),
+        "closed form": (tuple(q[k] for k in system.active) + v_a, ()),
+        "carried": (q + v_a, phi + norms),
+        "phase": (q + v, phi + speeds + norms),
+    }
+    if form in explicit:
+        x, invariants = explicit[form]
+        return {**fixed, "x": x, "z": (), "alg": (), "invariants": invariants}
+    kept = {
+        "index1": _of("der(der", rows, _RATE_OF_RATE, "))"),
+        "index2": speeds,
+        "index3": phi + _of("der", slips, RATE_UNIT),
+        "ggl": phi + speeds,
+    }[form]
+    mu = _of("mu", phi, dict.fromkeys(RATE_UNIT, "1")) if form == "ggl" else ()
+    return {
+        **fixed,
+        "x": q + v,
+        "z": a + _of("lam", rows, _EFFORT) + mu,
+        "alg": tau + kept,
+        "invariants": phi + speeds + norms,
+    }
+
+
+def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements]:
+    """Of q, v, a and tau, under the names that results of simulations have."""
+    q = tuple((f"{c.name}.q", c.unit) for c in system.coordinates)
+    v = tuple((f"{s.name}.v", s.unit) for s in system.speeds)
+    a = tuple((f"{s.name}.a", ACCELERATION_UNIT[s.unit]) for s in system.speeds)
+    tau = tuple((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.speeds)
+    return q, v, a, tau
+
+
+def _rows(system: System) -> tuple[Elements, Elements]:
+    """Of the independent rows of positions and of velocities alone, these as if integrated."""
+    if system.closure is None:
+        return (), ()
+    driven = {c.name: system.coordinates[c.driven].unit for c in system.couplings}
+    every = [
+        (label, (f"{loop.name}: {label}", driven.get(loop.name, _row_unit(label))))
+        for loop in system.loops
+        for label in loop.rows
+    ]
+    positions = [row for label, row in every if label not in SLIPS]
+    slips = [row for label, row in every if label in SLIPS]
+    kept = system.closure
+    return tuple(positions[k] for k in kept.rows), tuple(slips[k] for k in kept.slips)
+
+
+def _row_unit(label: str) -> str:
+    return "1" if label.startswith("moment") else "m"
+
+
+def _of(what: str, rows: Elements, unit: Mapping[str, str], end: str = ")") -> Elements:
+    return tuple((f"{what}({name}{end}", unit[u]) for name, u in rows)
+
 
 Array = NDArray[np.float64]
 

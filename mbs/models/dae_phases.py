@@ -2,23 +2,461 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from numbers import Real
+from typing import Any
 
 import casadi
 import numpy as np
-from casadi import SX, Function
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
 
-from mbs.assembly.rates import position_rate
-from mbs.errors import ModelError
-from mbs.messages import quoted
-from mbs.models.composition import outputs_of
-from mbs.models.dae import Dae, start_efforts
-from mbs.models.dae_forms import FORMS, DaeEquations, equations, implicit, motor_efforts, motors
-from mbs.models.dae_names import Elements, elements_of
-from mbs.models.dae_rows import rows_of
-from mbs.models.dae_standing import PhaseStart, Standing, split
-from mbs.models.symbols import symbols_of
+from mbs.assembly import System
+from mbs.assembly.tree import norm_rows, position_rate
+from mbs.components.forces import RelativeMotion
+from mbs.errors import ModelError, Unclosable
+from mbs.loops.closure import closure_rows
+from mbs.loops.configuration import Values, smallest_velocity
+from mbs.loops.velocity import acceleration_bias, constraint_rows, kept_rows
+from mbs.models.dae import (
+    FORMS,
+    Dae,
+    DaeEquations,
+    Elements,
+    Held,
+    Rows,
+    elements_of,
+    equations,
+    implicit,
+    motor_efforts,
+    motors,
+    rows_of,
+    start_efforts,
+)
+from mbs.models.inverse_dynamics import tree_efforts
+from mbs.models.symbols import ModelSymbols, outputs_of, surroundings, symbols_of
+from mbs.recursions.composite_body import inertia_matrix
+from mbs.recursions.route import relative_acceleration, relative_motion
+from mbs.recursions.velocities import link_accelerations, link_velocities, resting_base
+from mbs.solvers.least_squares import gauss_newton
+from mbs.solvers.rank import independent_rows, rank
+from mbs.spatial import zeros
+from mbs.text import did_you_mean, quoted
+
+# Points of links that planes may hold: where they are, how they move, what efforts act there.
+
+
+Touching = Iterable[str] | Mapping[str, str]
+"""Names of the points that stand; or for each name "fixed" or "sliding"."""
+
+WAYS = ("fixed", "sliding")
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPoint:
+    """The origin of a frame, which may touch the plane x, y of another frame from above.
+
+    Attributes:
+        name: of the contact.
+        frame: a body, a named frame, or the number of a link.
+        plane: likewise, 0 for the base; its z points from the ground to the point.
+        friction: coefficient of dry friction, None where the ground never lets the point slip.
+    """
+
+    name: str
+    frame: str | int
+    plane: str | int = 0
+    friction: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise ModelError(
+                f"contact point {quoted(self.name)}: the name is not a text; give it a name"
+            )
+        mu = self.friction
+        if mu is None:
+            return
+        if isinstance(mu, bool) or not isinstance(mu, Real) or not 0 <= mu < math.inf:
+            raise ModelError(
+                f"{quoted(self.name)}: friction is {quoted(mu)}; give a coefficient of zero or"
+                " more, or None"
+            )
+        object.__setattr__(self, "friction", float(mu))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointRows:
+    """How n points move, seen from their planes and in the axes of these, 3 n elements each.
+
+    Attributes:
+        r: positions [m]; the third of each point is its distance from the plane.
+        V: velocities [m/s].
+        J: (3 n, nv), V = J v; the force on a point acts along the lines of its rows.
+        bias: accelerations where those of the joints are zero [m/s^2].
+    """
+
+    r: SX
+    V: SX
+    J: SX
+    bias: SX
+
+
+def point_rows(system: System, s: ModelSymbols, points: Sequence[ContactPoint]) -> PointRows:
+    """The motion of contact points.
+
+    Args:
+        system: open or closed.
+        s: its symbols, in tree coordinates.
+        points: one or more.
+
+    Raises:
+        ModelError: there is no such frame.
+    """
+    tree = system.tree
+    moving = link_velocities(tree, s.poses, s.v)
+    rest = SX.zeros(system.nv)
+    drifting = link_accelerations(tree, s.poses, s.v, rest, resting_base(zeros()))
+    seen: list[RelativeMotion] = []
+    bias: list[SX] = []
+    for point in points:
+        plane, frame = system.frame(point.plane), system.frame(point.frame)
+        motion = relative_motion(tree, plane, frame, s.q, moving)
+        seen.append(motion)
+        bias.append(relative_acceleration(motion, plane, frame, drifting).A)
+    V = casadi.densify(casadi.vertcat(*(motion.V for motion in seen)))
+    r = casadi.densify(casadi.vertcat(*(motion.p for motion in seen)))
+    return PointRows(r, V, casadi.jacobian(V, s.v), casadi.densify(casadi.vertcat(*bias)))
+
+
+def held_elements(ways: Sequence[str]) -> DM:
+    """(3 n, 1) 1 for each element of the motion that the plane holds.
+
+    Args:
+        ways: of each point "fixed", "sliding" or "" where it is free.
+    """
+    held = {"fixed": (1, 1, 1), "sliding": (0, 0, 1), "": (0, 0, 0)}
+    return DM([element for way in ways for element in held[way]])
+
+
+def checked_points(name: str, points: Iterable[ContactPoint]) -> tuple[ContactPoint, ...]:
+    """One or more points, each with a name of its own.
+
+    Args:
+        name: of the mechanism, for errors.
+        points: that may touch.
+
+    Raises:
+        ModelError: there is none, two have one name, or something is no contact point.
+    """
+    every = tuple(points) if isinstance(points, Iterable) else (points,)
+    for point in every:
+        if not isinstance(point, ContactPoint):
+            raise ModelError(
+                f"{name}: {quoted(point)} is no contact point; give ContactPoint(name, frame)"
+            )
+    names = [point.name for point in every]
+    if not every or len(set(names)) < len(names):
+        raise ModelError(
+            f"{name}: the contact points are {', '.join(names) or 'none'}; give one or more, each a"
+            " name of its own"
+        )
+    return every
+
+
+def ways_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> tuple[str, ...]:
+    """Of each point "fixed", "sliding" or "" where it is free.
+
+    Args:
+        name: of the mechanism, for errors.
+        points: that may touch.
+        touching: those that do.
+
+    Raises:
+        ModelError: there is no such point, one is named twice, or it touches in no known way.
+    """
+    names = [point.name for point in points]
+    given = _ways_by_name(name, touching)
+    for point, way in given.items():
+        if point not in names:
+            raise ModelError(
+                f"{name}: there is no contact point {quoted(point)}; "
+                + did_you_mean(str(point), names)
+            )
+        if way not in WAYS:
+            raise ModelError(
+                f"{name}: point {point!r} touches {quoted(way)}; use 'fixed' or 'sliding', or"
+                " leave it out"
+            )
+    return tuple(given.get(point, "") for point in names)
+
+
+def _ways_by_name(name: str, touching: Touching) -> dict[str, str]:
+    """How each point touches that is named, each once."""
+    if isinstance(touching, Mapping):
+        return dict(touching)
+    alone = isinstance(touching, str) or not isinstance(touching, Iterable)
+    standing = [str(point) for point in ([touching] if alone else touching)]
+    if len(set(standing)) < len(standing):
+        raise ModelError(f"{name}: the points that touch are {', '.join(standing)}; name each once")
+    return dict.fromkeys(standing, "fixed")
+
+
+def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) -> Function:
+    """``cone(f) -> margin``; see `ContactPhases.friction`.
+
+    Args:
+        name: of the mechanism, for errors.
+        points: a column of f (3, n) each.
+        sides: of a pyramid, None for the cone.
+
+    Raises:
+        ModelError: a pyramid has fewer than three sides.
+    """
+    if sides is not None and (isinstance(sides, bool) or sides not in range(3, 1000)):
+        raise ModelError(
+            f"{name}: sides is {quoted(sides)}; give a number of sides from 3, or None for the cone"
+        )
+    f = SX.sym("f", 3, len(points))
+    margins = [
+        casadi.vertcat(f[2, k], _slip(f[:, k], point.friction, sides))
+        for k, point in enumerate(points)
+    ]
+    return Function("cone", [f], [casadi.densify(casadi.vertcat(*margins))], ["f"], ["margin"])
+
+
+def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
+    """How far a force is from the border of its cone."""
+    if friction is None:
+        return SX(0, 1)
+    if sides is None:
+        return (friction * f[2]) ** 2 - f[0] ** 2 - f[1] ** 2
+    turns = 2 * casadi.pi / sides * casadi.DM(range(sides))
+    reach = casadi.cos(casadi.pi / sides) * friction * f[2]
+    return reach - casadi.cos(turns) * f[0] - casadi.sin(turns) * f[1]
+
+
+# Points that stand, as rows beside those of loops, and a start that fulfils both.
+
+
+Array = NDArray[np.float64]
+
+_POSTURES, _REACH, _SEED = 4, 0.05, 20
+"""Postures near the start at which dependent rows show, and how far from it they are tried."""
+_OFF = 1e-10
+"""How far a given posture may be from touching by rounding [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseStart:
+    """Where a phase begins, as a user says it; see `ContactPhases.dae`."""
+
+    q0: Values
+    v0: Values
+    tau0: Values
+    parameters: Mapping[str, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Points and how each touches.
+
+    Attributes:
+        system: open or closed.
+        points: all that may touch.
+        ways: of each point "fixed", "sliding" or "" where it is free.
+    """
+
+    system: System
+    points: tuple[ContactPoint, ...]
+    ways: tuple[str, ...]
+
+    @property
+    def held(self) -> list[int]:
+        """Numbers of what planes hold among the elements x, y, z of all points."""
+        return [k for k, held in enumerate(held_elements(self.ways).elements()) if held]
+
+    @property
+    def names(self) -> str:
+        """Of the points that touch."""
+        return ", ".join(p.name for p, way in zip(self.points, self.ways, strict=True) if way)
+
+    def rows(self, kept: tuple[int, ...]) -> Held:
+        """The kept elements as rows; the distances bind positions, and come first."""
+        distances, drifts = split(kept)
+        order = [*distances, *drifts]
+
+        def rows(s: ModelSymbols, a: SX) -> Rows:
+            found = point_rows(self.system, s, self.points)
+            J = found.J[order, :]
+            return Rows(
+                J=J,
+                positions=found.r[distances],
+                velocities=casadi.mtimes(J, s.v),
+                accelerations=casadi.mtimes(J, a) + found.bias[order],
+                norms=SX(0, 1),
+            )
+
+        return rows
+
+    def elements(self, kept: tuple[int, ...]) -> tuple[Elements, Elements]:
+        """Name and unit of the rows that bind positions, and of those that bind velocities."""
+        distances, drifts = (
+            tuple((f"{self.points[k // 3].name}: {'xyz'[k % 3]}", "m") for k in part)
+            for part in split(kept)
+        )
+        return distances, drifts
+
+    def independent(self, q: Array, p: Array) -> tuple[int, ...]:
+        """The held elements that depend neither on loops nor on each other near a posture q.
+
+        Rows that depend on others only there, as those of a straight leg, are kept.
+        """
+        held, loops = self.held, kept_rows(self.system)
+        numbers = _numbers(self)
+        matrices = []
+        for posture in self._near(q, p):
+            _, _, J_loops, _, J, _ = (np.array(x) for x in numbers(posture, 0 * q[:1], p))
+            matrices.append(np.vstack([J_loops[loops], J[held]]))
+        ranks = [rank(matrix) for matrix in matrices]
+        best = [m for m, r in zip(matrices, ranks, strict=True) if r == max(ranks)]
+        first = tuple(range(len(loops)))
+        chosen = independent_rows(best, max(ranks), first)
+        return tuple(held[k - len(loops)] for k in chosen if k >= len(loops))
+
+    def _near(self, q: Array, p: Array) -> Iterator[Array]:
+        """The posture q, and others that touch and close the loops too."""
+        yield q
+        rng, function = np.random.default_rng(_SEED), _touching(self)
+
+        def residual(x: Array) -> tuple[Array, Array]:
+            return _pair(function(x, p))
+
+        for _ in range(_POSTURES):
+            root = gauss_newton(residual, q + rng.uniform(-_REACH, _REACH, len(q)))
+            if root.converged:
+                yield root.x
+
+    def start(self, begin: PhaseStart) -> tuple[Array, Array]:
+        """Positions (nq,) at which the points touch, and velocities (nv,) that keep them there.
+
+        Raises:
+            Unclosable: no posture with the positions that are given touches.
+            ModelError: a name is unknown, or the velocities that are given do not fit.
+        """
+        system = self.system
+        p = np.array(system.parameter_values(begin.parameters), dtype=float)
+        q, names = np.array(system.position(begin.q0)), [c.name for c in system.coordinates]
+        given = (begin.q0 or {}) if begin.q0 is None or isinstance(begin.q0, Mapping) else names
+        free = [k for k, name in enumerate(names) if name not in given]
+        function = _touching(self)
+
+        def residual(x: Array) -> tuple[Array, Array]:
+            r, J = _pair(function(_with(q, free, x), p))
+            return r, J[:, free]
+
+        if free:
+            q = _with(q, free, gauss_newton(residual, q[free]).x)
+        missing = _pair(function(q, p))[0]
+        if np.abs(missing).max(initial=0) > _OFF:
+            raise Unclosable(
+                f"{system.name}: no posture near the start lets {self.names or 'no point'} touch,"
+                f" {np.abs(missing).max():.2g} m is missing; give fewer positions in q0"
+            )
+        return q, self._velocity(q, p, begin.v0)
+
+    def _velocity(self, q: Array, p: Array, v0: Values) -> Array:
+        _, _, J_loops, _, J, _ = (np.array(x) for x in _numbers(self)(q, np.zeros(1), p))
+        rows = np.vstack([J_loops, J[self.held]])
+        v, missed = smallest_velocity(self.system, rows, v0)
+        if missed:
+            raise ModelError(
+                f"{self.system.name}: {self.names or 'the loops'} allow no motion with the"
+                f" velocities {missed}; give fewer of them, or take those after `impact`"
+            )
+        return v
+
+    def efforts(
+        self, kept: tuple[int, ...], motion: tuple[Array, Array], tau: Array, p: Array
+    ) -> Array:
+        """Accelerations (nv,) and efforts of the kept rows, as z of "index1" has them.
+
+        Raises:
+            ModelError: they are not determined there, as where a leg is straight.
+        """
+        q, v = motion
+        distances, drifts = split(kept)
+        s = len(self.system.closure.rows) if self.system.closure else 0
+        A, H, J_loops, psi, J, bias = (np.array(x) for x in _numbers(self)(q, v, p))
+        loops = kept_rows(self.system)
+        J_loops, psi = J_loops[loops], psi[loops]
+        rows = np.vstack([J_loops[:s], J[distances], J_loops[s:], J[drifts]])
+        slopes = np.vstack([psi[:s], bias[distances], psi[s:], bias[drifts]])
+        r = len(rows)
+        K = np.block([[A, -rows.T], [rows, np.zeros((r, r))]])
+        right = np.concatenate([tau - H.ravel(), -slopes.ravel()])
+        found: Array = np.linalg.lstsq(K, right, rcond=None)[0]
+        if not np.allclose(K @ found, right, rtol=1e-8, atol=1e-8 * np.abs(right).max(initial=1)):
+            raise ModelError(
+                f"{self.system.name}: the forces on {self.names} are not determined at the start,"
+                " where some of them move nothing; bend what is straight there, by q0"
+            )
+        return found
+
+
+def split(kept: tuple[int, ...]) -> tuple[list[int], list[int]]:
+    """The distances among elements x, y, z of points, and the others."""
+    return [k for k in kept if k % 3 == 2], [k for k in kept if k % 3 != 2]
+
+
+def _numbers(standing: Standing) -> Function:
+    """``numbers(q, v, p) -> A, H, J_loops, psi, J, bias``, every row of loops and points."""
+    system = standing.system
+
+    def build() -> Function:
+        s = symbols_of(system, "tree")
+        rows = point_rows(system, s, standing.points)
+        J, psi = SX(0, system.nv), SX(0, 1)
+        if system.is_closed:
+            J = constraint_rows(system, s.q)
+            psi = acceleration_bias(system, s.q, s.v, J)
+        A = inertia_matrix(system.tree, s.poses)
+        H = tree_efforts(system, s, SX.zeros(system.nv), surroundings(system))
+        outputs = [casadi.densify(x) for x in (A, H, J, psi, rows.J, rows.bias)]
+        return Function("numbers", [s.q, s.v, system.p], outputs, {"cse": True})
+
+    function: Function = system.cached(("standing", standing.points), build)
+    return function
+
+
+def _touching(standing: Standing) -> Function:
+    """``touching(q, p) -> r, J``: distances, loops and quaternions, all zero where they hold."""
+    system = standing.system
+
+    def build() -> Function:
+        s = symbols_of(system, "tree")
+        distances = split(tuple(standing.held))[0]
+        rows = [point_rows(system, s, standing.points).r[distances], norm_rows(system.tree, s.q)]
+        if system.is_closed:
+            rows.append(closure_rows(system, s.q))
+        r = casadi.densify(casadi.vertcat(*rows))
+        J = casadi.densify(casadi.jacobian(r, s.q))
+        return Function("touching", [s.q, system.p], [r, J], {"cse": True})
+
+    function: Function = system.cached(("touching", standing.points, standing.ways), build)
+    return function
+
+
+def _pair(results: Any) -> tuple[Array, Array]:
+    r, J = results
+    return np.array(r).ravel(), np.array(J)
+
+
+def _with(q: Array, places: list[int], values: Array) -> Array:
+    result = q.copy()
+    result[places] = values
+    return result
 
 
 @dataclass(frozen=True, slots=True, eq=False)

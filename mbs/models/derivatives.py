@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
+from itertools import accumulate
+from typing import Any
 
 import casadi
-from casadi import SX, Function
+from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import (
@@ -15,25 +17,191 @@ from mbs.assembly.model_function import (
     model_function,
     require_system,
 )
+from mbs.assembly.tree import normalised, position_rate, quaternion_slices
 from mbs.errors import ModelError
-from mbs.messages import quoted
-from mbs.models.direct_dynamics import require_inertia
-from mbs.models.slopes import (
-    Blocks,
-    accelerations_by_ad,
-    accelerations_by_efforts,
-    efforts_by_ad,
-    efforts_by_recursion,
-)
-from mbs.models.staged_accelerations import staged_accelerations
+from mbs.models.direct_dynamics import independent_dynamics, require_inertia
+from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.symbols import (
     ModelSymbols,
     check_coordinates,
     is_reduced,
+    outputs_of,
     posture_check,
+    solution_order,
+    surroundings,
     symbols_of,
 )
 from mbs.operations.counts import cheapest
+from mbs.recursions.composite_body import (
+    TreeFactor,
+    factor_symbols,
+    factorized,
+    substituted,
+    velocity_antecedents,
+)
+from mbs.recursions.composite_body import inertia_matrix as tree_inertia
+from mbs.recursions.force_elements import element_efforts
+from mbs.recursions.newton_euler import joint_efforts
+from mbs.recursions.newton_euler_derivatives import newton_euler_derivatives
+from mbs.recursions.velocities import resting_base
+from mbs.text import quoted
+
+# Slopes of efforts and accelerations, by every method there is.
+#
+# Source: Carpentier & Mansard 2018; Singh, Russell & Wensing 2022.
+
+
+Blocks = dict[str, SX]
+"""Derivatives by the name of the input that they are taken with respect to."""
+
+
+def efforts_by_ad(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
+    """Derivatives of the efforts by differentiating the recursion, and the efforts."""
+    tau = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(a), surroundings(system)))
+    blocks = {
+        "q": _along_motion(system, s, tau),
+        "v": casadi.jacobian(tau, s.v),
+        "a": s.reduced_matrix(tree_inertia(system.tree, s.poses)),
+    }
+    return blocks, tau
+
+
+def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
+    """The same by recursions of the derivatives, for trees."""
+    tree = system.tree
+    moving = newton_euler_derivatives(tree, s.poses, s.v, a, resting_base(tree.gravity))
+    acting = element_efforts(tree, system.forces, s.poses, s.q, s.v)
+    joints = joint_efforts(tree, s.q, s.v, a) + acting
+    blocks = {
+        "q": moving.dq + _along_motion(system, s, joints),
+        "v": moving.dv + casadi.jacobian(joints, s.v),
+        "a": moving.A + casadi.jacobian(joints, a),
+    }
+    return blocks, moving.efforts + joints
+
+
+def implicit_formula(
+    system: System, s: ModelSymbols, tau: SX, names: Collection[str]
+) -> tuple[TreeFactor, SX, Blocks]:
+    """What the derivatives of the accelerations are solved from.
+
+    Args:
+        system: any.
+        s: its symbols.
+        tau: (m, 1) efforts.
+        names: what to differentiate with respect to, of "q", "v" and "p".
+
+    Returns:
+        the factors of A, the accelerations, and for each name minus the derivative of the efforts
+        at these accelerations.
+    """
+    before = solution_order(system, s)
+    by = efforts_by_recursion if s.reduction is None else efforts_by_ad
+    symbol = SX.sym("a", s.size)
+    slopes, efforts = by(system, s, symbol)
+    factor = factorized(slopes["a"], before)
+    if "p" in names:
+        slopes["p"] = casadi.jacobian(efforts, system.p)
+    H = casadi.substitute(efforts, symbol, SX.zeros(s.size))
+    a = substituted(factor, tau - H, before)
+    minus = casadi.substitute([-SX(slopes[name]) for name in names], [symbol], [a])
+    return factor, a, dict(zip(names, map(casadi.densify, minus), strict=True))
+
+
+def accelerations_by_efforts(
+    system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
+) -> tuple[Blocks, SX]:
+    """Derivatives of the accelerations from those of the efforts, and the accelerations."""
+    wanted = [name for name in names if name != "tau"]
+    factor, a, right = implicit_formula(system, s, tau, wanted)
+    sides = [*right.values(), casadi.densify(SX.eye(s.size))]
+    ends = [0, *accumulate(side.shape[1] for side in sides)]
+    every = substituted(factor, casadi.horzcat(*sides), solution_order(system, s))
+    *solved, inverse = casadi.horzsplit(every, ends)
+    blocks = dict(zip(wanted, solved, strict=True))
+    return {**blocks, "tau": casadi.triu2symm(casadi.triu(inverse))}, a
+
+
+def accelerations_by_ad(
+    system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
+) -> tuple[Blocks, SX]:
+    """The same by differentiating the direct model."""
+    a = outputs_of(system, independent_dynamics(system), s.q, s.v, tau)[0]
+    blocks = {
+        "q": _along_motion(system, s, a),
+        "v": casadi.jacobian(a, s.v),
+        "tau": casadi.jacobian(a, tau),
+    }
+    if "p" in names:
+        blocks["p"] = casadi.jacobian(a, system.p)
+    return blocks, a
+
+
+def _along_motion(system: System, s: ModelSymbols, value: SX) -> SX:
+    """Derivative of a value when the positions move with unit velocities."""
+    slope = casadi.jacobian(value, s.q)
+    if system.nq != system.nv:
+        u = SX.sym("u", system.nv)
+        rate = casadi.jacobian(position_rate(system.tree, s.q, u), u)
+        slope = casadi.mtimes(slope, rate)
+    return slope if s.reduction is None else casadi.mtimes(slope, s.reduction.G)
+
+
+# Derivatives of accelerations in two stages: one front, then the same solution for each column.
+
+
+def solve_column(before: list[int]) -> Function:
+    """``solve_column(ratios, inverse, right) -> x``: the solution of A x = right.
+
+    Args:
+        before: as of `factorized`.
+
+    Returns:
+        Function of the factors and one column.
+    """
+    factor, right = factor_symbols(before), SX.sym("right", len(before))
+    names = ["ratios", "inverse", "right"], ["x"]
+    return Function("solve_column", [*factor, right], [substituted(factor, right, before)], *names)
+
+
+def staged_accelerations(system: System, names: Sequence[str]) -> tuple[list[MX], list[MX]]:
+    """Derivatives of the accelerations of a tree.
+
+    Args:
+        system: its coordinates are those of the tree.
+        names: what to differentiate with respect to, of "q", "v", "tau" and "p".
+
+    Returns:
+        the inputs q, v, tau and, of a system with parameters, p; then the derivatives in the
+        order of the names, and the accelerations.
+    """
+    solve = solve_column(velocity_antecedents(system.tree))
+    order = [name for name in names if name != "tau"]
+    front = _front(system, order)
+    inputs = [MX.sym(front.name_in(k), front.size_in(k)) for k in range(front.n_in())]
+    ratios, inverse, a, *right = front.call(inputs)
+    if "tau" in names:
+        order, right = [*order, "tau"], [*right, MX(DM.eye(system.nv))]
+    sides = casadi.densify(casadi.horzcat(*right))
+    every = solve.map("solve_columns", "serial", sides.shape[1], [0, 1], [])
+    ends = [0, *accumulate(side.shape[1] for side in right)]
+    columns = casadi.horzsplit(every(ratios, inverse, sides), ends)
+    blocks = dict(zip(order, columns, strict=True))
+    if "tau" in names:
+        blocks["tau"] = casadi.triu2symm(casadi.triu(blocks["tau"]))
+    return inputs, [*(blocks[name] for name in names), a]
+
+
+def _front(system: System, names: Sequence[str]) -> Function:
+    """Factors of A, accelerations, and the right-hand sides of their derivatives."""
+    s = symbols_of(system, "tree")
+    tau = SX.sym("tau", s.size)
+    factor, a, sides = implicit_formula(system, s, tau, names)
+    inputs = [s.q, s.v, tau, *([system.p] if system.parameters else [])]
+    labels = ["q", "v", "tau", "p"][: len(inputs)]
+    results = ["ratios", "inverse", "a", *(f"minus_dtau_d{name}" for name in sides)]
+    return Function("front", inputs, [*factor, a, *sides.values()], labels, results, {"cse": True})
+
 
 _COMPARED = 6
 """Velocities from the base to a leaf up to which both methods are built and their operations
@@ -228,3 +396,79 @@ def _outputs(of: str, s: ModelSymbols, names: tuple[str, ...], blocks: Blocks, v
     labels = [name if name == "p" else name + s.suffix for name in names]
     pairs = zip(labels, names, strict=True)
     return [*((f"d{of}_d{label}", blocks[name]) for label, name in pairs), (of, value)]
+
+
+# The direct model with its Jacobian by the implicit formula.
+#
+# Source: Carpentier & Mansard 2018, section IV.
+
+
+def with_implicit_jacobian(system: System, ddm: Function) -> Function:
+    """The direct model, its Jacobian made by the implicit formula where CasADi asks for it.
+
+    CasADi uses it wherever it takes the Jacobian of a call in an MX graph; directional
+    derivatives stay those of algorithmic differentiation, which are cheaper one at a time.
+    Quaternions are brought to unit length first, so that every element of q has the derivative
+    of a motion; at unit length the model is the same.
+
+    Args:
+        system: an open chain.
+        ddm: its `direct_dynamics`.
+
+    Returns:
+        a Function with the inputs and outputs of ddm.
+
+    Raises:
+        ModelError: the system has loops, or ddm is not a direct model of it.
+    """
+    require_system(system)
+    _check(system, ddm)
+    names, symbols, output = ddm.name_in(), ddm.sx_in(), ddm.name_out()[0]
+    q = symbols[0]
+    arguments = [normalised(system.tree, q), *symbols[1:]]
+    slopes = direct_dynamics_derivatives(system, with_respect_to=names)
+    along_motion, *others = slopes.call(arguments)[:-1]
+    jacobian = Function(
+        f"jac_{ddm.name()}",
+        [*symbols, SX(*ddm.size_out(0))],
+        [casadi.densify(casadi.mtimes(along_motion, _velocities(system, q))), *others],
+        [*names, f"out_{output}"],
+        [f"jac_{output}_{name}" for name in names],
+        {"cse": True},
+    )
+    options: dict[str, Any] = {
+        "cse": True,
+        "custom_jacobian": jacobian,
+        "jac_penalty": 1 / system.nv,
+        "default_in": [ddm.default_in(k) for k in range(ddm.n_in())],
+    }
+    model = Function(ddm.name(), symbols, ddm.call(arguments), names, ddm.name_out(), options)
+    like: Callable[[Function], Function] = getattr(ddm, "like", Function)
+    return like(model)
+
+
+def _check(system: System, ddm: Function) -> None:
+    if system.is_closed:
+        raise ModelError(
+            f"{system.name}: the implicit Jacobian is for open chains and this system has loops;"
+            " use its direct model as it is"
+        )
+    wanted = ["q", "v", "tau", *(["p"] if system.parameters else [])]
+    if not isinstance(ddm, Function) or ddm.name_in() != wanted or ddm.size1_in(0) != system.nq:
+        raise ModelError(
+            f"{system.name}: with_implicit_jacobian takes the direct model of the system; give"
+            " mbs.models.direct_dynamics(system)"
+        )
+
+
+def _velocities(system: System, q: SX) -> SX:
+    """(nv, nq) velocities with which elements of q change, those along no motion left out.
+
+    The rate of q is N v. The columns of N for a turn are half unit vectors, across the
+    quaternion; those of a linear velocity are unit vectors.
+    """
+    u = SX.sym("u", system.nv)
+    N = casadi.jacobian(position_rate(system.tree, normalised(system.tree, q), u), u)
+    for part in quaternion_slices(system.tree):
+        N[part, :] *= 4 / casadi.norm_2(q[part])
+    return N.T

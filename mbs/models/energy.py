@@ -9,7 +9,7 @@ from mbs.assembly.model_function import Named, model_function
 from mbs.models.symbols import posture_check, symbols_of
 from mbs.recursions.energy import kinetic_energy, potential_energy
 from mbs.recursions.force_elements import element_energy
-from mbs.recursions.joint_efforts import spring_energy
+from mbs.recursions.newton_euler import spring_energy
 
 
 def energy(system: System, coordinates: str = "independent") -> Function:

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, default_in, model_function, require_system
 from mbs.errors import NoClosedForm, Unclosable
-from mbs.loops.function import LoopFunction
+from mbs.loops.configuration import solve
+from mbs.loops.function import LoopFunction, follow_active
 from mbs.loops.function import function as closed_form
-from mbs.loops.numeric import follow_active
-from mbs.loops.posture import solve
-from mbs.models.composition import outputs_of
+from mbs.models.symbols import outputs_of
 from mbs.recursions.route import cheapest_pose
 
 

@@ -8,13 +8,18 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.models.actuation import effort_output
-from mbs.models.surroundings import Surroundings, exerted, surroundings
-from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
-from mbs.recursions.accelerations import resting_base
+from mbs.models.symbols import (
+    ModelSymbols,
+    Surroundings,
+    exerted,
+    posture_check,
+    surroundings,
+    symbols_of,
+)
 from mbs.recursions.force_elements import coordinate_efforts, element_efforts
-from mbs.recursions.joint_efforts import joint_efforts, spring_effort
 from mbs.recursions.names import newton_euler_names
-from mbs.recursions.newton_euler import Dynamics, newton_euler
+from mbs.recursions.newton_euler import Dynamics, joint_efforts, newton_euler, spring_effort
+from mbs.recursions.velocities import resting_base
 
 
 def inverse_dynamics(

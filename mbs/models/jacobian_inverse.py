@@ -2,14 +2,159 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import Named, model_function
-from mbs.models.square_selection import selection
+from mbs.assembly.model_function import Named, PostureCheck, model_function, require_system
+from mbs.errors import ModelError
+from mbs.loops.examine import LED
+from mbs.loops.reduction import reduction
+from mbs.models.symbols import check_coordinates, is_reduced
+from mbs.recursions.jacobian import VelocityTarget
+from mbs.recursions.square_jacobian import SquareJacobian, square_jacobian
 from mbs.solvers.block_triangular import solve_blocks
+from mbs.text import did_you_mean, quoted
+
+# The square part of a Jacobian that a user names by rows and columns.
+
+
+_ROWS = ("Vx", "Vy", "Vz", "wx", "wy", "wz")
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Rows of [V; w] and as many columns of a frame's Jacobian.
+
+    Attributes:
+        frame: that moves.
+        expressed_in: in whose axes V and w are.
+        rows: numbers 0 to 5.
+        columns: numbers of velocities, in the input coordinates.
+        reduced: whether they are the independent velocities of a closed system.
+        names: of these velocities.
+    """
+
+    frame: str | int
+    expressed_in: str | int
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    reduced: bool
+    names: tuple[str, ...]
+
+    @property
+    def check(self) -> PostureCheck | None:
+        """What refuses the postures that functions of the matrix cannot take."""
+        return LED if self.reduced else None
+
+    def of(self, system: System) -> tuple[SX, SquareJacobian]:
+        """Symbols q, (nq, 1), and the matrix at them in blocks; formed once."""
+        found: tuple[SX, SquareJacobian] = system.cached(
+            ("square_jacobian", self), lambda: self._formed(system)
+        )
+        return found
+
+    def _formed(self, system: System) -> tuple[SX, SquareJacobian]:
+        q = SX.sym("q", system.nq)
+        frame, axes = system.frame(self.frame), system.frame(self.expressed_in)
+        target = VelocityTarget(system.tree, q, system.p, frame, axes)
+        G = reduction(system, q).G if self.reduced else None
+        return q, square_jacobian(target, self.rows, self.columns, G)
+
+    def regular(self, system: System) -> tuple[SX, SquareJacobian]:
+        """The same of a matrix that has an inverse.
+
+        Raises:
+            ModelError: it is singular in every posture.
+        """
+        q, square = self.of(system)
+        if square.blocks is None:
+            raise ModelError(
+                f"{system.name}: rows {', '.join(map(str, self.rows))} and columns"
+                f" {', '.join(self.names)} of the Jacobian of {quoted(self.frame)} are singular in"
+                " every posture; name other rows or columns"
+            )
+        return q, square
+
+    def determinant(self, system: System) -> Function:
+        """``determinant(q) -> det``."""
+
+        def build() -> tuple[Named, Named]:
+            q, square = self.of(system)
+            return [("q", q)], [("det", square.determinant())]
+
+        return model_function(system, ("determinant", self), build, self.check)
+
+
+def selection(
+    system: System,
+    frame: str | int,
+    rows: Sequence[int | str] | None,
+    columns: Sequence[int | str] | None,
+    expressed_in: str | int,
+    coordinates: str,
+) -> Selection:
+    """What was named, checked; all rows, and the velocities that move the frame, when left out.
+
+    Raises:
+        ModelError: a row or column does not exist or comes twice, or there are not as many rows
+            as columns.
+    """
+    require_system(system)
+    check_coordinates(system, coordinates)
+    link, _ = system.frame(frame)
+    system.frame(expressed_in)
+    reduced = is_reduced(system, coordinates)
+    speeds = system.active if reduced else range(system.nv)
+    names = [system.speeds[k].name for k in speeds]
+    if columns is None:
+        moving = [system.tree.links[k].v for k in system.tree.path(link)]
+        columns = [k for part in moving for k in range(part.start, part.stop)]
+        columns = list(range(len(names))) if reduced else columns
+    kept = _numbers(system, "row", range(6) if rows is None else rows, _ROWS)
+    chosen = _numbers(system, "column", columns, names)
+    if len(kept) != len(chosen):
+        raise ModelError(
+            f"{system.name}: the selection of the Jacobian of {quoted(frame)} has {len(kept)} rows"
+            f" and {len(chosen)} columns; name as many rows=[...] of 0 to 5 (Vx, Vy, Vz, wx, wy,"
+            f" wz) as columns=[...] of {', '.join(names) or '(none)'}"
+        )
+    if not kept:
+        raise ModelError(f"{system.name}: no rows were named; give at least one of 0 to 5")
+    return Selection(
+        frame, expressed_in, kept, chosen, reduced, tuple(names[column] for column in chosen)
+    )
+
+
+def _numbers(
+    system: System, what: str, given: Iterable[Any], names: Sequence[str]
+) -> tuple[int, ...]:
+    numbers: list[int] = []
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        given = [given]
+    for value in given:
+        if isinstance(value, str):
+            if value not in names:
+                raise ModelError(
+                    f"{system.name}: there is no {what} {value!r}; " + did_you_mean(value, names)
+                )
+            value = names.index(value)
+        if not _is_number(value, len(names)):
+            raise ModelError(
+                f"{system.name}: there is no {what} {quoted(value)}; {what}s are numbers 0 to"
+                f" {len(names) - 1} or names: {', '.join(names)}"
+            )
+        if value in numbers:
+            raise ModelError(f"{system.name}: {what} {names[value]} was named twice; name it once")
+        numbers.append(int(value))
+    return tuple(numbers)
+
+
+def _is_number(value: object, size: int) -> bool:
+    return hasattr(value, "__index__") and not isinstance(value, bool) and value in range(size)
 
 
 def inverse_jacobian(

@@ -9,10 +9,20 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.reduction import reduction
-from mbs.messages import quoted
-from mbs.models.symbols import check_coordinates, is_reduced, posture_check
-from mbs.recursions.jacobian import VelocityTarget
-from mbs.recursions.renaud import cheapest_jacobian, renaud
+from mbs.models.symbols import (
+    ModelSymbols,
+    check_coordinates,
+    is_reduced,
+    posture_check,
+    symbols_of,
+)
+from mbs.recursions.jacobian import VelocityTarget, cheapest_jacobian, renaud
+from mbs.recursions.route import expressed
+from mbs.recursions.velocities import Acceleration, Velocity, moving_base, resting_base
+from mbs.recursions.velocities import link_accelerations as tree_accelerations
+from mbs.recursions.velocities import link_velocities as tree_velocities
+from mbs.spatial import Pose, zeros
+from mbs.text import quoted
 
 
 def jacobian(
@@ -104,3 +114,141 @@ def _on_the_way(system: System, link: int, frame: str | int, number: int | None)
             f" links there are {', '.join(str(m + 1) for m in path)}"
         )
     return k
+
+
+# Velocities and accelerations of links and frames, from a base that may move itself.
+
+
+def link_velocities(
+    system: System, coordinates: str = "independent", *, moving_base: bool = False
+) -> Function:
+    """``link_velocities(q, v) -> V``: velocity of every link, each in its own frame.
+
+    Source: Khalil & Creusot 1997, eq. 6.
+
+    Args:
+        system: open or closed; q must close the loops.
+        coordinates: of a closed system, "independent" (v is v_a) or "tree".
+        moving_base: add an input v_0 (6), velocity [V; w] of the base in its own axes.
+
+    Returns:
+        Function of q (nq, 1), v (m, 1) and v_0; V (6, nl), a column [V; w] for each link: of the
+        origin of its frame and angular [m/s, rad/s].
+    """
+    require_system(system)
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        v_0 = SX.sym("v_0", 6)
+        base = Velocity(v_0[0:3], v_0[3:6]) if moving_base else None
+        columns = [
+            casadi.vertcat(link.V, link.w)
+            for link in tree_velocities(system.tree, s.poses, s.v_tree, base)
+        ]
+        extra: Named = [("v_0", v_0)] if moving_base else []
+        return [*_state(s), *extra], [("V", casadi.horzcat(*columns))]
+
+    return model_function(
+        system,
+        ("link_velocities", moving_base, coordinates),
+        build,
+        posture_check(system, coordinates),
+    )
+
+
+def link_accelerations(
+    system: System, coordinates: str = "independent", *, moving_base: bool = False
+) -> Function:
+    """``link_accelerations(q, v, a) -> Vd``: acceleration of every link, each in its own frame.
+
+    They are those of the origins of the frames, seen from a fixed frame; gravity has no part.
+
+    Source: Khalil & Creusot 1997, eq. 8-10.
+
+    Args:
+        system: open or closed; q must close the loops.
+        coordinates: of a closed system, "independent" (v is v_a) or "tree".
+        moving_base: add inputs v_0 (6), velocity [V; w] of the base, and a_0 (6), accelerations
+            [vd; wd] of its origin and angular, in its own axes.
+
+    Returns:
+        Function of q (nq, 1), v, a (m, 1), v_0 and a_0; Vd (6, nl), a column [vd; wd] for each
+        link [m/s^2, rad/s^2].
+    """
+    require_system(system)
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        name, a = s.input("a")
+        base, extra = _base(moving_base)
+        motions = tree_accelerations(system.tree, s.poses, s.v_tree, s.tree_acceleration(a), base)
+        columns = [casadi.vertcat(link.vd, link.wd) for link in motions]
+        return [*_state(s), (name, a), *extra], [("Vd", casadi.horzcat(*columns))]
+
+    return model_function(
+        system,
+        ("link_accelerations", moving_base, coordinates),
+        build,
+        posture_check(system, coordinates),
+    )
+
+
+def jacobian_dot_velocity(
+    system: System,
+    frame: str | int,
+    expressed_in: str | int = "base",
+    *,
+    coordinates: str = "independent",
+    moving_base: bool = False,
+) -> Function:
+    """``jpqp(q, v) -> jpqp``: dJ/dt v, the acceleration of a frame when a is zero.
+
+    The derivative is the one that a fixed observer sees; `expressed_in` names the axes in which
+    it is then written. In a closed system with independent coordinates it holds what the joints
+    that follow do by themselves: d(J G)/dt v_a.
+
+    Source: Khalil & Creusot 1997, section 4.4.
+
+    Args:
+        system: open or closed; q must close the loops.
+        frame: a body, a named frame, or the number of a link.
+        expressed_in: the frame in whose axes the result is.
+        coordinates: of a closed system, "independent" (v is v_a) or "tree".
+        moving_base: as for `link_accelerations`; the acceleration of the base is part of it.
+
+    Returns:
+        Function of q (nq, 1), v (m, 1), v_0 and a_0; jpqp (6, 1), of the frame's origin and
+        angular [m/s^2, rad/s^2].
+
+    Raises:
+        ModelError: there is no such frame.
+    """
+    require_system(system)
+    check_coordinates(system, coordinates)
+    (j, inside), axes = system.frame(frame), system.frame(expressed_in)
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        base, extra = _base(moving_base)
+        a = s.tree_acceleration(SX.zeros(s.size))
+        links = tree_accelerations(system.tree, s.poses, s.v_tree, a, base)
+        motion = links[j] if j >= 0 else base
+        vd = motion.vd + casadi.mtimes(motion.rate.U, inside.p)
+        home = (j, Pose.identity())
+        parts = expressed(system.tree, s.q, axes, home, [vd, motion.wd])
+        return [*_state(s), *extra], [("jpqp", casadi.vertcat(*parts))]
+
+    key = ("jpqp", frame, expressed_in, moving_base, coordinates)
+    return model_function(system, key, build, posture_check(system, coordinates))
+
+
+def _state(s: ModelSymbols) -> Named:
+    return [("q", s.q), ("v" + s.suffix, s.v)]
+
+
+def _base(moves: bool) -> tuple[Acceleration, Named]:
+    """The base and the inputs that say how it moves."""
+    if not moves:
+        return resting_base(zeros()), []
+    v_0, a_0 = SX.sym("v_0", 6), SX.sym("a_0", 6)
+    return moving_base(v_0[3:6], a_0[3:6], a_0[0:3]), [("v_0", v_0), ("a_0", a_0)]

@@ -7,15 +7,14 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
-from mbs.assembly.rates import position_rate
+from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
-from mbs.messages import quoted
 from mbs.models.inverse_dynamics import static_efforts, tree_gravity
 from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
 from mbs.operations.counts import cheapest
-from mbs.recursions.augmented_body import LagrangeForm, lagrange_form
-from mbs.recursions.christoffel import christoffel
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
+from mbs.recursions.lagrange import LagrangeForm, christoffel, lagrange_form
+from mbs.text import quoted
 
 _METHODS = ("auto", "renaud", "christoffel")
 _SHORT = 8

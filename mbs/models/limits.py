@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.components.contacts_joint import RigidStop
-from mbs.components.forces_joint import JointStop
+from mbs.components.forces import JointStop, RigidStop
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float
-from mbs.messages import did_you_mean, quoted
+from mbs.text import did_you_mean, quoted
 
 Array = NDArray[np.float64]
 Largest = Mapping[str, float] | None

@@ -10,31 +10,43 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
-from mbs.assembly.sensors import AttachedSensor
+from mbs.assembly.tables import AttachedSensor
 from mbs.assembly.tree import Frame
-from mbs.components.forces import RelativeMotion
-from mbs.components.forces_line import regular_length
+from mbs.components.forces import RelativeMotion, regular_length
 from mbs.components.sensors import (
     AbsoluteSensor,
     DistanceSensor,
+    JointSensor,
+    PowerSensor,
     RelativeSensor,
     Sensor,
+    WrenchSensor,
 )
-from mbs.components.sensors_joint import JointSensor, PowerSensor, WrenchSensor
 from mbs.errors import ModelError
-from mbs.models.cut_coordinates import cut_coordinate
 from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
-from mbs.models.surroundings import Surroundings, surroundings
-from mbs.models.symbols import ModelSymbols, check_coordinates, posture_check, symbols_of
-from mbs.recursions.accelerations import Acceleration, link_accelerations, resting_base
-from mbs.recursions.frame_motion import (
+from mbs.models.loop_kinematics import cut_coordinate
+from mbs.models.symbols import (
+    ModelSymbols,
+    Surroundings,
+    check_coordinates,
+    posture_check,
+    surroundings,
+    symbols_of,
+)
+from mbs.recursions.route import (
     BASE,
     frame_velocity,
     relative_acceleration,
     relative_motion,
+    relative_pose,
 )
-from mbs.recursions.route import relative_pose
-from mbs.recursions.velocities import Velocity, link_velocities
+from mbs.recursions.velocities import (
+    Acceleration,
+    Velocity,
+    link_accelerations,
+    link_velocities,
+    resting_base,
+)
 from mbs.spatial import Wrench, zeros
 
 Readings = dict[str, SX]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -12,15 +13,71 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.joint_rows import JointRow
 from mbs.assembly.model_function import Named, model_function, require_system
-from mbs.assembly.rates import normalised
-from mbs.assembly.tree import Frame
-from mbs.components.motion import Motion
+from mbs.assembly.tables import JointRow
+from mbs.assembly.tree import Frame, normalised
+from mbs.components.joints import Motion
 from mbs.models.geometry import terminal_frame
-from mbs.models.link_outline import link_outline
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.spatial import Pose
+
+# The lines that stand for a rigid link: between the points at which it is held.
+
+
+Array = NDArray[np.float64]
+
+_SAME = 1e-9
+"""Points that are nearer than this part of the size of the link are one [1]."""
+
+_WIDE = 1e-6
+"""Points that lie off a line by less than this part of its length are on it [1]."""
+
+
+def link_outline(points: Array, held: int) -> list[tuple[int, int]]:
+    """Pairs of points that lines join.
+
+    The joints are on a line from end to end, or on a polygon that goes round them where three or
+    more are not in line. Each other point is joined to the nearest one, unless it lies between
+    them.
+
+    Args:
+        points: (k, 3) in the frame of the link [m].
+        held: how many of them, the first ones, are joints.
+
+    Returns:
+        numbers of points; of those that fall together the first one.
+    """
+    size = float(np.abs(points - points[0]).max())
+    kept = [k for k in range(len(points)) if _is_new(points, k, _SAME * max(size, 1.0))]
+    corners = [k for k in kept if k < held]
+    lines = _polygon(points, corners) if corners else []
+    for k in (k for k in kept if k >= held):
+        if not corners:
+            corners = [k]
+            continue
+        near = min(corners, key=lambda m: float(np.linalg.norm(points[m] - points[k])))
+        middle = points[corners].mean(axis=0)
+        reach = float(np.linalg.norm(points[near] - middle))
+        if len(corners) < 3 or float(np.linalg.norm(points[k] - middle)) > reach:
+            lines.append((near, k))
+    return lines
+
+
+def _is_new(points: Array, k: int, apart: float) -> bool:
+    """Whether point k is none of those before it."""
+    return bool(np.all(np.linalg.norm(points[:k] - points[k], axis=1) > apart))
+
+
+def _polygon(points: Array, corners: list[int]) -> list[tuple[int, int]]:
+    away = points[corners] - points[corners].mean(axis=0)
+    _, sizes, axes = np.linalg.svd(away)
+    flat = away @ axes[:2].T
+    if len(sizes) < 2 or sizes[1] <= _WIDE * sizes[0]:
+        path = [corners[k] for k in np.argsort(flat[:, 0], kind="stable")]
+        return list(itertools.pairwise(path))
+    path = [corners[k] for k in np.argsort(np.arctan2(flat[:, 1], flat[:, 0]), kind="stable")]
+    return list(itertools.pairwise([*path, path[0]]))
+
 
 _AXES = (Motion.REVOLUTE, Motion.PRISMATIC)
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi
-from casadi import SX
+from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import PostureCheck, require_system
+from mbs.assembly.model_function import Named, PostureCheck, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.examine import LED
 from mbs.loops.reduction import Reduction, reduction
+from mbs.recursions.composite_body import velocity_antecedents
+from mbs.recursions.force_elements import element_wrenches, summed
 from mbs.recursions.poses import LinkPose, link_poses
-from mbs.recursions.tree_factorization import velocity_antecedents
+from mbs.recursions.velocities import Acceleration, moving_base, resting_base
+from mbs.spatial import Wrench, carried
 
 COORDINATES = ("independent", "tree")
 
@@ -122,3 +125,145 @@ def solution_order(system: System, s: ModelSymbols) -> list[int]:
     if s.reduction is None:
         return velocity_antecedents(system.tree)
     return list(range(-1, s.size - 1))
+
+
+# What acts on a mechanism from outside: gravity, a base that moves, wrenches on bodies.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """What acts on a mechanism.
+
+    Attributes:
+        base: its motion, gravity included.
+        external: for some links the wrench that they exert on their environment, about and in
+            their frames.
+        inputs: of the model, that say all this.
+    """
+
+    base: Acceleration
+    external: dict[int, Wrench]
+    inputs: Named
+
+
+def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Surroundings:
+    """A resting base under gravity and no wrenches, or inputs for them.
+
+    Args:
+        system: whose tree has gravity, given in the base frame at R_0 = 1.
+        f_ext: add the input f_ext (6, bodies): for each row of `system.bodies` the wrench [force;
+            moment] that the body exerts on its environment, in the body's frame.
+        moves: add the inputs v_0 and a_0, (6, 1), velocity [V; w] and acceleration [vd; wd] of
+            the base's origin in its own axes, and R_0, (3, 3), orientation of the base frame in
+            the fixed frame in which gravity is given.
+    """
+    gravity, inputs = system.tree.gravity, list[tuple[str, SX]]()
+    base, external = resting_base(gravity), dict[int, Wrench]()
+    if f_ext:
+        wrenches = SX.sym("f_ext", 6, len(system.bodies))
+        external = wrenches_on_links(system, wrenches)
+        inputs.append(("f_ext", wrenches))
+    if moves:
+        v_0, a_0, R_0 = SX.sym("v_0", 6), SX.sym("a_0", 6), SX.sym("R_0", 3, 3)
+        base = moving_base(v_0[3:6], a_0[3:6], a_0[0:3] - casadi.mtimes(R_0.T, gravity))
+        inputs += [("v_0", v_0), ("a_0", a_0), ("R_0", R_0)]
+    return Surroundings(base, external, inputs)
+
+
+def exerted(
+    system: System, around: Surroundings, poses: list[LinkPose], q: SX, v: SX
+) -> dict[int, Wrench]:
+    """For some links the wrench that they exert on their environment, force elements included.
+
+    Args:
+        system: whose force elements act.
+        around: what else acts.
+        poses: of every link with respect to its antecedent.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities of the tree.
+    """
+    return summed(around.external, element_wrenches(system.tree, system.forces, poses, q, v))
+
+
+def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
+    """The wrenches of bodies, (6, bodies) in their frames, brought to the frames of their links."""
+    exerted: list[dict[int, Wrench]] = []
+    for column, row in enumerate(system.bodies):
+        link, pose = system.frames[row.name]
+        exerted.append({link: carried(pose, (wrenches[0:3, column], wrenches[3:6, column]))})
+    return summed(*exerted)
+
+
+# Functions made of other models, on the same symbols.
+
+
+def outputs_of(system: System, model: Function, *values: SX) -> list[SX]:
+    """The outputs of a model on symbols, its parameters passed on when it has any."""
+    arguments = [*values, *([system.p] if system.parameters else [])]
+    return [SX(output) for output in model.call(arguments)]
+
+
+def dense_function(name: str, inputs: list[SX], outputs: list[SX]) -> Function:
+    """A Function without structural zeros in its outputs, common parts shared."""
+    return Function(name, inputs, [casadi.densify(o) for o in outputs], {"cse": True})
+
+
+# The devices that drive shafts: what they deliver, and how their own states change.
+
+
+def devices(system: System) -> Function:
+    """``devices(v, z, u) -> tau, zdot, y``: the motors and torques of the drive lines.
+
+    The elements of z, u and y are those that `devices(system).elements("z")` names: currents of
+    motors; voltages and torques; what a simulation shows beside them.
+
+    Args:
+        system: open or closed, with devices.
+
+    Returns:
+        Function of v (nv, 1) velocities of the tree, z (nz, 1) states and u (nu, 1) inputs; tau
+        (nv, 1) what they deliver at the coordinates [N m or N], zdot (nz, 1), y (ny, 1).
+
+    Raises:
+        ModelError: the system has no device.
+    """
+    require_system(system)
+    if not system.devices:
+        raise ModelError(
+            f"{system.name}: there is no motor and no torque on a flange; connect a DCMotor or a"
+            " TorqueSource, or use the efforts tau of the joints"
+        )
+
+    def build() -> tuple[Named, Named]:
+        nz, nu = state_count(system), len(system.devices)
+        v, z, u = SX.sym("v", system.nv), SX.sym("z", nz), SX.sym("u", nu)
+        tau, zdot, y = device_equations(system, v, z, u)
+        return [("v", v), ("z", z), ("u", u)], [("tau", tau), ("zdot", zdot), ("y", y)]
+
+    return model_function(system, ("devices",), build)
+
+
+def state_count(system: System) -> int:
+    """Number of the states of all devices."""
+    return sum(len(device.states) for device in system.devices)
+
+
+def device_equations(system: System, v: SX, z: SX, u: SX) -> tuple[SX, SX, SX]:
+    """What all devices deliver at the coordinates, the rates of their states, and their outputs.
+
+    Args:
+        system: with devices or without any.
+        v: (nv, 1) velocities of the tree.
+        z: (nz, 1) states, device by device.
+        u: (nu, 1) inputs, one for each device.
+    """
+    tau = SX.zeros(system.nv)
+    rates, shown, first = [SX(0, 1)], [SX(0, 1)], 0
+    for number, device in enumerate(system.devices):
+        last = first + len(device.states)
+        own = z[first:last], u[number], v
+        tau[device.velocity] += device.effort(*own)
+        rates.append(device.rate(*own))
+        shown.append(device.shown(*own))
+        first = last
+    return tau, casadi.vertcat(*rates), casadi.vertcat(*shown)

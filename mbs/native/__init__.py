@@ -1,9 +1,14 @@
 """Machine code: the C compiler, cached libraries, compiled Functions and the C run-time."""
 
 from mbs.native.batch import Batch, batch
-from mbs.native.cache import cached_library
 from mbs.native.compiled import c_source, compiled
-from mbs.native.compiler import Compiler, compile_library, compiler_found, find_compiler
+from mbs.native.compiler import (
+    Compiler,
+    cached_library,
+    compile_library,
+    compiler_found,
+    find_compiler,
+)
 
 __all__ = [
     "Batch",

@@ -13,11 +13,18 @@ from typing import ClassVar, Literal
 import numpy as np
 from casadi import Function
 
-from mbs.native.block_code import BlockCode
-from mbs.native.kernel_source import BLOCK
-from mbs.native.operators import constant, form_of, operand
-from mbs.native.schedule import Batch, Step, blocks, plain_order
-from mbs.native.slots import slots
+from mbs.native.c_code import (
+    Batch,
+    BlockCode,
+    Step,
+    blocks,
+    constant,
+    form_of,
+    operand,
+    plain_order,
+    slots,
+)
+from mbs.native.kernel import BLOCK
 from mbs.operations.graph import Graph, Node, graph_of
 
 Real = Literal["double", "float"]

@@ -9,11 +9,8 @@ from itertools import accumulate
 import casadi
 from casadi import Function
 
-from mbs.native.block_code import BlockCode
-from mbs.native.kernel_source import BLOCK, HEADERS
-from mbs.native.lane_code import LaneCode
-from mbs.native.schedule import Batch, blocks, schedule
-from mbs.native.slots import slots
+from mbs.native.c_code import Batch, BlockCode, LaneCode, blocks, schedule, slots
+from mbs.native.kernel import BLOCK, HEADERS
 from mbs.operations.graph import Graph, graph_of
 
 _HEAD = """\

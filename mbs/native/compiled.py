@@ -7,15 +7,12 @@ from typing import Any
 
 import casadi
 
-from mbs.comments import in_c_comment
 from mbs.errors import ModelError
-from mbs.messages import quoted
 from mbs.native.array_calls import with_array_calls
-from mbs.native.cache import cached_library
-from mbs.native.compiler import compiler_found, flags_for
-from mbs.native.kernel import kernel_library
-from mbs.native.library_index import indexed_library
+from mbs.native.compiler import cached_library, compiler_found, flags_for
+from mbs.native.kernel import indexed_library, kernel_library
 from mbs.native.patterns import patterns_source
+from mbs.text import in_c_comment, quoted
 
 
 def compiled(

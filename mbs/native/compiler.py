@@ -1,18 +1,25 @@
 """The C compiler of this computer: which one there is, and shared libraries made with it."""
 
+import atexit
 import functools
+import hashlib
 import importlib.util
 import os
+import platform
 import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
+import casadi
+
 from mbs.errors import CompilerError
-from mbs.messages import install_command
+from mbs.text import did_you_mean, install_command, quoted
 
 FLAGS = ("-O2", "-ffp-contract=off", "-fPIC", "-shared")
 """Contraction is off so that compiled code gives the very bits of the interpreted Function."""
@@ -165,3 +172,206 @@ def _complaint(stderr: str) -> str:
     lines = stderr.splitlines()
     found = (s for word in ("undefined reference", "error") for s in lines if word in s)
     return next(found, stderr)
+
+
+# Shared libraries for other computers, made by the compiler inside ziglang.
+
+
+_OLD_GLIBC = "2.17"
+"""Every Linux in use since 2014 has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Platform:
+    """A kind of computer that a library is made for.
+
+    Attributes:
+        name: as FMI 3.0 names it.
+        fmi2: as FMI 2.0 names it.
+        target: as ziglang names it.
+        suffix: of its shared libraries.
+    """
+
+    name: str
+    fmi2: str
+    target: str
+    suffix: str
+
+
+PLATFORMS = {
+    p.name: p
+    for p in (
+        Platform("x86_64-linux", "linux64", f"x86_64-linux-gnu.{_OLD_GLIBC}", ".so"),
+        Platform("aarch64-linux", "aarch64-linux", f"aarch64-linux-gnu.{_OLD_GLIBC}", ".so"),
+        Platform("x86_64-windows", "win64", "x86_64-windows-gnu", ".dll"),
+        Platform("x86_64-darwin", "darwin64", "x86_64-macos", ".dylib"),
+        Platform("aarch64-darwin", "aarch64-darwin", "aarch64-macos", ".dylib"),
+    )
+}
+
+
+def host_platform() -> Platform:
+    """This computer."""
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower())
+    machine = machine or platform.machine().lower()
+    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    name = f"{machine}-{system}"
+    return PLATFORMS.get(name, Platform(name, name, "", LIBRARY_SUFFIX))
+
+
+def platform_named(name: object) -> Platform:
+    """The platform of a name.
+
+    Raises:
+        CompilerError: there is none of that name.
+    """
+    if isinstance(name, str) and name in PLATFORMS:
+        return PLATFORMS[name]
+    raise CompilerError(
+        f"there is no platform {quoted(name)}; {did_you_mean(str(name), list(PLATFORMS))}"
+    )
+
+
+def cross_compiler(goal: Platform) -> Compiler:
+    """The compiler that makes libraries for a platform, on whatever computer it runs.
+
+    Raises:
+        CompilerError: ziglang is not installed.
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        raise CompilerError(
+            f"libraries for {goal.name} are made with ziglang, which is not installed; run: "
+            + install_command("cross")
+        )
+    command = (sys.executable, "-m", "ziglang", "cc", "-target", goal.target)
+    return Compiler(command, metadata.version("ziglang"))
+
+
+# Shared libraries kept on disk under the hash of all that made them, so none is built twice.
+
+
+def cache_dir() -> Path:
+    """The folder of built libraries: MBS_CACHE_DIR, else the cache folder of the user.
+
+    Returns:
+        a folder that exists and can be written: one that lasts as long as this process when the
+        usual one cannot.
+    """
+    wanted = _wanted_dir()
+    if wanted is not None and _writable(wanted):
+        return wanted
+    return _process_dir()
+
+
+def cached_library(
+    files: Mapping[str, str],
+    flags: Sequence[str] = FLAGS,
+    *,
+    compiler: Compiler | None = None,
+    suffix: str = LIBRARY_SUFFIX,
+) -> Path:
+    """The shared library of these sources, built when nobody has built it yet.
+
+    Two processes may ask at once: each builds in a folder of its own and the last to finish wins.
+    The name of a library holds a hash of its content; one that is damaged is built again.
+
+    Args:
+        files: file name to its text; names that end in .c are compiled, the others are headers.
+        flags: every flag of the compiler.
+        compiler: that builds it, the one of this computer when left out.
+        suffix: of the library.
+
+    Returns:
+        path of the library.
+
+    Raises:
+        CompilerError: there is no compiler, or it refused the code.
+    """
+    folder, chosen = cache_dir(), compiler or find_compiler()
+    key = _key(files, flags, chosen)
+    for known in sorted(folder.glob(f"{key}-*{suffix}")):
+        if is_whole(known):
+            return known
+    with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as name:
+        build = Path(name)
+        for file, text in files.items():
+            (build / file).write_text(text, encoding="utf-8")
+        sources = [build / file for file in files if file.endswith(".c")]
+        output = build / f"library{suffix}"
+        library = compile_library(sources, [build], flags, output, compiler=chosen)
+        return _installed(library, folder / f"{key}-{_sum_of(library)}{suffix}")
+
+
+def is_whole(library: Path) -> bool:
+    """Whether the content of a library of the cache is that which its name tells."""
+    try:
+        facts = library.stat()
+        return _checked(library, facts.st_mtime_ns, facts.st_size)
+    except OSError:  # it has gone, or another user keeps it to himself
+        return False
+
+
+@functools.lru_cache(maxsize=1024)
+def _checked(library: Path, changed: int, size: int) -> bool:
+    return library.stem.rpartition("-")[2] == _sum_of(library)
+
+
+def _sum_of(library: Path) -> str:
+    with library.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+
+
+def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> str:
+    digest = hashlib.sha256()
+    facts = (casadi.CasadiMeta.version(), platform.machine(), *compiler.command, compiler.version)
+    texts = (text for name in sorted(files) for text in (name, files[name]))
+    for text in (*facts, *flags, *texts):
+        digest.update(text.encode())
+        digest.update(b"\0")
+    return digest.hexdigest()[:40]
+
+
+def _installed(library: Path, target: Path) -> Path:
+    """The target; where another user keeps one of its name to himself, a copy for this process."""
+    try:
+        os.replace(library, target)
+    except OSError as error:
+        if not target.exists():
+            raise CompilerError(
+                f"library {target} could not be stored ({error}); set MBS_CACHE_DIR to a folder "
+                "that you may write"
+            ) from error
+        if not is_whole(target):  # else another process holds it open, which some systems protect
+            return Path(shutil.copy(library, _process_dir() / target.name))
+    return target
+
+
+def _wanted_dir() -> Path | None:
+    override = os.environ.get("MBS_CACHE_DIR")
+    if override:
+        return Path(override)
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "mbs" / "cache"
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches" / "mbs"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "mbs"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+@functools.cache
+def _process_dir() -> Path:
+    folder = tempfile.mkdtemp(prefix="mbs-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)

@@ -3,15 +3,322 @@
 from __future__ import annotations
 
 import functools
+import hashlib
+import math
+import os
 import platform
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from importlib import resources
+from importlib.resources.abc import Traversable
+from itertools import accumulate
 from pathlib import Path
+from typing import NamedTuple, TypeAlias
 
-from casadi import Function
+import casadi
+from casadi import Function, Sparsity
 
 from mbs.errors import ModelError
-from mbs.native.cache import cached_library
-from mbs.native.kernel_source import kernel_source
+from mbs.native.c_code import (
+    LANES,
+    Batch,
+    BlockCode,
+    LaneCode,
+    Memory,
+    Step,
+    blocks,
+    gives,
+    phases,
+    schedule,
+    slots,
+)
+from mbs.native.compiler import cache_dir, cached_library, find_compiler, is_whole
+from mbs.native.staged import Mapped, Staged, staged
+from mbs.operations.graph import Graph, graph_of
+
+# C text of a map: all columns by a loop, several at a time in vector lanes.
+
+
+class Place(NamedTuple):
+    """Where a column goes: number of the output and of the first element in it."""
+
+    output: int
+    first: int
+
+
+Columns: TypeAlias = Mapping[tuple[int, int], Place]
+"""Of the inputs of a graph that are outputs of maps, the columns that are part of an output."""
+
+
+def direct_columns(graph: Graph, maps: Sequence[Mapped], outputs: int) -> tuple[Columns, set[int]]:
+    """The columns that need no copy, for each element of them is used once, in one output.
+
+    Args:
+        graph: the scalar operations around the maps.
+        maps: give some of its inputs.
+        outputs: how many of its outputs are those of the whole Function.
+
+    Returns:
+        where they go, and the nodes of their elements.
+    """
+    uses, node_of, places = graph.uses(), {}, {}
+    for number, node in enumerate(graph.nodes):
+        if node.op == casadi.OP_INPUT:
+            node_of[node.args] = number
+    for k, result in enumerate(graph.results[:outputs]):
+        places.update({number: Place(k, element) for element, number in enumerate(result)})
+    found: dict[tuple[int, int], Place] = {}
+    nodes: set[int] = set()
+    for m in maps:
+        for k, port in enumerate(m.outputs):
+            rows = m.column.nnz_out(k)
+            for column in range(m.columns):
+                numbers = [node_of.get((port, column * rows + row), -1) for row in range(rows)]
+                at = places.get(numbers[0]) if numbers else None
+                if at is None or not all(
+                    uses[n] == 1 and places.get(n) == Place(at.output, at.first + row)
+                    for row, n in enumerate(numbers)
+                ):
+                    continue
+                found[port, column] = at
+                nodes.update(numbers)
+    return found, nodes
+
+
+class MapSource(NamedTuple):
+    """C text of a map.
+
+    Attributes:
+        text: functions, the last of which has the name of the map and takes `out`, the outputs of
+            the scalar operations followed by those of the maps, and work space.
+        work: doubles of work space.
+    """
+
+    text: str
+    work: int
+
+
+def map_source(
+    name: str, mapped: Mapped, columns: Columns, buffers: Sequence[int], block: int
+) -> MapSource:
+    """The C functions of a map.
+
+    Args:
+        name: of the last of them.
+        mapped: the map.
+        columns: the columns that go to another place than the buffer of their output.
+        buffers: for each output of the map its number in `out`.
+        block: assignments in one C function.
+    """
+    graph = graph_of(mapped.column)
+    pieces = blocks(graph, schedule(graph), block)
+    where = slots(graph, pieces)
+    code = LaneCode(graph, where, "mbs_sincos_wide", mapped.shared)
+    sizes = [len(result) for result in graph.results]
+    starts = list(accumulate(sizes, initial=where.count))
+    rows = ", ".join(f"w + {start}" for start in starts[:-1])
+    lines = [
+        *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
+        f"static NOINLINE void {name}(double *const *out, mbs_lanes *w)",
+        "{",
+        *_tables(mapped, columns, list(zip(buffers, sizes, strict=True))),
+        f"  for (int c = 0; c < {mapped.columns}; c += MBS_LANES) {{",
+        f"    const int left = {mapped.columns} - c, many = left < MBS_LANES ? left : MBS_LANES;",
+        f"    const double *const in[] = {{{', '.join(_inputs(graph, mapped)) or '0'}}};",
+        f"    mbs_lanes *const rows[] = {{{rows or '0'}}};",
+        "    double *to[MBS_LANES];",
+        *(f"    {name}_part{k}(in, rows, w);" for k in range(len(pieces))),
+    ]
+    for k, size in enumerate(sizes):
+        lines += [
+            f"    for (int l = 0; l < many; ++l) to[l] = out[place{k}[c + l].output]"
+            f" + place{k}[c + l].first;",
+            f"    mbs_columns(rows[{k}], {size}, many, to);",
+        ]
+    return MapSource("\n".join([*lines, "  }", "}"]), LANES * starts[-1])
+
+
+def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]) -> list[str]:
+    """Where the columns of each output go; of its buffer the number and the length of a column."""
+    lines = []
+    for k, (port, (buffer, size)) in enumerate(zip(mapped.outputs, buffers, strict=True)):
+        places = [columns.get((port, c), Place(buffer, c * size)) for c in range(mapped.columns)]
+        table = ", ".join(f"{{{place.output}, {place.first}}}" for place in places)
+        lines.append(f"  static const struct {{ int output, first; }} place{k}[] = {{{table}}};")
+    return lines
+
+
+def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
+    """Where each input of a column begins."""
+    result = []
+    for k, port in enumerate(graph.inputs):
+        text = f"out[{mapped.inputs[k]}]"
+        if not mapped.shared[k]:
+            size = port.sparsity.nnz() * LANES
+            text += f" + c / MBS_GROUP * {size} + c % MBS_GROUP"
+        result.append(text)
+    return result
+
+
+# What CasADi asks a compiled function about itself: names, shapes, defaults, work space.
+
+
+def function_table(function: Function, work: int) -> str:
+    """C text of the functions beside `name` through which CasADi's `external` learns its shape.
+
+    Args:
+        function: described; its text declares EXPORT and casadi_int.
+        work: doubles of work space that the code needs.
+    """
+    name, n_in, n_out = function.name(), function.n_in(), function.n_out()
+    shape = "const casadi_int *"
+    tables = {
+        "sparsity_in": [function.sparsity_in(k) for k in range(n_in)],
+        "sparsity_out": [function.sparsity_out(k) for k in range(n_out)],
+    }
+    lines = [
+        f"EXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}",
+        f"EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}",
+        _chosen("double ", f"{name}_default_in", _defaults(function)),
+        _chosen("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
+        _chosen("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
+    ]
+    for kind, patterns in tables.items():
+        names = [f"{name}_{kind}_{k}" for k in range(len(patterns))]
+        lines += [_table(*row) for row in zip(names, patterns, strict=True)]
+        lines.append(_chosen(shape, f"{name}_{kind}", names))
+    return "\n".join([*lines, _work(name, n_in, n_out, work)])
+
+
+def _defaults(function: Function) -> list[str]:
+    values = [float(function.default_in(k)) for k in range(function.n_in())]
+    return [repr(x) if math.isfinite(x) else "NAN" for x in values]
+
+
+def _chosen(kind: str, name: str, answers: Sequence[str]) -> str:
+    """A C function of a number that gives the answer of that number, else 0."""
+    cases = "".join(f" case {k}: return {answer};" for k, answer in enumerate(answers))
+    return f"EXPORT {kind}{name}(casadi_int i) {{ switch (i) {{{cases} default: return 0; }} }}"
+
+
+def _table(name: str, pattern: Sparsity) -> str:
+    numbers = [int(k) for k in pattern.compress()]
+    values = ", ".join(map(str, numbers))
+    return f"static const casadi_int {name}[{len(numbers)}] = {{{values}}};"
+
+
+def _work(name: str, n_in: int, n_out: int, work: int) -> str:
+    sizes = {"arg": n_in, "res": n_out, "iw": 0, "w": work}
+    pointers = ", ".join(f"casadi_int *{kind}" for kind in sizes)
+    sets = " ".join(f"if ({kind}) *{kind} = {size};" for kind, size in sizes.items())
+    return f"EXPORT int {name}_work({pointers}) {{ {sets} return 0; }}"
+
+
+# C text of Functions, made to run fast: straight lines in blocks, angles in vector lanes.
+
+
+BLOCK = 500
+"""Assignments in one C function: longer ones compile slower and run no faster."""
+
+HEADERS = ("sincos.h", "lanes.h", "elementary.h")
+"""What the text includes."""
+
+_INLINE = 16  # batches of angles whose code stands in the function; more are called
+
+_SHORT = 2500  # operations up to which gcc gains by reordering them before it assigns registers
+
+_GCC = """\
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("schedule-insns", "sched-pressure")
+#endif
+"""
+_HEAD = """\
+#include <math.h>
+#include <string.h>
+#include "elementary.h"
+#define casadi_int long long int
+#define NOINLINE __attribute__((noinline))
+#define ALIGNED __attribute__((aligned(64)))
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+"""
+
+
+def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str, str]:
+    """C files of Functions with different names, in CasADi's calling convention.
+
+    The text is for compilers that know vector types (gcc, clang); results differ from those of
+    the interpreter in the last digits.
+
+    Args:
+        functions: made of scalar operations and of maps of them, or to be expanded to them.
+        block: assignments in one C function.
+
+    Returns:
+        file name to text: a C file for each Function, and what they include.
+
+    Raises:
+        ModelError: some Function has no scalar operations, or one that C does not have.
+    """
+    runtime = resources.files("mbs.native").joinpath("runtime")
+    headers = {name: runtime.joinpath(name).read_text("utf-8") for name in HEADERS}
+    return {**{f"{function.name()}.c": _file(function, block) for function in functions}, **headers}
+
+
+def _file(function: Function, block: int) -> str:
+    stages = staged(function) or Staged(function, ())
+    graph = graph_of(stages.scalar)
+    scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
+    return "\n".join([scheduling, _HEAD, _function(function, graph, stages.maps, block)])
+
+
+def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: int) -> str:
+    name = function.name()
+    late = {port: k + 1 for k, m in enumerate(maps) for port in m.outputs}
+    pieces = _pieces(graph, late, len(maps), block)
+    begins = [0, *accumulate(map(len, pieces))]
+    every = [steps for some in pieces for steps in some]
+    columns, elsewhere = direct_columns(graph, maps, function.n_out())
+    where = slots(graph, every, {port: begins[k] for port, k in late.items()}, elsewhere)
+    batches = sum(isinstance(step, Batch) for steps in every for step in steps)
+    code = BlockCode(graph, where, "mbs_sincos8" if batches <= _INLINE else "mbs_sincos8_call")
+    memory = Memory(function, graph, where.count)
+    sources = []
+    for k, m in enumerate(maps):
+        buffers = [memory.buffer(port) for port in m.outputs]
+        sources.append(map_source(f"{name}_map{k}", m, columns, buffers, block))
+    calls: list[str] = []
+    for k in range(len(pieces)):
+        calls += [f"  {name}_map{k - 1}(out, lanes);"] if k else []
+        calls += [f"  {name}_part{j}(in, out, w);" for j in range(begins[k], begins[k + 1])]
+    return "\n".join(
+        [
+            *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(every)),
+            *(source.text for source in sources),
+            f"EXPORT int {name}(const double **arg, double **res, casadi_int *iw, double *w,"
+            " int mem)",
+            "{",
+            *memory.pointers(),
+            *calls,
+            "  return 0;",
+            "}",
+            function_table(function, memory.size + max((s.work for s in sources), default=0)),
+        ]
+    )
+
+
+def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Step]]]:
+    """The blocks before the first map, between it and the second one, and so on."""
+    phase = phases(graph, late)
+    order = schedule(graph, phase)
+    every: list[list[Step]] = [[] for _ in range(maps + 1)]
+    for step in order:
+        every[max(phase[n] for n in gives(step))].append(step)
+    return [blocks(graph, steps, block) for steps in every]
+
 
 _NATIVE = "-march=native" if platform.machine().lower() in ("x86_64", "amd64") else "-mcpu=native"
 FAST_FLAGS = (
@@ -60,3 +367,90 @@ def processor() -> str:
         return f"{platform.processor()} of {platform.node()}"
     keys = ("model name", "flags", "Features", "CPU part", "CPU architecture")
     return " ".join(dict.fromkeys(line for line in lines if line.startswith(keys)))
+
+
+# Which library of the cache belongs to a Function, found without writing its C text again.
+#
+# The text of a Function and its derivatives may take far longer to write than the library to
+# load. A small file, named by a hash of the serialised Function and of all else that decides the
+# text, holds the name of the library.
+
+
+_SUFFIX = ".library"
+_SOURCES = (".py", ".h", ".c")
+
+
+def indexed_library(
+    function: casadi.Function, options: str, make: Callable[[], Path | None]
+) -> Path | None:
+    """The library that `make` gives for a Function, remembered from run to run.
+
+    Several processes may ask at once; what is damaged or has gone is made again.
+
+    Args:
+        function: that is compiled.
+        options: what else decides the library.
+        make: writes and compiles it; None where that cannot be done, which is not remembered.
+    """
+    try:
+        text = function.serialize()
+    except (RuntimeError, NotImplementedError):  # a callback has no text
+        return make()
+    folder = cache_dir()
+    entry = folder / f"{_index_key(text, options)}{_SUFFIX}"
+    known = _entry(entry)
+    if known is not None:
+        return known
+    library = make()
+    if library is not None and library.parent == folder:
+        _write(entry, library.name)
+    return library
+
+
+def _entry(entry: Path) -> Path | None:
+    """The library that an entry names, when both are whole."""
+    try:
+        name = entry.read_text("utf-8")
+        library = entry.parent / name
+        return library if Path(name).name == name and is_whole(library) else None
+    except (OSError, ValueError):
+        return None
+
+
+def _write(entry: Path, name: str) -> None:
+    """Keep the name; where that fails, the next call writes the text of the Function again."""
+    try:
+        with tempfile.TemporaryDirectory(dir=entry.parent, prefix="build-") as folder:
+            written = Path(folder) / entry.name
+            written.write_text(name, encoding="utf-8")
+            os.replace(written, entry)
+    except OSError:  # the disk is full, or another process holds the entry open
+        return
+
+
+def _index_key(text: str, options: str) -> str:
+    compiler = find_compiler()
+    facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
+    digest = hashlib.sha256()
+    for part in (*facts, *FAST_FLAGS, _writer(), options, text):
+        digest.update(part.encode())
+        digest.update(b"\0")
+    return digest.hexdigest()[:40]
+
+
+@functools.cache
+def _writer() -> str:
+    """A hash of the code that writes the text: another version may write another one."""
+    digest = hashlib.sha256()
+    for package in ("mbs.native", "mbs.operations"):
+        for name, data in sorted(_files(resources.files(package), package)):
+            digest.update(name.encode() + b"\0" + data + b"\0")
+    return digest.hexdigest()
+
+
+def _files(folder: Traversable, path: str) -> Iterator[tuple[str, bytes]]:
+    for item in folder.iterdir():
+        if item.is_dir() and item.name != "__pycache__":
+            yield from _files(item, f"{path}/{item.name}")
+        elif item.name.endswith(_SOURCES):
+            yield f"{path}/{item.name}", item.read_bytes()

@@ -10,12 +10,9 @@ from collections.abc import Iterable
 
 from casadi import Function
 
-from mbs.native.block_code import BlockCode
+from mbs.native.c_code import BlockCode, Memory, Step, blocks, plain_order, slots
 from mbs.native.compiler import FLAGS
-from mbs.native.kernel_source import BLOCK
-from mbs.native.memory import Memory
-from mbs.native.schedule import Step, blocks, plain_order
-from mbs.native.slots import slots
+from mbs.native.kernel import BLOCK
 from mbs.operations.graph import Graph, graph_of
 
 _HEAD = """\

@@ -14,8 +14,7 @@ import casadi
 from casadi import MX, SX, Function
 
 from mbs.errors import ModelError
-from mbs.native.operators import ELEMENTWISE
-from mbs.native.schedule import LANES
+from mbs.native.c_code import ELEMENTWISE, LANES
 
 _MAPS = ("Map", "OmpMap", "ThreadMap")
 

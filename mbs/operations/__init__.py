@@ -1,9 +1,16 @@
 """The number of scalar operations of a Function, and equal Functions with fewer of them."""
 
-from mbs.operations.catalogue import PASSES, Pass
 from mbs.operations.counts import Count, count
-from mbs.operations.pipeline import Simplification, Step, simplification, simplify
-from mbs.operations.splitting import Split, split
+from mbs.operations.pipeline import (
+    PASSES,
+    Pass,
+    Simplification,
+    Split,
+    Step,
+    simplification,
+    simplify,
+    split,
+)
 
 __all__ = [
     "PASSES",

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import casadi
-from casadi import SX, Function, Sparsity
+from casadi import DM, SX, Function, Sparsity
 
 from mbs.errors import ModelError
-from mbs.messages import quoted
+from mbs.text import quoted
 
 
 class Node(NamedTuple):
@@ -183,3 +184,279 @@ def _value(node: Node, values: Sequence[SX], elements: list[list[SX]]) -> SX:
         return SX(node.value)
     first, *second = (values[number] for number in node.args)
     return SX(SX.binary(node.op, first, *second) if second else SX.unary(node.op, first))
+
+
+# Graphs written node by node: nothing twice, constants folded, signs moved outwards.
+
+
+COMMUTATIVE = {
+    *(casadi.OP_ADD, casadi.OP_MUL, casadi.OP_FMIN, casadi.OP_FMAX),
+    *(casadi.OP_EQ, casadi.OP_NE, casadi.OP_AND, casadi.OP_OR, casadi.OP_HYPOT),
+}
+_FREE = {casadi.OP_INPUT, casadi.OP_CONST, casadi.OP_NEG}
+_ODD = {
+    *(casadi.OP_SIN, casadi.OP_TAN, casadi.OP_ASIN, casadi.OP_ATAN, casadi.OP_SINH),
+    *(casadi.OP_TANH, casadi.OP_ASINH, casadi.OP_ATANH, casadi.OP_ERF, casadi.OP_SIGN),
+    casadi.OP_INV,
+}
+_EVEN = {casadi.OP_COS, casadi.OP_COSH, casadi.OP_FABS, casadi.OP_SQ}
+
+
+class Builder:
+    """The nodes of a graph in the making.
+
+    Every method returns the number of the node that holds the value asked for: an old one where
+    there is one. A sign is a node of its own, moved outwards through sums, products and odd
+    functions, so that x - y and y - x, or sin(x) and sin(-x), are one value.
+
+    Attributes:
+        nodes: each made of nodes before it.
+        fixed: for each node, whether constants and parameters alone determine it.
+    """
+
+    def __init__(self, graph: Graph, parameters: Iterable[str] = ()) -> None:
+        self.nodes: list[Node] = []
+        self.fixed: list[bool] = []
+        names = set(parameters)
+        self._known = [port.name in names for port in graph.inputs]
+        self._numbers: dict[Node, int] = {}
+        self._rules: dict[int, Callable[..., int]] = {
+            casadi.OP_ASSIGN: lambda a: a,
+            casadi.OP_NEG: self.negative,
+            casadi.OP_ADD: self.sum,
+            casadi.OP_SUB: self.difference,
+            casadi.OP_MUL: self.product,
+            casadi.OP_TWICE: lambda a: self.product(self.constant(2.0), a),
+            casadi.OP_DIV: self.quotient,
+            casadi.OP_IF_ELSE_ZERO: self._if_else_zero,
+        }
+
+    def node(self, op: int, args: tuple[int, ...], value: float = 0.0) -> int:
+        """The node as it is, without a rule; the old one if it is there."""
+        if op in COMMUTATIVE and args[1] < args[0]:
+            args = (args[1], args[0])
+        node = Node(op, args, value)
+        number = self._numbers.get(node)
+        if number is None:
+            number = self._numbers[node] = len(self.nodes)
+            self.nodes.append(node)
+            self.fixed.append(self._is_fixed(node))
+        return number
+
+    def add(self, node: Node, operands: Sequence[int]) -> int:
+        """A node of another graph, made of these operands here."""
+        if node.op in (casadi.OP_INPUT, casadi.OP_CONST):
+            return self.node(node.op, node.args, node.value)
+        return self.apply(node.op, *operands)
+
+    def apply(self, op: int, *operands: int) -> int:
+        """An operation on nodes."""
+        rule = self._rules.get(op)
+        if rule is not None:
+            return rule(*operands)
+        if all(self.nodes[a].op == casadi.OP_CONST for a in operands):
+            return self._folded(op, operands)
+        if op in _ODD and self._is(operands[0], casadi.OP_NEG):
+            return self.negative(self.apply(op, self.nodes[operands[0]].args[0]))
+        if op in _EVEN and self._is(operands[0], casadi.OP_NEG):
+            return self.apply(op, self.nodes[operands[0]].args[0])
+        return self.node(op, operands)
+
+    def cost_since(self, start: int) -> int:
+        """How many nodes from this number on take time at every call."""
+        numbers = range(start, len(self.nodes))
+        return sum(1 for n in numbers if not self.fixed[n] and self.nodes[n].op not in _FREE)
+
+    def forget_since(self, start: int) -> None:
+        """Take back all nodes from this number on."""
+        for node in self.nodes[start:]:
+            del self._numbers[node]
+        del self.nodes[start:], self.fixed[start:]
+
+    def constant(self, value: float) -> int:
+        """A constant."""
+        return self.node(casadi.OP_CONST, (), float(value))
+
+    def value(self, number: int) -> float | None:
+        """The number that a node is; None when it is no constant."""
+        node = self.nodes[number]
+        return node.value if node.op == casadi.OP_CONST else None
+
+    def unsigned(self, number: int) -> tuple[int, int]:
+        """A node as a sign, 1 or -1, times a node without one."""
+        node = self.nodes[number]
+        if node.op == casadi.OP_NEG:
+            return -1, node.args[0]
+        if node.op == casadi.OP_CONST and node.value < 0:
+            return -1, self.constant(-node.value)
+        return 1, number
+
+    def negative(self, a: int) -> int:
+        """-a."""
+        node = self.nodes[a]
+        if node.op == casadi.OP_NEG:
+            return node.args[0]
+        if node.op == casadi.OP_CONST:
+            return self.constant(-node.value if node.value else 0.0)
+        return self.node(casadi.OP_NEG, (a,))
+
+    def sum(self, a: int, b: int) -> int:
+        """The sum a + b."""
+        folded = self._both_constant(casadi.OP_ADD, a, b)
+        if folded is not None:
+            return folded
+        (sign_a, a), (sign_b, b) = self.unsigned(a), self.unsigned(b)
+        if sign_a != sign_b:
+            return self._subtract(a, b) if sign_a > 0 else self._subtract(b, a)
+        if self.value(a) == 0.0:
+            result = b
+        elif self.value(b) == 0.0:
+            result = a
+        elif a == b:
+            result = self.product(self.constant(2.0), a)
+        else:
+            result = self._plain_sum(a, b)
+        return result if sign_a > 0 else self.negative(result)
+
+    def difference(self, a: int, b: int) -> int:
+        """The difference a - b."""
+        return self.sum(a, self.negative(b))
+
+    def product(self, a: int, b: int) -> int:
+        """The product a b."""
+        folded = self._both_constant(casadi.OP_MUL, a, b)
+        if folded is not None:
+            return folded
+        (sign_a, a), (sign_b, b) = self.unsigned(a), self.unsigned(b)
+        if self.nodes[b].op == casadi.OP_CONST:
+            a, b = b, a
+        result = self._multiply(a, b)
+        return result if sign_a == sign_b else self.negative(result)
+
+    def quotient(self, a: int, b: int) -> int:
+        """The quotient a / b; by a constant it is a product."""
+        (sign_a, a), (sign_b, b) = self.unsigned(a), self.unsigned(b)
+        divisor = self.value(b)
+        if self.value(a) == 1.0:
+            result = self.apply(casadi.OP_INV, b)
+        elif divisor and math.isfinite(1.0 / divisor):
+            result = self.product(self.constant(1.0 / divisor), a)
+        else:
+            result = self.node(casadi.OP_DIV, (a, b))
+        return result if sign_a == sign_b else self.negative(result)
+
+    def _multiply(self, a: int, b: int) -> int:
+        """The product a b without signs; a constant is a."""
+        factor = self.value(a)
+        if factor == 0.0:
+            return a
+        if factor == 1.0:
+            return b
+        if a == b:
+            return self.node(casadi.OP_SQ, (a,))
+        if factor is None:
+            return self.node(casadi.OP_MUL, (a, b))
+        inner = self.nodes[b]
+        if inner.op == casadi.OP_TWICE:
+            return self.product(self.constant(2.0 * factor), inner.args[0])
+        if inner.op == casadi.OP_MUL:
+            for one, other in (inner.args, inner.args[::-1]):
+                if (known := self.value(one)) is not None:
+                    return self.product(self.constant(known * factor), other)
+        if factor == 2.0:
+            return self.node(casadi.OP_TWICE, (b,))
+        return self.node(casadi.OP_MUL, (a, b))
+
+    def _plain_sum(self, a: int, b: int) -> int:
+        """The sum a + b without signs; where one of them is x minus the other it is x."""
+        for one, other in ((a, b), (b, a)):
+            if self._is(one, casadi.OP_SUB) and self.nodes[one].args[1] == other:
+                return self.nodes[one].args[0]
+        return self.node(casadi.OP_ADD, (a, b))
+
+    def _remainder(self, a: int, b: int) -> int | None:
+        """The difference a - b, known where a is a sum of b and something else."""
+        node = self.nodes[a]
+        if node.op == casadi.OP_ADD and b in node.args:
+            return node.args[1] if node.args[0] == b else node.args[0]
+        if node.op == casadi.OP_SUB and node.args[0] == b:
+            return self.negative(node.args[1])
+        return None
+
+    def _subtract(self, a: int, b: int) -> int:
+        """The difference a - b without signs; that of b - a negated where it is there."""
+        if a == b:
+            return self.constant(0.0)
+        if self.value(b) == 0.0:
+            return a
+        if self.value(a) == 0.0:
+            return self.negative(b)
+        if (rest := self._remainder(a, b)) is not None:
+            return rest
+        if (rest := self._remainder(b, a)) is not None:
+            return self.negative(rest)
+        opposite = self._numbers.get(Node(casadi.OP_SUB, (b, a)))
+        if opposite is not None:
+            return self.negative(opposite)
+        return self.node(casadi.OP_SUB, (a, b))
+
+    def _if_else_zero(self, condition: int, value: int) -> int:
+        if self.value(value) == 0.0 or self.value(condition) == 0.0:
+            return self.constant(0.0)
+        if self.value(condition) is not None:
+            return value
+        sign, value = self.unsigned(value)
+        result = self.node(casadi.OP_IF_ELSE_ZERO, (condition, value))
+        return result if sign > 0 else self.negative(result)
+
+    def _both_constant(self, op: int, a: int, b: int) -> int | None:
+        """A sum or product of constants; None of anything else."""
+        one, other = self.nodes[a], self.nodes[b]
+        if one.op != casadi.OP_CONST or other.op != casadi.OP_CONST:
+            return None
+        product = op == casadi.OP_MUL
+        return self.constant(one.value * other.value if product else one.value + other.value)
+
+    def _folded(self, op: int, operands: Sequence[int]) -> int:
+        """An operation on constants; it stays when the result is no finite number."""
+        numbers = [DM(self.nodes[a].value) for a in operands]
+        result = DM.unary(op, *numbers) if len(numbers) == 1 else DM.binary(op, *numbers)
+        if not math.isfinite(float(result)):
+            return self.node(op, tuple(operands))
+        return self.constant(float(result))
+
+    def _is(self, number: int, op: int) -> bool:
+        return self.nodes[number].op == op
+
+    def _is_fixed(self, node: Node) -> bool:
+        if node.op == casadi.OP_INPUT:
+            return self._known[node.args[0]]
+        return node.op == casadi.OP_CONST or all(self.fixed[a] for a in node.args)
+
+
+def rebuilt(graph: Graph, builder: Builder) -> Graph:
+    """The live nodes of a graph added to a builder, one by one."""
+    numbers = [-1] * len(graph.nodes)
+    for number, alive in enumerate(graph.live()):
+        if alive:
+            operands = [numbers[a] for a in graph.operands(number)]
+            numbers[number] = builder.add(graph.nodes[number], operands)
+    results = [[numbers[number] for number in result] for result in graph.results]
+    return graph.with_nodes(builder.nodes, results)
+
+
+# Leave out what no output needs.
+
+
+def drop(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """The same graph without the nodes that no output needs."""
+    numbers = [-1] * len(graph.nodes)
+    nodes: list[Node] = []
+    for number, alive in enumerate(graph.live()):
+        if alive:
+            node = graph.nodes[number]
+            if node.op not in (casadi.OP_INPUT, casadi.OP_CONST):
+                node = node._replace(args=tuple(numbers[a] for a in node.args))
+            numbers[number] = len(nodes)
+            nodes.append(node)
+    return graph.with_nodes(nodes, [[numbers[n] for n in result] for result in graph.results])

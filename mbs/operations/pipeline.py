@@ -3,18 +3,53 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-from casadi import Function
+import casadi
+import numpy as np
+from casadi import DM, SX, Function, Sparsity
+from numpy.typing import NDArray
 
 from mbs.errors import ModelError
-from mbs.messages import did_you_mean, quoted
-from mbs.operations.catalogue import PASSES, Pass
 from mbs.operations.counts import Count, count_graph
-from mbs.operations.graph import Graph, function_of, graph_of
+from mbs.operations.graph import Graph, Node, Port, drop, function_of, graph_of
+from mbs.operations.passes import angles, factor, fold, order, parameters, pythagoras, share
 from mbs.operations.verification import Witness, witness
+from mbs.text import did_you_mean, quoted
+
+# The passes by name, in the order in which they are made.
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """A way to make a graph cheaper.
+
+    Attributes:
+        name: what it is called by.
+        meaning: what it does, in a line.
+        apply: takes a graph and the names of the inputs that are parameters, and gives an equal
+            graph.
+    """
+
+    name: str
+    meaning: str
+    apply: Callable[[Graph, tuple[str, ...]], Graph]
+
+
+PASSES = (
+    Pass("drop", "leave out what no output needs", drop),
+    Pass("fold", "compute constants, remove 0 and 1, move signs outwards", fold),
+    Pass("parameters", "gather parameters: c1 (x c2) is (c1 c2) x", parameters),
+    Pass("angles", "join parallel axes: c2 c3 - s2 s3 is cos(q2 + q3)", angles),
+    Pass("factor", "put common factors outside: a b + a c is a (b + c)", factor),
+    Pass("pythagoras", "s s x + c c x is x", pythagoras),
+    Pass("share", "compute common parts of sums and products once", share),
+    Pass("order", "order the operations so that few values wait at a time", order),
+)
+"""The passes in the order in which they are made."""
+
 
 _MOST_ROUNDS = 6
 
@@ -153,3 +188,195 @@ def _function_like(function: Function, graph: Graph) -> Function:
     made = function_of(graph, defaults)
     rewritten: Any = getattr(function, "rewritten", None)
     return made if rewritten is None else rewritten(made)
+
+
+# What depends on parameters alone, apart from what changes from call to call.
+
+
+_CONSTANTS = "c"
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """A Function in two: what is done once, and what is done at every call.
+
+    Attributes:
+        setup: from the parameters to c, a column of everything that main needs of them.
+        main: from the other inputs and c to the outputs.
+        inputs: names of the inputs of the Function that was split, in their order.
+    """
+
+    setup: Function
+    main: Function
+    inputs: tuple[str, ...]
+
+    def joined(self) -> Function:
+        """The Function that was split: main after setup."""
+        sparsity = {
+            f.name_in(k): f.sparsity_in(k) for f in (self.main, self.setup) for k in range(f.n_in())
+        }
+        symbols = {name: SX.sym(name, sparsity[name]) for name in self.inputs}
+        constants = self.setup.call([symbols[n] for n in self.setup.name_in()])
+        given = [symbols[n] for n in self.main.name_in()[:-1]]
+        outputs = self.main.call([*given, *constants])
+        names = self.main.name_out()
+        return Function(self.main.name(), list(symbols.values()), outputs, self.inputs, names)
+
+
+def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
+    """A Function in two, so that work on parameters is not repeated.
+
+    Numbers of c are parameters that main uses as they are, and results that it uses. Constants
+    are in main itself. Simplify the Function first, so that there is little of both.
+
+    Args:
+        function: made of scalar operations, or a Function that can be expanded to them.
+        parameters: names of inputs that do not change from call to call; names that the
+            Function does not have are ignored.
+
+    Returns:
+        `setup(p) -> c`, of the parameters that the Function has in its order, for a model with
+        their defaults, and `main(..., c) -> ...`, of its other inputs and its outputs.
+
+    Raises:
+        ModelError: the Function has no scalar operations, or an input is named c.
+    """
+    graph, names = drop(graph_of(function)), set(parameters)
+    if any(port.name == _CONSTANTS for port in graph.inputs):
+        raise ModelError(
+            f"{function.name()}: its input c has the name of what is computed once; rename it"
+        )
+    kept = _needed_of_parameters(graph, names)
+    column = Port(_CONSTANTS, Sparsity.dense(len(kept), 1))
+    setup = function_of(_setup(graph, names, kept, column))
+    like = getattr(function, "like", None)
+    return Split(
+        setup if like is None else like(setup),
+        function_of(_main(graph, names, kept, column)),
+        tuple(port.name for port in graph.inputs),
+    )
+
+
+def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
+    """Parameter-only nodes that outputs or changing nodes use, constants apart."""
+    fixed = graph.fixed_by(names)
+    used = [number for result in graph.results for number in result]
+    for number in range(len(graph.nodes)):
+        if not fixed[number]:
+            used += graph.operands(number)
+    return sorted({n for n in used if fixed[n] and graph.nodes[n].op != casadi.OP_CONST})
+
+
+def _setup(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
+    """The graph from parameters to the kept nodes."""
+    inputs = tuple(port for port in graph.inputs if port.name in names)
+    nodes = _renumbered(graph, [port.name for port in inputs])
+    return Graph(f"{graph.name}_setup", inputs, (column,), nodes, (tuple(kept),))
+
+
+def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
+    """The graph in which the kept nodes are inputs."""
+    inputs = tuple(port for port in graph.inputs if port.name not in names)
+    nodes = list(_renumbered(graph, [port.name for port in inputs]))
+    for position, number in enumerate(kept):
+        nodes[number] = Node(casadi.OP_INPUT, (len(inputs), position))
+    return drop(Graph(graph.name, (*inputs, column), graph.outputs, tuple(nodes), graph.results))
+
+
+def _renumbered(graph: Graph, names: list[str]) -> tuple[Node, ...]:
+    """The nodes with inputs counted among these names; others are left as they are."""
+    place = {k: names.index(p.name) for k, p in enumerate(graph.inputs) if p.name in names}
+
+    def moved(node: Node) -> Node:
+        if node.op != casadi.OP_INPUT or node.args[0] not in place:
+            return node
+        return Node(node.op, (place[node.args[0]], node.args[1]))
+
+    return tuple(moved(node) for node in graph.nodes)
+
+
+# The named scalars of a Function found again in an equal one that computes them otherwise.
+
+
+_SAME = 1e-9
+"""Two scalars are equal whose values at every point differ by no more than this part of them."""
+
+
+def names_found(function: Function, named: Function) -> Function:
+    """A Function with further outputs: those of its scalars that bear a name in an equal one.
+
+    Scalars are the same where their values at random points are. No operation but signs is
+    added: a name whose scalar, or its opposite, the Function does not compute is left out, and
+    so is one of a constant.
+
+    Args:
+        function: of scalar operations, such as a simplified model.
+        named: of the same inputs; its outputs are those of the Function, then named scalars.
+
+    Returns:
+        the Function; after its own outputs come those scalars of `named` that were found.
+    """
+    graph, count = graph_of(function), function.n_out()
+    points = witness(named).points
+    wanted = np.array([_scalars(named, point, count) for point in points]).T
+    computed = _values(graph, points)
+    same = _found(graph, wanted, computed)
+    others = _found(graph, -wanted, computed)
+    known = set(same.values())
+    nodes, named_nodes = list(graph.nodes), dict(same)
+    for k, number in others.items():
+        if k not in same and number not in known:
+            named_nodes[k] = len(nodes)
+            nodes.append(Node(casadi.OP_NEG, (number,)))
+    names, scalar = named.name_out()[count:], Sparsity.dense(1, 1)
+    order = sorted(named_nodes)
+    more = replace(
+        graph,
+        nodes=tuple(nodes),
+        outputs=(*graph.outputs, *(Port(names[k], scalar) for k in order)),
+        results=(*graph.results, *((named_nodes[k],) for k in order)),
+    )
+    return function_of(more, [function.default_in(k) for k in range(function.n_in())])
+
+
+def _scalars(named: Function, point: Sequence[DM], count: int) -> NDArray[np.float64]:
+    """The named scalars at a point; no number where an output is not one scalar."""
+    outputs = Function.call(named, list(point))[count:]
+    return np.array([float(x) if x.shape == (1, 1) else np.nan for x in outputs])
+
+
+def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]:
+    """(nodes, points) the value of every node."""
+    size = len(graph.nodes)
+    port, numbers = Port("nodes", Sparsity.dense(size, 1)), tuple(range(size))
+    every = function_of(replace(graph, outputs=(port,), results=(numbers,)))
+    return np.hstack([np.array(Function.call(every, list(point))[0]) for point in points])
+
+
+def _found(
+    graph: Graph, wanted: NDArray[np.float64], computed: NDArray[np.float64]
+) -> dict[int, int]:
+    """For named scalars that vary, where there is one, the first node that has their values.
+
+    Args:
+        graph: its operations that an output needs are looked through.
+        wanted: (names, points) values of the named scalars.
+        computed: (nodes, points) values of the nodes.
+    """
+    alive = graph.live()
+    leaves = casadi.OP_CONST, casadi.OP_INPUT, casadi.OP_NEG
+    numbers = [n for n, node in enumerate(graph.nodes) if alive[n] and node.op not in leaves]
+    order = np.array(sorted(numbers, key=lambda n: computed[n, 0]), dtype=int)
+    keys = computed[order, 0]
+    found: dict[int, int] = {}
+    for k, values in enumerate(wanted):
+        margin = _SAME * np.abs(values)
+        if not np.all(np.isfinite(values)) or np.ptp(values) <= margin.max():
+            continue
+        first = np.searchsorted(keys, values[0] - margin[0], "left")
+        last = np.searchsorted(keys, values[0] + margin[0], "right")
+        near = order[first:last]
+        same = np.all(np.abs(computed[near] - values) <= margin, axis=1)
+        if same.any():
+            found[k] = int(near[same].min())
+    return found

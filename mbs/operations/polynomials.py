@@ -7,14 +7,16 @@ computed.
 
 from __future__ import annotations
 
-from collections import Counter
+import heapq
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import combinations, islice, product
 
 import casadi
 
-from mbs.operations.builder import Builder
-from mbs.operations.graph import Graph
-from mbs.operations.passes.drop import drop
+from mbs.operations.counts import count_graph
+from mbs.operations.graph import Builder, Graph, drop
 
 Monomial = tuple[int, ...]
 """Sorted numbers of nodes to be multiplied, in a Builder; a square is a number twice."""
@@ -277,3 +279,248 @@ def without(monomial: Monomial, *factors: int) -> Monomial:
     for factor in factors:
         rest.remove(factor)
     return tuple(rest)
+
+
+# Polynomials in sines and cosines: which angles are in them, and how they meet.
+
+
+Pair = tuple[str, str]
+"""The names of two angles; one name twice for an angle and itself."""
+
+Reshape = Callable[[Algebra, Polynomial], Polynomial]
+
+_DEEPEST_NAME = 6
+_DEEPEST_PRODUCT = 6
+_LONGEST_MONOMIAL = 12
+_ALLOWANCES = (1000, 4, 0)
+_MOST_PAIRS = 24
+_MOST_WORK = 40_000
+
+
+def angle(algebra: Algebra, number: int) -> str:
+    """A name of the angle of a sine or cosine, the same in equal graphs; else empty."""
+    node = algebra.builder.nodes[number]
+    if node.op not in (casadi.OP_SIN, casadi.OP_COS):
+        return ""
+    return _name(algebra, node.args[0])
+
+
+def angles_in(algebra: Algebra, monomial: Monomial) -> set[str]:
+    """The names of the angles of which a monomial has sines or cosines."""
+    return {name for number in monomial if (name := angle(algebra, number))}
+
+
+def angles_met(algebra: Algebra, polynomial: Polynomial) -> set[Pair]:
+    """Pairs of angles that meet in a product, directly or within a factor."""
+    met: set[Pair] = set()
+    for monomial in polynomial:
+        inner: set[str] = set()
+        for factor in monomial:
+            inner |= _within(algebra, factor)
+        outer = inner if len(monomial) == 1 else angles_in(algebra, monomial)
+        inner |= outer
+        met |= {(min(a, b), max(a, b)) for a in outer for b in inner}
+    return met
+
+
+def multiplied_out(algebra: Algebra, polynomial: Polynomial, pair: Pair) -> Polynomial:
+    """A polynomial, factors that hold one angle opened where the other is a factor too.
+
+    Products in products are opened, and one sum of each term.
+    """
+    total: Polynomial = {}
+    waiting = [(monomial, c, True) for monomial, c in reversed(polynomial.items())]
+    while waiting:
+        monomial, coefficient, opens_sums = waiting.pop()
+        factor = _factor_with(algebra, monomial, pair, opens_sums)
+        if factor is None:
+            algebra.accumulate(total, [(monomial, coefficient)])
+            continue
+        rest, inside = without(monomial, factor), algebra.written[factor]
+        opens_sums = opens_sums and len(inside) == 1
+        waiting += (
+            (
+                tuple(sorted(rest + inner)),
+                algebra.builder.product(c, coefficient),
+                opens_sums,
+            )
+            for inner, c in inside.items()
+        )
+    return total
+
+
+def improved(
+    graph: Graph,
+    parameters: Iterable[str],
+    reshape: Callable[[Pair, Algebra, Polynomial], Polynomial],
+    pairs: Callable[[Pair], bool],
+) -> Graph:
+    """A graph reshaped for each pair of angles for which that makes it cheaper, by themselves.
+
+    A polynomial stays as it is where the reshaped one is much dearer by itself; a little dearer
+    it may be, as what is no longer needed then may be worth more. Of a large graph only the pairs
+    that are met most often are tried, so that the work grows with the number of nodes.
+
+    Args:
+        graph: what is computed.
+        parameters: names of the inputs that are constant.
+        reshape: gives a polynomial as it is with a pair; itself where nothing changes.
+        pairs: whether a pair is of the kind that is reshaped.
+    """
+    names, met = tuple(parameters), Counter[Pair]()
+
+    def noted(algebra: Algebra, polynomial: Polynomial) -> int:
+        for pair in angles_met(algebra, polynomial):
+            if pairs(pair) and reshape(pair, algebra, polynomial) != polynomial:
+                met[pair] += 1
+        return algebra.plain(polynomial)
+
+    rewritten(graph, names, noted)
+    most = [partial(reshape, pair) for pair, _ in met.most_common(_MOST_PAIRS)]
+    best = count_graph(graph, names).total
+    trials = max(2, _MOST_WORK // max(1, len(graph.nodes)))
+    for way, allowance in islice(product(most, _ALLOWANCES), trials):
+        trial = rewritten(graph, names, _writer(way, allowance))
+        total = count_graph(trial, names).total
+        if total < best:
+            graph, best = trial, total
+    return graph
+
+
+def _writer(reshape: Reshape, allowance: int) -> Callable[[Algebra, Polynomial], int]:
+    def write(algebra: Algebra, polynomial: Polynomial) -> int:
+        reshaped = reshape(algebra, polynomial)
+        dearest = algebra.cost(polynomial) + allowance
+        kept = reshaped if algebra.cost(reshaped) <= dearest else polynomial
+        return algebra.plain(kept)
+
+    return write
+
+
+def _factor_with(algebra: Algebra, monomial: Monomial, pair: Pair, opens_sums: bool) -> int | None:
+    """A factor that is itself written with one angle of a pair while the other is a factor."""
+    if len(monomial) > _LONGEST_MONOMIAL:
+        return None
+    present = angles_in(algebra, monomial)
+    wanted = {b for a, b in (pair, pair[::-1]) if a in present}
+    for factor in monomial:
+        inside = algebra.written.get(factor, {})
+        if len(inside) == 1 or (inside and opens_sums):
+            within = _within(algebra, factor)
+            if within & wanted or (len(inside) == 1 and within & set(pair)):
+                return factor
+    return None
+
+
+def _within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> frozenset[str]:
+    """The angles that are factors in a polynomial that is written, products in it opened."""
+    known = algebra.angles_within.get(factor)
+    if known is None:
+        names: set[str] = set()
+        for monomial in algebra.written.get(factor, ()):
+            names |= angles_in(algebra, monomial)
+            for inner in monomial if depth else ():
+                if len(algebra.written.get(inner, ())) == 1:
+                    names |= _within(algebra, inner, depth - 1)
+        known = algebra.angles_within[factor] = frozenset(names)
+    return known
+
+
+def _name(algebra: Algebra, number: int) -> str:
+    """What a node is computed from; empty when that is much."""
+    known = algebra.names.get(number)
+    if known is None:
+        known = algebra.names[number] = _spelt(algebra, number, _DEEPEST_NAME)
+    return known
+
+
+def _spelt(algebra: Algebra, number: int, depth: int) -> str:
+    node = algebra.builder.nodes[number]
+    if node.op in (casadi.OP_INPUT, casadi.OP_CONST):
+        return f"{node.op} {node.args} {node.value}"
+    parts = [_spelt(algebra, operand, depth - 1) for operand in node.args] if depth else [""]
+    if node.op != casadi.OP_SUB:
+        parts.sort()
+    return f"({node.op} {' '.join(parts)})" if all(parts) else ""
+
+
+# The pairs of elements that many groups have in common.
+
+
+Group = dict[int, int]
+"""The sign of each element of a group, 1 or -1."""
+
+_Pair = tuple[int, int, int]
+"""Two elements, the lower first, and the product of their signs."""
+
+_LONGEST = 48
+
+
+def extract_pairs(groups: dict[int, Group], first_name: int) -> None:
+    """Make what several groups have in common an element of theirs, in place.
+
+    The pair that is held most often, up to a common sign, becomes a group of its own, again and
+    again until no pair is held twice. Of a long group the first elements alone take part, so that
+    the work grows with the number of elements.
+
+    Args:
+        groups: by name; they get the new groups too.
+        first_name: the first of the numbers that are free as names.
+    """
+    extraction = _Extraction(groups)
+    name = first_name
+    while (pair := extraction.most_common()) is not None:
+        extraction.replace(pair, name)
+        name += 1
+
+
+class _Extraction:
+    def __init__(self, groups: dict[int, Group]) -> None:
+        self._groups = groups
+        self._holders: dict[_Pair, dict[int, None]] = defaultdict(dict)
+        self._queue: list[tuple[int, _Pair]] = []
+        for name, group in groups.items():
+            for a, b in combinations(sorted(list(group)[:_LONGEST]), 2):
+                self._holders[(a, b, group[a] * group[b])][name] = None
+        self._queue = [(-len(h), pair) for pair, h in self._holders.items() if len(h) > 1]
+        heapq.heapify(self._queue)
+
+    def most_common(self) -> _Pair | None:
+        """A pair that no other is held more often than; None when none is held twice."""
+        while self._queue:
+            count, pair = heapq.heappop(self._queue)
+            held = len(self._holders.get(pair, ()))
+            if held == -count:
+                return pair
+            if held > 1:
+                heapq.heappush(self._queue, (-held, pair))
+        return None
+
+    def replace(self, pair: _Pair, name: int) -> None:
+        """Make a group of a pair and an element of those that hold it."""
+        a, b, sign = pair
+        for holder in list(self._holders.pop(pair)):
+            group = self._groups[holder]
+            outer = group[a]
+            self._forget(holder, group, a, b)
+            del group[a], group[b]
+            self._notice(holder, group, name, outer)
+            group[name] = outer
+        self._groups[name] = {a: 1, b: sign}
+
+    def _forget(self, holder: int, group: Group, a: int, b: int) -> None:
+        for other, sign in group.items():
+            for gone in (a, b):
+                if other != gone:
+                    low, high = min(gone, other), max(gone, other)
+                    holders = self._holders.get((low, high, sign * group[gone]))
+                    if holders is not None:
+                        holders.pop(holder, None)
+
+    def _notice(self, holder: int, group: Group, name: int, outer: int) -> None:
+        for other in list(group)[:_LONGEST]:
+            pair = (other, name, group[other] * outer)
+            holders = self._holders[pair]
+            holders[holder] = None
+            if len(holders) > 1:
+                heapq.heappush(self._queue, (-len(holders), pair))

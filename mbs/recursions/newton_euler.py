@@ -10,16 +10,150 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.assembly.tree import Tree
-from mbs.recursions.accelerations import Acceleration, link_accelerations
-from mbs.recursions.first_effort import moment_of_run, runs_behind
-from mbs.recursions.motion import effort
+from mbs.assembly.tree import Link, Tree
+from mbs.components.forces import smooth_sign
+from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regrouped
-from mbs.recursions.rotation_rate import moment_of_rotation
-from mbs.recursions.rotors import rotor_efforts, rotor_moments
-from mbs.recursions.sliding import heights_first, slid
-from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero
+from mbs.recursions.regrouping import heights_first, regrouped, slid
+from mbs.recursions.velocities import Acceleration, effort, link_accelerations, moment_of_rotation
+from mbs.spatial import PseudoInertia, Rotation, Wrench, add_wrenches, cross, is_zero, vector, zeros
+
+# Rotors that spin with joints: what their angular momentum asks of joints and carriers.
+#
+# A rotor of inertia Jm about the unit vector z of link c, its carrier, spins at N qd relative to
+# it. Its locked inertia belongs to link c. The spin adds N^2 Jm qd^2 / 2 + N Jm qd (z . w_c) to
+# the kinetic energy, hence N^2 Jm qdd + N Jm (z . wd_c) to the effort of the joint and the moment
+# N Jm (qdd z + w_c x z qd) to the carrier.
+#
+# Source: Sciavicco, Siciliano & Villani 1996.
+
+
+def momentum_on(link: Link, carrier: int) -> SX:
+    """(3, 1) angular momentum that a unit velocity of the joint gives a carrier, in its frame.
+
+    Zero where the joint has no rotor or its rotor is on another link [kg m^2].
+    """
+    rotor = link.rotor
+    return rotor.momentum if rotor is not None and rotor.carrier == carrier else zeros()
+
+
+def spin_momenta(tree: Tree, v: SX) -> dict[int, SX]:
+    """For every link that carries rotors their angular momentum (3, 1), seen from it [N m s]."""
+    total: dict[int, SX] = {}
+    for link in tree.links:
+        if link.rotor is not None:
+            c, momentum = link.rotor.carrier, link.rotor.momentum * v[link.v]
+            total[c] = total[c] + momentum if c in total else momentum
+    return total
+
+
+def rotor_efforts(tree: Tree, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
+    """(nv, 1) efforts that accelerate the rotors of the joints [N m or N]."""
+    total = SX.zeros(tree.nv)
+    for link in tree.links:
+        if link.rotor is not None:
+            carrier = motions[link.rotor.carrier] if link.rotor.carrier >= 0 else base
+            total[link.v] = link.rotor.seen_at_joint * a[link.v] + casadi.dot(
+                link.rotor.momentum, carrier.wd
+            )
+    return total
+
+
+def rotor_moments(tree: Tree, v: SX, a: SX, motions: list[Acceleration]) -> dict[int, SX]:
+    """For every link that carries rotors the moment (3, 1) that turns their spin [N m]."""
+    total: dict[int, SX] = {}
+    for link in tree.links:
+        if link.rotor is None or link.rotor.carrier < 0:
+            continue
+        c, momentum = link.rotor.carrier, link.rotor.momentum
+        moment = momentum * a[link.v] + cross(motions[c].w, momentum * v[link.v])
+        total[c] = total[c] + moment if c in total else moment
+    return total
+
+
+def rotor_energy(tree: Tree, v: SX, w: list[SX]) -> SX:
+    """Kinetic energy of the spin, beyond that of the locked rotors [J].
+
+    Args:
+        tree: the links.
+        v: (nv, 1) joint velocities.
+        w: (3, 1) angular velocities of the links, each in its frame.
+    """
+    total = SX(0)
+    for link in tree.links:
+        if link.rotor is not None:
+            qd = v[link.v]
+            total += 0.5 * link.rotor.seen_at_joint * qd**2
+            if link.rotor.carrier >= 0:
+                total += qd * casadi.dot(link.rotor.momentum, w[link.rotor.carrier])
+    return total
+
+
+# The effort of a joint on the base, across the parallel axes behind it.
+#
+# A wrench reaches link 1 from a run of parallel axes turned once for each of them. The joint of
+# link 1 feels one element of its moment only; that one is had in fewer operations by turning the
+# load of every link of the run once, by the sum of its angles.
+
+
+def runs_behind(tree: Tree, poses: list[LinkPose]) -> dict[int, list[int]]:
+    """For links that turn on the base, the links of a run of parallel axes behind them.
+
+    There is one where the run has more than one joint and its axes stand at right angles to that
+    of the link on the base.
+    """
+    found = {}
+    for g, link in enumerate(tree.links):
+        i = link.antecedent
+        if i < 0 or tree.links[i].antecedent >= 0 or tree.links[i].motion is not Motion.REVOLUTE:
+            continue
+        members = [j for j, pose in enumerate(poses) if pose.run[0] == g]
+        if len(members) > 1 and i not in found and _stands_across(poses, members):
+            found[i] = members
+    return found
+
+
+def _stands_across(poses: list[LinkPose], members: list[int]) -> bool:
+    first = poses[members[0]]
+    axis = first.at_seat(vector([0, 0, 1]))
+    square = axis[2].is_zero() and first.foot[1].is_zero()
+    return bool(square) and all(poses[j].height.is_zero() for j in members)
+
+
+def moment_of_run(
+    tree: Tree, poses: list[LinkPose], members: list[int], loads: list[Wrench], forces: list[SX]
+) -> SX:
+    """Moment of a run about the axis of the link before it.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        members: the links of the run.
+        loads: for every link the wrench on it, in its frame, without what the other links of the
+            run transmit to it.
+        forces: for every link the force that its joint transmits along its axis.
+    """
+    first = poses[members[0]]
+    axis = first.at_seat(vector([0, 0, 1]))
+    moments = {j: loads[j][1] for j in members}
+    pushes = {j: loads[j][0] for j in members}
+    total = cross(axis, first.at_seat(first.foot))[2] * forces[members[0]]
+    for j in reversed(members[1:]):
+        i, foot = tree.links[j].antecedent, poses[j].foot
+        moments[i] = moments[i] + vector([0, -foot[0] * forces[j], 0])
+    for j in members:
+        total += _along(axis, poses[j].spin, moments[j])
+    across = cross(axis, vector([0, 0, 1]))
+    for j in members[1:]:
+        behind = [k for k in members if j in poses[k].run]
+        total += poses[j].foot[2] * sum(
+            (_along(across, poses[k].spin, pushes[k]) for k in behind), SX(0)
+        )
+    return total
+
+
+def _along(axis: SX, turn: Rotation, vector: SX) -> SX:
+    return SX(casadi.dot(axis, turn.apply(vector)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,3 +227,60 @@ def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:
     """The wrench that moves a body: F = m vd + U ms, M = its moment of U + ms x vd."""
     f = body.m * motion.vd + casadi.mtimes(motion.rate.U, body.ms)
     return f, moment_of_rotation(body.S, motion.rate) + cross(body.ms, motion.vd)
+
+
+# What a joint itself needs of effort, whatever moves with it: drive, friction and spring.
+#
+# Source: Khalil & Creusot 1997, eq. 20; Khalil & Dombre 2002 for elastic joints.
+
+
+def joint_efforts(tree: Tree, q: SX, v: SX, a: SX) -> SX:
+    """(nv, 1) rotor inertia, friction and spring of every joint [N m or N].
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities.
+        a: (nv, 1) accelerations.
+    """
+    return rotor_and_friction(tree, v, a) + spring_effort(tree, q)
+
+
+def rotor_and_friction(tree: Tree, v: SX, a: SX) -> SX:
+    """(nv, 1) Ia a + Fv v + Fs tanh(v / Fs_width) of every joint [N m or N].
+
+    The sign(v) of the source is smoothed over a width so that integrators and optimisers can use
+    the same model; a width of zero gives the sign.
+    """
+    return casadi.vertcat(*(_rotor_and_friction(link, v[link.v], a[link.v]) for link in tree.links))
+
+
+def spring_effort(tree: Tree, q: SX) -> SX:
+    """(nv, 1) stiffness (q - rest), what holds the spring of every joint [N m or N]."""
+    return casadi.vertcat(*(_spring_effort(link, q[link.q]) for link in tree.links))
+
+
+def spring_energy(tree: Tree, q: SX) -> SX:
+    """Energy in the springs of the joints, zero where they are at rest [J]."""
+    total = SX(0)
+    for link in tree.links:
+        if not link.stiffness.is_zero():
+            total += 0.5 * link.stiffness * (q[link.q] - link.rest) ** 2
+    return total
+
+
+def _spring_effort(link: Link, q: SX) -> SX:
+    if link.stiffness.is_zero():
+        return zeros(link.motion.nv)
+    return link.stiffness * (q - link.rest)
+
+
+def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
+    total = zeros(link.motion.nv)
+    if link.motion is Motion.FREE:  # the velocity is in the turning frame
+        a = a + casadi.vertcat(cross(v[3:6], v[0:3]), zeros())
+    step = smooth_sign(v, link.Fs_width)
+    for coefficient, rate in ((link.Ia, a), (link.Fv, v), (link.Fs, step)):
+        if not coefficient.is_zero():
+            total = total + coefficient * rate
+    return total

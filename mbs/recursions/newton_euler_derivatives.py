@@ -7,23 +7,361 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import casadi
 from casadi import SX
 
-from mbs.assembly.tree import Tree
-from mbs.recursions.accelerations import Acceleration, link_accelerations
-from mbs.recursions.base_axes import BaseAxes, base_axes
-from mbs.recursions.column_route import links_by_base
-from mbs.recursions.effort_column import Couple, EffortColumn, effort_column, rotor_couple
-from mbs.recursions.joint_axes import JointAxes, joint_axes
-from mbs.recursions.joint_lines import Line
+from mbs.assembly.tree import CarriedRotor, Tree
+from mbs.recursions.joint_axes import Drift, JointAxes, Line, Step, Twist, joint_axes
+from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments, spin_momenta
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regrouped
-from mbs.recursions.rotors import rotor_efforts, rotor_moments, spin_momenta
-from mbs.recursions.sliding import heights_first, slid
-from mbs.recursions.subtree_motion import SubtreeMotion, subtree_motions
-from mbs.spatial import PseudoInertia, is_zero, zeros
+from mbs.recursions.regrouping import heights_first, regrouped, slid
+from mbs.recursions.velocities import Acceleration, link_accelerations
+from mbs.spatial import (
+    FreeDisplacement,
+    Inertia,
+    MatrixTurn,
+    PseudoInertia,
+    Rotation,
+    Screw,
+    Wrench,
+    add_wrenches,
+    cross,
+    is_zero,
+    skew,
+    zeros,
+)
+
+# What a joint must know of everything behind it: inertia, its rate, and the wrench it takes.
+#
+# Source: Khalil, Bennis & Gautier 1990 (composite links); Singh, Russell & Wensing 2022 (their
+# composite matrix B, of which twelve numbers are left for an observer at rest or in steady
+# motion).
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SubtreeMotion:
+    """Links that move together, about a point and for an observer who moves with it.
+
+    With r and r_dot the place and velocity of an element of mass dm, N = integral of r_dot r' dm.
+
+    Attributes:
+        body: their inertia.
+        K: (3, 3) 2 (tr(N) - N): times an angular velocity, the moment that it adds to bodies
+            that move [kg m^2/s].
+        n: (3, 1) twice their linear momentum [kg m/s].
+        f: (3, 1) force that they take [N].
+        m: (3, 1) moment that they take [N m].
+    """
+
+    body: Inertia
+    K: SX
+    n: SX
+    f: SX
+    m: SX
+
+    @staticmethod
+    def zero() -> SubtreeMotion:
+        """No link at all."""
+        return SubtreeMotion(Inertia.zero(), zeros(3, 3), zeros(), zeros(), zeros())
+
+    @staticmethod
+    def of_link(pseudo: PseudoInertia, motion: Acceleration, spin: SX, moment: SX) -> SubtreeMotion:
+        """One link, for an observer at the origin of its frame.
+
+        Args:
+            pseudo: of the link, about and in its frame.
+            motion: of the link.
+            spin: (3, 1) angular momentum of rotors on the link, seen from it, in its frame.
+            moment: (3, 1) moment that their spin takes.
+        """
+        twice = 2 * motion.w
+        f, m = inertial_wrench(pseudo, motion)
+        return SubtreeMotion(
+            pseudo.inertia(),
+            -casadi.mtimes(skew(twice), pseudo.S) - skew(spin),
+            cross(twice, pseudo.ms),
+            f,
+            m + moment,
+        )
+
+    def __add__(self, other: SubtreeMotion) -> SubtreeMotion:
+        """Both, about the same point."""
+        return SubtreeMotion(
+            self.body + other.body,
+            self.K + other.K,
+            self.n + other.n,
+            self.f + other.f,
+            self.m + other.m,
+        )
+
+    def turned(self, R: Rotation) -> SubtreeMotion:
+        """In the axes of frame i, R being the orientation of the present ones in i."""
+        f, m = R.apply(self.f), R.apply(self.m)
+        return SubtreeMotion(self.body.turned(R), R.apply_to_square(self.K), R.apply(self.n), f, m)
+
+    def slid(self, axis: int, t: SX) -> SubtreeMotion:
+        """Displaced by t [m] along a coordinate axis."""
+        if t.is_zero():
+            return self
+        K, m = SX(self.K), SX(self.m)
+        k, h = (axis + 1) % 3, (axis + 2) % 3
+        across = t * self.n[axis]
+        for row in (k, h):
+            K[row, row] += across
+            K[row, axis] -= t * self.n[row]
+        m[k] -= t * self.f[h]
+        m[h] += t * self.f[k]
+        return SubtreeMotion(self.body.slid(axis, t), K, self.n, self.f, m)
+
+    def drifting(self, twice: SX) -> SubtreeMotion:
+        """For an observer to whom everything has half of `twice` added to its velocity."""
+        ms, K = self.body.ms, SX(self.K)
+        for k in range(3):
+            for h in {0, 1, 2} - {k}:
+                K[k, k] += twice[h] * ms[h]
+                K[k, h] -= twice[k] * ms[h]
+        return SubtreeMotion(self.body, K, self.n + self.body.m * twice, self.f, self.m)
+
+    def through(self, step: Step) -> SubtreeMotion:
+        """Seen from the other end of a step."""
+        if isinstance(step, Drift):
+            return self.drifting(step.twice)
+        return step.body(self)
+
+    def wrench_of(self, twist: Twist) -> Wrench:
+        """Momentum for a velocity; force and moment for an acceleration."""
+        return self.body.momentum(twist.linear, twist.angular)
+
+    def wrench_of_spin(self, s: SX) -> Wrench:
+        """What an angular velocity added to all of them adds to the wrench."""
+        return cross(s, self.n), casadi.mtimes(self.K, s)
+
+    def wrench_of_displacement(self, unit: Twist) -> Wrench:
+        """What a displacement changes of the wrench that goes with it."""
+        t, s = unit.linear, unit.angular
+        return cross(s, self.f), cross(s, self.m) + cross(t, self.f)
+
+    def spin_of(self, unit: Twist) -> SX:
+        """(3, 1) times an angular velocity: the effort that it adds along a unit motion."""
+        return casadi.mtimes(self.K.T, unit.angular) + cross(self.n, unit.linear)
+
+
+def subtree_motions(
+    tree: Tree, axes: list[JointAxes], own: list[SubtreeMotion]
+) -> list[SubtreeMotion]:
+    """Everything behind each joint, in its axes.
+
+    Args:
+        tree: the links.
+        axes: of the joints.
+        own: of each link alone, in its frame.
+    """
+    in_frame, parallel = list(own), [SubtreeMotion.zero()] * len(own)
+    result = list(own)
+    for j in reversed(range(len(own))):
+        turn, i = axes[j].turn, tree.links[j].antecedent
+        here = in_frame[j] if turn is None else in_frame[j].turned(turn)
+        here = result[j] = here + parallel[j]
+        if i < 0:
+            continue
+        for step in axes[j].way:
+            here = here.through(step)
+        if axes[j].joined:
+            parallel[i] += here
+        else:
+            in_frame[i] += here
+    return result
+
+
+# What one joint changes of the wrench behind it, on its way to the joints before.
+#
+# Source: Singh, Russell & Wensing 2022.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Couple:
+    """What a rotor that spins with a joint takes of its carrier, (3, 1) each.
+
+    Attributes:
+        dv: moment for a unit velocity of the joint.
+        da: for a unit acceleration.
+    """
+
+    dv: SX
+    da: SX
+
+    def turned(self, R: Rotation) -> Couple:
+        """In the axes of frame i, R being the orientation of the present ones in i."""
+        return Couple(R.apply(self.dv), R.apply(self.da))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EffortColumn:
+    """How the wrench of a subtree changes with its joint, and its effort with other joints.
+
+    Attributes:
+        dq: change of the wrench with the position of the joint.
+        dv: with its velocity.
+        momentum: with its acceleration; its power with an acceleration of everything behind the
+            joint is the effort that this takes.
+        spin: (3, 1) times an angular velocity given to everything behind the joint: the effort.
+    """
+
+    dq: Wrench
+    dv: Wrench
+    momentum: Wrench
+    spin: SX
+
+    def through(self, step: Step) -> EffortColumn:
+        """Seen from the other end of a step."""
+        if isinstance(step, Drift):
+            return self.drifting(step.twice)
+        return EffortColumn(
+            step.wrench(*self.dq),
+            step.wrench(*self.dv),
+            step.wrench(*self.momentum),
+            step.turn.apply(self.spin),
+        )
+
+    def turned(self, R: Rotation) -> EffortColumn:
+        """In the axes of frame i, R being the orientation of the present ones in i."""
+        dq, dv, momentum = ((R.apply(f), R.apply(m)) for f, m in (self.dq, self.dv, self.momentum))
+        return EffortColumn(dq, dv, momentum, R.apply(self.spin))
+
+    def drifting(self, twice: SX) -> EffortColumn:
+        """For an observer to whom everything has half of `twice` added to its velocity."""
+        spin = self.spin + cross(twice, self.momentum[0])
+        return EffortColumn(self.dq, self.dv, self.momentum, spin)
+
+    def with_couple(self, couple: Couple) -> EffortColumn:
+        """With couples that velocity and acceleration of the joint take besides."""
+        (f_v, m_v), (f_a, m_a) = self.dv, self.momentum
+        return EffortColumn(
+            self.dq, (f_v, m_v + couple.dv), (f_a, m_a + couple.da), self.spin + couple.dv
+        )
+
+    def row(self, line: Line) -> tuple[SX, SX, SX]:
+        """Effort of the column's joint for position, velocity and acceleration along a line."""
+        return (
+            line.second.power(*self.momentum) + casadi.dot(self.spin, line.spin),
+            line.faster.power(*self.momentum) + casadi.dot(self.spin, line.unit.angular),
+            line.unit.power(*self.momentum),
+        )
+
+    def efforts(self, line: Line) -> tuple[SX, SX, SX]:
+        """Effort along a line for position, velocity and acceleration of the column's joint."""
+        unit = line.unit
+        return unit.power(*self.dq), unit.power(*self.dv), unit.power(*self.momentum)
+
+
+def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
+    """What a joint changes that moves a subtree along a line, in the axes of both."""
+    spinning = add_wrenches(subtree.wrench_of(line.second), subtree.wrench_of_spin(line.spin))
+    return EffortColumn(
+        dq=add_wrenches(spinning, subtree.wrench_of_displacement(line.unit)),
+        dv=add_wrenches(subtree.wrench_of(line.faster), subtree.wrench_of_spin(line.unit.angular)),
+        momentum=subtree.wrench_of(line.unit),
+        spin=subtree.spin_of(line.unit),
+    )
+
+
+def rotor_couple(rotor: CarriedRotor, axes: JointAxes) -> Couple:
+    """The couple of a rotor, in the axes of the joint of the link that carries it."""
+    momentum = rotor.momentum if axes.turn is None else axes.turn.apply(rotor.momentum)
+    return Couple(cross(axes.w, momentum), momentum)
+
+
+# Which columns of the derivatives cost less in the base than through the axes of all joints.
+
+
+_TURN, _SLIDE, _DRIFT, _PAIR = 42, 12, 12, 17
+"""Operations of a column on its way through the axes of the joints before."""
+
+_BASE_PAIR, _BASE_COLUMN, _BASE_LINE = 67, 130, 150
+"""Operations in the base: of a pair, and of the way there of a column and of a line."""
+
+
+def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
+    """Links whose columns cost less by way of the base; empty when too few do.
+
+    In the base a pair of joints costs the same however far they are apart and however their axes
+    lie; on the way through the joints right angles and vanishing distances are cheaper still.
+    """
+    saved: dict[int, int] = {}
+    for j, link in enumerate(tree.links):
+        path = tree.path(j)
+        pairs = sum(tree.links[i].motion.nv for i in path[:-1])
+        walk = sum(_cost(step) for i in path[1:] for step in axes[i].way)
+        turns = sum(axes[i].turn is not None and not axes[k].joined for i, k in pairwise(path))
+        saving = walk + _TURN * turns - (_BASE_PAIR - _PAIR) * pairs - _BASE_COLUMN
+        if saving > 0:
+            saved[j] = saving * link.motion.nv
+    return set(saved) if sum(saved.values()) > _BASE_LINE * tree.nv else set()
+
+
+def _cost(step: Step) -> int:
+    """Operations that a step takes of a column."""
+    match step:
+        case Drift():
+            return _DRIFT
+        case Screw():
+            quarter = step.turn.c.is_zero() or step.turn.s.is_zero()
+            return _TURN * (not quarter) + _SLIDE * (not step.t.is_zero())
+    return 3 * (_TURN + _SLIDE)
+
+
+# The axes of the joints seen from the base, where every joint meets every other at once.
+#
+# Source: Singh, Russell & Wensing 2022 (all vectors in the ground frame).
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BaseAxes:
+    """The axes of a joint in the base.
+
+    Attributes:
+        place: where they stand.
+        twice: (3, 1) twice the velocity of their origin, in the base [m/s].
+        lines: the motions of the joint, about the origin of the base, for an observer at rest.
+    """
+
+    place: FreeDisplacement
+    twice: SX
+    lines: tuple[Line, ...]
+
+
+def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
+    """The axes of every joint in the base."""
+    result: list[BaseAxes] = []
+    for link, own in zip(tree.links, axes, strict=True):
+        i = link.antecedent
+        R, p, twice = SX.eye(3), zeros(), zeros()
+        if i >= 0:
+            R, p, twice = result[i].place.turn.matrix, result[i].place.p, result[i].twice
+            turn = axes[i].turn
+            if turn is not None and not own.joined:
+                R = _turned(R, turn)
+        for step in reversed(own.way):
+            R, p, twice = _after(step, R, p, twice)
+        place = FreeDisplacement(MatrixTurn(R), p)
+        lines = (line.displaced(R, p).drifting(twice) for line in own.lines)
+        result.append(BaseAxes(place, twice, tuple(lines)))
+    return result
+
+
+def _after(step: Step, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
+    if isinstance(step, Drift):
+        return R, p, twice + casadi.mtimes(R, step.twice)
+    p = p + casadi.mtimes(R, step.point(zeros()))
+    return _turned(R, step.turn), p, twice
+
+
+def _turned(R: SX, turn: Rotation) -> SX:
+    """R times the matrix of a turn."""
+    return casadi.horzcat(*(turn.apply_inverse(R[k, :].T) for k in range(3))).T
+
 
 Passage = tuple[int, tuple[Line, ...], EffortColumn]
 """A joint that a column passes, the motions of this joint, and the column in the same axes."""

@@ -11,7 +11,7 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Link, Tree
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.spatial import (
     Displacement,
     FreeDisplacement,

@@ -9,17 +9,242 @@ Source: Khalil & Creusot 1997, section 6.1; Gautier & Khalil 1990 for the sums.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
 import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
-from mbs.recursions.accelerations import Acceleration
+from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regressor_sums import Elements, filled
-from mbs.recursions.regressor_twists import PathTwist, path_twists
-from mbs.spatial import cross, vector, zeros
+from mbs.recursions.velocities import Acceleration, Velocity, unit_motions
+from mbs.spatial import (
+    Inertia,
+    Screw,
+    body_through,
+    cross,
+    elements,
+    is_zero,
+    origin,
+    vector,
+    zeros,
+)
+
+# Columns of a link that are sums of columns of the link before it.
+#
+# A joint cannot tell a part of its link from the same part fixed on the link before: mass on the
+# axis of a revolute joint, the rotational inertia behind a prismatic joint, the mass at the
+# centre of a spherical joint.
+#
+# Source: Gautier & Khalil 1990.
+
+
+_XX, _YY, _MZ, _M = 0, 3, 8, 9
+_DEPTH = 9
+_OWN_PRODUCTS = {**dict.fromkeys(range(6), 2), _MZ: 5, _M: 3}
+"""Products of an element that is computed as the work of its own unit wrench."""
+
+Elements = Mapping[int, Callable[[int], SX]]
+"""For some rows what computes the element of a column, given the number of its parameter."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColumnSum:
+    """A column of link j: columns of link i times constants, less a column of link j.
+
+    Attributes:
+        terms: a constant, and columns of link i that it multiplies, each with its sign.
+        less: number of the column of link j, or None.
+    """
+
+    terms: tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]
+    less: int | None
+
+    @property
+    def products(self) -> int:
+        """Products of an element."""
+        return sum(not (c.is_one() or c.is_minus_one()) for c, _ in self.terms)
+
+    def of(self, before: SX, own: SX) -> SX:
+        """The element of a row, from the row (1, 10) of link i and that of link j."""
+        total = SX(0)
+        for constant, columns in self.terms:
+            part = SX(0)
+            for column, sign in columns:
+                part = part + before[column] if sign > 0 else part - before[column]
+            total = total + constant * part
+        return total if self.less is None else total - own[self.less]
+
+
+def filled(tree: Tree, poses: list[LinkPose], height: int, links: list[Elements]) -> list[SX]:
+    """For every link the ten columns (height, 10) of its inertial parameters.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        height: number of rows.
+        links: what computes the elements of the columns that are no sums, for each link.
+    """
+    result: list[SX] = []
+    for j, rows in enumerate(links):
+        sums = column_sums(tree, poses, j)
+        block, i = zeros(height, 10), tree.links[j].antecedent
+        before = result[i] if i >= 0 else block
+        for row, element in rows.items():
+            for k in range(10):
+                if k not in sums:
+                    block[row, k] = element(k)
+            for k, total in sums.items():
+                block[row, k] = total.of(before[row, :], block[row, :])
+        result.append(block)
+    return result
+
+
+def column_sums(tree: Tree, poses: list[LinkPose], j: int) -> dict[int, ColumnSum]:
+    """The columns of link j that cost less as sums; none where it stands on the base."""
+    link = tree.links[j]
+    if link.antecedent < 0:
+        return {}
+    parts: dict[int, tuple[int, ...]]
+    match link.motion:
+        case Motion.REVOLUTE:
+            parts = {_YY: (_XX, _YY), _MZ: (_MZ,), _M: (_M,)}
+        case Motion.PRISMATIC:
+            parts = {k: (k,) for k in range(6)}
+        case Motion.SPHERICAL:
+            parts = {_M: (_M,)}
+        case Motion.FREE:
+            return {}
+    sums = {k: _sum(link.motion, poses[j], part) for k, part in parts.items()}
+    return {k: total for k, total in sums.items() if total.products <= _OWN_PRODUCTS[k]}
+
+
+def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
+    """The column of the first parameter of link j, when all parameters of `part` are one."""
+    ten = zeros(10)
+    for k in part:
+        ten[k] = 1
+    body, screw = Inertia.from_parameters(ten), pose.motion[0]
+    if motion is Motion.PRISMATIC:
+        body = body.turned(screw.turn)
+    elif isinstance(screw, Screw):
+        body = body.slid(2, screw.t)
+    constants = elements(body_through(pose.seat, body).parameters)
+    return ColumnSum(_grouped(constants), _XX if len(part) > 1 else None)
+
+
+def _grouped(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]:
+    """Columns with the same constant, but for its sign, together; those with zero left out."""
+    groups: list[tuple[SX, list[tuple[int, int]]]] = []
+    for column, constant in enumerate(constants):
+        if constant.is_zero():
+            continue
+        for known, columns in groups:
+            if casadi.is_equal(known, constant, _DEPTH):
+                columns.append((column, 1))
+                break
+            if casadi.is_equal(known, -constant, _DEPTH):
+                columns.append((column, -1))
+                break
+        else:
+            groups.append((constant, [(column, 1)]))
+    return tuple((constant, tuple(columns)) for constant, columns in groups)
+
+
+# Velocities of the joints before a link, as the link sees them.
+#
+# Across a run of parallel axes a velocity is turned once, by the sum of the angles.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathTwist:
+    """What a unit of one joint velocity gives a link, or the rate at which that changes.
+
+    Attributes:
+        row: number of the velocity.
+        t: (3, 1) velocity of the origin of the frame.
+        n: (3, 1) angular velocity.
+    """
+
+    row: int
+    t: SX
+    n: SX
+
+    def at(self, p: SX) -> PathTwist:
+        """About the point p, (3, 1) in the same axes."""
+        return PathTwist(self.row, self.t + cross(self.n, p), self.n)
+
+    def seen(self, turn: Callable[[SX], SX]) -> PathTwist:
+        """In other axes."""
+        return PathTwist(self.row, turn(self.t), turn(self.n))
+
+    def rate(self, of: Velocity) -> PathTwist:
+        """How it changes where it is fixed on a link that moves with this velocity."""
+        t = cross(of.V, self.n) + cross(of.w, self.t)
+        return PathTwist(self.row, t, cross(of.w, self.n))
+
+
+def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
+    """For every link unit velocities of the joints from the base to it, in its frame."""
+    return _carried(tree, poses, _unit_twists(tree))
+
+
+def path_twist_rates(
+    tree: Tree, poses: list[LinkPose], velocities: list[Velocity]
+) -> list[list[PathTwist]]:
+    """How those of `path_twists` change, each fixed on the link of its joint, seen at rest.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        velocities: of the links.
+    """
+    pairs = zip(_unit_twists(tree), velocities, strict=True)
+    return _carried(tree, poses, [[twist.rate(v) for twist in own] for own, v in pairs])
+
+
+def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
+    """A vector (3, 1) of the base in the frame of every link."""
+    result: list[SX] = []
+    for link, pose in zip(tree.links, poses, strict=True):
+        first = poses[pose.run[0]] if len(pose.run) > 1 else pose
+        i = tree.links[pose.run[0]].antecedent if len(pose.run) > 1 else link.antecedent
+        seat = first.at_seat(result[i] if i >= 0 else vector)
+        result.append(pose.spin.apply_inverse(seat))
+    return result
+
+
+def _unit_twists(tree: Tree) -> list[list[PathTwist]]:
+    return [
+        [PathTwist(link.v.start + k, t, n) for k, (t, n) in enumerate(unit_motions(link.motion))]
+        for link in tree.links
+    ]
+
+
+def _carried(
+    tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]
+) -> list[list[PathTwist]]:
+    """To every link the twists of the links before it, and its own."""
+    outer: list[list[PathTwist]] = []
+    inner: list[list[PathTwist]] = []
+    result: list[list[PathTwist]] = []
+    for j, pose in enumerate(poses):
+        i = tree.links[j].antecedent
+        passed: list[PathTwist] = []
+        if len(pose.run) > 1:
+            p = poses[i].spin.apply(pose.p)
+            seated = [twist.at(p) for twist in outer[i]]
+            passed = [twist.at(pose.p).seen(pose.apply_inverse) for twist in inner[i]]
+        else:
+            before, p = result[i] if i >= 0 else [], origin(pose.motion)
+            seated = [twist.at(pose.foot).seen(pose.at_seat).at(p) for twist in before]
+        outer.append(seated)
+        inner.append([*passed, *own[j]])
+        result.append([twist.seen(pose.spin.apply_inverse) for twist in seated] + inner[j])
+    return result
+
 
 Unit = tuple[SX | None, SX | None]
 """Force and moment, or linear and angular momentum, of a unit of a parameter; None for zero."""
@@ -74,3 +299,129 @@ def work(twist: PathTwist, unit: Unit) -> SX:
 def element(twist: PathTwist, units: list[Unit], k: int) -> SX:
     """Work of the unit of parameter k."""
     return work(twist, units[k])
+
+
+# Energy as a row times the inertial parameters of the links.
+#
+# Source: Gautier & Khalil 1988; Khalil & Creusot 1997, eq. 52.
+
+
+def inertial_energy(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
+    """For every link the row (1, 10) whose product with its parameters is its energy E + U.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        velocities: of the links; see `link_velocities`.
+    """
+    ups = seen_by_links(tree, poses, -tree.gravity)
+    heights: list[SX] = []
+    links: list[Elements] = []
+    for j, pose in enumerate(poses):
+        i = tree.links[j].antecedent
+        below, up = (heights[i], ups[i]) if i >= 0 else (SX(0), -tree.gravity)
+        heights.append(below + casadi.dot(up, pose.p))
+        row = unit_energies(velocities[j], ups[j], heights[j])
+        links.append({0: row.__getitem__})
+    return filled(tree, poses, 1, links)
+
+
+def unit_energies(velocity: Velocity, up: SX, height: SX) -> list[SX]:
+    """Energies of a link of which one inertial parameter is one, in their order.
+
+    Args:
+        velocity: of the link.
+        up: (3, 1) the opposite of gravity, in its frame.
+        height: potential energy of a unit of mass at its origin.
+    """
+    V, w = velocity.V, velocity.w
+    x, y, z = w[0], w[1], w[2]
+    turning = [0.5 * x * x, x * y, x * z, 0.5 * y * y, y * z, 0.5 * z * z]
+    firsts = [casadi.dot(axis(k), cross(V, w) + up) for k in range(3)]
+    return [*turning, *firsts, 0.5 * casadi.dot(V, V) + height]
+
+
+# Momentum and its rate as matrices times the inertial parameters, without joint accelerations.
+#
+# The effort of a joint is the rate of the momentum along its axis, less what the turning of that
+# axis makes of it, and gravity: Gamma = d(D1 K)/dt + D2 K.
+#
+# Source: Khalil & Restrepo 1996; Khalil & Creusot 1997, eq. 41-43.
+
+
+def momentum_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
+    """For every link the matrix (nv, 10) of D1: the derivative of kinetic energy in v.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        velocities: of the links; see `link_velocities`.
+    """
+    links: list[Elements] = []
+    for velocity, twists in zip(velocities, path_twists(tree, poses), strict=True):
+        units = unit_momenta(velocity)
+        links.append({twist.row: partial(element, twist, units) for twist in twists})
+    return filled(tree, poses, tree.nv, links)
+
+
+def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
+    """For every link the matrix (nv, 10) of D2: less the derivative of E - U in the positions.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        velocities: of the links; see `link_velocities`.
+    """
+    links: list[Elements] = []
+    paths = path_twists(tree, poses)
+    rates = path_twist_rates(tree, poses, velocities)
+    ups = seen_by_links(tree, poses, -tree.gravity)
+    level = _level_rows(tree, paths, ups)
+    for j, velocity in enumerate(velocities):
+        units, lifts = unit_momenta(velocity), unit_lifts(ups[j])
+        rows: dict[int, Callable[[int], SX]] = {}
+        for twist, rate in zip(paths[j], rates[j], strict=True):
+            raising = None if twist.row in level else twist
+            rows[twist.row] = partial(_element, raising, rate, lifts, units)
+        links.append(rows)
+    return filled(tree, poses, tree.nv, links)
+
+
+def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:
+    """Velocities that raise nothing: turns about vertical axes and level slides."""
+    own = [
+        (twist, ups[j])
+        for j, link in enumerate(tree.links)
+        for twist in paths[j]
+        if link.v.start <= twist.row < link.v.stop
+    ]
+    return {t.row for t, up in own if is_zero(cross(t.n, up)) and casadi.dot(t.t, up).is_zero()}
+
+
+def unit_momenta(velocity: Velocity) -> list[Unit]:
+    """Momenta of a link of which one inertial parameter is one, in their order."""
+    V, w = velocity.V, velocity.w
+    turning = (
+        (w[0], 0, 0),
+        (w[1], w[0], 0),
+        (w[2], 0, w[0]),
+        (0, w[1], 0),
+        (0, w[2], w[1]),
+        (0, 0, w[2]),
+    )
+    inertias: list[Unit] = [(None, vector(angular)) for angular in turning]
+    firsts: list[Unit] = [(cross(w, axis(k)), cross(axis(k), V)) for k in range(3)]
+    return [*inertias, *firsts, (V, None)]
+
+
+def unit_lifts(up: SX) -> list[Unit]:
+    """The wrenches that hold such a link against gravity, whose opposite is `up`, (3, 1)."""
+    nothing: Unit = (None, None)
+    return [nothing] * 6 + [(None, cross(axis(k), up)) for k in range(3)] + [(up, None)]
+
+
+def _element(
+    twist: PathTwist | None, rate: PathTwist, lifts: list[Unit], units: list[Unit], k: int
+) -> SX:
+    lifted = SX(0) if twist is None else work(twist, lifts[k])
+    return lifted - work(rate, units[k])

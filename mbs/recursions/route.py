@@ -8,15 +8,18 @@ Source: Khalil & Kleinfinger 1986 for the frames; Renaud 1980 for sums of angles
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import casadi
-from casadi import SX
+from casadi import SX, Function
 
-from mbs.assembly.tree import Link, Tree
-from mbs.components.motion import Motion
-from mbs.recursions.cost import cost
+from mbs.assembly.tree import Frame, Link, Tree
+from mbs.components.forces import RelativeMotion
+from mbs.components.joints import Motion
+from mbs.operations import count
+from mbs.recursions.poses import LinkPose
+from mbs.recursions.velocities import Acceleration, Velocity
 from mbs.spatial import (
     Khalil,
     MatrixTurn,
@@ -24,10 +27,52 @@ from mbs.spatial import (
     Rotation,
     Turn,
     axis_turn,
+    cross,
     is_zero,
     quaternion_rotation,
     vector,
+    zeros,
 )
+
+# The price of a result, by which one of several ways to it is chosen.
+
+
+def cost(value: SX, q: SX, p: SX) -> int:
+    """The price of a matrix; see `mbs.operations.counts.Count.price`.
+
+    Args:
+        value: of the symbols q and p.
+        q: (nq, 1) positions.
+        p: (np, 1) parameters; operations on them alone are free.
+    """
+    names = ["q", "p"], ["value"]
+    f = Function("f", [q, p], [casadi.densify(value)], *names, {"cse": True})
+    return count(f).price
+
+
+def price(value: SX, parameters: Collection[int]) -> int:
+    """The price of a matrix of any symbols, operations on parameters alone being free.
+
+    Args:
+        value: the matrix.
+        parameters: hashes of their symbols; see `parameters_of`.
+    """
+    symbols = casadi.symvar(value)
+    kinds: tuple[list[SX], list[SX]] = ([], [])
+    for symbol in symbols:
+        kinds[symbol.element_hash() in parameters].append(symbol)
+    return cost(value, casadi.vertcat(SX(0, 1), *kinds[0]), casadi.vertcat(SX(0, 1), *kinds[1]))
+
+
+def parameters_of(tree: Tree, poses: list[LinkPose]) -> frozenset[int]:
+    """Hashes of the symbols that the constants of a tree hold."""
+    constants = [tree.gravity]
+    for link, pose in zip(tree.links, poses, strict=True):
+        constants += [link.inertia.parameters, pose.foot, pose.at_seat(vector([1, 1, 1]))]
+        if link.motion is Motion.REVOLUTE:
+            constants.append(pose.height)
+    symbols = casadi.symvar(casadi.vertcat(*map(casadi.vec, constants)))
+    return frozenset(symbol.element_hash() for symbol in symbols)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -277,3 +322,86 @@ def common_link(tree: Tree, a: int, b: int) -> int:
 def along(rotation: Rotation, vectors: Iterable[SX]) -> list[SX]:
     """Each vector of the turned frame in the fixed one; zeros stay zeros."""
     return [v if is_zero(v) else casadi.densify(rotation.apply(v)) for v in vectors]
+
+
+# How frames fixed on links move, by themselves and seen from each other.
+#
+# Source: Khalil & Dombre 2002 for composition of velocities and accelerations.
+
+
+BASE: Frame = (-1, Pose.identity())
+"""The frame of the base."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RelativeAcceleration:
+    """Accelerations of a frame b for an observer who moves with a frame a, in the axes of a.
+
+    Attributes:
+        A: (3, 1) of the origin of b [m/s^2].
+        wd: (3, 1) angular [rad/s^2].
+    """
+
+    A: SX
+    wd: SX
+
+
+def relative_motion(
+    tree: Tree, a: Frame, b: Frame, q: SX, moving: list[Velocity]
+) -> RelativeMotion:
+    """How frame b moves, seen from frame a and in its axes.
+
+    Args:
+        tree: the links.
+        a: the frame of the observer.
+        b: the frame that moves.
+        q: (nq, 1) positions.
+        moving: velocities of the links, each in its frame.
+    """
+    T = relative_pose(tree, q, a, b)
+    V_a, w_a = frame_velocity(a, moving)
+    V_b, w_b = frame_velocity(b, moving)
+    V = casadi.mtimes(T.R, V_b) - V_a - cross(w_a, T.p)
+    return RelativeMotion(T.p, T.R, V, casadi.mtimes(T.R, w_b) - w_a)
+
+
+def frame_velocity(frame: Frame, moving: list[Velocity]) -> tuple[SX, SX]:
+    """Linear and angular velocity of a frame, in its axes."""
+    link, pose = frame
+    if link < 0:
+        return zeros(), zeros()
+    V, w = moving[link].V, moving[link].w
+    return casadi.mtimes(pose.R.T, V + cross(w, pose.p)), casadi.mtimes(pose.R.T, w)
+
+
+def relative_acceleration(
+    motion: RelativeMotion, a: Frame, b: Frame, motions: list[Acceleration]
+) -> RelativeAcceleration:
+    """Accelerations of frame b, seen from frame a and in its axes.
+
+    Args:
+        motion: of b seen from a.
+        a: the frame of the observer.
+        b: the frame that moves.
+        motions: of the links, each in its frame; gravity takes no part where the base rests.
+    """
+    A_a, w_a, wd_a = _acceleration(a, motions)
+    A_b, _, wd_b = _acceleration(b, motions)
+    p, R = motion.p, motion.R
+    carried = A_a + cross(wd_a, p) + cross(w_a, cross(w_a, p)) + 2 * cross(w_a, motion.V)
+    return RelativeAcceleration(
+        casadi.mtimes(R, A_b) - carried,
+        casadi.mtimes(R, wd_b) - wd_a - cross(w_a, motion.w),
+    )
+
+
+def _acceleration(frame: Frame, motions: list[Acceleration]) -> tuple[SX, SX, SX]:
+    """Acceleration of the origin, angular velocity and acceleration of a frame, in its axes."""
+    link, pose = frame
+    if link < 0:
+        return zeros(), zeros(), zeros()
+    motion = motions[link]
+    at = motion.vd + casadi.mtimes(motion.rate.U, pose.p)
+    turned = (casadi.mtimes(pose.R.T, vector) for vector in (at, motion.w, motion.wd))
+    A, w, wd = turned
+    return A, w, wd

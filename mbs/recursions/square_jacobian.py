@@ -18,10 +18,19 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly.tree import Tree
-from mbs.recursions.jacobian import VelocityTarget
-from mbs.recursions.renaud import arm_from, cheapest_jacobian, spread
+from mbs.recursions.jacobian import (
+    Array,
+    Survey,
+    VelocityTarget,
+    arm_from,
+    cheapest_jacobian,
+    nonzero,
+    random_samples,
+    spread,
+    survey,
+    varying,
+)
 from mbs.recursions.route import relative_pose
-from mbs.recursions.survey import Array, Survey, nonzero, random_samples, survey, varying
 from mbs.solvers.block_triangular import Block, block_triangular, determinant, solve_blocks
 from mbs.spatial import skew
 

@@ -7,12 +7,45 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
-from mbs.recursions.motion import relative_motion
+from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import cross, is_zero, zeros
+from mbs.spatial import Screw, cross, is_zero, vector, zeros
+
+# What an elementary motion adds to a link: its velocity, and the effort that it feels.
+
+
+def motion_behind(motion: Motion, v: SX) -> tuple[SX, SX]:
+    """Linear and angular velocity of frame j with respect to its placement, both in frame j."""
+    match motion:
+        case Motion.REVOLUTE:
+            return zeros(), casadi.vertcat(SX(0), SX(0), v)
+        case Motion.PRISMATIC:
+            return casadi.vertcat(SX(0), SX(0), v), zeros()
+        case Motion.SPHERICAL:
+            return zeros(), v
+    return v[0:3], v[3:6]
+
+
+def effort(motion: Motion, f: SX, m: SX) -> SX:
+    """The part of a wrench, force f and moment m about the origin of frame j, along the motion."""
+    match motion:
+        case Motion.REVOLUTE:
+            return m[2]
+        case Motion.PRISMATIC:
+            return f[2]
+        case Motion.SPHERICAL:
+            return m
+    return casadi.vertcat(f, m)
+
+
+def unit_motions(motion: Motion) -> list[tuple[SX, SX]]:
+    """Linear and angular velocity in frame j for a unit of each of its velocities."""
+    identity = SX.eye(motion.nv)
+    return [motion_behind(motion, casadi.densify(identity[:, k])) for k in range(motion.nv)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,9 +69,210 @@ def link_velocities(
     for link, pose in zip(tree.links, poses, strict=True):
         i = link.antecedent
         before = result[i] if i >= 0 else (base or Velocity(zeros(), zeros()))
-        linear, angular = relative_motion(link.motion, v[link.v])
+        linear, angular = motion_behind(link.motion, v[link.v])
         moved = before.V if is_zero(before.w) else before.V + cross(before.w, pose.p)
         result.append(
             Velocity(pose.apply_inverse(moved) + linear, pose.apply_inverse(before.w) + angular)
         )
     return result
+
+
+# The matrix U of a turning body, and its moment, on the fewest products.
+#
+# Source: Balafoutis, Patel & Misra 1988 for the moment; Khalil & Creusot 1997, eq. 8-10.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RotationRate:
+    """How acceleration changes over a turning body: U = skew(wd) + skew(w) skew(w).
+
+    Attributes:
+        U: (3, 3) [rad/s^2].
+        spread: U33 - U22, U11 - U33 and U22 - U11.
+    """
+
+    U: SX
+    spread: tuple[SX, SX, SX]
+
+
+def rotation_rate(w: SX, wd: SX, across: SX | None = None, still: SX | None = None) -> RotationRate:
+    """U on six products of the velocities, or on five.
+
+    Args:
+        w: (3, 1) angular velocity.
+        wd: (3, 1) angular acceleration.
+        across: x^2 + y^2 of w where it is known; y^2 then needs no product.
+        still: (3, 1) part of wd that is not w x (0, 0, z), where z is the third element of w;
+            then U13 and U23 are elements of it.
+    """
+    x, y, z = w[0], w[1], w[2]
+    xx, zz, xy, xz, yz = x * x, z * z, x * y, x * z, y * z
+    xy_square = xx + y * y if across is None or x.is_zero() or y.is_zero() else across
+    xz_square, xz_difference = xx + zz, xx - zz
+    yz_square = xy_square - xz_difference
+    U13, U23 = (xz + wd[1], yz - wd[0]) if still is None else (still[1], -still[0])
+    U = casadi.vertcat(
+        casadi.horzcat(-yz_square, xy - wd[2], U13),
+        casadi.horzcat(xy + wd[2], -xz_square, U23),
+        casadi.horzcat(xz - wd[1], yz + wd[0], -xy_square),
+    )
+    return RotationRate(U, (xz_square - xy_square, xz_difference, yz_square - xz_square))
+
+
+def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
+    """(3, 1) J wd + w x (J w), the skew part of U S: thirteen products when S[2, 2] is zero.
+
+    Row x is (U S)_zy - (U S)_yz, the integral of y (U r)_z - z (U r)_y.
+
+    Args:
+        S: (3, 3) second moments of the body's mass.
+        rate: of its rotation.
+    """
+    rows, U = [], rate.U
+    for k in range(3):
+        m, n = (k + 1) % 3, (k + 2) % 3
+        row = U[n, k] * S[k, m] - U[m, k] * S[k, n] + rate.spread[k] * S[m, n]
+        rows.append(row + _difference(U[n, m], S[m, m], U[m, n], S[n, n]))
+    return casadi.vertcat(*rows)
+
+
+def _difference(a: SX, first: SX, b: SX, second: SX) -> SX:
+    """A first - b second; one product when a = b or a = -b."""
+    if (a + b).is_zero():
+        return a * (first + second)
+    if (a - b).is_zero():
+        return a * (first - second)
+    return a * first - b * second
+
+
+# Accelerations of the links, each in its own frame.
+#
+# Source: Khalil & Creusot 1997, eq. 6 and 8-10.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Acceleration:
+    """What the equations of a link need of its motion.
+
+    Attributes:
+        w: (3, 1) angular velocity in frame j [rad/s].
+        wd: (3, 1) angular acceleration in frame j [rad/s^2].
+        rate: of rotation, in frame j.
+        vd: (3, 1) acceleration of the origin of frame j, minus gravity, in frame j [m/s^2].
+    """
+
+    w: SX
+    wd: SX
+    rate: RotationRate
+    vd: SX
+
+
+def resting_base(gravity: SX) -> Acceleration:
+    """A base at rest; gravity, (3, 1) in its frame, enters as an upward acceleration."""
+    return moving_base(zeros(), zeros(), -gravity)
+
+
+def moving_base(w: SX, wd: SX, vd: SX) -> Acceleration:
+    """A base with a given motion, all (3, 1) in its frame; vd is minus gravity."""
+    return Acceleration(w, wd, rotation_rate(w, wd), vd)
+
+
+def link_accelerations(
+    tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
+) -> list[Acceleration]:
+    """Acceleration of every link.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        v: (nv, 1) joint velocities.
+        a: (nv, 1) joint accelerations.
+        base: motion of the base; see `resting_base`.
+    """
+    result: list[Acceleration] = []
+    for j, link in enumerate(tree.links):
+        pose = poses[j]
+        before = result[link.antecedent] if link.antecedent >= 0 else base
+        linear, angular = motion_behind(link.motion, v[link.v])
+        linear_rate, _ = motion_behind(link.motion, a[link.v])
+        w, wd, rate = _rotation(tree, poses, j, v, a, [*result, base])
+        vd = _moved(pose, before, rate.U) + linear_rate
+        vd += cross(2 * pose.apply_inverse(before.w) + angular, linear)
+        result.append(Acceleration(w, wd, rate, vd))
+    return result
+
+
+def _rotation(
+    tree: Tree, poses: list[LinkPose], j: int, v: SX, a: SX, motions: list[Acceleration]
+) -> tuple[SX, SX, RotationRate]:
+    """w, wd and U of link j; `motions` are those of the links before it and, last, of the base."""
+    link, pose = tree.links[j], poses[j]
+    before = motions[link.antecedent]
+    if link.motion.nv > 1:
+        _, angular = motion_behind(link.motion, v[link.v])
+        _, angular_rate = motion_behind(link.motion, a[link.v])
+        w_i = pose.apply_inverse(before.w)
+        w = w_i + angular
+        wd = pose.apply_inverse(before.wd) + angular_rate + cross(w_i, angular)
+        return w, wd, rotation_rate(w, wd)
+    run = _run(tree, poses, j, motions)
+    first = poses[run[0]]
+    root = motions[tree.links[run[0]].antecedent]
+    w_seat, wd_seat = first.at_seat(root.w), first.at_seat(root.wd)
+    turn = pose.spin if len(run) > 1 else pose.motion[0].turn
+    speed, acceleration = SX(0), SX(0)
+    if link.motion is Motion.REVOLUTE:
+        for k in run:
+            speed, acceleration = speed + v[tree.links[k].v], acceleration + a[tree.links[k].v]
+    w = turn.apply_inverse(w_seat) + vector([0, 0, speed])
+    carried = turn.apply_inverse(wd_seat)
+    wd = carried + vector([w[1] * speed, -w[0] * speed, acceleration])
+    still = carried if w_seat[2].is_zero() else None
+    return w, wd, rotation_rate(w, wd, _square_across(before, pose), still)
+
+
+def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]) -> tuple[int, ...]:
+    """The joints that turn the angular velocity of link j.
+
+    Those of a run of parallel axes turn it once, by the sum of their angles, where it has a zero
+    before the first of them: the zero would be lost from joint to joint.
+    """
+    run = poses[j].run
+    w = poses[run[0]].at_seat(motions[tree.links[run[0]].antecedent].w)
+    return run if w[0].is_zero() or w[1].is_zero() else (j,)
+
+
+def _square_across(before: Acceleration, pose: LinkPose) -> SX | None:
+    """The square of the angular velocity across axis j, where an entry of U_i already holds it.
+
+    It is the same for both links of the joint. When the axis is coordinate axis k of frame i,
+    it is -U_i[k, k].
+    """
+    axis = vector([0, 0, 1])
+    for step in reversed(pose.seat):
+        axis = step.turn.apply(axis)
+    for k in range(3):
+        if axis[(k + 1) % 3].is_zero() and axis[(k + 2) % 3].is_zero():
+            return SX(-before.rate.U[k, k])
+    return None
+
+
+def _moved(pose: LinkPose, before: Acceleration, U: SX) -> SX:
+    """Acceleration of the point of link i at the origin of frame j, in frame j.
+
+    A point on the axis of a joint is a point of both links: its distance r from the foot of the
+    axis may be multiplied by U_j instead of U_i, whichever has fewer entries.
+    """
+    screw, U_i = pose.motion[0], before.rate.U
+    if isinstance(screw, Screw):
+        slide = pose.p - pose.foot
+        if _products(U_i, slide) > _products(U, vector([0, 0, screw.t])):
+            carried = pose.apply_inverse(before.vd + casadi.mtimes(U_i, pose.foot))
+            return carried + screw.t * U[:, 2]
+    return pose.apply_inverse(before.vd + casadi.mtimes(U_i, pose.p))
+
+
+def _products(U: SX, p: SX) -> int:
+    """How many multiplications U p takes."""
+    moved = [k for k in range(3) if not p[k].is_zero()]
+    return sum(not U[row, k].is_zero() for row in range(3) for k in moved)

@@ -12,7 +12,7 @@ from mbs.components import Mechanism
 from mbs.errors import DescriptionError
 from mbs.expressions import Parameter
 from mbs.formats import from_dict, read_mjcf, read_par, read_toml, read_urdf, to_mechanism
-from mbs.messages import did_you_mean
+from mbs.text import did_you_mean
 
 _READERS: Mapping[str, Callable[[str | Path], Mechanism]] = MappingProxyType(
     {

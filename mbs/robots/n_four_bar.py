@@ -7,7 +7,7 @@ from math import pi
 
 from mbs.components import Body, Mechanism, Revolute
 from mbs.errors import DescriptionError
-from mbs.messages import quoted
+from mbs.text import quoted
 
 _SOURCE = (
     "Gonzalez, Dopico, Lugris & Cuadrado 2006, multibody benchmark library, problem A02;"

@@ -2,7 +2,6 @@
 
 from mbs.simulate.fmu import fmu
 from mbs.simulate.run import run
-from mbs.simulate.sweep import sweep
-from mbs.simulate.swept import Sweep
+from mbs.simulate.sweep import Sweep, sweep
 
 __all__ = ["Sweep", "fmu", "run", "sweep"]

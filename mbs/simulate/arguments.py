@@ -5,7 +5,7 @@ import numbers
 import numpy as np
 
 from mbs.errors import ModelError
-from mbs.messages import quoted
+from mbs.text import quoted
 
 LONGEST = 10_000_000
 """Rows of the longest result."""

@@ -3,16 +3,268 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from mbs.errors import ModelError
+from mbs.errors import ModelError, SolverError
+from mbs.result import Result
 from mbs.simulate.arguments import count_steps
-from mbs.simulate.fmu_inputs import Tracks
-from mbs.simulate.fmu_variables import set_values
+from mbs.simulate.fmu_variables import (
+    CONTINUOUS,
+    NOTHING,
+    NUMBERS,
+    columns_of,
+    numbers_of,
+    reader,
+    set_values,
+    writer,
+)
+from mbs.text import did_you_mean, quoted
+
+# Values of the variables of an FMU that a user gives.
+
+
+Array = NDArray[np.float64]
+Signal = float | Callable[[float], float] | tuple[ArrayLike, ArrayLike]
+
+_FORMS = "a number, a function of time, or (times, values)"
+
+
+def start_values(
+    description: Any, parameters: Mapping[str, float], start: Mapping[str, float]
+) -> dict[str, float]:
+    """Values of parameters, states and inputs before the run, their names and numbers checked."""
+    known = numbers_of(description)
+    every = (*known, *(v.name for v in description.modelVariables))
+    fixed = {n for n, v in known.items() if v.causality == "parameter"}
+    check_names("parameters", parameters, fixed, every)
+    check_names("start", start, {n for n, v in known.items() if _settable(v)} - fixed, every)
+    return {name: finite_number(name, value) for name, value in {**start, **parameters}.items()}
+
+
+def _settable(variable: Any) -> bool:
+    """Whether the standard allows to set it before the run."""
+    if variable.variability == "constant" or variable.causality == "independent":
+        return False
+    return variable.causality == "input" or variable.initial in ("exact", "approx")
+
+
+def check_names(what: str, given: Iterable[str], allowed: set[str], known: Iterable[str]) -> None:
+    """Refuse names that are unknown or may not be given.
+
+    Args:
+        what: the argument that names them.
+        given: names.
+        allowed: names that may be given.
+        known: all names.
+
+    Raises:
+        ModelError: says which name, and the nearest one that may be given.
+    """
+    everything = set(known)
+    for name in given:
+        if name not in allowed:
+            why = "cannot be set" if name in everything else "does not exist"
+            hint = did_you_mean(name, sorted(allowed))
+            raise ModelError(f"{what}: variable {name!r} {why} here; {hint}")
+
+
+def pair(name: str, signal: tuple[Any, ...]) -> tuple[Array, Array]:
+    """The times and values of a table.
+
+    Raises:
+        ModelError: it is no pair of arrays of numbers.
+    """
+    try:
+        times, values = (np.asarray(part, dtype=float) for part in signal)
+    except (TypeError, ValueError):
+        raise ModelError(f"input {name} is {quoted(signal)}; give {_FORMS}") from None
+    return times, values
+
+
+def finite_number(name: str, value: Any) -> float:
+    """A value as a finite number.
+
+    Raises:
+        ModelError: it is none.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = float("nan")
+    if not np.isfinite(number):
+        raise ModelError(f"{name} = {quoted(value)}: use a finite number")
+    return number
+
+
+# Inputs of an FMU over time, as they jump, bend and are held.
+
+
+Inputs = Mapping[str, Signal] | Result
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """One input over time.
+
+    Attributes:
+        value: of (time, True right after a jump or False right before it).
+        corners: times at which it bends or jumps [s].
+        jumps: times at which it jumps [s].
+    """
+
+    value: Callable[[float, bool], float]
+    corners: tuple[float, ...] = ()
+    jumps: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Tracks:
+    """All inputs that are given.
+
+    Attributes:
+        variables: of the model description.
+        tracks: one for each.
+        starts: values at the start, of elements of arrays that have no track.
+    """
+
+    variables: tuple[Any, ...]
+    tracks: tuple[Track, ...]
+    starts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def corners(self) -> list[float]:
+        """Times at which an input bends or jumps [s]."""
+        return sorted({t for track in self.tracks for t in track.corners})
+
+    @property
+    def jumps(self) -> frozenset[float]:
+        """Times at which an input jumps [s]."""
+        return frozenset(t for track in self.tracks for t in track.jumps)
+
+    def continuous(self) -> Tracks:
+        """Those that are continuous in time."""
+        chosen = [k for k, variable in enumerate(self.variables) if _continuous(variable)]
+        variables = tuple(self.variables[k] for k in chosen)
+        return Tracks(variables, tuple(self.tracks[k] for k in chosen), self.starts)
+
+    def at(self, time: float, after: bool) -> list[float]:
+        """The value of each input at a time, right after a jump or right before it."""
+        return [track.value(time, after) for track in self.tracks]
+
+    def setter(self, instance: Any) -> Callable[[float, bool], None]:
+        """A function of (time, after) that sets the inputs of an instance."""
+        write = writer(instance, self.variables, self.starts)
+
+        def apply(time: float, after: bool) -> None:
+            if self.variables:
+                write(self.at(time, after))
+
+        return apply
+
+    def slopes(self, begin: float, end: float) -> tuple[list[int], list[float]]:
+        """Value references of the continuous inputs, and their mean rates over a step [1/s]."""
+        given = [
+            (variable.valueReference, track)
+            for variable, track in zip(self.variables, self.tracks, strict=True)
+            if _continuous(variable)
+        ]
+        rises = [t.value(end, False) - t.value(begin, True) for _, t in given]
+        return [r for r, _ in given], [rise / (end - begin) for rise in rises]
+
+
+def tracks_of(description: Any, inputs: Inputs, starts: Mapping[str, float] = NOTHING) -> Tracks:
+    """Inputs as functions of time.
+
+    Args:
+        description: of the FMU.
+        inputs: name of an input to a number, a function of time or (times, values); or a Result,
+            whose columns feed the inputs of the same name; of an array its elements, `tau[2]`.
+        starts: values at the start, by name.
+
+    Raises:
+        ModelError: a name is unknown or no input, or a value does not fit.
+    """
+    numbers = numbers_of(description)
+    known = {name: v for name, v in numbers.items() if v.causality == "input"}
+    if isinstance(inputs, Result):
+        inputs = _from_result(inputs, known)
+    every = (*numbers, *(v.name for v in description.modelVariables))
+    check_names("inputs", inputs, set(known), every)
+    variables = tuple(known[name] for name in inputs)
+    tracks = tuple(_track(known[name], signal) for name, signal in inputs.items())
+    return Tracks(variables, tracks, starts)
+
+
+def _continuous(variable: Any) -> bool:
+    return variable.type in CONTINUOUS and variable.variability != "discrete"
+
+
+def _from_result(result: Result, known: Mapping[str, Any]) -> dict[str, Signal]:
+    found: dict[str, Signal] = {n: (result.time, result[n]) for n in known if n in result}
+    if not found:
+        raise ModelError(
+            f"inputs: result {result.name!r} has no column of an input; the FMU has"
+            f" {did_you_mean('', known)}"
+        )
+    return found
+
+
+def _track(variable: Any, signal: Signal) -> Track:
+    name = str(variable.name)
+    if callable(signal):
+        return _of_function(name, signal)
+    if isinstance(signal, tuple):
+        return _of_table(name, signal, straight=_continuous(variable))
+    number = finite_number(f"input {name}", signal)
+    return Track(lambda time, after: number)
+
+
+def _of_function(name: str, function: Callable[[float], float]) -> Track:
+    def value(time: float, after: bool) -> float:
+        try:
+            found = float(function(time))
+        except Exception as error:
+            raise ModelError(
+                f"input {name}: no number at time {time:g} s ({error}); give a function of time"
+                " that returns one"
+            ) from error
+        if not np.isfinite(found):
+            raise ModelError(
+                f"input {name} has a value that is not finite at time {time:g} s; use numbers"
+            )
+        return found
+
+    return Track(value)
+
+
+def _of_table(name: str, signal: tuple[Any, ...], *, straight: bool) -> Track:
+    times, values = pair(name, signal)
+    if times.ndim != 1 or times.shape != values.shape or not len(times):
+        raise ModelError(f"input {name}: give as many values as increasing times")
+    if np.any(np.diff(times) < 0):
+        raise ModelError(
+            f"input {name}: the times decrease; give as many values as increasing times"
+        )
+    if not (np.isfinite(times).all() and np.isfinite(values).all()):
+        raise ModelError(f"input {name} has a value that is not finite; use numbers")
+    last = len(times) - 1
+
+    def value(time: float, after: bool) -> float:
+        k = int(np.searchsorted(times, time, side="right" if after else "left"))
+        if k == 0 or k > last or not straight:
+            return float(values[min(max(k - 1, 0), last)])
+        share = (time - times[k - 1]) / (times[k] - times[k - 1])
+        return float(values[k - 1] + share * (values[k] - values[k - 1]))
+
+    repeated = times[:-1][np.diff(times) == 0]
+    jumps = repeated if straight else times[1:][np.diff(values) != 0]
+    return Track(value, tuple(map(float, times)), tuple(map(float, jumps)))
+
 
 Interface = Literal["CoSimulation", "ModelExchange"]
 
@@ -134,3 +386,122 @@ def require_equal_steps(plan: Plan, where: str) -> None:
             f"{where}: steps of {steps[0]:g} s do not divide {span:g} s and the FMU takes steps of"
             f" one length only; give step={span / count:.12g}"
         )
+
+
+# What is kept of the run of an FMU: rows of variables, and events.
+
+
+Event = tuple[float, str, str]
+
+
+@dataclass(slots=True)
+class Recording:
+    """Rows and events of a run, while it lasts.
+
+    Attributes:
+        name: of the model.
+        columns: name of a column to its unit.
+        read: the values of a row now.
+        watched: names of the discrete variables.
+        modes: their values now.
+        reached: told the time of every row.
+        times: of the rows [s].
+        rows: values.
+        events: time, name and words.
+    """
+
+    name: str
+    columns: dict[str, str]
+    read: Callable[[], list[float]]
+    watched: list[str]
+    modes: Callable[[], list[float]]
+    reached: Callable[[float], None]
+    times: list[float] = field(default_factory=list)
+    rows: list[list[float]] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    last: list[float] = field(default_factory=list)
+
+    def begin(self, time: float) -> None:
+        """The first row."""
+        self.last = self.modes() if self.watched else []
+        self.row(time)
+
+    def row(self, time: float) -> None:
+        """Keep the values of now, once where nothing has changed at that time.
+
+        Raises:
+            SolverError: one of them is not finite.
+        """
+        values = self.read()
+        for column, value in zip(self.columns, values, strict=True):
+            if not math.isfinite(value):
+                raise SolverError(f"FMU {self.name}: {column} is not finite at time {time:g} s")
+        if not self.times or self.times[-1] != time or self.rows[-1] != values:
+            self.times.append(time)
+            self.rows.append(values)
+        self.reached(time)
+
+    def happened(self, time: float, otherwise: Iterable[tuple[str, str]] = ()) -> None:
+        """Keep every discrete variable that has changed, or where none has, these names and words.
+
+        Args:
+            time: [s].
+            otherwise: what is said where no discrete variable changed.
+        """
+        now = self.modes() if self.watched else []
+        changed = [
+            (time, name, f"{before:g} -> {after:g}")
+            for name, before, after in zip(self.watched, self.last, now, strict=True)
+            if before != after
+        ]
+        self.last = now
+        self.events.extend(changed or [(time, name, words) for name, words in otherwise])
+
+    def ended(self, time: float) -> None:
+        """The FMU asks for the end."""
+        self.events.append((time, self.name, "ends the simulation"))
+
+    def result(self, stopped: tuple[float, str] | None = None) -> Result:
+        """All of it.
+
+        Args:
+            stopped: time, s, and sentence of what stopped the run early; None where it is complete.
+        """
+        values = np.array(self.rows, dtype=float).reshape(len(self.times), len(self.columns))
+        return Result(
+            np.array(self.times),
+            values,
+            self.columns,
+            self.name,
+            events=tuple(self.events),
+            stopped=stopped,
+        )
+
+
+def recording_of(
+    instance: Any, description: Any, variables: list[Any], reached: Callable[[float], None]
+) -> Recording:
+    """A recording of an instance, still empty.
+
+    Args:
+        instance: of an FMU, an object of fmpy.
+        description: its model description.
+        variables: to keep.
+        reached: told the time of every row.
+    """
+    watched = [
+        v
+        for v in description.modelVariables
+        if v.variability == "discrete"
+        and v.causality in ("output", "local")
+        and v.type in NUMBERS
+        and not v.dimensions
+    ]
+    return Recording(
+        name=description.modelName,
+        columns=columns_of(variables),
+        read=reader(instance, variables),
+        watched=[v.name for v in watched],
+        modes=reader(instance, watched),
+        reached=reached,
+    )

@@ -2,27 +2,686 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
+import casadi
 import numpy as np
+from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
-from mbs.loops.start import Values, start
-from mbs.models.effort import Effort, effort_function
-from mbs.models.full_state import full_state
+from mbs.errors import Interrupted, ModelError, SolverError
+from mbs.loops.analysis import rows_at
+from mbs.loops.closure import least_upright, rolling_discs
+from mbs.loops.configuration import Values, start
+from mbs.loops.examine import row_independence
+from mbs.loops.velocity import constraint_jacobian, scales
+from mbs.models.contacts import Contacts, contacts_of, require_lasting_rows, require_undriven
+from mbs.models.direct_dynamics import hybrid_dynamics
+from mbs.models.measurements import measurements
+from mbs.models.state.signals import (
+    Effort,
+    Prescribed,
+    Signal,
+    effort_function,
+    signal_function,
+    untraceable,
+)
+from mbs.models.state.tree import FullState, full_state
 from mbs.progress import progress
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
-from mbs.simulate.contacts import contact_columns, every_effort, require_contacts_possible, told
-from mbs.simulate.inputs import device_columns, device_states, input_function
-from mbs.simulate.legs import Leg, Stop, integrated
-from mbs.simulate.motion import Motion, prescribed_motions, started
-from mbs.simulate.sensor_columns import sensor_columns
+from mbs.solvers import EventMotion, Events, integrate_events
+from mbs.solvers.integrate import is_compilable
+from mbs.solvers.problem import Event, failed
+from mbs.text import did_you_mean, quoted
+
+# Rigid stops and dry friction in a simulation: how they start, and what a result tells of them.
+
 
 Array = NDArray[np.float64]
+
+_LIMITS = {-1: "lower", 1: "upper"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactMotion:
+    """What k coordinates with contacts do in a simulation.
+
+    Attributes:
+        first: (2 k,) modes at the start.
+        modes: (m, 2 k) at the times of the motion.
+        events: in the order of time.
+    """
+
+    first: Array
+    modes: Array
+    events: tuple[Event, ...]
+
+
+def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> None:
+    """Refuse what rigid stops and dry friction cannot be simulated with.
+
+    Raises:
+        ModelError: a motion is prescribed where one acts, two of one kind act on one coordinate,
+            or the loops are over-constrained in a way that changes with the posture.
+    """
+    contacts = contacts_of(system)
+    require_undriven(system, contacts, [motion.velocity for motion in motions])
+    require_lasting_rows(system, contacts)
+
+
+def first_modes(system: System, x0: Array, p: Sequence[float]) -> Array:
+    """(2 k,) modes at the start: what rests at a limit touches it, what moves slides.
+
+    Args:
+        system: with k coordinates on which contacts act.
+        x0: state at the start.
+        p: (np,) parameters.
+
+    Raises:
+        ModelError: a coordinate starts beyond a limit.
+    """
+    contacts, nq = contacts_of(system), system.nq
+    q, v = SX.sym("q", nq), SX.sym("v", system.nv)
+    start = Function("start", [q, v, system.p], [*contacts.first(q, v), *contacts.bounds])
+    modes, outside, *limits = (
+        np.array(value)[:, 0] for value in start(x0[:nq], x0[nq : nq + system.nv], p)
+    )
+    for number in np.flatnonzero(outside > 0):
+        side, j = divmod(int(number), len(contacts))
+        position = contacts.positions[j]
+        assert position is not None
+        raise ModelError(
+            f"{system.name}: {contacts.names[j]} starts at {x0[position]:g}, beyond the"
+            f" {_LIMITS[2 * side - 1]} limit {limits[side][j]:g} of its rigid stop; start inside,"
+            " by q0"
+        )
+    return modes
+
+
+def contact_columns(
+    system: System, contact: ContactMotion | None, efforts: Array
+) -> Iterator[tuple[str, str, Array]]:
+    """Name, unit and values of the columns of contacts.
+
+    Args:
+        system: with k coordinates on which contacts act.
+        contact: their modes.
+        efforts: (m, 2 k) of the stops, then of friction.
+    """
+    if contact is None:
+        return
+    contacts = contacts_of(system)
+    for column, force in enumerate((*contacts.stops, *contacts.frictions)):
+        if force is not None:
+            unit = system.speeds[force.levers[0].velocity].unit
+            yield f"{force.element.name}.mode", "1", contact.modes[:, column]
+            yield f"{force.element.name}.effort", EFFORT_UNIT[unit], efforts[:, column]
+
+
+def every_effort(system: System, tau: Array, efforts: Array) -> Array:
+    """(m, nv) joint efforts, those of contacts included.
+
+    Args:
+        system: with k coordinates on which contacts act, or none.
+        tau: (m, nv) joint efforts without them.
+        efforts: (m, 2 k) of the stops, then of friction.
+    """
+    total = tau.copy()
+    for column, number in enumerate(2 * contacts_of(system).velocities):
+        total[:, number] += efforts[:, column]
+    return total
+
+
+def told(system: System, contact: ContactMotion | None) -> tuple[tuple[float, str, str], ...]:
+    """Time, name of the element and what it does, of every event."""
+    if contact is None:
+        return ()
+    contacts, before = contacts_of(system), contact.first
+    happened = []
+    for event in contact.events:
+        for j in range(len(contacts)):
+            for name, what in _changes(contacts, j, before, event):
+                happened.append((event.time, name, what))
+        before = event.modes
+    return tuple(happened)
+
+
+def _changes(contacts: Contacts, j: int, before: Array, event: Event) -> Iterator[tuple[str, str]]:
+    k = len(contacts)
+    stop, friction = contacts.stops[j], contacts.frictions[j]
+    was, now = int(before[j]), int(event.modes[j])
+    if stop is not None:
+        for side, name in enumerate(("lower", "upper")):
+            if side * k + j in event.fired:
+                rests = now == (-1, 1)[side]
+                yield stop.element.name, f"{'rests at' if rests else 'bounces off'} {name}"
+        if was and not now:
+            yield stop.element.name, f"leaves {_LIMITS[was]}"
+    slid, slides = before[k + j], event.modes[k + j]
+    if friction is not None and slid != slides:
+        yield friction.element.name, "slides" if slides else "sticks"
+
+
+# Inputs of the devices of drive lines, in whatever form the user gives them.
+
+
+def input_function(system: System, u: Effort) -> Function | None:
+    """`u(t, q, v, p) -> u`, (nu, 1), one input for each device.
+
+    Args:
+        system: open or closed.
+        u: constants by the name of the device, or all of them, or a function of (t, q, v), or
+            None for zeros.
+
+    Returns:
+        the Function; None where nothing is given.
+
+    Raises:
+        ModelError: a name is unknown, or the inputs are not (nu, 1) numbers.
+    """
+    if u is None:
+        return None
+    signal = Signal("u", "inputs", [device.input[0] for device in system.devices])
+    if not system.devices:
+        raise ModelError(
+            f"{system.name}: u is given, but no motor and no torque is connected to a flange;"
+            " leave u out, or give the efforts tau of the joints"
+        )
+    if callable(u):
+        return signal_function(system, signal, u)
+    if isinstance(u, Mapping):
+        names = [device.name for device in system.devices]
+        return signal_function(system, signal, SX(DM(_by_name(system, "u", u, names))))
+    return signal_function(system, signal, SX(DM(_numbers(system, "u", u))))
+
+
+def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | None) -> list[float]:
+    """The states of the devices at the start, zero where none is given.
+
+    Args:
+        system: open or closed.
+        z0: by name, such as `motor.i`, or all of them.
+
+    Raises:
+        ModelError: a name is unknown, or a value is no number.
+    """
+    names = [name for device in system.devices for name, _ in device.states]
+    if z0 is None or isinstance(z0, Mapping):
+        return _by_name(system, "z0", z0 or {}, names)
+    values = _numbers(system, "z0", z0)
+    if len(values) != len(names):
+        raise ModelError(
+            f"{system.name}: z0 has {len(values)} values, the devices have {len(names)} states:"
+            f" {', '.join(names)}"
+        )
+    return values
+
+
+def device_columns(
+    system: System, u: Array, z: Array, y: Array
+) -> Iterator[tuple[str, str, Array]]:
+    """Name, unit and values of all that a result shows of devices, from inputs, states, outputs.
+
+    Args:
+        system: open or closed.
+        u: (m, nu) inputs at m instants.
+        z: (m, nz) states.
+        y: (m, ny) outputs.
+    """
+    tables = (
+        ([device.input for device in system.devices], u),
+        ([state for device in system.devices for state in device.states], z),
+        ([output for device in system.devices for output in device.outputs], y),
+    )
+    for quantities, values in tables:
+        for column, (name, unit) in enumerate(quantities):
+            yield name, unit, values[:, column]
+
+
+def _by_name(
+    system: System, what: str, values: Mapping[str, float], names: Sequence[str]
+) -> list[float]:
+    result = [0.0] * len(names)
+    for name, value in values.items():
+        if name not in names:
+            raise ModelError(f"{system.name}: {what} names {name!r}; {did_you_mean(name, names)}")
+        (result[names.index(name)],) = _numbers(system, f"{what} of {name}", [value])
+    return result
+
+
+def _numbers(system: System, what: str, values: Any) -> list[float]:
+    try:
+        numbers = [float(value) for value in values]
+    except (TypeError, ValueError):
+        numbers = [math.nan]
+    if not all(map(math.isfinite, numbers)):
+        raise ModelError(f"{system.name}: {what} is {quoted(values)}; give finite numbers")
+    return numbers
+
+
+# Integration in one leg, or in several: over-constrained loops whose independent rows change.
+#
+# In a loop such as Bennett's, which rows of the closing joint are independent changes with the
+# configuration: no choice holds all the way round. Steps in local tangent coordinates use all
+# rows, and need no choice. Where there are none, as for laws that CasADi cannot write as C, a leg
+# ends where its rows have lost most of their independence, and the next one begins there with
+# rows that are chosen for that configuration.
+
+
+_LOST = 0.05
+"""Part of its independence at the start of a leg at which a leg ends."""
+_SINGULAR = 1e-6
+"""Independence below which a configuration is singular for all rows: a thousandth, as a sine."""
+_FLAT = 1e-3
+"""Sine of the angle between a rolling disc and its plane at which it counts as flat."""
+
+Stop = SolverError | Interrupted | None
+"""Why a motion ends early; None where it does not."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leg:
+    """A part of a motion with one state equation.
+
+    Attributes:
+        state: its equations.
+        times: (m,) s, that were reached.
+        x: (m, nx) states at these times.
+        contact: what rigid stops and dry friction do meanwhile, None where there are none.
+    """
+
+    state: FullState
+    times: Array
+    x: Array
+    contact: ContactMotion | None = None
+
+    @property
+    def without_start(self) -> Leg:
+        """The same without its first row, which belongs to the leg before."""
+        return Leg(self.state, self.times[1:], self.x[1:])
+
+    def observed(self, p: Sequence[float]) -> list[Array]:
+        """What the state equation observes, (m, ..) each."""
+        observe, count = self.state.observe, len(self.times)
+        if not count:
+            return [np.empty((0, observe.numel_out(k))) for k in range(observe.n_out())]
+        own = np.repeat(np.array(p, dtype=float).reshape(-1, 1), count, axis=1)
+        every = own if self.contact is None else np.vstack([own, self.contact.modes.T])
+        values = observe.map(count)(self.times.reshape(1, -1), self.x.T, every)
+        return [np.array(value).T for value in values]
+
+
+def integrated(
+    system: System,
+    equations: Callable[[System], FullState],
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    **options: Any,
+) -> tuple[list[Leg], Stop]:
+    """The motion at given times, in one leg for most systems, and why it ends before the last.
+
+    Args:
+        system: open or closed.
+        equations: the state equation of a system that differs in its independent rows alone.
+        x0: (nx,) state at the first time.
+        times: (m,) s, increasing.
+        p: (np,) parameters.
+        options: of `integrate`.
+
+    Returns:
+        the legs that were reached, one at least; None where they reach the last time, or else why
+        they do not: the message says when and in which configuration, and at a singular one the
+        joint that the loops do not hold.
+    """
+    legs, stop = _integrated(system, equations, x0, times, p, **options)
+    if isinstance(stop, SolverError) and stop.state:
+        q = np.array(stop.state[: system.nq])
+        where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
+        lost = _lost(system, q, p) if stop.singular and system.is_closed else ""
+        stop = SolverError(
+            f"{system.name}: {stop}; the configuration is {where}{lost}",
+            state=stop.state,
+            singular=stop.singular,
+            time=stop.time,
+        )
+    return legs, stop
+
+
+def _lost(system: System, q: Array, p: Sequence[float]) -> str:
+    """The joint that moves most in what the rows hold least at a configuration, in words."""
+    found = scales(system)
+    J = np.array(constraint_jacobian(system)(q, np.array(p, dtype=float)))
+    J = J * found.rows.reshape(-1, 1) * found.columns([speed.unit for speed in system.speeds])
+    assert system.closure is not None
+    rank = system.nv - system.closure.mobility
+    if not rank or not np.isfinite(J).all():
+        return ""
+    free = np.linalg.svd(J)[2][rank - 1 :]  # as many directions as are free there, at the least
+    moves = np.round(np.sum(free**2, axis=0), 6)  # the first of joints that move alike
+    name = system.speeds[int(np.argmax(moves))].name
+    return f", and the loops hardly hold {name} there"
+
+
+def _integrated(
+    system: System,
+    equations: Callable[[System], FullState],
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    **options: Any,
+) -> tuple[list[Leg], Stop]:
+    state = equations(system)
+    if system.closure is not None and system.closure.varies:
+        if state.passage is None or not is_compilable(state.rhs):
+            return _with_other_rows(system, equations, x0, times, p, options)
+        q, parameters = x0[: system.nq], np.array(p, dtype=float)
+        if float(row_independence(system)(q, parameters)) < _SINGULAR:
+            state = equations(rows_at(system, q, parameters))  # the start may be regular for others
+    if state.events is not None:
+        return _with_contacts(system, state, x0, times, p, options)
+    discs = [disc.name for _, disc in rolling_discs(system)]
+    if discs:
+        upright = Limit(least_upright(system), _FLAT)
+        leg, motion = _leg(system, state, x0, times, p, upright, options)
+        if not motion.events:
+            return [leg], motion.stop
+        end = motion.events[0].time
+        return [leg], SolverError(
+            f"{system.name}: {' or '.join(discs)} lies flat on its plane at t = {end:.6g} s, where"
+            " no single point of a disc touches; end the run before, or keep it upright",
+            time=end,
+        )
+    motion = _motion(state, x0, times, None, p, options)
+    return [Leg(state, times[: len(motion.x)], motion.x)], motion.stop
+
+
+def _motion(
+    state: FullState,
+    x0: Array,
+    times: Array,
+    events: Events | None,
+    p: Sequence[float],
+    options: dict[str, Any],
+) -> EventMotion:
+    """The motion as far as it comes."""
+    return integrate_events(
+        state.rhs,
+        x0,
+        times,
+        events,
+        p=p,
+        project=state.project,
+        passage=state.passage,
+        partial=True,
+        **options,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limit:
+    """Where a leg ends: a measure of the configuration falls below a level.
+
+    Attributes:
+        measure: `measure(q, p)`.
+        level: of the measure.
+    """
+
+    measure: Function
+    level: float
+
+
+def _with_other_rows(
+    system: System,
+    equations: Callable[[System], FullState],
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    options: dict[str, Any],
+) -> tuple[list[Leg], Stop]:
+    """Legs of an over-constrained system, each with rows that suit its first posture."""
+    legs: list[Leg] = []
+    start = Leg(equations(system), times[:1], x0.reshape(1, -1))
+    system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
+    if limit is None:
+        moves = x0[system.nq : system.nq + system.nv].any()
+        reason = "singular" if moves else "undetermined"
+        return [start], failed(float(times[0]), 0.0, reason, state=x0.tolist())
+    left = times
+    known: dict[tuple[int, ...], tuple[System, FullState]] = {}
+    while True:
+        assert system.closure is not None
+        rows = (*system.closure.rows, -1, *system.closure.slips)
+        if rows not in known:
+            known[rows] = system, equations(system)
+        system, state = known[rows]
+        leg, motion = _leg(system, state, x0, left, p, limit, options)
+        legs.append(leg if not legs else leg.without_start)
+        if motion.stop is not None or not motion.events:
+            return legs, motion.stop
+        x0, end = motion.x[-1], motion.events[0].time
+        left = left[left > end]
+        if not len(left):
+            return legs, None
+        left = np.concatenate([[end], left])
+        system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
+        if limit is None:
+            return legs, failed(end, 0.0, "singular", state=x0.tolist())
+
+
+def _with_contacts(
+    system: System,
+    state: FullState,
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    options: dict[str, Any],
+) -> tuple[list[Leg], Stop]:
+    assert state.events is not None
+    first = first_modes(system, x0, p)
+    motion = _motion(state, x0, times, Events(*state.events, first), p, options)
+    contact = ContactMotion(first, motion.modes, motion.events)
+    return [Leg(state, times[: len(motion.x)], motion.x, contact)], motion.stop
+
+
+def _leg(
+    system: System,
+    state: FullState,
+    x0: Array,
+    times: Array,
+    p: Sequence[float],
+    limit: Limit,
+    options: dict[str, Any],
+) -> tuple[Leg, EventMotion]:
+    """One leg, and the motion whose first event is its end, if it ends early; it rests then."""
+    n, n_p = len(x0), len(p)
+    t, x, pm, fired = (SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", 1)))
+    parameters, ended = pm[:n_p], pm[n_p]
+    rate = casadi.if_else(
+        ended, 0, state.rhs(t, x, parameters)
+    )  # what has no value there is let be
+    rhs = Function("rhs", [t, x, pm], [rate])
+    assert state.project is not None
+    moved, residual = state.project(t, x, parameters)
+    kept = [casadi.if_else(ended, x, moved), casadi.if_else(ended, 0, residual)]
+    project = Function("project", [t, x, pm], kept)
+    left = limit.measure(x[: system.nq], parameters) - limit.level
+    events = Events(
+        Function("lost", [t, x, pm], [casadi.if_else(ended, 1, left)]),
+        Function("end", [t, x, pm, fired], [x, SX(1)]),
+        [0.0],
+    )
+    motion = integrate_events(rhs, x0, times, events, p=p, project=project, partial=True, **options)
+    reached = times[: len(motion.x)]
+    before = reached <= (motion.events[0].time if motion.events else np.inf)
+    return Leg(state, reached[before], motion.x[before]), motion
+
+
+def _next(system: System, q: Array, p: Array) -> tuple[System, Limit | None]:
+    """The system with rows that suit a configuration better, and where its leg ends.
+
+    No leg begins where all rows are dependent.
+    """
+    better = rows_at(system, q, p)
+    old, new = (float(row_independence(one)(q, p)) for one in (system, better))
+    chosen, now = (better, new) if new > 2 * old else (system, old)
+    limit = Limit(row_independence(chosen), _LOST * now) if now >= _SINGULAR else None
+    return chosen, limit
+
+
+# Prescribed motions of a simulation: laws of time by the names of positions and rates.
+
+
+Motion = Mapping[str, float | Function | Callable[[Any], Any]] | None
+_KINDS = ("q", "v", "a")
+
+
+def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
+    """What a user prescribes, by names such as "j1.q", "j1.v" and "j1.a".
+
+    Args:
+        system: open or closed.
+        motion: for each name a number, or a function of the time made of CasADi operations.
+
+    Raises:
+        ModelError: a name is unknown, a law is no function of time, or the loops tie what is
+            prescribed.
+    """
+    if not isinstance(motion, Mapping | None):
+        raise ModelError(
+            f"{system.name}: motion is {quoted(motion)}; give a dict such as"
+            ' {"j1.q": lambda t: 0.3 * casadi.sin(t)}'
+        )
+    found = [_prescribed(system, name, law) for name, law in (motion or {}).items()]
+    names = [one.name for one in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise ModelError(
+                f"{system.name}: motion prescribes {name} more than once; give its position, its"
+                " velocity or its acceleration"
+            )
+    if found:
+        hybrid_dynamics(system, names)  # refuses what the loops tie
+    return found
+
+
+def started(
+    system: System, motions: list[Prescribed], q0: Values, v0: Values
+) -> tuple[Values, Values]:
+    """The start of a motion, with what is prescribed of it at the time zero.
+
+    Raises:
+        ModelError: a start is given for what is prescribed, or not by name.
+    """
+    if not motions:
+        return q0, v0
+    for what, given in (("q0", q0), ("v0", v0)):
+        if not isinstance(given, Mapping | None):
+            raise ModelError(
+                f"{system.name}: {what} is given as a sequence, beside motion; give a dict of names"
+            )
+    positions, velocities = dict(q0 or {}), dict(v0 or {})  # type: ignore[arg-type]
+    for one in motions:
+        place, speed, _ = (float(value) for value in one.law(SX(0)))
+        if one.position is not None:
+            _put(system, positions, one.name, place, "q0")
+        if one.holds_speed:
+            _put(system, velocities, one.name, speed, "v0")
+    return positions, velocities
+
+
+def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:
+    if name in values and abs(values[name] - value) > 1e-9 * max(1.0, abs(value)):
+        raise ModelError(
+            f"{system.name}: {what} gives {name} = {values[name]:g}, but its motion starts at"
+            f" {value:g}; leave it out of {what}"
+        )
+    values[name] = value
+
+
+def _prescribed(system: System, name: str, law: Any) -> Prescribed:
+    base, _, kind = str(name).rpartition(".")
+    speeds = [speed.name for speed in system.speeds]
+    positions = [coordinate.name for coordinate in system.coordinates]
+    known = [f"{n}.{k}" for n in speeds for k in _KINDS if k != "q" or n in positions]
+    if name not in known:
+        raise ModelError(
+            f"{system.name}: motion names {quoted(name)}, which is no position, velocity or"
+            f" acceleration; {did_you_mean(str(name), known)}"
+        )
+    t = SX.sym("t")
+    value = _value(system, name, law, t)
+    rate = casadi.jacobian(value, t)
+    laws = {
+        "q": (value, rate, casadi.jacobian(rate, t)),
+        "v": (SX(0), value, rate),
+        "a": (SX(0), SX(0), value),
+    }[kind]
+    position = positions.index(base) if kind == "q" else None
+    return Prescribed(base, speeds.index(base), position, kind != "a", t, laws)
+
+
+def _value(system: System, name: str, law: Any, t: SX) -> SX:
+    """The law as one scalar expression of the time."""
+    given = law
+    if callable(law):
+        try:
+            given = law(t)
+        except Exception as error:
+            raise untraceable(system, f"the motion of {name}", error) from error
+    try:
+        value = SX(given)
+    except Exception:
+        value = SX(0, 0)
+    constant = not casadi.symvar(value)
+    if value.numel() != 1 or (constant and not casadi.evalf(value).is_regular()):
+        raise ModelError(
+            f"{system.name}: the motion of {name} is {quoted(given)}; give a finite number, or a"
+            " function of the time made of CasADi operations, such as"
+            " lambda t: 0.3 * casadi.sin(2 * t)"
+        )
+    alone = Function("law", [t], [value], {"allow_free": True})
+    if alone.has_free():
+        raise ModelError(
+            f"{system.name}: the motion of {name} holds the symbols {', '.join(alone.get_free())};"
+            " make it of the time and numbers"
+        )
+    return value
+
+
+# What sensors read in the course of a simulation.
+
+
+def sensor_columns(system: System, motion: Mapping[str, Array]) -> Iterator[tuple[str, str, Array]]:
+    """Name, unit and values of every element that the sensors read.
+
+    Args:
+        system: with or without sensors.
+        motion: a column for each instant of q (nq, n), v, a and tau (nv, n) of the whole tree, and
+            of the parameters p (np, n).
+    """
+    if not system.sensors:
+        return
+    model = measurements(system, "tree")
+    count = motion["q"].shape[1]
+    inputs = [motion[name] for name in model.name_in()]
+    read = model.map(count)(*inputs)
+    outputs = iter(read if isinstance(read, tuple) else (read,))
+    for attached in system.sensors:
+        columns = iter(attached.columns)
+        for _ in attached.quantities:
+            values = np.array(next(outputs)).T.reshape(count, -1)
+            for element in values.T:
+                name, unit = next(columns)
+                yield name, unit, element
+
 
 _SCALARS = (("kinetic_energy", "J"), ("potential_energy", "J"), ("closure_residual", "1"))
 

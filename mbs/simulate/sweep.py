@@ -2,36 +2,447 @@
 
 from __future__ import annotations
 
+import hashlib
 import inspect
+import itertools
+import json
 import os
 import pickle
+import re
 import shutil
 import tempfile
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import (
-    BrokenExecutor,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    as_completed,
-)
-from dataclasses import dataclass
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
-from mbs.archives import check_archive
+import numpy as np
+from numpy.typing import NDArray
+
 from mbs.assembly import System
-from mbs.errors import Interrupted, MbsError, ModelError, SolverError
-from mbs.messages import did_you_mean, quoted
+from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
+from mbs.files import check_archive, path_of, write_text
 from mbs.progress import progress
-from mbs.result import Result
-from mbs.simulate.cases import Case, Folder, Grid, cases_of
+from mbs.result import Result, optional_module
 from mbs.simulate.fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
 from mbs.simulate.run import run
-from mbs.simulate.study import study_of
-from mbs.simulate.swept import Sweep
+from mbs.text import did_you_mean, quoted
+
+# The cases of a parameter study, and the folder that keeps their results.
+
+
+_INDEX = "study.json"
+
+Case = dict[str, float]
+Grid = Mapping[str, Iterable[float]] | Sequence[Mapping[str, float]]
+
+
+def cases_of(grid: Grid) -> tuple[Case, ...]:
+    """Every combination of the values of a grid, the last name fastest; or the cases as listed.
+
+    Args:
+        grid: name to its values, or one dict of names to values for each case.
+
+    Raises:
+        ModelError: there is no case, or a value is no number.
+    """
+    listed = list(_combinations(grid)) if isinstance(grid, Mapping) else [dict(c) for c in grid]
+    if not grid or not listed:
+        raise ModelError("sweep: the grid has no case; give at least one value for every name")
+    return tuple({str(name): _number(name, x) for name, x in case.items()} for case in listed)
+
+
+def _combinations(grid: Mapping[str, Iterable[float]]) -> Iterable[Case]:
+    columns = [
+        list(values) if isinstance(values, Iterable) else [values] for values in grid.values()
+    ]
+    for values in itertools.product(*columns):
+        yield dict(zip(grid, values, strict=True))
+
+
+def _number(name: str, value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ModelError(f"sweep: {name} is {quoted(value)}; give numbers") from None
+
+
+@dataclass(frozen=True, slots=True, weakref_slot=True)
+class Folder:
+    """Where the results of a study are kept, a file for each case.
+
+    Attributes:
+        path: the folder.
+    """
+
+    path: Path
+
+    @staticmethod
+    def opened(path: object, study: Mapping[str, object]) -> Folder:
+        """The folder of a study: made, or found with the same study in it.
+
+        Args:
+            path: where.
+            study: what is studied, as JSON knows it.
+
+        Raises:
+            ModelError: it holds another study, or results of an unknown one.
+            ExportError: it cannot be written.
+        """
+        folder = Folder(_made(path_of(path)))
+        index = folder.path / _INDEX
+        text = json.dumps(study, indent=1, sort_keys=True) + "\n"
+        known = index.read_bytes() if index.exists() else None
+        if known == text.encode():
+            return folder
+        if known is not None or any(folder.path.glob("case_*.npz")):
+            raise ModelError(
+                f"sweep: folder {folder.path} holds another study; choose another folder, or delete"
+                " it"
+            )
+        write_text(text, index)
+        return folder
+
+    def file(self, number: int) -> Path:
+        """The file of a case."""
+        return self.path / f"case_{number:06d}.npz"
+
+    def part(self, number: int) -> Path:
+        """The file of what a case that failed had reached."""
+        return self.path / f"part_{number:06d}.npz"
+
+    def keep(self, number: int, result: Result | None, complaint: str = "") -> None:
+        """Write the result of a case; or why it failed, with what it had reached.
+
+        Args:
+            number: of the case.
+            result: whole, or up to where it stopped; None where nothing was reached.
+            complaint: why it failed; empty where it did not.
+
+        Raises:
+            ExportError: the folder cannot be written.
+        """
+        said, part = self._complaint(number), self.part(number)
+        part.unlink(missing_ok=True)
+        if complaint:
+            write_text(complaint, said)
+        else:
+            said.unlink(missing_ok=True)
+        if result is not None:
+            result.save(part if complaint else self.file(number))
+
+    def complained(self, number: int) -> str:
+        """Why a case has no result."""
+        said = self._complaint(number)
+        return said.read_text(encoding="utf-8") if said.is_file() else "not simulated yet"
+
+    def known(self) -> tuple[str, tuple[Case, ...]]:
+        """The name of the model that is studied here, and the cases.
+
+        Raises:
+            ModelError: there is no study.
+        """
+        try:
+            study = json.loads((self.path / _INDEX).read_text(encoding="utf-8"))
+            return str(study["model"]), tuple(dict(case) for case in study["cases"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise ModelError(
+                f"sweep: {self.path} holds no study; give the folder that a sweep was given"
+            ) from error
+
+    def _complaint(self, number: int) -> Path:
+        return self.path / f"case_{number:06d}.txt"
+
+    def missing(self, count: int) -> list[int]:
+        """The numbers of the cases, of so many, that have no whole result yet."""
+        return [number for number in range(count) if not zipfile.is_zipfile(self.file(number))]
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(
+            f"folder {folder} cannot be made ({error.strerror}); choose another one"
+        ) from error
+    return folder
+
+
+# What makes a parameter study the same as an earlier one.
+
+
+_ADDRESS = re.compile(r" at 0x[0-9A-Fa-f]+")  # of objects in memory, another one every time
+
+
+def study_of(
+    model: System | str | os.PathLike[str], cases: Sequence[Case], options: Mapping[str, Any]
+) -> dict[str, object]:
+    """A study as JSON knows it.
+
+    Args:
+        model: a system, or the path of an FMU.
+        cases: name to value, of each simulation.
+        options: further arguments of every simulation.
+
+    Raises:
+        ModelError: there is no such FMU.
+    """
+    name, content = _system(model) if isinstance(model, System) else _fmu(model)
+    told = {option: _told(value) for option, value in sorted(options.items())}
+    digest = hashlib.sha256(content).hexdigest()
+    return {"model": name, "content": digest, "cases": list(cases), "options": told}
+
+
+def _system(system: System) -> tuple[str, bytes]:
+    """Its name, and all that it holds; numbers inside expressions are told to six digits."""
+    held = [getattr(system, part.name) for part in fields(system) if part.name[0] != "_"]
+    return system.name, _ADDRESS.sub("", repr(held)).encode()
+
+
+def _fmu(path: object) -> tuple[str, bytes]:
+    if not isinstance(path, (str, os.PathLike)):
+        raise ModelError(f"sweep: {quoted(path)} is no model; give a System or the path of an FMU")
+    file = Path(os.fspath(path))
+    try:
+        return file.name, file.read_bytes()
+    except OSError as error:
+        raise ModelError(
+            f"sweep: {file} cannot be read ({error.strerror}); give the path of an FMU"
+        ) from error
+
+
+def _told(value: object) -> str:
+    """A text that is the same the next time."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key!r}: {_told(value[key])}" for key in value) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_told(part) for part in value) + "]"
+    if isinstance(value, np.ndarray):
+        return f"array {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    return getattr(value, "__qualname__", None) or _ADDRESS.sub("", repr(value))
+
+
+# The results of a parameter study, read from disk one by one.
+
+
+Array = NDArray[np.float64]
+Measures = Mapping[str, Callable[[Result], float]]
+"""Name of a column to a function that makes one number of a result."""
+
+_SHOWN = 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweep:
+    """The results of a parameter study; each is read from disk when it is asked for.
+
+    `sweep[k]` is the result of case k, `sweep[-1]` that of the last one, `sweep[2:5]` a study of
+    some of the cases.
+
+    Attributes:
+        name: of the model.
+        cases: name to value, of each simulation.
+        folder: where the results are.
+        failures: number of a case that failed, and what it said.
+        numbers: of the file of each case.
+    """
+
+    name: str
+    cases: tuple[Case, ...]
+    folder: Folder
+    failures: Mapping[int, str]
+    numbers: tuple[int, ...]
+
+    @classmethod
+    def open(cls, folder: str | os.PathLike[str]) -> Sweep:
+        """The study in a folder, whole or not, without simulating anything.
+
+        Args:
+            folder: that `sweep` was given.
+
+        Returns:
+            the study; cases without a result are among the failures.
+
+        Raises:
+            ModelError: there is no study.
+        """
+        place = Folder(path_of(folder))
+        name, cases = place.known()
+        return cls(name, cases, place, {}, tuple(range(len(cases)))).as_found()
+
+    def as_found(self) -> Sweep:
+        """The same study, with the failures that its folder tells of now."""
+        missing = self.folder.missing(len(self.cases))
+        return replace(self, failures={k: self.folder.complained(k) for k in missing})
+
+    def __repr__(self) -> str:
+        return (
+            f"<Sweep of {self.name}: {len(self.cases)} cases, {len(self.failures)} failed,"
+            f" {self.folder.path}>"
+        )
+
+    def __str__(self) -> str:
+        """A table of the cases, the first twenty of them."""
+        names = list(dict.fromkeys(name for case in self.cases for name in case))
+        rows = [["case", *names, ""]]
+        for k, case in enumerate(self.cases[:_SHOWN]):
+            values = (f"{case[name]:g}" if name in case else "" for name in names)
+            rows.append([str(k), *values, self.failures.get(k, "")])
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)][:-1]
+        lines = [
+            "  ".join((*(x.rjust(w) for x, w in zip(row, widths, strict=False)), row[-1])).rstrip()
+            for row in rows
+        ]
+        more = len(self.cases) - _SHOWN
+        rest = [f"and {more} more"] if more > 0 else []
+        return "\n".join([repr(self)[1:-1], *lines, *rest])
+
+    def __len__(self) -> int:
+        return len(self.cases)
+
+    def __iter__(self) -> Iterator[tuple[Case, Result]]:
+        """Each case that succeeded, with its result."""
+        return ((case, self[k]) for k, case in enumerate(self.cases) if k not in self.failures)
+
+    @overload
+    def __getitem__(self, number: int) -> Result: ...
+    @overload
+    def __getitem__(self, number: slice) -> Sweep: ...
+    def __getitem__(self, number: int | slice) -> Result | Sweep:
+        """The result of a case, counted from the end where negative; or a study of some cases.
+
+        Raises:
+            ModelError: it failed, or there is no such case.
+        """
+        if isinstance(number, slice):
+            return self._part(range(len(self.cases))[number])
+        place = _index(number, len(self.cases))
+        if place in self.failures:
+            raise ModelError(f"sweep: case {place} failed: {self.failures[place]}")
+        return Result.load(self.folder.file(self.numbers[place]))
+
+    def reached(self, number: int) -> Result:
+        """What a case came to, up to where it stopped if it failed; its `stopped` says so.
+
+        Args:
+            number: of the case, counted from the end where negative.
+
+        Raises:
+            ModelError: it failed before it had a row, or there is no such case.
+        """
+        place = _index(number, len(self.cases))
+        if place not in self.failures:
+            return self[place]
+        file = self.folder.part(self.numbers[place])
+        if not file.is_file():
+            raise ModelError(f"sweep: case {place} reached nothing: {self.failures[place]}")
+        return Result.load(file)
+
+    def _part(self, chosen: range) -> Sweep:
+        failures = {new: self.failures[k] for new, k in enumerate(chosen) if k in self.failures}
+        cases = tuple(self.cases[k] for k in chosen)
+        numbers = tuple(self.numbers[k] for k in chosen)
+        return Sweep(self.name, cases, self.folder, failures, numbers)
+
+    def summary(self, measures: Measures | None = None) -> dict[str, Array]:
+        """One number of each case, for each measure.
+
+        Args:
+            measures: name to a function of a `Result`; when left out, the last value of every
+                signal, as `j1.q.end` and so on.
+
+        Returns:
+            name to (number of cases,) values, in the unit of the measure; NaN where a case failed.
+
+        Raises:
+            ModelError: a measure gives no number, or has the name of what varies.
+        """
+        varied = {name for case in self.cases for name in case}
+        for name in measures or ():
+            if name in varied:
+                raise ModelError(f"sweep: measure {name!r} has the name of what varies; rename it")
+        columns: dict[str, Array] = {}
+        for k in range(len(self)):
+            if k in self.failures:
+                continue
+            for name, value in _measured(self[k], measures, k):
+                column = columns.setdefault(name, np.full(len(self), np.nan))
+                column[k] = value
+        return columns
+
+    def to_pandas(self, measures: Measures | None = None) -> Any:
+        """A pandas DataFrame: a row for each case with its values, then the measures.
+
+        Args:
+            measures: as for `summary`.
+
+        Returns:
+            the table; `.attrs["failures"]` has what failed cases said.
+        """
+        pandas = optional_module("pandas", "tables")
+        names = list(dict.fromkeys(name for case in self.cases for name in case))
+        given = {name: [case.get(name, np.nan) for case in self.cases] for name in names}
+        frame = pandas.DataFrame({**given, **self.summary(measures)})
+        frame.index.name = "case"
+        frame.attrs["failures"] = dict(self.failures)
+        return frame
+
+    def to_xarray(self, measures: Measures | None = None) -> Any:
+        """An xarray Dataset of the measures.
+
+        Args:
+            measures: as for `summary`.
+
+        Returns:
+            over the names that were varied where the cases are every combination of their values;
+            else over the number of the case.
+        """
+        xarray = optional_module("xarray", "tables")
+        columns, axes = self.summary(measures), _axes(self.cases)
+        if axes is None:
+            names = list(dict.fromkeys(name for case in self.cases for name in case))
+            given = {n: ("case", [c.get(n, np.nan) for c in self.cases]) for n in names}
+            flat = {name: ("case", column) for name, column in columns.items()}
+            return xarray.Dataset(flat, coords={"case": np.arange(len(self)), **given})
+        shape = tuple(len(values) for values in axes.values())
+        data = {name: (tuple(axes), column.reshape(shape)) for name, column in columns.items()}
+        return xarray.Dataset(data, coords={name: list(values) for name, values in axes.items()})
+
+
+def _index(number: object, count: int) -> int:
+    if isinstance(number, (int, np.integer)) and -count <= number < count:
+        return int(number) % count
+    raise ModelError(
+        f"sweep: there is no case {quoted(number)}; they are 0 to {count - 1}, or -1 for the last"
+    )
+
+
+def _measured(result: Result, measures: Measures | None, case: int) -> Iterator[tuple[str, float]]:
+    if measures is None:
+        ends = result.values[-1].tolist()
+        yield from ((f"{name}.end", x) for name, x in zip(result.names, ends, strict=True))
+        return
+    for name, measure in measures.items():
+        try:
+            yield name, float(measure(result))
+        except Exception as error:
+            raise ModelError(
+                f"sweep: measure {name!r} gives no number of case {case} ({error}); give a function"
+                " of a Result that returns one"
+            ) from error
+
+
+def _axes(cases: tuple[Case, ...]) -> dict[str, tuple[float, ...]] | None:
+    """The values of each name, where the cases are all their combinations in order."""
+    names = list(cases[0]) if cases else []
+    values = {name: tuple(dict.fromkeys(c.get(name, np.nan) for c in cases)) for name in names}
+    every = [dict(zip(names, x, strict=True)) for x in itertools.product(*values.values())]
+    return values if names and every == list(cases) else None
+
 
 _START = {".q": "q0", ".v": "v0", ".tau": "tau"}
 _OPTIONS = {

@@ -16,7 +16,7 @@ import numpy as np
 from casadi import DM, SX
 from numpy.typing import NDArray
 
-from mbs.solvers.small_linear import solve_square
+from mbs.solvers.linear import solve_square
 
 _EXPANDED = 7
 """Largest determinant that is expanded; beyond it is taken of a factorisation."""

@@ -1,21 +1,218 @@
 """Motions of a generated system, advanced in time by compiled code and kept on its constraints."""
 
+import ctypes
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import resources
+from pathlib import Path
+from typing import Any
 
 import casadi
 import numpy as np
 import numpy.typing as npt
 
-from mbs.native import compiler_found
-from mbs.solvers.compiled_run import library_of, run_compiled
-from mbs.solvers.events import EventMotion, Events
+from mbs.errors import Interrupted, SolverError
+from mbs.native import cached_library, compiler_found
+from mbs.native.compiled import calls_machine_code, generated, unwritten
+from mbs.native.compiler import flags_for
 from mbs.solvers.interpreted_run import run_interpreted
-from mbs.solvers.passage import Passage
-from mbs.solvers.problem import Problem, equations, problem
+from mbs.solvers.problem import (
+    Equations,
+    Event,
+    EventMotion,
+    Events,
+    Passage,
+    Problem,
+    equations,
+    failed,
+    fired_of,
+    interrupted,
+    problem,
+)
+
+# Integrations run by the compiled driver `native/runtime/driver.c`.
+
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
+
+_CHUNK = 200  # steps between two looks at the keyboard
+_FIRED, _MORE = -1, 1
+_REASONS = {
+    2: "steps",
+    3: "small",
+    4: "rhs",
+    5: "projection",
+    6: "finite",
+    7: "singular",
+    8: "singular",
+    9: "near miss",
+    10: "singular",
+    11: "undetermined",
+    12: "indicators",
+    13: "jump",
+    14: "settle",
+    15: "standstill",
+}
+_CROWDED = (14, 15)
+_RUNTIME = ("stepper", "dopri5")
+
+
+def is_compilable(function: casadi.Function) -> bool:
+    """Whether there is a compiler, and CasADi can write a Function as C.
+
+    Args:
+        function: any Function.
+    """
+    functions = [function]
+    return (
+        compiler_found()
+        and not calls_machine_code(functions)
+        and not unwritten(generated(functions))
+    )
+
+
+def library_of(equations: Equations) -> ctypes.CDLL | None:
+    """The compiled driver of these functions; None when CasADi can only interpret them.
+
+    Raises:
+        CompilerError: the compiler refused the code.
+    """
+    if calls_machine_code(equations.all):
+        return None
+    source = generated(equations.all)
+    if unwritten(source):
+        return None
+    names, flags = [*_RUNTIME], [*flags_for(source)]
+    if equations.project is not None:
+        flags.append("-DMBS_PROJECT")
+    if equations.jacobian is not None:
+        names.append("rodas")
+        flags.append("-DMBS_RODAS")
+    if equations.indicators is not None:
+        names.append("events")
+        flags.append("-DMBS_EVENTS")
+    if equations.passage is not None:
+        names.extend(("dense", "passage"))
+        flags.append("-DMBS_PASSAGE")
+    library = cached_library({"system.c": source, **_runtime(tuple(names))}, flags)
+    return _load(library, equations.indicators is not None, equations.passage is not None)
+
+
+def run_compiled(library: ctypes.CDLL, problem: Problem, progress: Progress | None) -> EventMotion:
+    """The motion at the times of a problem, as far as it comes.
+
+    Control-C is heard between two chunks of steps: the compiled code runs to the end of its own.
+
+    Args:
+        library: what `library_of` gave for its equations.
+        problem: what to integrate.
+        progress: called now and then with the time reached, s.
+
+    Raises:
+        SolverError: there is no memory for it.
+    """
+    x, times = problem.x0.copy(), problem.times
+    table = np.empty((len(times), len(x)))
+    done = ctypes.c_longlong(0)
+    log: list[Event] = []
+    stop: SolverError | Interrupted | None = None
+    with _opened(library, problem) as driver:
+        status = library.mbs_begin(driver, _pointer(x))
+        try:
+            while status <= _MORE and done.value < len(times):
+                status = library.mbs_table(
+                    driver,
+                    _pointer(x),
+                    _pointer(times),
+                    len(times),
+                    _pointer(table),
+                    ctypes.byref(done),
+                    _CHUNK,
+                )
+                if status == _FIRED:
+                    log.append(_event(library, driver, problem))
+                if progress is not None:
+                    progress(library.mbs_time(driver))
+        except KeyboardInterrupt:
+            stop = interrupted(library.mbs_time(driver))
+        if stop is None and status > _MORE:
+            blamed = _event(library, driver, problem).fired if status in _CROWDED else ()
+            stop = failed(
+                library.mbs_time(driver),
+                library.mbs_step(driver),
+                _REASONS[status],
+                blamed,
+                x.tolist(),
+            )
+    return problem.motion(table[: done.value], log, stop)
+
+
+def _event(library: ctypes.CDLL, driver: ctypes.c_void_p, problem: Problem) -> Event:
+    assert problem.equations.indicators is not None
+    fired = np.empty(problem.equations.indicators.numel_out(0))
+    modes = np.empty(problem.modes)
+    library.mbs_event(driver, _pointer(fired), _pointer(modes))
+    return Event(library.mbs_time(driver), fired_of(fired), modes)
+
+
+@functools.cache
+def _runtime(names: tuple[str, ...]) -> dict[str, str]:
+    folder = resources.files("mbs.native") / "runtime"
+    files = ["driver.c", *(name + end for name in names for end in (".h", ".c"))]
+    return {name: (folder / name).read_text(encoding="utf-8") for name in files}
+
+
+def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
+    library = ctypes.CDLL(str(path))
+    handle, real, pointer = ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p
+    integer = ctypes.c_longlong
+    types: dict[str, tuple[Any, list[Any]]] = {
+        "mbs_open": (handle, [ctypes.c_int, ctypes.c_int, pointer, pointer, real]),
+        "mbs_close": (None, [handle]),
+        "mbs_begin": (ctypes.c_int, [handle, pointer]),
+        "mbs_table": (
+            ctypes.c_int,
+            [handle, pointer, pointer, integer, pointer, ctypes.POINTER(integer), integer],
+        ),
+        "mbs_time": (real, [handle]),
+        "mbs_step": (real, [handle]),
+    }
+    if has_events:
+        types["mbs_watch"] = (ctypes.c_int, [handle, ctypes.c_int, ctypes.c_int])
+        types["mbs_event"] = (None, [handle, pointer, pointer])
+    if has_passage:
+        types["mbs_pass"] = (ctypes.c_int, [handle, ctypes.POINTER(ctypes.c_int), real])
+    for name, (result, arguments) in types.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+@contextmanager
+def _opened(library: ctypes.CDLL, problem: Problem) -> Iterator[ctypes.c_void_p]:
+    n, p, start = len(problem.x0), problem.p, float(problem.times[0])
+    indicators = problem.equations.indicators
+    control = np.array([problem.rtol, problem.atol, problem.max_step])
+    driver = library.mbs_open(n, len(p), _pointer(p), _pointer(control), start)
+    full = not driver
+    try:
+        if driver and indicators is not None:
+            full = library.mbs_watch(driver, indicators.numel_out(0), problem.modes) != 0
+        if driver and not full and (through := problem.equations.passage) is not None:
+            sizes = (ctypes.c_int * len(through.size))(*through.size)
+            full = library.mbs_pass(driver, sizes, through.typical) != 0
+        if full:
+            raise SolverError(f"no memory is left to integrate {n} states; close other programs")
+        yield driver
+    finally:
+        library.mbs_close(driver)
+
+
+def _pointer(array: Array) -> int:
+    return array.ctypes.data
 
 
 def integrate(

@@ -1,6 +1,7 @@
 """Integrations run by the Python twins of the compiled driver."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import casadi
 import numpy as np
@@ -8,14 +9,262 @@ import numpy.typing as npt
 
 from mbs.errors import Interrupted, SolverError
 from mbs.solvers.dopri5 import Dopri5
-from mbs.solvers.event_stepper import EventStepper, Flags
-from mbs.solvers.events import Event, EventMotion, fired_of
-from mbs.solvers.failures import Failure, failed, interrupted
-from mbs.solvers.problem import Problem
+from mbs.solvers.problem import Event, EventMotion, Failure, Problem, failed, fired_of, interrupted
 from mbs.solvers.rodas import Rodas
-from mbs.solvers.stepper import Projection, Stepper, Table
+from mbs.solvers.stepper import EPSILON, Array, Projection, Stepper, Table
 
-Array = npt.NDArray[np.float64]
+# Location of events and jumps in plain Python: the twin of `native/runtime/events.c`.
+#
+# Source: Cellier and Kofman 2006, chapter 9; Dowell and Jarratt 1971 for the location.
+
+
+Flags = npt.NDArray[np.bool_]
+Values = Callable[[float, Array], Array]
+Jump = Callable[[float, Array, Flags], Array]
+"""(t, x, fired) -> x; it keeps the modes."""
+Look = tuple[Array, Array]
+"""Indicators and how fast they rise."""
+
+LOOKS, TANGENTS, SECANTS, MAX_JUMPS, MAX_IDLE = 2, 30, 20, 20, 100
+DEPARTURE = 1e-8
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(slots=True)
+class EventStepper:
+    """One integration with events under way.
+
+    Attributes:
+        solver: takes the steps.
+        indicators: (k,) values that are positive between events.
+        rates: (k,) how fast they rise along the motion.
+        jump: the state after an event, projected.
+        left: indicators at the last look, and how fast they rise there.
+        armed: which of them have been positive, so that they can fire.
+        due: which of them ask for a jump at the present time.
+        fired: which of them asked for jumps at the last event.
+        last: time of the last event, s.
+        idle: number of events since time advanced.
+    """
+
+    solver: Stepper
+    indicators: Values
+    rates: Values
+    jump: Jump
+    left: Look = field(default_factory=lambda: (np.empty(0), np.empty(0)))
+    armed: Flags = field(default_factory=lambda: np.empty(0, bool))
+    due: Flags = field(default_factory=lambda: np.empty(0, bool))
+    fired: Flags = field(default_factory=lambda: np.empty(0, bool))
+    last: float = -np.inf
+    idle: int = 0
+
+    def start(self) -> None:
+        """Look at the first state: an indicator may ask for a jump there.
+
+        Raises:
+            SolverError: an indicator has no value there.
+        """
+        try:
+            with np.errstate(all="ignore"):
+                self._judge()
+        except Failure as failure:
+            t, h, x = self.solver.t, self.solver.h, self.solver.x
+            raise failed(t, h, str(failure), state=x.tolist()) from failure
+
+    def fill(self, table: Table, budget: int) -> bool:
+        """Fill the next rows of a table, in about `budget` steps, at most to the next event.
+
+        Args:
+            table: with the rows that are left; a row at the time of an event is after it.
+            budget: number of steps after which to return.
+
+        Returns:
+            whether an event has just happened.
+
+        Raises:
+            SolverError: the integration cannot go on.
+        """
+        solver, limit = self.solver, float(table.times[-1])
+        try:
+            with np.errstate(all="ignore"):
+                while not table.full:
+                    t = table.next
+                    if t < solver.t or (t == solver.t and not self.due.any()):
+                        table.fill(solver.output(t))
+                    elif self.due.any():
+                        self._settle(limit)
+                        return True
+                    elif budget <= 0:
+                        break
+                    else:
+                        budget -= self._step(limit)
+        except Failure as failure:
+            raise failed(
+                solver.t, solver.h, str(failure), self._blamed(failure), solver.x.tolist()
+            ) from failure
+        return False
+
+    def _blamed(self, failure: Failure) -> tuple[int, ...]:
+        return fired_of(self.fired) if str(failure) in ("settle", "standstill") else ()
+
+    def _values(self, t: float, x: Array) -> Array:
+        try:
+            values = self.indicators(t, x)
+        except RuntimeError as error:
+            raise Failure("indicators") from error
+        if not np.isfinite(values).all():
+            raise Failure("indicators")
+        return values
+
+    def _look(self, t: float) -> Look:
+        x = self.solver.state(t)
+        values = self._values(t, x)
+        try:
+            return values, self.rates(t, x)
+        except RuntimeError as error:
+            raise Failure("indicators") from error
+
+    def _least(self, values: Array) -> float:
+        return float(np.min(values[self.armed], initial=np.inf))
+
+    def _judge(self) -> None:
+        """Which indicators ask for a jump at the present state.
+
+        One that is zero to the tolerance and does not clearly fall waits: the first look at the
+        next step tells whether it leaves zero. So does one that rises from there, since rounding
+        alone may have made it positive.
+        """
+        t, step, zero = self.solver.t, self.solver.last_step, self.solver.atol
+        slack = max(1e3 * EPSILON * abs(t), DEPARTURE * step)
+        value, rise = self.left = self._look(t)
+        waits = (value >= -np.fmax(zero, rise * slack)) & ~(rise * step < -zero)
+        self.armed = value > np.where(rise > 0, zero, 0.0)
+        self.due = (value <= 0) & ~waits
+
+    def _step(self, limit: float) -> int:
+        """One step, cut at its first event; returns how many were tried."""
+        solver = self.solver
+        start = here = solver.t
+        tried = solver.step(limit)
+        end, part = solver.t, 1
+        while here < end:
+            planned = start + part * (end - start) / LOOKS if part < LOOKS else end
+            if here > start:
+                to, right = planned, self._look(planned)
+            else:
+                to, right = self._first_look(start, planned)
+            to, right = self._dips(here, to, right)
+            if self._least(right[0]) <= 0:
+                self._stop_at_event(here, to, right[0])
+                break
+            self.armed |= right[0] > 0
+            self.left = right
+            part += to == planned
+            here = to
+        return tried
+
+    def _first_look(self, start: float, end: float) -> tuple[float, Look]:
+        """What has just left zero may be back at the first look: look earlier."""
+        right = self._look(end)
+        while np.any(~self.armed & (right[0] <= 0)):
+            if end - start <= 4 * EPSILON * max(abs(end), 1e-3 * self.solver.last_step):
+                self.left = np.where(self.armed, self.left[0], _TINY), self.left[1]
+                self.armed[:] = True
+                break
+            end = start + 0.5 * (end - start)
+            right = self._look(end)
+        return end, right
+
+    def _dips(self, a: float, b: float, right: Look) -> tuple[float, Look]:
+        for k in np.flatnonzero(self.armed & (self.left[0] > 0)):
+            if right[0][k] > 0:
+                b, right = self._dip(int(k), a, b, right)
+        return b, right
+
+    def _dip(self, k: int, a: float, b: float, right: Look) -> tuple[float, Look]:
+        """A time before b at which an indicator is not positive, if it falls at a and rises at b.
+
+        Tangents at the ends bound what is convex from below; they are drawn again from where they
+        meet, until they stay positive.
+        """
+        end, (low, fall), (high, rise) = b, _of(self.left, k), _of(right, k)
+        for _ in range(TANGENTS):
+            if not (fall < 0 < rise):
+                break
+            width = end - a
+            meet = (low - high + rise * width) / (rise - fall)
+            inside = 0 < meet < width
+            if inside and low + fall * meet > 0:
+                break
+            t = a + (meet if inside else 0.5 * width)
+            seen = self._look(t)
+            value, rate = _of(seen, k)
+            if value <= 0:
+                return t, seen
+            if rate < 0:
+                a, low, fall = t, value, rate
+            else:
+                end, high, rise = t, value, rate
+        return b, right
+
+    def _stop_at_event(self, a: float, b: float, right: Array) -> None:
+        b, right = self._located(a, b, right)
+        self.due = self.armed & (right <= 0)
+        self.solver.rewind(b)
+
+    def _located(self, a: float, b: float, right: Array) -> tuple[float, Array]:
+        """The first time after a at which an indicator is not positive, and all of them there.
+
+        Secants with a safeguard, and the half of each value that stays (the Illinois rule).
+        """
+        low, high = self._least(self.left[0]), self._least(right)
+        step = self.solver.last_step
+        count = side = 0
+        while True:
+            margin = 2 * EPSILON * max(abs(a), abs(b), 1e-3 * step)
+            t = _next_guess(a, b, low, high, margin) if count < SECANTS else a + 0.5 * (b - a)
+            if not a < t < b or b - a <= 1e-3 * EPSILON * step:
+                return b, right
+            values = self._values(t, self.solver.state(t))
+            value = self._least(values)
+            if value > 0:
+                high *= 0.5 if side > 0 else 1.0
+                a, low, side = t, value, 1
+            else:
+                low *= 0.5 if side < 0 else 1.0
+                b, high, side, right = t, value, -1, values
+            count += 1
+
+    def _settle(self, limit: float) -> None:
+        """Jumps until no indicator asks for another one."""
+        solver = self.solver
+        t = solver.t
+        self.fired = np.zeros_like(self.due)
+        jumps = 0
+        while self.due.any():
+            self.fired |= self.due
+            if jumps == MAX_JUMPS:
+                raise Failure("settle")
+            solver.restart(self.jump(t, solver.x, self.due))
+            self._judge()
+            jumps += 1
+        still = t - self.last <= 1e3 * EPSILON * max(abs(t), abs(limit))
+        self.idle = self.idle + 1 if still else 0
+        self.last = t
+        if self.idle > MAX_IDLE:
+            raise Failure("standstill")
+
+
+def _of(look: Look, k: int) -> tuple[float, float]:
+    return float(look[0][k]), float(look[1][k])
+
+
+def _next_guess(a: float, b: float, low: float, high: float, margin: float) -> float:
+    if b - a <= 4 * margin:
+        return a + 0.5 * (b - a)
+    return min(max(a + (b - a) * low / (low - high), a + margin), b - margin)
+
+
 Progress = Callable[[float], None]
 
 TOLERANCE = 1e-12

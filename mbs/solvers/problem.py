@@ -8,11 +8,113 @@ import numpy as np
 import numpy.typing as npt
 
 from mbs.errors import Interrupted, ModelError, SolverError
-from mbs.messages import quoted
-from mbs.solvers.events import Event, EventMotion, Events, modes_at
-from mbs.solvers.passage import Passage
+from mbs.text import quoted
+
+# What a motion with constraints that become dependent in single states is integrated with.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """Functions of t, x = [q; v; z] and p, for steps in local tangent coordinates.
+
+    `native/runtime/passage.h` tells what is done with them.
+
+    Attributes:
+        rows: `rows(t, x, p) -> place, slope, J, b, c, N, bend, rank`: rows of positions and their
+            slopes by q; rows of velocities with J v = b and J a = c; q' = N v and q'' = N a + bend;
+            the rank of J.
+        forces: `forces(t, x, p) -> M, f, rate`: M a = f + J' y, and the rates of z.
+        regularity: `regularity(t, x, p)`, near zero and linear in the distance from where rows
+            become dependent.
+        size: nq, nv and nz; the number of rows of positions, of those that hold a coordinate
+            wherever it is, and of rows of velocities; 1 where rows depend on time.
+        typical: regularity at a common configuration.
+    """
+
+    rows: casadi.Function
+    forces: casadi.Function
+    regularity: casadi.Function
+    size: tuple[int, int, int, int, int, int, int]
+    typical: float
+
+
+# Events of an integration with discrete modes: what a caller gives, and what comes back.
+
 
 Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Events:
+    """Where the state and the modes jump, and how.
+
+    Modes are numbers that are constant between events. All functions of the integration take them
+    as the last of their parameters.
+
+    Attributes:
+        indicators: `indicators(t, x, p) -> g`, positive between events. An event is where one of
+            them is not positive any more. After the jump each must be positive, or leave zero
+            upwards.
+        jump: `jump(t, x, p, fired) -> (x, modes)`, state and modes after an event; fired is 1 for
+            each indicator that is not positive, 0 for the others. Without modes x alone will do.
+        modes: (nm,) at the start.
+    """
+
+    indicators: casadi.Function
+    jump: casadi.Function
+    modes: npt.ArrayLike = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Event:
+    """One event of a motion.
+
+    Attributes:
+        time: [s].
+        fired: numbers of the indicators that asked for jumps.
+        modes: (nm,) after it.
+    """
+
+    time: float
+    fired: tuple[int, ...]
+    modes: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EventMotion:
+    """A motion with events.
+
+    Attributes:
+        x: (m, nx) states at the times asked for, those that were reached; at the time of an event,
+            after it.
+        modes: (m, nm) modes at these times.
+        events: in the order of time.
+        stop: why not all the times were reached; None where they were.
+    """
+
+    x: Array
+    modes: Array
+    events: tuple[Event, ...]
+    stop: SolverError | Interrupted | None = None
+
+
+def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:
+    """Numbers of the indicators whose flag is set."""
+    return tuple(np.flatnonzero(flags).tolist())
+
+
+def modes_at(times: Array, first: Array, events: tuple[Event, ...]) -> Array:
+    """(m, nm) modes at given times; at the time of an event, after it.
+
+    Args:
+        times: (m,) s, increasing.
+        first: (nm,) modes before the first event.
+        events: in the order of time.
+    """
+    values = np.array([first, *(event.modes for event in events)])
+    passed = np.searchsorted([event.time for event in events], times, side="right")
+    return values[passed]
+
 
 METHODS = ("dopri5", "rodas")
 
@@ -257,3 +359,75 @@ def numbers(values: npt.ArrayLike) -> Array:
         return np.array(values, dtype=float).reshape(-1)
     except (TypeError, ValueError):
         raise ModelError(f"integrate: {quoted(values)} are not numbers; give real ones") from None
+
+
+# Why an integration stops, in words.
+
+
+MAX_STEPS = 100_000
+REASONS = {
+    "steps": f"more than {MAX_STEPS} steps between two output times; ask for a looser tolerance "
+    "or, when fast decays are in the system, for a method for stiff equations",
+    "small": "error control asks for a step below the rounding of time; "
+    "look for a singularity or a jump",
+    "rhs": "the right-hand side has no value there",
+    "projection": "the projection onto the constraints does not converge; "
+    "look for a singular posture",
+    "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
+    "around it; start elsewhere, or end the run before",
+    "near miss": "branches of motion come near each other and do not meet, by so little that what "
+    "turns there cannot be told from what goes on; make the branches meet, or miss by more, or ask "
+    "for a looser tolerance",
+    "undetermined": "the motion starts in a singular configuration, where branches of motion meet, "
+    "and its velocities are those of no branch with the mobility of the mechanism; give velocities "
+    "of one branch to all joints, or start beside it",
+    "finite": "a value is not finite; look for a singularity",
+    "indicators": "an event indicator has no value there; look for efforts or laws that have none, "
+    "or a singular configuration",
+    "jump": "the jump of an event has no value there",
+    "settle": "the events there do not settle, each jump asks for another one; "
+    "let the jump make the indicators positive, or zero and rising",
+    "standstill": "more than 100 events, and time hardly advances; "
+    "add a mode in which what repeats is at rest",
+}
+
+
+class Failure(Exception):
+    """An evaluation had no answer, so the step must be shortened."""
+
+
+_SINGULAR = ("singular", "near miss", "undetermined", "projection")
+
+
+def failed(
+    t: float, h: float, reason: str, fired: Sequence[int] = (), state: Sequence[float] = ()
+) -> SolverError:
+    """The error that says when, with which step and why an integration stopped.
+
+    Args:
+        t: time of the last accepted state, s.
+        h: step that was wanted next, s; 0 when there was none.
+        reason: a key of REASONS.
+        fired: numbers of the event indicators that are to blame.
+        state: the last one that was reached.
+
+    Returns:
+        an error to raise.
+    """
+    step = f" with step {h:.3g} s" if h > 0 else ""
+    who = f"; indicators {', '.join(map(str, fired))}" if fired else ""
+    return SolverError(
+        f"integration stopped at t = {t:.9g} s{step}: {REASONS[reason]}{who}",
+        state=state,
+        singular=reason in _SINGULAR,
+        time=t,
+    )
+
+
+def interrupted(t: float) -> Interrupted:
+    """What says when an integration was interrupted.
+
+    Args:
+        t: time of the last accepted state, s.
+    """
+    return Interrupted(f"integration interrupted at t = {t:.9g} s", time=t)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mbs.solvers.failures import Failure
+from mbs.solvers.problem import Failure
 from mbs.solvers.stepper import Array, Stepper, combine
 
 Jacobian = Callable[[float, Array], tuple[Array, Array]]

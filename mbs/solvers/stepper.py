@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mbs.solvers.failures import MAX_STEPS, Failure, failed
+from mbs.solvers.problem import MAX_STEPS, Failure, failed
 
 Array = npt.NDArray[np.float64]
 RightHandSide = Callable[[float, Array], Array]

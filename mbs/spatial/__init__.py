@@ -4,12 +4,21 @@ Nothing here is larger than 3x3: zeros and ones fold into the graph, which is wh
 operation counts of the models low.
 """
 
-from mbs.spatial.angles import sin_cos
-from mbs.spatial.inertia import Inertia
+from mbs.spatial.inertia import Body, Inertia, PseudoInertia
 from mbs.spatial.khalil import Khalil, placed
-from mbs.spatial.pose import Pose
-from mbs.spatial.pseudo_inertia import Body, PseudoInertia
-from mbs.spatial.quaternion import quaternion_rate, quaternion_rotation
+from mbs.spatial.pose import (
+    Displacement,
+    FreeDisplacement,
+    Movable,
+    Pose,
+    Screw,
+    Wrench,
+    add_wrenches,
+    body_through,
+    carried,
+    origin,
+    wrench_through,
+)
 from mbs.spatial.rotation import (
     MatrixTurn,
     Rotation,
@@ -17,16 +26,9 @@ from mbs.spatial.rotation import (
     align_z,
     axis_turn,
     nearest_rotation,
+    quaternion_rate,
+    quaternion_rotation,
     unit_vector,
-)
-from mbs.spatial.screw import (
-    Displacement,
-    FreeDisplacement,
-    Movable,
-    Screw,
-    body_through,
-    origin,
-    wrench_through,
 )
 from mbs.spatial.vectors import (
     cross,
@@ -34,11 +36,11 @@ from mbs.spatial.vectors import (
     exact_product,
     exact_sum,
     is_zero,
+    sin_cos,
     skew,
     vector,
     zeros,
 )
-from mbs.spatial.wrench import Wrench, add_wrenches, carried
 
 __all__ = [
     "Body",

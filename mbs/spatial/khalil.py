@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 import casadi
 from casadi import DM, SX, Function
 
-from mbs.spatial.pose import Pose
+from mbs.spatial.pose import Pose, Screw
 from mbs.spatial.rotation import axis_turn
-from mbs.spatial.screw import Screw
 from mbs.spatial.vectors import exact_sum, vector
 
 _QUARTER = math.pi / 2

@@ -14,7 +14,7 @@ from typing import Protocol
 import casadi
 from casadi import DM, SX
 
-from mbs.spatial.angles import sin_cos
+from mbs.spatial.vectors import sin_cos, skew
 
 Rows = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 """A (3, 3) matrix of numbers, row by row."""
@@ -202,3 +202,37 @@ def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -
         R = [[sum(R[i][k] * half[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
     first, second, third = ((row[0], row[1], row[2]) for row in R)
     return first, second, third
+
+
+# Unit quaternions w, x, y, z for joints that turn freely.
+
+
+def quaternion_rotation(quaternion: SX) -> SX:
+    """(3, 3) orientation of the turned frame, of a unit quaternion (w, x, y, z).
+
+    The diagonal is w2 + x2 - y2 - z2 and so on, which keeps R' R = |quaternion|^4 I when the norm
+    is not one.
+
+    Source: Khalil & Dombre 2002, section 3.6.
+    """
+    w, x, y, z = (quaternion[k] for k in range(4))
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    return casadi.vertcat(
+        casadi.horzcat(ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        casadi.horzcat(2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)),
+        casadi.horzcat(2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz),
+    )
+
+
+def quaternion_rate(quaternion: SX, angular_velocity: SX) -> SX:
+    """(4, 1) time derivative of the quaternion of a frame that turns with the velocity [rad/s].
+
+    Args:
+        quaternion: (4, 1) w, x, y, z.
+        angular_velocity: (3, 1) in the turned frame.
+    """
+    w, e = quaternion[0], quaternion[1:4]
+    return 0.5 * casadi.vertcat(
+        -casadi.dot(e, angular_velocity),
+        w * angular_velocity + casadi.mtimes(skew(e), angular_velocity),
+    )

@@ -1,8 +1,8 @@
 """Pictures of mechanisms: scenes for any viewer, files and notebooks, graphs of connections."""
 
-from mbs.view.asset_files import SCRIPTS as SCRIPTS
-from mbs.view.asset_files import assets_folder
 from mbs.view.diagram import Diagram
+from mbs.view.page import SCRIPTS as SCRIPTS
+from mbs.view.page import assets_folder
 from mbs.view.picture import Picture, animate, show
 from mbs.view.scene import Scene, scene
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbs.assembly import System
-from mbs.view.measures import plane_normal
 from mbs.view.mesh import BOX_CORNERS, BOX_FACES, turned_to
-from mbs.view.posed import Array, PosedLinks, posed
+from mbs.view.posed import Array, PosedLinks, plane_normal, posed
 from mbs.view.primitives import (
     AxisShape,
     BallShape,

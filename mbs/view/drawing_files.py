@@ -9,8 +9,8 @@ from html import escape
 import numpy as np
 
 from mbs.view.drawing import LETTERS, Drawing, Name, Point, Stroke
-from mbs.view.palette import Theme, rgb
 from mbs.view.posed import Array
+from mbs.view.primitives import Theme, rgb
 
 SIZE = 200
 """Width and height of the PNG picture in pixels."""

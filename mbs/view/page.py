@@ -5,13 +5,77 @@ from __future__ import annotations
 import base64
 import html
 import json
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from mbs.view.asset_files import SCRIPTS, STYLES, asset
-from mbs.view.look import Look
+from mbs.errors import ModelError
+from mbs.text import did_you_mean
 from mbs.view.posed import Array
 from mbs.view.scene import HIDDEN, Scene
+
+# The files that show a scene in a browser.
+
+
+SCRIPTS = ("three.bundle.js", "shapes.js", "viewer.js")
+"""Scripts of the viewer, in the order in which they are loaded."""
+
+STYLES = ("viewer.css",)
+"""Styles of the viewer."""
+
+
+def assets_folder() -> Path:
+    """The folder with the scripts and styles of the viewer, for a server to hand out."""
+    return Path(__file__).parent / "assets"
+
+
+def asset(name: str) -> str:
+    """The text of one of these files."""
+    return (assets_folder() / name).read_text(encoding="utf-8")
+
+
+# How a picture looks: from where, on which background, and what is shown.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """How a picture looks.
+
+    Attributes:
+        view: iso, front, side or top.
+        theme: light or dark, or auto: what the browser prefers, and light in other files.
+        shown: roles that are shown besides the usual ones: "label", "link frame".
+    """
+
+    view: str = "iso"
+    theme: Literal["auto", "light", "dark"] = "auto"
+    shown: tuple[str, ...] = ()
+
+
+def look_of(made: Scene, view: str, theme: str, shown: Collection[str]) -> Look:
+    """How a picture of a scene looks.
+
+    Raises:
+        ModelError: there is no such view, theme or role.
+    """
+    themes: dict[str, Literal["auto", "light", "dark"]]
+    themes = {"auto": "auto", "light": "light", "dark": "dark"}
+    roles = {item.role for item in made.primitives}
+    given = (shown,) if isinstance(shown, str) else tuple(shown)
+    for what, name, known in (
+        ("view", view, made.views),
+        ("theme", theme, themes),
+        *(("role", role, roles) for role in given),
+    ):
+        if name not in known:
+            raise ModelError(
+                f"{made.system.name}: there is no {what} {name!r}; {did_you_mean(name, known)}"
+            )
+    return Look(view, themes[theme], given)
+
 
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"

@@ -2,19 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import itertools
+import shutil
+import subprocess
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from mbs.errors import ExportError, ModelError
+from mbs.files import PathLike, whole_file
+from mbs.progress import progress
 from mbs.result import optional_module
-from mbs.view.camera import Camera, camera
+from mbs.text import did_you_mean
 from mbs.view.mesh import Faces, faces_of, stretched
-from mbs.view.palette import PALETTE, Theme, rgb
 from mbs.view.posed import Array
-from mbs.view.primitives import LabelShape, SpanShape, SpringShape
+from mbs.view.primitives import PALETTE, LabelShape, SpanShape, SpringShape, Theme, rgb
 from mbs.view.scene import HIDDEN, Scene
+
+# Where a picture is seen from, and how points of space fall on it.
+
+
+FIELD = np.radians(32.0)
+"""Angle between the lower and the upper edge, as in the viewer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A perspective view.
+
+    Attributes:
+        place: of the eye [m].
+        axes: (3, 3) rows: to the right, upwards, towards the eye.
+        away: distance of the eye from the middle of the picture [m].
+    """
+
+    place: Array
+    axes: Array
+    away: float
+
+    def seen(self, points: Array) -> tuple[Array, Array]:
+        """Places (..., 2) on the picture, whose height is 2, and depths (...), larger nearer."""
+        local = (points - self.place) @ self.axes.T
+        depth = local[..., 2]
+        flat = local[..., :2] / (-depth[..., None] * np.tan(FIELD / 2))
+        return flat, depth
+
+
+def camera(scene: Scene, view: str) -> Camera:
+    """The camera that looks at a scene from one of its views.
+
+    Raises:
+        ModelError: there is no such view.
+    """
+    if view not in scene.views:
+        raise ModelError(
+            f"{scene.system.name}: there is no view {view!r}; " + did_you_mean(view, scene.views)
+        )
+    out, up = np.array(scene.views[view]), np.array(scene.up)
+    right = np.cross(up, out)
+    right = right / np.linalg.norm(right)
+    away = 1.06 * scene.bounds.radius / float(np.sin(FIELD / 2))
+    axes = np.vstack([right, np.cross(out, right), out])
+    return Camera(np.array(scene.bounds.center) + away * out, axes, away)
+
 
 _LIGHT = np.array([0.35, 0.85, 0.55])
 """Towards the light: right, up, towards the eye."""
@@ -193,3 +247,108 @@ def painter(scene: Scene, view: str, theme: Theme, shown: Collection[str] = ()) 
     figure.set_facecolor(str(PALETTE[theme]["background"]))
     axes = figure.add_axes((0, 0, 1, 1))
     return Painter(scene, camera(scene, view), theme, roles, solid, figure, axes)
+
+
+# Files of pictures made without a browser: PNG and SVG, GIF by Pillow, MP4 by ffmpeg.
+
+
+Image = npt.NDArray[np.uint8]
+
+_DOTS = 110.0
+_FILM_DOTS = 80.0
+"""Dots an inch."""
+
+_COLOURS = 256
+
+
+def save_still(painter: Painter, poses: Array, path: PathLike) -> None:
+    """Write one picture in the format that the ending names: .png or .svg.
+
+    Raises:
+        ExportError: the file cannot be written.
+    """
+    matplotlib = optional_module("matplotlib", "plot")
+    figure = painter.paint(poses)
+    with (
+        whole_file(path) as scratch,
+        matplotlib.rc_context({"svg.hashsalt": "mbs"}),
+    ):
+        kept = {"Date": None} if scratch.suffix.lower() == ".svg" else {}
+        figure.savefig(scratch, dpi=_DOTS, metadata=kept)
+
+
+def save_gif(painter: Painter, poses: Array, path: PathLike, fps: float) -> None:
+    """Write a motion (n, 12 links) as a GIF that starts again at its end.
+
+    Raises:
+        ExportError: the file cannot be written.
+    """
+    images = optional_module("PIL.Image", "plot")
+    middle = images.fromarray(next(_frames(painter, poses[len(poses) // 2 :])))
+    palette = middle.quantize(_COLOURS, method=images.Quantize.MAXCOVERAGE)
+    small = [
+        images.fromarray(frame).quantize(palette=palette, dither=images.Dither.NONE)
+        for frame in _frames(painter, poses)
+    ]
+    with whole_file(path) as scratch:
+        small[0].save(
+            scratch,
+            format="GIF",
+            save_all=True,
+            append_images=small[1:],
+            duration=round(1000 / fps),
+            loop=0,
+        )
+
+
+def save_mp4(painter: Painter, poses: Array, path: PathLike, fps: float) -> None:
+    """Write a motion (n, 12 links) as an MP4 file (H.264).
+
+    Raises:
+        ExportError: ffmpeg is not there or fails, or the file cannot be written.
+    """
+    program = shutil.which("ffmpeg")
+    if program is None:
+        raise ExportError(
+            f"{Path(path)}: ffmpeg, which makes .mp4 files, was not found; install it, or save a"
+            " .gif or .html file"
+        )
+    frames = _frames(painter, poses)
+    first = next(frames)
+    height, width, _ = first.shape
+    given = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height} -r {fps:g} -i -"
+    made = "-an -vcodec libx264 -pix_fmt yuv420p -movflags +faststart"
+    with whole_file(path) as scratch:
+        command = [program, "-y", "-loglevel", "error", *given.split(), *made.split()]
+        _feed([*command, str(scratch)], itertools.chain([first], frames), path)
+
+
+def _feed(command: list[str], frames: Iterator[Image], path: PathLike) -> None:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdin is not None
+        try:
+            for frame in frames:
+                process.stdin.write(frame.tobytes())
+        except BrokenPipeError:  # it has stopped; its words say why
+            pass
+        _, words = process.communicate()
+    if process.returncode:
+        reason = " ".join(words.decode("utf-8", "replace").split())[-200:]
+        raise ExportError(f"{Path(path)}: ffmpeg failed ({reason}); save a .gif or .html file")
+
+
+def _frames(painter: Painter, poses: Array) -> Iterator[Image]:
+    """(height, width, 3) pictures, of even height and width."""
+    canvases = optional_module("matplotlib.backends.backend_agg", "plot")
+    painter.figure.set_dpi(_FILM_DOTS)
+    canvas: Any = canvases.FigureCanvasAgg(painter.figure)
+    with progress("painting", 0.0, float(len(poses)), quiet=False) as reached:
+        for number, row in enumerate(poses, start=1):
+            painter.paint(row)
+            canvas.draw()
+            pixels: Image = np.asarray(canvas.buffer_rgba())[:, :, :3]
+            height, width = pixels.shape[0] // 2 * 2, pixels.shape[1] // 2 * 2
+            yield np.ascontiguousarray(pixels[:height, :width])
+            reached(float(number))

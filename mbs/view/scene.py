@@ -11,12 +11,21 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
-from mbs.view.joint_shapes import force_shapes, joint_shapes
-from mbs.view.link_shapes import base_shapes, corners, frame_shapes, link_shapes, solid_shapes
-from mbs.view.measures import BoundingBall, Floor, bounds_of, floor_of, measures, views
-from mbs.view.palette import PALETTE
-from mbs.view.posed import Array, Values, pose_rows, posed, position_of
+from mbs.view.posed import (
+    Array,
+    BoundingBall,
+    Floor,
+    Values,
+    bounds_of,
+    floor_of,
+    measures,
+    pose_rows,
+    posed,
+    position_of,
+    views,
+)
 from mbs.view.primitives import (
+    PALETTE,
     BallShape,
     BarShape,
     BoxShape,
@@ -25,6 +34,15 @@ from mbs.view.primitives import (
     Primitive,
     RingShape,
     Vector,
+)
+from mbs.view.shapes import (
+    base_shapes,
+    corners,
+    force_shapes,
+    frame_shapes,
+    joint_shapes,
+    link_shapes,
+    solid_shapes,
 )
 
 HIDDEN = ("link frame", "label")

@@ -10,7 +10,7 @@ import mbs.assembly.open_system
 import mbs.models
 from mbs.assembly import symbolic
 from mbs.components import Body, Box, Prismatic, Revolute
-from mbs.components.placement import Turned, angle_expression
+from mbs.components.component import Turned, angle_expression
 from mbs.errors import AssemblyError
 from mbs.export.languages.header import tables
 from mbs.expressions import Number

@@ -28,7 +28,7 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.errors import AssemblyError, ModelError
 from mbs.expressions import Parameter
 

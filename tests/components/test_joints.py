@@ -16,8 +16,8 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.components.axes import in_plane
-from mbs.components.motion import Motion
+from mbs.components.component import in_plane
+from mbs.components.joints import Motion
 from mbs.errors import DescriptionError
 from mbs.expressions import Parameter, parameters_of
 

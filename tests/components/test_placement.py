@@ -7,7 +7,7 @@ from support.messages import refused
 from support.random_trees import random_rotation
 
 from mbs.components import Body
-from mbs.components.placement import KhalilStep, Oriented, Translation, Turned
+from mbs.components.component import KhalilStep, Oriented, Translation, Turned
 from mbs.errors import DescriptionError
 
 B = Body("b")

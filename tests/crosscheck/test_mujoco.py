@@ -6,7 +6,7 @@ from support.mujoco_rounding import as_exact_as
 from support.random_trees import ALL_KINDS, KINDS, random_state, random_tree
 
 import mbs.models
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 
 mujoco = pytest.importorskip("mujoco")
 full_inertia = pytest.importorskip("support.mujoco_inertia").full_inertia

@@ -9,7 +9,7 @@ from casadi import SX, Function
 from export.code_text import idm, lines
 
 import mbs
-from mbs.export.languages.signs import turned
+from mbs.export.languages.build import turned
 from mbs.operations import count, simplify
 from mbs.operations.graph import function_of, graph_of
 

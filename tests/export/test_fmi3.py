@@ -15,8 +15,7 @@ from fmu_instances import Fmu3 as Fmu
 from fmu_models import pendulum, slider_crank
 
 from mbs.errors import ExportError
-from mbs.export.fmu.faces import FACES
-from mbs.export.fmu.pack import write_fmu
+from mbs.export.fmu.pack import FACES, write_fmu
 from mbs.native import find_compiler
 
 MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}

@@ -18,8 +18,7 @@ from fmu_models import MODELS, crank_reference, pendulum, slider_crank
 from mbs.errors import CompilerError, ExportError
 from mbs.export.fmu import fmi2_xml
 from mbs.export.fmu.description import FmuVariable, State
-from mbs.export.fmu.faces import FACES
-from mbs.export.fmu.pack import write_fmu
+from mbs.export.fmu.pack import FACES, write_fmu
 from mbs.native import find_compiler
 
 SOURCES = FACES["2.0"].compiled("dopri5")

@@ -6,8 +6,7 @@ import pytest
 from fmu_models import pendulum, slider_crank
 from fmu_structures import ball, two_cranks
 
-from mbs.export.fmu.dependencies import dependencies
-from mbs.export.fmu.linearity import linearity
+from mbs.export.fmu.xml import dependencies, linearity
 
 SEED = 20261122
 

@@ -18,7 +18,7 @@ from mbs.errors import ExportError
 from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel, FmuVariable, Member, Terminal
 from mbs.export.fmu.system_fmu import fmu_model
-from mbs.export.fmu.terminals import terminals_and_icons
+from mbs.export.fmu.xml import terminals_and_icons
 
 
 def texts(model):

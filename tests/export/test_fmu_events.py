@@ -7,9 +7,9 @@ from support.contact_mechanisms import block, pendulum, stick_slip, stopped_rock
 
 import mbs
 from mbs.components import CoulombFriction, RigidStop
-from mbs.export.fmu.events import jumps
 from mbs.export.fmu.system_fmu import Contents, fmu_model
-from mbs.models.minimal_state import minimal_state
+from mbs.export.fmu.variables import jumps
+from mbs.models.state.independent import minimal_state
 
 
 def stopped_pendulum():

@@ -20,9 +20,8 @@ from fmu_structures import ball
 
 import mbs
 from mbs.errors import ExportError
-from mbs.export.fmu.about import About
-from mbs.export.fmu.description import FmuModel, FmuVariable, State
-from mbs.export.fmu.licences import MBS
+from mbs.export.fmu.description import About, FmuModel, FmuVariable, State
+from mbs.export.fmu.documentation import MBS
 from mbs.export.fmu.pack import write_fmu
 from mbs.export.fmu.reference import FOLDER, reference_files
 from mbs.solvers.integrate import integrate

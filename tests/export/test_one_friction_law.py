@@ -11,10 +11,9 @@ from fmu_instances import Fmu
 import mbs
 from mbs.components import Body, JointFriction, JointStop, Mechanism, Prismatic
 from mbs.identification import regressor
-from mbs.identification.regressors.columns import values_of
-from mbs.identification.regressors.dynamic import known_efforts
+from mbs.identification.regressors import known_efforts, values_of
 from mbs.models import ContactPoint, contact_phases, dae
-from mbs.models.full_state import full_state
+from mbs.models.state.tree import full_state
 
 MASS, DRY, WIDTH, VISCOUS = 2.0, 3.0, 0.05, 0.7
 SLIDING, MORE, FALL, NARROW = 1.1, 0.5, 0.3, 0.02

@@ -7,7 +7,7 @@ from formats.test_urdf import ARM, INERTIAL
 import mbs.models
 from mbs.assembly.tree import Tree
 from mbs.components import Coupling, Fixed, Free, Prismatic, Revolute, Spherical
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 from mbs.formats import read_mjcf, read_urdf

@@ -3,7 +3,7 @@
 import pytest
 
 from mbs.errors import DescriptionError
-from mbs.formats.par_file import ParFile
+from mbs.formats.par import ParFile
 
 LONG = 1_000_000
 

@@ -4,19 +4,17 @@ import pytest
 from support.measured_arm import arm, motion, noisy_record, true_efforts
 
 import mbs
+import mbs.identification.bodies as physical_set
 from mbs.errors import ModelError, SolverError
-from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.bodies import physical_set
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.estimation.methods import METHODS
-from mbs.identification.exciting.excitation import Series, excitation
+from mbs.identification.base_parameters import base_parameters
+from mbs.identification.excitation import Series, excitation
 from mbs.identification.identify import identify
-from mbs.identification.observations.observations import observe
-from mbs.identification.postures import active_places
-from mbs.identification.records.filters import Samples
-from mbs.identification.records.record import Record
-from mbs.identification.regressors.columns import numbers_of, values_of
-from mbs.identification.regressors.dynamic import regressor
+from mbs.identification.leading import active_places
+from mbs.identification.least_squares import least_squares
+from mbs.identification.methods import METHODS
+from mbs.identification.observations import observe
+from mbs.identification.record import Record, Samples
+from mbs.identification.regressors import numbers_of, regressor, values_of
 
 
 def test_an_arm_identified_from_a_noisy_record_predicts_another_motion():

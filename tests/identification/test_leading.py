@@ -7,11 +7,10 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError
-from mbs.identification.exciting.excitation import Series, excitation
+from mbs.identification.excitation import Series, excitation
 from mbs.identification.identify import identify
-from mbs.identification.leading import LED, leads_of, led, signed_leads
-from mbs.identification.postures import active_places, positions
-from mbs.identification.records.record import Record
+from mbs.identification.leading import LED, active_places, leads_of, led, positions, signed_leads
+from mbs.identification.record import Record
 
 
 @cache

@@ -5,7 +5,7 @@ from support.measured_arm import arm
 import mbs
 from mbs.components import Body, Spherical
 from mbs.errors import ModelError
-from mbs.identification.postures import active_places, is_explicit, positions
+from mbs.identification.leading import active_places, is_explicit, positions
 
 
 def test_open_systems_are_their_own_posture():

@@ -4,21 +4,15 @@ import numpy as np
 import pytest
 from support.real_records import panda_record, tx40_record
 
-from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.bodies.consistent import consistent
-from mbs.identification.bodies.physical_set import consistent_links
-from mbs.identification.bodies.prior import Prior
-from mbs.identification.estimation.essential import essential
-from mbs.identification.estimation.estimate import held_out
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.estimation.robust import robust
-from mbs.identification.estimation.weighted import weighted
+from mbs.identification.base_parameters import base_parameters
+from mbs.identification.bodies import Prior, consistent, consistent_links
+from mbs.identification.estimate import held_out
 from mbs.identification.identify import identify
-from mbs.identification.observations.equations import EQUATIONS
-from mbs.identification.observations.observations import observe, observe_filtered
-from mbs.identification.observations.quality import excitation_quality
-from mbs.identification.records.filters import smoothed, smoothed_with_velocity
-from mbs.identification.regressors.dynamic import regressor
+from mbs.identification.least_squares import least_squares, robust, weighted
+from mbs.identification.methods import essential
+from mbs.identification.observations import EQUATIONS, excitation_quality, observe, observe_filtered
+from mbs.identification.record import smoothed, smoothed_with_velocity
+from mbs.identification.regressors import regressor
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from support.measured_arm import equations, noisy_samples
 
-from mbs.identification.bodies.consistent import consistent
-from mbs.identification.estimation.estimate import held_out
-from mbs.identification.estimation.residual_plot import plot_residuals
-from mbs.identification.estimation.weighted import weighted
-from mbs.identification.observations.observations import observe
-from mbs.identification.report import report
+from mbs.identification.bodies import consistent
+from mbs.identification.estimate import held_out, plot_residuals
+from mbs.identification.identify import report
+from mbs.identification.least_squares import weighted
+from mbs.identification.observations import observe
 
 
 def full():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from casadi import DM, SX
 
-from mbs.loops.sequence.conics import real_quartic, trigonometric_quartic
+from mbs.closed_forms.sequence import real_quartic, trigonometric_quartic
 
 SIGNS = tuple(itertools.product((1, -1), repeat=2))
 APART = 1e-2

@@ -13,11 +13,11 @@ from support.arm_search import distance, plain_arm, some
 from support.arms import general_6r, slides_and_turns, spherical, three_parallel
 
 import mbs
-from mbs.components.motion import Motion
+from mbs.closed_forms.paul import paul
+from mbs.closed_forms.ring import Gap, Ring, Unknown
+from mbs.closed_forms.sequence import Problem
+from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
-from mbs.loops.closed_form.ring import Gap, Ring, Unknown
-from mbs.loops.paul import paul
-from mbs.loops.sequence import Problem
 from mbs.models.inverse_geometry.chain import chain
 from mbs.robots.rows import frame, robot
 from mbs.spatial import Pose, axis_turn, vector

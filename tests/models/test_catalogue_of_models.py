@@ -4,8 +4,8 @@ import pytest
 import mbs
 from mbs.errors import ModelError
 from mbs.models.catalogue import entries, entry
+from mbs.models.catalogue.entry import regular_part
 from mbs.models.catalogue.postures import held_at, moving_joints, surplus_joints
-from mbs.models.catalogue.regular_part import regular_part
 
 
 @pytest.fixture(scope="module")

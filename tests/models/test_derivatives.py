@@ -14,9 +14,9 @@ from mbs.errors import ModelError
 from mbs.models import inverse_dynamics_derivatives
 from mbs.operations import count
 from mbs.recursions import newton_euler_derivatives as recursion
-from mbs.recursions.accelerations import moving_base, resting_base
 from mbs.recursions.newton_euler import newton_euler
 from mbs.recursions.poses import link_poses
+from mbs.recursions.velocities import moving_base, resting_base
 
 TREES = [
     *((seed, False, False) for seed in range(4)),

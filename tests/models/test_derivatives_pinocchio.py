@@ -7,7 +7,7 @@ from support.random_trees import ALL_KINDS, random_state, random_tree
 from test_derivatives import assert_close
 
 import mbs
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.models import direct_dynamics_derivatives, inverse_dynamics_derivatives
 
 pin = pytest.importorskip("pinocchio")

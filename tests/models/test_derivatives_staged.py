@@ -11,7 +11,7 @@ import mbs
 from mbs.components import Body, Mechanism, Revolute
 from mbs.errors import ModelError
 from mbs.models import direct_dynamics_derivatives
-from mbs.models.slopes import accelerations_by_efforts
+from mbs.models.derivatives import accelerations_by_efforts
 from mbs.models.symbols import symbols_of
 from mbs.native import compiled
 from mbs.native.staged import staged

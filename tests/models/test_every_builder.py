@@ -179,7 +179,7 @@ def test_closed_forms_differentiate_twice(name):
 
 def test_loops_solved_by_iteration_differentiate_by_the_implicit_function_theorem():
     """Newton's method is one node: its derivatives are those of the equations, twice."""
-    from mbs.loops.numeric import follow_active
+    from mbs.loops.function import follow_active
 
     system = CLOSED["slider_crank"]()
     follow = follow_active(system)

@@ -25,7 +25,7 @@ from mbs.components import (
     Spring,
     Torque,
 )
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.operations import count
 
 MODELS = mbs.models

@@ -11,7 +11,7 @@ from support.random_trees import random_tree
 import mbs
 import mbs.models
 from mbs.components import RigidStop
-from mbs.models.full_state import full_state
+from mbs.models.state.tree import full_state
 
 ELASTIC = mbs.Parameter("e", 0.5)
 

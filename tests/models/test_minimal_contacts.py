@@ -26,7 +26,7 @@ from mbs.components import (
     RigidStop,
 )
 from mbs.errors import ModelError
-from mbs.models.minimal_state import DriveInputs, minimal_state
+from mbs.models.state.independent import DriveInputs, minimal_state
 
 
 def compared(system, duration, q0=None, v0=None, tau=None, motion=None):

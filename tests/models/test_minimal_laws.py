@@ -18,7 +18,7 @@ from mbs.components import (
     Torque,
 )
 from mbs.errors import ModelError
-from mbs.models.minimal_state import DriveInputs, minimal_state
+from mbs.models.state.independent import DriveInputs, minimal_state
 
 
 def controller(system, kind, index=0):

@@ -7,7 +7,7 @@ from support.contact_mechanisms import five_bar, stick_slip, stopped_rocker
 from support.minimal_runs import moved, start_of
 
 import mbs
-from mbs.assembly.rates import normalised
+from mbs.assembly.tree import normalised
 from mbs.components import (
     Box,
     CoulombFriction,
@@ -20,7 +20,7 @@ from mbs.components import (
 )
 from mbs.errors import ModelError
 from mbs.models import direct_dynamics, hybrid_dynamics, transform
-from mbs.models.minimal_state import DriveInputs, consistent_start, minimal_state
+from mbs.models.state.independent import DriveInputs, consistent_start, minimal_state
 
 
 def floating():

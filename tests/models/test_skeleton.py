@@ -7,8 +7,7 @@ import pytest
 import mbs
 from mbs.components import Box, Free, PointMass, Revolute, Spring
 from mbs.errors import ModelError
-from mbs.models.link_outline import link_outline
-from mbs.models.skeleton import skeleton
+from mbs.models.skeleton import link_outline, skeleton
 
 SEED = 20261122
 CATALOGUE = ("puma560", "four_bar", "sr400", "stewart_platform", "andrews_squeezer", "cart_pole")

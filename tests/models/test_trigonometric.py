@@ -7,14 +7,14 @@ from casadi import SX, cos, sin
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mbs.models.trigonometric import (
+from mbs.models.singularities import (
     NotTrigonometric,
     factored,
     lowered,
     polynomial_of,
+    value,
     with_sums_of_angles,
 )
-from mbs.models.trigonometric_text import value
 
 x = SX.sym("x", 5)
 a, b, c, d, e = (x[k] for k in range(5))

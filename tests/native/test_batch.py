@@ -12,8 +12,8 @@ from support.batches import bits, example
 
 from mbs.native import batch, compiled, find_compiler
 from mbs.native.batch_source import batch_source
+from mbs.native.c_code import BINARY, ELEMENTWISE
 from mbs.native.kernel import FAST_FLAGS
-from mbs.native.operators import BINARY, ELEMENTWISE
 
 MODULE = sys.modules["mbs.native.batch"]
 INF = float("inf")

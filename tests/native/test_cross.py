@@ -2,9 +2,9 @@
 
 import pytest
 
+import mbs.native.compiler as cross
 from mbs.errors import CompilerError
-from mbs.native import cross
-from mbs.native.cross import PLATFORMS, cross_compiler, host_platform, platform_named
+from mbs.native.compiler import PLATFORMS, cross_compiler, host_platform, platform_named
 
 
 def test_every_platform_has_a_target_and_a_suffix():

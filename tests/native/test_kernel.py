@@ -10,11 +10,9 @@ from support.random_trees import random_state, random_tree
 import mbs
 import mbs.models
 from mbs.native import compiled, find_compiler
+from mbs.native.c_code import LANES, Batch, blocks, gives, needs, schedule, slots
 from mbs.native.compiler import compile_library
-from mbs.native.kernel import FAST_FLAGS, kernel_library, processor
-from mbs.native.kernel_source import kernel_source
-from mbs.native.schedule import LANES, Batch, blocks, gives, needs, schedule
-from mbs.native.slots import slots
+from mbs.native.kernel import FAST_FLAGS, kernel_library, kernel_source, processor
 from mbs.operations.graph import graph_of
 
 OPERATIONS = {

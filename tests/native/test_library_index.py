@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from mbs.native import compiled, library_index
-from mbs.native.cache import cached_library, is_whole
-from mbs.native.compiler import LIBRARY_SUFFIX, compiler_found
+from mbs.native import compiled, kernel
+from mbs.native.compiler import LIBRARY_SUFFIX, cached_library, compiler_found, is_whole
 
 pytestmark = pytest.mark.skipif(not compiler_found(), reason="there is no compiler")
 
@@ -78,7 +77,7 @@ def test_what_differs_has_a_library_of_its_own(cache, built):
 
 def test_another_writer_writes_again(cache, built, monkeypatch):
     compiled(model())
-    monkeypatch.setattr(library_index, "_writer", lambda: "another version")
+    monkeypatch.setattr(kernel, "_writer", lambda: "another version")
     compiled(model())
     assert len(built) == 2
 
@@ -123,7 +122,7 @@ def test_a_damaged_library_of_texts_is_built_again(cache):
 def test_a_library_that_another_user_keeps_to_himself_is_built_elsewhere(cache, monkeypatch):
     files = {"f.c": "int f(void) { return 43; }"}
     library = cached_library(files)
-    module = sys.modules["mbs.native.cache"]
+    module = sys.modules["mbs.native.compiler"]
     read = module._sum_of
 
     def guarded(path):
@@ -150,7 +149,7 @@ def test_an_index_that_cannot_be_written_is_done_without(cache, built, monkeypat
     model_before = compiled(model(7.0))
     for entry in parts(cache)[".library"]:
         entry.unlink()
-    monkeypatch.setattr(library_index.os, "replace", full)
+    monkeypatch.setattr(kernel.os, "replace", full)
     again = compiled(model(7.0))
     np.testing.assert_array_equal(again(POINT), model_before(POINT))
     assert len(built) == 2

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from mbs.native import compiled
+from mbs.native.c_code import LANES
 from mbs.native.compiler import compile_library, find_compiler
-from mbs.native.kernel import FAST_FLAGS, kernel_library
-from mbs.native.kernel_source import kernel_source
-from mbs.native.schedule import LANES
+from mbs.native.kernel import FAST_FLAGS, kernel_library, kernel_source
 from mbs.native.staged import staged
 from mbs.operations.graph import graph_of
 

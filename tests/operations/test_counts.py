@@ -5,7 +5,7 @@ from casadi import SX, Function
 
 from mbs.operations import count
 from mbs.operations.counts import Count
-from mbs.recursions.cost import cost
+from mbs.recursions.route import cost
 
 
 def test_a_division_is_two_multiplications():

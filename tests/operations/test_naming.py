@@ -7,7 +7,7 @@ from casadi import SX, Function
 import mbs
 import mbs.models
 from mbs.operations import count, simplify
-from mbs.operations.naming import names_found
+from mbs.operations.pipeline import names_found
 
 
 def functions(between, result, other):

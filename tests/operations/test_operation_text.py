@@ -4,8 +4,8 @@ import casadi
 import pytest
 from casadi import SX, Function
 
-from mbs.identification.base.text import equation
-from mbs.native.operators import ELEMENTWISE, VECTORS
+from mbs.identification.grouping.grouping import equation
+from mbs.native.c_code import ELEMENTWISE, VECTORS
 from mbs.operations.graph import graph_of
 from mbs.operations.text import CODES, NAMES, PRODUCT, SUM, Infix
 

@@ -4,15 +4,17 @@ from casadi import SX
 from operations.expressions import counted, function, passed, require_equal, sincos
 
 from mbs.operations import count
-from mbs.operations.graph import Node, function_of, graph_of
-from mbs.operations.passes.angles import angles
-from mbs.operations.passes.drop import drop
-from mbs.operations.passes.factor import factor
-from mbs.operations.passes.fold import fold
-from mbs.operations.passes.order import order, waiting
-from mbs.operations.passes.parameters import parameters
-from mbs.operations.passes.pythagoras import pythagoras
-from mbs.operations.passes.share import share
+from mbs.operations.graph import Node, drop, function_of, graph_of
+from mbs.operations.passes import (
+    angles,
+    factor,
+    fold,
+    order,
+    parameters,
+    pythagoras,
+    share,
+    waiting,
+)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from operations.expressions import function, require_equal
 
 import mbs
 from mbs.errors import ModelError
-from mbs.operations import PASSES, Pass, catalogue, count, simplification, simplify
+from mbs.operations import PASSES, Pass, count, pipeline, simplification, simplify
 from mbs.operations.verification import witness
 
 
@@ -84,7 +84,7 @@ def test_an_output_that_is_nothing_but_rounding_may_vanish():
 
 
 def _zeroed(graph, parameters):
-    zero = catalogue.fold(graph).nodes[0]._replace(op=casadi.OP_CONST, args=())
+    zero = pipeline.fold(graph).nodes[0]._replace(op=casadi.OP_CONST, args=())
     return graph.with_nodes([zero], [[0]])
 
 

@@ -9,10 +9,9 @@ from symbolic_robots import symbolic_robot
 import mbs.models
 from mbs.models.kinematics import jacobian
 from mbs.operations import count
-from mbs.recursions.cost import cost
-from mbs.recursions.jacobian import VelocityTarget, outlook
+from mbs.recursions.jacobian import VelocityTarget, cheapest_jacobian, outlook
 from mbs.recursions.jacobian import jacobian as frame_jacobian
-from mbs.recursions.renaud import cheapest_jacobian
+from mbs.recursions.route import cost
 
 
 @pytest.mark.parametrize(

@@ -8,14 +8,14 @@ import mbs.models
 from mbs.operations import count
 from mbs.recursions import (
     articulated_body,
-    augmented_body,
     composite_body,
+    lagrange,
     newton_euler,
     newton_euler_derivatives,
 )
 
 RECURSIONS = (
-    *(articulated_body, augmented_body, composite_body),
+    *(articulated_body, composite_body, lagrange),
     *(newton_euler, newton_euler_derivatives),
 )
 MODELS = {

@@ -7,8 +7,7 @@ from casadi import SX
 import mbs
 import mbs.models
 from mbs.models.singularities import singularities
-from mbs.recursions.jacobian import VelocityTarget
-from mbs.recursions.survey import nonzero, survey, varying
+from mbs.recursions.jacobian import VelocityTarget, nonzero, survey, varying
 
 
 def arm(size):

@@ -10,7 +10,7 @@ from support.extrapolation import solution
 from support.spatial_chain import Chain, Part, X, Y, Z
 
 import mbs
-from mbs.models.full_state import full_state
+from mbs.models.state.tree import full_state
 from mbs.robots import bricard, modelica_four_bar, modelica_rod_four_bar
 from mbs.solvers import integrate
 

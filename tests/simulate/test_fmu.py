@@ -382,7 +382,7 @@ def test_what_is_unpacked_has_limits(limit, value, reason, tmp_path, monkeypatch
     file = packed(tmp_path / "x.fmu", **{f"resources/{k}": bytes(1_000_000) for k in range(3)})
     with pytest.raises(ModelError, match="is not a valid FMU"):  # only that no description is there
         fmu(file)
-    monkeypatch.setattr(mbs.archives, limit, value)
+    monkeypatch.setattr(mbs.files, limit, value)
     refuse(file, reason)
 
 

@@ -7,8 +7,8 @@ import pytest
 from support.change_points import linkage
 
 import mbs
+import mbs.solvers.integrate as compiled_run
 from mbs.errors import SolverError
-from mbs.solvers import compiled_run
 
 PARALLELOGRAM, MEETS, ANTI = "parallelogram", "a+g=b+c", "antiparallelogram"
 SYSTEMS = {

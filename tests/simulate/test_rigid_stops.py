@@ -5,7 +5,7 @@ import pytest
 
 import mbs
 from mbs.components import Body, PointMass, Prismatic, Revolute, RigidStop
-from mbs.models.full_state import full_state
+from mbs.models.state.tree import full_state
 from mbs.solvers import Events, integrate_events
 
 G = 9.81

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mbs.solvers.levenberg_marquardt import levenberg_marquardt
+from mbs.solvers.least_squares import levenberg_marquardt
 
 
 def test_linear_least_squares_is_that_of_numpy():

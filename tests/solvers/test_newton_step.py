@@ -1,7 +1,7 @@
 import casadi as ca
 import numpy as np
 
-from mbs.solvers.newton_step import newton_step
+from mbs.solvers.linear import newton_step
 
 
 def circle_and_line():

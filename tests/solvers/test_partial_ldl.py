@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
-from mbs.solvers.partial_ldl import partial_ldl
+from mbs.solvers.linear import partial_ldl
 
 LEAST = 1e-6
 

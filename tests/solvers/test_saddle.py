@@ -7,7 +7,7 @@ from casadi import DM, SX, Function
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mbs.solvers.saddle import elimination_order, solve_saddle
+from mbs.solvers.linear import elimination_order, solve_saddle
 
 
 def solved(A, J, b, d, scale=1.0):

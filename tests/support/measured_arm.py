@@ -7,11 +7,9 @@ from functools import cache
 import numpy as np
 
 import mbs
-from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.records.filters import Samples
-from mbs.identification.records.record import Record
-from mbs.identification.regressors.columns import values_of
-from mbs.identification.regressors.dynamic import regressor
+from mbs.identification.base_parameters import base_parameters
+from mbs.identification.record import Record, Samples
+from mbs.identification.regressors import regressor, values_of
 from mbs.robots.rows import cuboid, frame, robot
 
 RATE = 400.0

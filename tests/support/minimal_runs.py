@@ -9,8 +9,8 @@ import casadi
 import numpy as np
 from casadi import SX, Function
 
-from mbs.loops.posture import solve
-from mbs.models.minimal_state import consistent_start
+from mbs.loops.configuration import solve
+from mbs.models.state.independent import consistent_start
 from mbs.solvers import Events, integrate, integrate_events
 
 

@@ -8,9 +8,9 @@ from contextlib import asynccontextmanager
 from nicegui import ui
 from nicegui.testing.user_simulation import user_simulation
 
+import mbs.app.desk.jobs as jobs
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.document.document import Document
-from mbs.app.desk.jobs import jobs
 from mbs.app.desk.session import Session
 
 PATIENT = 100

@@ -9,8 +9,8 @@ import numpy as np
 from support.arm_search import distance, merged, plain_arm, searched
 
 import mbs
+from mbs.closed_forms.pieper import pieper
 from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.pieper import pieper
 from mbs.robots.rows import frame, robot
 
 EXACT, NOISE = 1e-11, 1e-10

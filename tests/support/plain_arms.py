@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mbs.models.inverse_geometry.arm import Arm
+from mbs.closed_forms.arm import Arm
 
 
 def khalil(rows, slides=None):

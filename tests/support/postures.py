@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbs.assembly.rates import quaternion_slices
-from mbs.loops.closed_form.places import independent_places
+from mbs.assembly.tree import quaternion_slices
+from mbs.closed_forms.ring import independent_places
 from mbs.loops.closing import Closing, closure_parameters
 
 

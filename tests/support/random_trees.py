@@ -17,8 +17,8 @@ from mbs.components import (
     Spherical,
     Universal,
 )
-from mbs.components.axes import in_plane
-from mbs.components.motion import Motion
+from mbs.components.component import in_plane
+from mbs.components.joints import Motion
 
 KINDS = ("revolute", "prismatic", "universal", "cylindrical", "planar", "spherical")
 ALL_KINDS = (*KINDS, "free")

@@ -8,8 +8,7 @@ import pytest
 import mbs
 from mbs.components import Body, Box, Free, Revolute
 from mbs.errors import ExportError
-from mbs.view.connections import connections
-from mbs.view.diagram_layout import PILL, layout
+from mbs.view.diagram import PILL, connections, layout
 
 SVG = "{http://www.w3.org/2000/svg}"
 CATALOGUE = mbs.robots.catalogue()

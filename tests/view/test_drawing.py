@@ -12,7 +12,7 @@ import mbs
 from mbs.components import Body, Box, Cylinder, Free, Revolute, Spring
 from mbs.view.drawing import Drawing, Name, Stroke, drawing, hull, placed
 from mbs.view.drawing_files import SIZE, icon, png, standalone, svg
-from mbs.view.palette import rgb
+from mbs.view.primitives import rgb
 
 CLOSED = ("four_bar", "stewart_platform")
 

@@ -11,8 +11,8 @@ import pytest
 
 import mbs
 from mbs.errors import ExportError
-from mbs.view.camera import camera
 from mbs.view.mesh import faces_of, revolved, stretched, turned_to
+from mbs.view.painter import camera
 from mbs.view.primitives import (
     BallShape,
     BarShape,

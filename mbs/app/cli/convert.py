@@ -12,7 +12,7 @@ from mbs.app.cli.arguments import Parameters, Robot, examples
 from mbs.app.cli.loading import mechanism, numbers
 from mbs.app.cli.printing import note
 from mbs.errors import DescriptionError, ExportError
-from mbs.messages import did_you_mean
+from mbs.text import did_you_mean
 
 if TYPE_CHECKING:
     from mbs.formats import RobotTable

@@ -15,7 +15,7 @@ from mbs.app.cli.printing import PrintedTable, note, print_json, print_tables
 from mbs.errors import ModelError
 
 if TYPE_CHECKING:
-    from mbs.app.tasks.counts import CountRow
+    from mbs.app.tasks.equations import CountRow
     from mbs.assembly import System
     from mbs.operations import Count
 
@@ -62,9 +62,8 @@ def count(
     Signs are not counted, a product by 2 is an addition, and what depends on parameters alone is
     counted apart, as in the literature.
     """
-    from mbs.app.tasks.counts import counts
-    from mbs.app.tasks.equations import EVERY_PASS
-    from mbs.app.tasks.simulation_laws import assignments
+    from mbs.app.tasks.equations import EVERY_PASS, counts
+    from mbs.app.tasks.simulation import assignments
 
     assembled = system(robot, parameter)
     options = assignments(option or (), "--option")

@@ -13,7 +13,7 @@ from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import note, print_json
 from mbs.errors import DescriptionError
-from mbs.messages import quoted
+from mbs.text import quoted
 
 if TYPE_CHECKING:
     from mbs.app.tasks.identification import Identified
@@ -92,7 +92,7 @@ def identify(
     --output writes the base parameters as CSV.
     """
     from mbs.app.tasks import identification as task
-    from mbs.app.tasks.identification_record import LARGEST
+    from mbs.app.tasks.identification import LARGEST
     from mbs.files import write_text
 
     require_places(output, residuals)

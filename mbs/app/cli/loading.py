@@ -45,7 +45,7 @@ def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
     Raises:
         DescriptionError: a text is no assignment of a number.
     """
-    from mbs.app.tasks.simulation_laws import assignments
+    from mbs.app.tasks.simulation import assignments
     from mbs.expressions import number
 
     given = assignments(texts or (), option)

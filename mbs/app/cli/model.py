@@ -111,7 +111,7 @@ def equations_of(
         MbsError: there is no such model, option or language, or the robot does not have it.
     """
     from mbs.app.tasks import equations as task
-    from mbs.app.tasks.simulation_laws import assignments
+    from mbs.app.tasks.simulation import assignments
 
     texts = assignments(options or (), "--option")
     values = task.parsed_options(assembled, task.entry(key), texts)

@@ -161,7 +161,7 @@ def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
     Raises:
         DescriptionError: a text is no NAME=VALUE.
     """
-    from mbs.app.tasks.simulation_laws import assignments
+    from mbs.app.tasks.simulation import assignments
 
     fields = {"input": "inputs"}
     return {

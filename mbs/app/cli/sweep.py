@@ -64,7 +64,7 @@ def sweep(
     have empty fields, are told on the standard error, and make the exit code 1.
     """
     from mbs.app.tasks import simulation, sweeping
-    from mbs.app.tasks.simulation_laws import assignments
+    from mbs.app.tasks.simulation import assignments
 
     require_places(output)
     grid = sweeping.grid_of(assignments(over, "--over"))

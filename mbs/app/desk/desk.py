@@ -3,22 +3,273 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import json
+import logging
+from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from typing import Any
 
-from mbs.app.desk.desk_base import aside
-from mbs.app.desk.desk_picture import DeskPicture
-from mbs.app.desk.document.cells import Cell
+import numpy as np
+from nicegui import background_tasks, ui
+from nicegui.client import Client
+
+import mbs.app.desk.jobs as jobs
 from mbs.app.desk.document.document import Document
+from mbs.app.desk.document.tables import Cell
 from mbs.app.desk.drawer import Drawer
-from mbs.app.desk.jobs import jobs
-from mbs.app.desk.jobs.cards import JobCards
-from mbs.app.desk.session import Session
-from mbs.app.desk.session_posture import Vector, carried, handles, moved
+from mbs.app.desk.jobs import JobCards
+from mbs.app.desk.session import Session, Vector, carried, handles, moved
+from mbs.app.desk.style import VIEW
 from mbs.assembly import System
 from mbs.errors import MbsError
 from mbs.view import Scene, scene
+
+# What every part of the desk needs: the session, the page, one thread, and words to say.
+
+
+_LOG = logging.getLogger(__name__)
+_ASIDE = ThreadPoolExecutor(max_workers=1, thread_name_prefix="mbs-desk")
+"""The one thread that builds graphs: they are not made for several at once."""
+
+Listener = Callable[[], Coroutine[Any, Any, None] | None]
+
+
+async def aside(function: Callable[..., Any], *args: Any) -> Any:
+    """What a short function returns, called in the one thread that builds graphs."""
+    return await asyncio.get_running_loop().run_in_executor(_ASIDE, function, *args)
+
+
+class DeskBase:
+    """The session of a visitor and the page that shows it.
+
+    Attributes:
+        session: the robot, its history and its posture.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self._client: Client = ui.context.client
+        self._on_robot: list[Listener] = []
+        self._on_posture: list[Listener] = []
+        self._on_document: list[Listener] = []
+
+    @property
+    def document(self) -> Document:
+        """The robot as typed."""
+        return self.session.document
+
+    @property
+    def q(self) -> Vector:
+        """(nq,) present posture [rad or m]."""
+        return self.session.q
+
+    @property
+    def is_left(self) -> bool:
+        """Whether the page was closed for good; nothing can be shown on it any more."""
+        return self._client.is_deleted
+
+    def system(self) -> System:
+        """The robot as typed, assembled already.
+
+        Raises:
+            MbsError: something is wrong in it; the sentence says what.
+        """
+        return self.session.require_system()
+
+    def checked_system(self) -> System | None:
+        """The robot as typed; None where something is wrong in it, which is told."""
+        try:
+            return self.system()
+        except MbsError as error:
+            self.complain(error)
+            return None
+
+    async def aside(self, function: Callable[..., Any], *args: Any) -> Any:
+        """What a short function returns, called in the one thread that builds graphs."""
+        return await aside(function, *args)
+
+    def complain(self, error: Exception | str) -> None:
+        """Show why something was refused."""
+        sentence = self._sentence(error)
+        if self.is_left:
+            return
+        with self._client:
+            ui.notify(
+                sentence,
+                type="negative",
+                multi_line=True,
+                timeout=9000,
+                close_button="Close",
+                position="bottom",
+            )
+
+    def tell(self, sentence: str) -> None:
+        """Show a short message."""
+        if self.is_left:
+            return
+        with self._client:
+            ui.notify(sentence, position="bottom", timeout=3500)
+
+    def download(self, data: bytes, name: str) -> None:
+        """Send a file to the browser."""
+        if self.is_left:
+            return
+        with self._client:
+            ui.download(data, name)
+
+    @staticmethod
+    def _sentence(error: Exception | str) -> str:
+        if isinstance(error, (str, MbsError)):
+            return str(error)
+        _LOG.error("the desk could not go on", exc_info=error)
+        return (
+            f"this did not work ({type(error).__name__}); the log has the details, please report it"
+        )
+
+    def on_robot(self, listener: Listener) -> None:
+        """Call a function after each robot that could be assembled."""
+        self._on_robot.append(listener)
+
+    def on_posture(self, listener: Listener) -> None:
+        """Call a function after each change of the posture."""
+        self._on_posture.append(listener)
+
+    def on_document(self, listener: Listener) -> None:
+        """Call a function after each edit, good or not."""
+        self._on_document.append(listener)
+
+    def on_time(self, listener: Callable[[float], Any]) -> None:
+        """Call a function with the time of the film that is shown, ten times a second."""
+        ui.on("desk-time", lambda event: listener(float(event.args)))
+
+    def _tell(self, listeners: Sequence[Listener]) -> None:
+        if self.is_left:
+            return
+        with self._client:
+            for listener in listeners:
+                answer = listener()
+                if answer is not None:
+                    background_tasks.create(answer)
+
+
+# The posture of the mechanism, and the picture that shows it in the browser.
+
+
+class DeskPicture(DeskBase):
+    """A desk whose picture can be moved."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self._scene: Scene | None = None
+        self._camera: str | None = "iso"
+        self._wanted: dict[int, float] = {}
+        self._is_moving = False
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether somebody moves a joint at this moment."""
+        return self._is_moving
+
+    def _draw(self, drawn: Scene) -> None:
+        """Put another scene in the place of the present one."""
+        self._scene = drawn
+        self._send("mount", VIEW, drawn.as_dict(), self._camera)
+        self._camera = None
+
+    async def set_posture(self, q: Sequence[float]) -> None:
+        """Show the mechanism at another posture.
+
+        Args:
+            q: (nq,) positions that close the loops [rad or m].
+        """
+        system = self.session.system
+        if system is None or len(q) != system.nq:
+            self.complain("the posture is of a robot with other joints; make it anew for this one")
+            return
+        self.session.q = tuple(float(x) for x in q)
+        await self._pose(self.session.q)
+        self._tell(self._on_posture)
+
+    async def move(self, place: int, value: float) -> None:
+        """Move one coordinate by hand; of many moves of it in a row the last one counts.
+
+        Args:
+            place: of the coordinate in q.
+            value: where it is to be [rad or m].
+        """
+        self._wanted[place] = value
+        if self._is_moving:
+            return
+        self._is_moving = True
+        try:
+            while self._wanted:
+                await self._move_once()
+        finally:
+            self._is_moving = False
+
+    async def _move_once(self) -> None:
+        place = next(iter(self._wanted))
+        value = self._wanted.pop(place)
+        system, q = self.session.system, self.session.q
+        if system is None or not 0 <= place < len(q):
+            return
+        try:
+            q = await self.aside(moved, system, q, place, value)
+        except Exception as error:
+            self.session.refusal = self._sentence(error)
+            self._tell(self._on_posture)
+            return
+        if self.session.system is system:
+            self.session.refusal = ""
+            await self.set_posture(q)
+
+    async def _pose(self, q: Vector) -> None:
+        drawn = self._scene
+        if drawn is not None and len(q) == drawn.system.nq:
+            flat = await self.aside(drawn.poses, q)
+            self._send("poses", flat)
+
+    async def play(self, times: Sequence[float], postures: Any, speed: float = 1.0) -> None:
+        """Show a motion again and again until `pause`.
+
+        Args:
+            times: (n,) [s].
+            postures: (n, nq) [rad or m].
+            speed: of the film; 1 is as in reality.
+        """
+        drawn = self._scene
+        film_of = np.asarray(postures, dtype=float)
+        if drawn is None or film_of.shape[1:] != (drawn.system.nq,):
+            self.complain("the motion is of a robot with other joints; simulate this one")
+            return
+        poses = await self.aside(drawn.motion, film_of)
+        film = {"times": [float(t) for t in times], "poses": poses.tolist(), "speed": speed}
+        self._send("play", film)
+
+    def pause(self) -> None:
+        """Stop the film where it is."""
+        self._send("pause")
+
+    def look(self, camera: str) -> None:
+        """Look from "iso", "front", "top", "side", or "fit"."""
+        self._send("camera", camera)
+
+    def show(self, role: str, shown: bool) -> None:
+        """Show a role of the picture, such as "frame", or hide it."""
+        self.session.shown[role] = shown
+        self._send("visible", role, shown)
+
+    def screenshot(self) -> None:
+        """Download the picture as a PNG file."""
+        self._send("screenshot", f"{self.document.name}.png")
+
+    def _send(self, method: str, *args: Any) -> None:
+        """Call a method of the picture in the browser."""
+        if self.is_left:
+            return
+        values = ", ".join(json.dumps(value) for value in args)
+        self._client.run_javascript(f"deskView.{method}({values})")
 
 
 class Desk(DeskPicture):

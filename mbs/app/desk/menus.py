@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from functools import partial
+from pathlib import PurePath
 from typing import Any
 
-from nicegui import ui
+from nicegui import events, ui
 
 from mbs.app.desk.desk import Desk
+from mbs.app.desk.document.document import Document
+from mbs.app.desk.document.reading import LARGEST_UPLOAD, READERS
 from mbs.app.desk.panels import base as base_panel
 from mbs.app.desk.panels import singular as singular_panel
 from mbs.app.desk.panels.equations import open_equations
 from mbs.app.desk.panels.export import open_export
 from mbs.app.desk.panels.identification import open_identification
-from mbs.app.desk.panels.optimizer import open_optimizer
-from mbs.app.desk.panels.optimizer_settings import optimizer_switch
+from mbs.app.desk.panels.optimizer import open_optimizer, optimizer_switch
 from mbs.app.desk.panels.postures import open_postures
 from mbs.app.desk.panels.simulation import open_simulation
 from mbs.app.tasks.equations import MENUS, entries
+from mbs.errors import MbsError
 from mbs.models.catalogue import Entry
+from mbs.robots import catalogue
 
 Act = Callable[[], Awaitable[None] | None]
 
@@ -92,3 +96,145 @@ def _menu(title: str) -> Any:
 
 def _plain(title: str, act: Act) -> ui.menu_item:
     return ui.menu_item(title, on_click=act)
+
+
+# The menu Robot: new, open, save, undo.
+
+
+_SUFFIXES = ",".join(READERS)
+
+
+class FilesMenu:
+    """The menu Robot and its dialogs."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        with ui.button("Robot").props("flat no-caps dense").classes("desk-menu"), ui.menu():
+            self._item("catalogue", "From the catalogue…", self.choose)
+            self._item("open", "Open a file…", self.upload)
+            self._item("new", "New, one joint", self._blank)
+            ui.separator()
+            self._item("toml", "Save as TOML", lambda: self._save("toml"))
+            self._item("par", "Save as SYMORO .par", lambda: self._save("par"))
+            self._convert = self._item("table", "Make it a table of frames", self._to_table)
+            ui.separator()
+            self._undo = self._item("undo", "Undo", desk.undo, "Ctrl+Z")
+            self._redo = self._item("redo", "Redo", desk.redo, "Ctrl+Shift+Z")
+            ui.separator()
+            self._item("report", "What was assembled", self._report)
+        desk.on_document(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Grey what cannot be done now."""
+        session = self._desk.session
+        self._undo.set_enabled(bool(session.past))
+        self._redo.set_enabled(bool(session.future))
+        self._convert.set_visibility(not session.document.is_table)
+
+    def choose(self) -> None:
+        """The catalogue as a list to choose from."""
+        with ui.dialog() as dialog, ui.card().style("width: 640px; max-width: 92vw"):
+            ui.label("From the catalogue").classes("desk-robot")
+            field = ui.input(placeholder="Search").props("dense outlined autofocus clearable")
+            field.style("width: 100%")
+            rows: dict[str, ui.element] = {}
+            with ui.element("div").classes("desk-list"):
+                for name, make in catalogue().items():
+                    rows[name] = self._row(dialog, name, _first_line(make))
+
+        def narrow() -> None:
+            text = str(field.value or "").lower()
+            for name, row in rows.items():
+                row.set_visibility(text in f"{name} {_first_line(catalogue()[name])}".lower())
+
+        field.on_value_change(narrow)
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+
+    def upload(self) -> None:
+        """A dialog that takes a file."""
+        with ui.dialog() as dialog, ui.card().style("width: 460px"):
+            ui.label("Open a robot file").classes("desk-robot")
+            ui.label(
+                ".toml, SYMORO .par, .urdf, or MJCF .xml; at most"
+                f" {LARGEST_UPLOAD // 1_000_000} MB. Meshes are not needed."
+            ).classes("desk-note")
+
+            async def take(event: events.UploadEventArguments) -> None:
+                dialog.close()
+                await self.open_upload(event.file.name, await event.file.read())
+
+            ui.upload(
+                label="Drop a file here, or press +",
+                auto_upload=True,
+                max_files=1,
+                max_file_size=LARGEST_UPLOAD,
+                on_upload=take,
+                on_rejected=lambda: self._desk.complain(
+                    f"the file is of another kind than {_SUFFIXES}, or larger than"
+                    f" {LARGEST_UPLOAD} bytes; choose another one"
+                ),
+            ).props(f'accept="{_SUFFIXES}" flat bordered').style("width: 100%")
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+
+    async def open_upload(self, name: str, content: bytes) -> None:
+        """Show the robot in a file that was sent; of its name only the suffix is looked at."""
+        suffix = PurePath(name.replace("\\", "/")).suffix
+        if await self._desk.open_robot(Document.of_upload, content, suffix):
+            self._desk.tell(f"{self._desk.document.name} is open")
+
+    def _row(self, dialog: ui.dialog, name: str, words: str) -> ui.element:
+        async def take() -> None:
+            dialog.close()
+            await self._desk.open_robot(Document.of_name, name)
+
+        with ui.element("div").classes("desk-list-row").mark(f"catalogue-{name}") as row:
+            ui.label(name).classes("desk-list-name")
+            ui.label(words).classes("desk-note")
+        row.on("click", take)
+        return row
+
+    def _item(self, key: str, title: str, act: Any, keys: str = "") -> ui.menu_item:
+        with ui.menu_item(on_click=act).mark(f"robot-{key}") as item:
+            ui.label(title)
+            if keys:
+                ui.element("div").classes("desk-space")
+                ui.label(keys).classes("desk-note").style("padding-left: 26px")
+        return item
+
+    async def _blank(self) -> None:
+        await self._desk.open_robot(Document.blank)
+
+    async def _to_table(self) -> None:
+        if await self._desk.open_robot(self._desk.document.as_table):
+            self._desk.tell("Its links are rows of a table now, and can be changed")
+
+    async def _save(self, kind: str) -> None:
+        document = self._desk.document
+        try:
+            text = await self._desk.aside(_text, document, kind)
+        except MbsError as error:
+            self._desk.complain(error)
+            return
+        self._desk.download(text.encode(), f"{document.file_name}.{kind}")
+
+    async def _report(self) -> None:
+        try:
+            system = self._desk.system()
+        except MbsError as error:
+            self._desk.complain(error)
+            return
+        text = await self._desk.aside(system.report)
+        with self._desk.open(f"{system.name}: assembled", "report"):
+            ui.label(text).classes("desk-code")
+
+
+def _text(document: Document, kind: str) -> str:
+    table = document.as_table()
+    return table.toml() if kind == "toml" else table.par()
+
+
+def _first_line(make: Any) -> str:
+    return (make.__doc__ or "").strip().partition("\n")[0]

@@ -8,13 +8,12 @@ from nicegui import app, events, ui
 
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.document.document import Document
-from mbs.app.desk.files_menu import FilesMenu
-from mbs.app.desk.menus import build_menus
+from mbs.app.desk.menus import FilesMenu, build_menus
 from mbs.app.desk.open_again import open_again
 from mbs.app.desk.picture_panel import PicturePanel
 from mbs.app.desk.session import Session
 from mbs.app.desk.style import add_head
-from mbs.app.desk.table_panel import TablePanel
+from mbs.app.desk.tables import TablePanel
 
 _KEY = "desk"
 _DRAWER = 58.0

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbs.errors import MbsError
-from mbs.messages import install_command, quoted
+from mbs.text import install_command, quoted
 
 if TYPE_CHECKING:
     from mbs.app.desk.document.document import Document

@@ -2,14 +2,187 @@
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mbs.app.desk.document.document import Document
 from mbs.app.desk.document.tables import Tables
-from mbs.app.desk.session_posture import Vector
 from mbs.assembly import System
-from mbs.errors import DescriptionError, MbsError
+from mbs.assembly.tree import quaternion_slices
+from mbs.errors import DescriptionError, LoopError, MbsError, NoClosedForm, Unclosable
+from mbs.loops import Mode, modes
+from mbs.loops.closing import Closing, closure_parameters, followed_posture
+from mbs.loops.function import independent_names
+
+# Postures of the picture: joints that can be moved by hand, the others following.
+
+
+Vector = tuple[float, ...]
+
+_FULL_TURN = math.pi
+_SAME = 1e-6
+_MOST_MODES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Handle:
+    """A coordinate that can be moved by hand.
+
+    Attributes:
+        name: of the coordinate.
+        place: in q.
+        unit: rad, m, or 1 for the parts of a quaternion.
+        low, high: ends of its slider.
+        limited: whether they are limits of the joint.
+    """
+
+    name: str
+    place: int
+    unit: str
+    low: float
+    high: float
+    limited: bool
+
+
+def handles(system: System) -> tuple[Handle, ...]:
+    """The coordinates that can be moved: all of an open chain, the independent ones of loops."""
+    chosen = set(independent_names(system)) if system.is_closed else None
+    reach = _reach(system)
+    return tuple(
+        _handle(system, place, reach)
+        for place, coordinate in enumerate(system.coordinates)
+        if chosen is None or coordinate.name in chosen
+    )
+
+
+def _handle(system: System, place: int, reach: float) -> Handle:
+    c = system.coordinates[place]
+    if c.limits is not None:
+        return Handle(c.name, place, c.unit, c.limits[0], c.limits[1], True)
+    half = {"rad": _FULL_TURN, "m": reach}.get(c.unit, 1.0)
+    middle = system.posture[place] if c.unit == "m" else 0.0
+    return Handle(c.name, place, c.unit, middle - half, middle + half, False)
+
+
+def _reach(system: System) -> float:
+    """A length of the size of the mechanism [m], 1 where nothing tells it."""
+    lengths = [
+        abs(value)
+        for link in system.links
+        for value in (_number(link.b), _number(link.d), _number(link.r))
+    ]
+    return sum(lengths) / 2 or 1.0
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, (int, float)) else 0.0
+
+
+def moved(system: System, q: Sequence[float], place: int, value: float) -> Vector:
+    """The posture with one coordinate at another value and the loops closed near to the old one.
+
+    Args:
+        system: the mechanism.
+        q: (nq,) present posture [rad or m].
+        place: of the coordinate in q.
+        value: where it is to be.
+
+    Raises:
+        LoopError: the loops cannot be closed there.
+    """
+    target = list(q)
+    target[place] = value
+    if not system.is_closed:
+        return _unit(system, target, place)
+    p = closure_parameters(system)
+    try:
+        found = followed_posture(
+            replace(system, posture=tuple(q)), np.array(target), _held(system), p
+        )
+    except Unclosable as error:
+        name = system.coordinates[place].name
+        end = re.search(rf"ends near .*?\b{re.escape(name)} = (\S+?)[,;]", str(error))
+        until = f"; on this branch it ends near {end[1]}" if end else ""
+        raise Unclosable(
+            f"{system.name}: the loop cannot be closed with {name} = {value:.4g}{until}"
+        ) from None
+    return tuple(float(x) for x in found)
+
+
+def _held(system: System) -> tuple[int, ...]:
+    return tuple(handle.place for handle in handles(system))
+
+
+def _unit(system: System, q: list[float], place: int) -> Vector:
+    """The posture with quaternions of unit length, the moved part kept as far as it can be."""
+    for part in quaternion_slices(system.tree):
+        values = np.array(q[part])
+        if part.start <= place < part.stop:
+            values = _with_part(values, place - part.start)
+        norm = float(np.linalg.norm(values))
+        q[part] = [float(x) for x in (values / norm if norm > _SAME else [1.0, 0.0, 0.0, 0.0])]
+    return tuple(q)
+
+
+def _with_part(values: NDArray[np.float64], kept: int) -> NDArray[np.float64]:
+    """The quaternion whose other parts are scaled so that its length is one."""
+    values = values.copy()
+    values[kept] = min(max(values[kept], -1.0), 1.0)
+    others = [k for k in range(4) if k != kept]
+    rest, wanted = float(np.linalg.norm(values[others])), math.sqrt(1.0 - values[kept] ** 2)
+    values[others] = values[others] * (wanted / rest) if rest > _SAME else 0.0
+    if rest <= _SAME:
+        values[others[0]] = wanted
+    return values
+
+
+def carried(old: System | None, q: Sequence[float], new: System) -> Vector:
+    """The posture of a changed mechanism nearest to that of the old one.
+
+    It is the assembled one where the mechanism is another, or cannot be closed there.
+    """
+    names = [c.name for c in new.coordinates]
+    if old is None or [c.name for c in old.coordinates] != names:
+        return new.posture
+    if not new.is_closed:
+        return tuple(q)
+    closed = Closing(new, closure_parameters(new), _held(new)).nearest(np.array(q))
+    return tuple(float(x) for x in closed.q) if closed.is_closed else new.posture
+
+
+def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str:
+    """Every way to assemble the mechanism with its independent joints as in q.
+
+    Returns:
+        the modes, or a sentence why they are not known.
+    """
+    if not system.is_closed:
+        return ()
+    known = {handle.name: q[handle.place] for handle in handles(system)}
+    try:
+        found = modes(system, known)
+    except NoClosedForm:
+        return "its loops are closed by iteration, so that its assembly modes cannot be listed"
+    except LoopError as error:
+        return str(error)
+    return tuple(found[:_MOST_MODES])
+
+
+def mode_of(found: Sequence[Mode], q: Sequence[float]) -> int | None:
+    """The number of the mode that a posture is in, angles being alike after a whole turn."""
+    for k, mode in enumerate(found):
+        apart = np.subtract(mode.q, q)
+        turned = np.abs((apart + math.pi) % (2 * math.pi) - math.pi)
+        if float(np.max(np.minimum(np.abs(apart), turned), initial=0.0)) < _SAME:
+            return k
+    return None
+
 
 _LONGEST_HISTORY = 200
 

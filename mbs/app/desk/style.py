@@ -8,7 +8,7 @@ from nicegui import app, ui
 
 from mbs.version import __version__
 from mbs.view import assets_folder
-from mbs.view.asset_files import SCRIPTS
+from mbs.view.page import SCRIPTS
 
 VIEW = "desk-canvas"
 """The id of the element that the picture is drawn in."""

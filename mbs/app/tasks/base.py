@@ -14,8 +14,8 @@ import numpy as np
 from casadi import Function
 
 from mbs.assembly import System
-from mbs.identification.base.base_parameters import METHODS, BaseParameters, base_parameters
-from mbs.identification.regressors.columns import values_of
+from mbs.identification.base_parameters import METHODS, BaseParameters, base_parameters
+from mbs.identification.regressors import values_of
 
 __all__ = ["METHODS", "BaseRow", "BaseTable", "base"]
 

@@ -11,16 +11,100 @@ from typing import Any
 
 from casadi import Function
 
-from mbs.app.tasks.equations_options import OptionRow, option_values, parsed_options
 from mbs.assembly import System
-from mbs.errors import ModelError
+from mbs.errors import MbsError, ModelError
 from mbs.export import code
 from mbs.export.languages import LANGUAGES, language_of
 from mbs.identification.catalogue import entries as identification_entries
-from mbs.messages import did_you_mean
 from mbs.models import catalogue
-from mbs.models.catalogue import Entry
-from mbs.operations import PASSES, Count, Step, count, simplification
+from mbs.models.catalogue import Entry, Option
+from mbs.operations import PASSES, Count, Step, count, simplification, simplify
+from mbs.progress import progress
+from mbs.text import did_you_mean, quoted
+
+# The options of a model: as rows of a form, and from texts.
+
+
+_FLAGS = {"yes": True, "true": True, "1": True, "on": True}
+_FLAGS |= {"no": False, "false": False, "0": False, "off": False}
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class OptionRow:
+    """An option of a model as a form shows it.
+
+    Attributes:
+        name: of the option.
+        title: for people.
+        kind: "frame", "choice", "flag" or "several".
+        values: what there is to choose from.
+        chosen: the value that was given, else the default; a tuple of "several".
+    """
+
+    name: str
+    title: str
+    kind: str
+    values: tuple[Any, ...]
+    chosen: Any
+
+
+def option_values(
+    system: System, entry: Entry, given: Mapping[str, Any] = _NOTHING
+) -> tuple[OptionRow, ...]:
+    """The options of a model that make a difference to a mechanism.
+
+    Args:
+        system: the mechanism.
+        entry: the model.
+        given: values by the names of options, from which defaults of others may follow.
+
+    Raises:
+        ModelError: there is no such option, or the mechanism offers no such value.
+    """
+    chosen = entry.choices(system, **given)
+    return tuple(
+        OptionRow(o.name, o.title, o.kind, tuple(o.values(system, chosen)), chosen[o.name])
+        for o in entry.options
+        if o.matters(system)
+    )
+
+
+def parsed_options(system: System, entry: Entry, texts: Mapping[str, str]) -> dict[str, Any]:
+    """Values of options from texts such as {"frame": "6", "rows": "Vx, Vy", "f_ext": "yes"}.
+
+    Raises:
+        ModelError: there is no such option, or the mechanism offers no such value.
+    """
+    known = {option.name: option for option in entry.options}
+    chosen = dict[str, Any]()
+    for name, text in texts.items():
+        if name not in known:
+            names = did_you_mean(name, known) if known else "it has none"
+            raise ModelError(f"{entry.key}: there is no option {name!r}; {names}")
+        if text.strip():
+            chosen[name] = _value(system, entry, known[name], text.strip(), chosen)
+    return chosen
+
+
+def _value(
+    system: System, entry: Entry, option: Option, text: str, chosen: Mapping[str, Any]
+) -> Any:
+    if option.kind == "flag":
+        if text.lower() not in _FLAGS:
+            raise ModelError(f"{entry.key}: {option.title} is {quoted(text)}; write yes or no")
+        return _FLAGS[text.lower()]
+    offered = {str(value): value for value in option.values(system, chosen)}
+    parts = [part.strip() for part in text.split(",")] if option.kind == "several" else [text]
+    for part in parts:
+        if part not in offered:
+            raise ModelError(
+                f"{entry.key} of {system.name}: {option.title} {part!r} is not offered;"
+                f" {did_you_mean(part, offered)}"
+            )
+    values = tuple(offered[part] for part in parts)
+    return values if option.kind == "several" else values[0]
+
 
 __all__ = [
     "EVERY_PASS",
@@ -206,3 +290,71 @@ def _language(one: Entry, system: System, language: str | None) -> str:
             f" {did_you_mean(spoken, offered)}"
         )
     return spoken
+
+
+# Operations of many models, before and after the optimizer.
+
+
+_NO_COUNT_OPTIONS: Mapping[str, str] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class CountRow:
+    """The operations of a model.
+
+    Attributes:
+        key: of the model.
+        title: of the model.
+        before: as its recursion made it; None where the mechanism does not have it.
+        after: after the optimizer; None likewise.
+        reason: why there is none, "" where there is one.
+    """
+
+    key: str
+    title: str
+    before: Count | None
+    after: Count | None
+    reason: str
+
+
+def counts(
+    system: System,
+    keys: Sequence[str] = (),
+    passes: Sequence[str] = EVERY_PASS,
+    options: Mapping[str, str] = _NO_COUNT_OPTIONS,
+) -> tuple[CountRow, ...]:
+    """The operations of models.
+
+    Args:
+        system: the mechanism.
+        keys: of the models; every one that is a Function when left out.
+        passes: names of the passes of the optimizer.
+        options: texts of options of all these models, as `parsed_options` takes them; the others
+            at their defaults.
+
+    Raises:
+        ModelError: there is no such model, option or pass.
+    """
+    chosen = [entry(key) for key in keys] or [one for one in entries() if one.function is not None]
+    rows = list[CountRow]()
+    with progress(f"Counting operations of {system.name}", 0, len(chosen)) as reached:
+        for number, one in enumerate(chosen):
+            rows.append(_row(system, one.key, passes, options))
+            reached(number + 1)
+    return tuple(rows)
+
+
+def _row(system: System, key: str, passes: Sequence[str], options: Mapping[str, str]) -> CountRow:
+    one = entry(key)
+    reason = one.refusal(system)
+    if not reason and not one.has_function(system):
+        reason = f"{one.title}: {system.name} has it as text or postures only"
+    if reason:
+        return CountRow(key, one.title, None, None, reason)
+    given = parsed_options(system, one, options)
+    try:
+        model = one.build(system, **given)
+    except MbsError as error:
+        return CountRow(key, one.title, None, None, str(error))
+    final = simplify(model, passes) if passes else model
+    return CountRow(key, one.title, count(model), count(final), "")

@@ -15,14 +15,14 @@ from casadi import Function
 
 from mbs import export
 from mbs.app.tasks.equations import entry
-from mbs.app.tasks.simulation_laws import number
+from mbs.app.tasks.simulation import number
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.export.fmu.description import Solver
 from mbs.export.par import robot_table
 from mbs.formats import RobotTable, write_toml
-from mbs.messages import did_you_mean
+from mbs.text import did_you_mean
 
 SOLVERS: tuple[str, ...] = get_args(Solver)
 """Methods of integration that an FMU may hold."""

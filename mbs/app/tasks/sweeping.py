@@ -12,15 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.app.tasks.simulation import SimulationSettings, run_arguments
-from mbs.app.tasks.simulation_laws import number
+from mbs.app.tasks.simulation import SimulationSettings, number, run_arguments
 from mbs.assembly import System
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError
-from mbs.messages import quoted
 from mbs.result import Result
 from mbs.simulate import Sweep
 from mbs.simulate import sweep as simulated_cases
+from mbs.text import quoted
 
 _MOST_VALUES = 10_000
 _END = ".end"

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import Array, FmuEntry, FmuModel, FmuVariable, Kind, State
-from mbs.export.fmu.linearity import KINDS, DependencyKind
+from mbs.export.fmu.xml import KINDS, DependencyKind, Known
 
 
 @dataclass(frozen=True, slots=True)

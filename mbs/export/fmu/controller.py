@@ -2,20 +2,258 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, get_args
 
 import casadi
 from casadi import MX, SX, Function
 
 from mbs.assembly import System
 from mbs.errors import ExportError
-from mbs.export.fmu.c_law import CController, Sources, c_function
-from mbs.export.fmu.description import FmuVariable
-from mbs.messages import quoted
-from mbs.models.effort import effort_function
+from mbs.export.fmu.description import FmuVariable, Solver
+from mbs.export.fmu.pack import FACES
+from mbs.files import PathLike, path_of
+from mbs.models.state.signals import effort_function
+from mbs.native.compiler import cached_library, flags_for
+from mbs.text import quoted
+
+# A control law that a user wrote in C, as a casadi.Function and as sources of an FMU.
+
+
+_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_DEFINED = re.compile(
+    r"^(?P<type>[A-Za-z_][\w *]*?[ *])(?P<name>[A-Za-z_]\w*)\s*\([^;{}()]*\)\s*\{", re.ASCII | re.M
+)
+_PREFIXES = ("fmi2", "fmi3", "mbs_")
+_C_ARGUMENTS = "double t, const double *q, const double *v, const double *w"
+
+Sources = tuple[tuple[str, str], ...]
+"""File names and texts."""
+
+
+@dataclass(frozen=True, slots=True)
+class CController:
+    """A C function that gives the joint efforts, and the inputs that it has beside the motion.
+
+    Its prototype, with w the further inputs one after the other, is
+
+        void NAME(double t, const double *q, const double *v, const double *w, double *tau);
+
+    and that of the derivatives, J (nv, 1 + nq + nv + nw) by t, q, v and w, column by column,
+
+        void NAME(double t, const double *q, const double *v, const double *w, double *J);
+
+    Both are called at any time in any order: they keep nothing from one call to the next.
+
+    Attributes:
+        function: name of the function.
+        inputs: name and number of values of every further input, in order.
+        jacobian: name of the function for the derivatives; central differences when left out.
+    """
+
+    function: str
+    inputs: Mapping[str, int] = field(default_factory=dict)
+    jacobian: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in filter(None, (self.function, self.jacobian)):
+            if not isinstance(name, str) or not _NAME.fullmatch(name):
+                raise ExportError(f"controller: {quoted(name)} is no name of a C function")
+        for name, size in self.inputs.items():
+            if not isinstance(size, int) or isinstance(size, bool) or size < 1:
+                raise ExportError(
+                    f"controller {self.function}: input {quoted(name)} has {quoted(size)} values;"
+                    " give a whole number from 1"
+                )
+
+
+def read_sources(paths: Sequence[PathLike]) -> Sources:
+    """The user's C files.
+
+    Raises:
+        ExportError: one cannot be read, is given twice, is no C file, or is called as a part of
+            the FMU is or defines a function that is.
+    """
+    if not isinstance(paths, Iterable) and not isinstance(paths, os.PathLike):
+        raise ExportError(f"sources: {quoted(paths)} is no list of paths; name C files")
+    given = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
+    texts: dict[str, str] = {}
+    taken = _own_files() if given else {}
+    functions = _functions(taken.values())
+    for path in map(path_of, given):
+        if path.suffix not in (".c", ".h"):
+            raise ExportError(f"sources: {path} is no C file; give files that end in .c or .h")
+        if path.name in texts:
+            raise ExportError(f"sources: {path.name} is given twice; give each file once")
+        if path.name in taken or path.name.startswith(_PREFIXES):
+            raise ExportError(f"sources: {path.name} is a file of every FMU; rename yours")
+        try:
+            texts[path.name] = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "it is not UTF-8"
+            raise ExportError(f"sources: {path} cannot be read ({reason})") from error
+        _check_functions(path.name, _functions([texts[path.name]]), functions)
+    return tuple(texts.items())
+
+
+def _own_files() -> dict[str, str]:
+    """The files that FMUs have in their folder of sources."""
+    fixed = (face.fixed(solver) for face in FACES.values() for solver in get_args(Solver))
+    return {"model.c": "", "model.h": "", **{k: v for files in fixed for k, v in files.items()}}
+
+
+def _functions(texts: Iterable[str]) -> set[str]:
+    """The functions that C files define for other files."""
+    return {
+        found["name"]
+        for text in texts
+        for found in _DEFINED.finditer(text)
+        if "static" not in found["type"].split()
+    }
+
+
+def _check_functions(file: str, found: set[str], taken: set[str]) -> None:
+    """Refuse what a linker would confuse with a part of the FMU."""
+    for name in sorted(found):
+        if name in taken or name.startswith(_PREFIXES):
+            raise ExportError(
+                f"sources: {file} defines {name}, which is a function of every FMU; rename yours"
+            )
+
+
+def c_function(
+    system: System, law: CController, sources: Sources
+) -> tuple[Function, tuple[str, str]]:
+    """The law as `law(t, q, v, w) -> tau`, and the C file that lets CasADi call it.
+
+    Args:
+        system: whose efforts it gives.
+        law: the functions in the sources.
+        sources: C files and headers.
+
+    Raises:
+        ExportError: there are no sources.
+        CompilerError: there is no C compiler, or it refused the sources.
+    """
+    if not any(name.endswith(".c") for name, _ in sources):
+        raise ExportError(
+            f"{system.name}: the controller {law.function} is a C function without source; name"
+            " its file in sources"
+        )
+    name = f"mbs_law_{law.function}"
+    glue = f"{name}.c", _glue(name, law, (system.nq, system.nv, sum(law.inputs.values())))
+    files = dict((*sources, glue))
+    complete = ("-Wl,-z,defs",) if sys.platform == "linux" else ()  # refuses what is not defined
+    library = cached_library(files, (*flags_for("".join(files.values())), *complete))
+    return casadi.external(name, str(library)), glue
+
+
+_GLUE = """\
+/* Calls {function} as the generated code does. */
+#include <math.h>
+
+#define N_Q {nq}
+#define N_V {nv}
+#define N_W {nw}
+#define N_IN (1 + N_Q + N_V + N_W)
+
+void {function}({point}, double *tau);
+{prototype}
+static const long long SIZES[4][3] = {{{{1, 1, 1}}, {{N_Q, 1, 1}}, {{N_V, 1, 1}}, {{N_W, 1, 1}}}};
+static const long long BLOCKS[4][3] = {{
+    {{N_V, 1, 1}}, {{N_V, N_Q, 1}}, {{N_V, N_V, 1}}, {{N_V, N_W, 1}}}};
+
+static void mbs_gather(const double **arg, double *in) {{
+    const int sizes[] = {{1, N_Q, N_V, N_W}};
+    for (int k = 0; k < 4; ++k)
+        for (int i = 0; i < sizes[k]; ++i) *in++ = arg[k] ? arg[k][i] : 0;
+}}
+
+static void mbs_evaluate(const double *in, double *tau) {{
+    {function}(in[0], in + 1, in + 1 + N_Q, in + 1 + N_Q + N_V, tau);
+}}
+
+{differentiate}
+int {name}(const double **arg, double **res, long long *iw, double *w, int mem) {{
+    (void)iw, (void)mem;
+    mbs_gather(arg, w);
+    if (res[0]) mbs_evaluate(w, res[0]);
+    return 0;
+}}
+
+int jac_{name}(const double **arg, double **res, long long *iw, double *w, int mem) {{
+    const int sizes[] = {{1, N_Q, N_V, N_W}};
+    double *J = w + N_IN;
+    (void)iw, (void)mem;
+    mbs_gather(arg, w);
+    mbs_differentiate(w, J, J + N_V * N_IN);
+    for (int k = 0; k < 4; ++k)
+        for (int i = 0; i < N_V * sizes[k]; ++i, ++J)
+            if (res[k]) res[k][i] = *J;
+    return 0;
+}}
+
+long long {name}_n_in(void) {{ return 4; }}
+long long {name}_n_out(void) {{ return 1; }}
+const long long *{name}_sparsity_in(long long k) {{ return SIZES[k]; }}
+const long long *{name}_sparsity_out(long long k) {{ (void)k; return SIZES[2]; }}
+int {name}_work(long long *arg, long long *res, long long *iw, long long *w) {{
+    *arg = 4, *res = 1, *iw = 0, *w = N_IN;
+    return 0;
+}}
+long long jac_{name}_n_in(void) {{ return 5; }}
+long long jac_{name}_n_out(void) {{ return 4; }}
+const long long *jac_{name}_sparsity_in(long long k) {{ return SIZES[k < 4 ? k : 2]; }}
+const long long *jac_{name}_sparsity_out(long long k) {{ return BLOCKS[k]; }}
+int jac_{name}_work(long long *arg, long long *res, long long *iw, long long *w) {{
+    *arg = 5, *res = 4, *iw = 0, *w = N_IN + N_V * N_IN + 2 * N_V;
+    return 0;
+}}
+"""
+_DIFFERENCES = """\
+/* Central differences; `room` holds 2 N_V numbers. */
+static void mbs_differentiate(double *in, double *J, double *room) {
+    for (int k = 0; k < N_IN; ++k, J += N_V) {
+        const double x = in[k], h = 6e-6 * fmax(1, fabs(x)), up = x + h, down = x - h;
+        in[k] = up;
+        mbs_evaluate(in, room);
+        in[k] = down;
+        mbs_evaluate(in, room + N_V);
+        in[k] = x;
+        for (int i = 0; i < N_V; ++i) J[i] = (room[i] - room[N_V + i]) / (up - down);
+    }
+}
+"""
+_GIVEN = """\
+static void mbs_differentiate(double *in, double *J, double *room) {{
+    (void)room;
+    {jacobian}(in[0], in + 1, in + 1 + N_Q, in + 1 + N_Q + N_V, J);
+}}
+"""
+
+
+def _glue(name: str, law: CController, sizes: tuple[int, int, int]) -> str:
+    nq, nv, nw = sizes
+    prototype, differentiate = "", _DIFFERENCES
+    if law.jacobian is not None:
+        prototype = f"void {law.jacobian}({_C_ARGUMENTS}, double *J);\n"
+        differentiate = _GIVEN.format(jacobian=law.jacobian)
+    return _GLUE.format(
+        name=name,
+        function=law.function,
+        point=_C_ARGUMENTS,
+        prototype=prototype,
+        differentiate=differentiate,
+        nq=nq,
+        nv=nv,
+        nw=nw,
+    )
+
 
 Law = Function | Callable[[Any, Any, Any], Any] | CController | str | None
 """A law as a user gives it."""

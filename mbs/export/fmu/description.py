@@ -1,16 +1,223 @@
 """The one description of an FMU, from which both its XML file and its C tables are written."""
 
+from __future__ import annotations
+
+import math
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 import casadi
 
-from mbs.export.fmu.about import About
-from mbs.export.fmu.description_checks import check
-from mbs.export.fmu.names import structured
-from mbs.models.tree_state import TreeState
+from mbs.assembly import System
+from mbs.errors import ExportError, ModelError
+from mbs.models.state.tree import TreeState
+from mbs.text import quoted
+from mbs.units import UNITS
+from mbs.view.drawing import Drawing
+
+# What is refused in the description of an FMU, before anything is written.
+
+
+TIME = "time"
+"""What the independent variable is called, in FMI 3.0 and in results."""
+
+SOLVERS = ("dopri5", "rodas", "rk4")
+
+
+def check(model: FmuModel) -> None:
+    """Refuse a description that is no FMU.
+
+    Raises:
+        ExportError: a name, a number or the size of a function is wrong.
+    """
+    _check_names(model)
+    _check_texts(model)
+    _check_numbers(model)
+    _check_functions(model)
+
+
+def _check_names(model: FmuModel) -> None:
+    if not model.name:
+        raise ExportError("FMU: the model has no name; give it one")
+    seen: set[str] = set()
+    names = [entry.variable.name for entry in model.entries]
+    for name in (*names, *(array.name for array in model.arrays)):
+        if not name or not name.isprintable():
+            raise ExportError(f"FMU {model.name}: {name!r} is no name; use printable characters")
+        if name == TIME:
+            raise ExportError(f"FMU {model.name}: {name!r} is the name of time itself; use another")
+        if name in seen:
+            raise ExportError(f"FMU {model.name}: two variables are called {name!r}; rename one")
+        seen.add(name)
+
+
+def _check_texts(model: FmuModel) -> None:
+    """What people read in the description, where other characters are lost or invalid."""
+    for what, text in {"description": model.description, **asdict(model.origin)}.items():
+        if not isinstance(text, str) or not text.isprintable():
+            raise ExportError(
+                f"FMU {model.name}: {what} is {quoted(text)}; give a line of printable characters"
+            )
+
+
+def _check_numbers(model: FmuModel) -> None:
+    if model.solver not in SOLVERS:
+        raise ExportError(
+            f"FMU {model.name}: solver is {model.solver!r}; use {' or '.join(SOLVERS)}"
+        )
+    for entry in model.entries:
+        v = entry.variable
+        place = f"FMU {model.name}: {v.name}"
+        if v.unit not in UNITS:
+            raise ExportError(f"{place} has unit {v.unit!r}; use one of {', '.join(UNITS)}")
+        if not math.isfinite(v.start):
+            raise ExportError(f"{place} starts at {v.start}; use a finite number")
+        if not (v.nominal > 0 and math.isfinite(v.nominal)):
+            raise ExportError(f"{place} has nominal {v.nominal}; use a positive number")
+        low = -math.inf if v.min is None else v.min
+        high = math.inf if v.max is None else v.max
+        if not low <= v.start <= high and entry.kind == "parameter":
+            raise ExportError(f"{place} starts at {v.start}, outside {low} to {high}; move one")
+    for what, value in (
+        ("stop time", model.stop_time),
+        ("tolerance", model.tolerance),
+        ("step size", model.step_size),
+        ("internal step", model.internal_step),
+    ):
+        known = isinstance(value, (int, float)) and math.isfinite(value)
+        if not (known and value > 0):
+            raise ExportError(f"FMU {model.name}: {what} {quoted(value)} must be positive")
+
+
+def _check_functions(model: FmuModel) -> None:
+    nx, nz, nu = len(model.states), len(model.dependents), len(model.inputs)
+    ny, n_p, n_m = len(model.outputs), len(model.parameters), len(model.modes)
+    _check_shape(model, "rhs", model.rhs, (1, nx, nz, nu, n_p + n_m), (nx, ny))
+    if (model.closure is None) != (nz == 0):
+        raise ExportError(
+            f"FMU {model.name}: {nz} dependent coordinates need "
+            f"{'a closure' if nz else 'no closure'}; give both or neither"
+        )
+    if model.closure is not None:
+        _check_shape(model, "closure", model.closure, (nx, nz, n_p), (nz, 1))
+    if model.jumps is not None:
+        point, k = (1, nx, nz, nu, n_p + n_m), len(model.jumps.names)
+        _check_shape(model, "first", model.jumps.first, point, (n_m, k))
+        _check_shape(model, "indicators", model.jumps.indicators, point, (k,))
+        _check_shape(model, "jump", model.jumps.jump, (*point, k), (nx, n_m))
+
+
+def _check_shape(
+    model: FmuModel,
+    what: str,
+    function: casadi.Function,
+    inputs: tuple[int, ...],
+    outputs: tuple[int, ...],
+) -> None:
+    found_in = tuple(function.numel_in(k) for k in range(function.n_in()))
+    found_out = tuple(function.numel_out(k) for k in range(function.n_out()))
+    if found_in != inputs or found_out != outputs:
+        raise ExportError(
+            f"FMU {model.name}: {what} has inputs of sizes {found_in} and outputs of sizes "
+            f"{found_out}; the variables ask for {inputs} and {outputs}"
+        )
+
+
+# What people read and see of an FMU beside its variables.
+
+
+@dataclass(frozen=True, slots=True)
+class PageTable:
+    """A table of the documentation.
+
+    Attributes:
+        title: what it shows.
+        columns: heads of the columns.
+        rows: a text for each column.
+        note: a sentence below the title.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What the documentation shows beside text and variables.
+
+    Attributes:
+        tables: in the order of the page.
+        drawing: of it at the start posture, or None; the icon is made of it too.
+    """
+
+    tables: tuple[PageTable, ...] = ()
+    drawing: Drawing | None = None
+
+
+# Names: those that a user gives of what an FMU is to hold, and those of its variables.
+
+
+_INDEX = r"(?:\[\d+(?:,\d+)*\])?"
+_QUOTED = r"""'(?:[\w!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+'"""
+_PART = rf"(?:[A-Za-z_]\w*|{_QUOTED}){_INDEX}"
+_PATH = rf"{_PART}(?:\.{_PART})*"
+_STRUCTURED = re.compile(rf"{_PATH}|der\({_PATH}(?:,\d+)?\)", re.ASCII)
+_WHOLE_PART = re.compile(_PART, re.ASCII)
+_STEM_AND_INDEX = re.compile(rf"(.+?)({_INDEX})", re.ASCII)
+_ESCAPED = str.maketrans({mark: f"\\{mark}" for mark in "'\"\\"})
+
+
+def once(system: System, what: str, names: Sequence[str]) -> list[str]:
+    """Names as a list.
+
+    Raises:
+        ModelError: one is no text or is given twice.
+    """
+    if not isinstance(names, Iterable):
+        raise ModelError(f"{system.name}: {what} is {quoted(names)}; give a list of texts")
+    given = [names] if isinstance(names, str) else list(names)
+    for name in given:
+        if not isinstance(name, str):
+            raise ModelError(f"{system.name}: {what} name {quoted(name)}; give texts")
+        if given.count(name) > 1:
+            raise ModelError(f"{system.name}: {what} name {name!r} twice; name it once")
+    return given
+
+
+def structured(name: str) -> str:
+    """A name as the naming convention `structured` of FMI has it, such as `'left-arm'.q`.
+
+    A path of identifiers stays as it is. A part between two dots that is no identifier is put in
+    single quotes. A name with characters beyond ASCII, for which the convention has no place, stays
+    too: see `is_structured`.
+
+    Args:
+        name: of a variable or terminal.
+    """
+    if is_structured(name) or not (name.isascii() and name.isprintable()):
+        return name
+    parts = name.split(".")
+    return ".".join(map(_part, parts)) if all(parts) else _part(name)
+
+
+def is_structured(name: str) -> bool:
+    """Whether the naming convention `structured` of FMI knows such a name."""
+    return _STRUCTURED.fullmatch(name) is not None
+
+
+def _part(text: str) -> str:
+    """A part of a path, quoted where it is no identifier; its indices stay behind the quotes."""
+    if not text or _WHOLE_PART.fullmatch(text):
+        return text
+    found = _STEM_AND_INDEX.fullmatch(text)
+    assert found is not None  # any text is a stem without index
+    stem, index = found.groups()
+    return f"'{stem.translate(_ESCAPED)}'{index}"
+
 
 Solver = Literal["dopri5", "rodas", "rk4"]
 Kind = Literal[
@@ -38,7 +245,7 @@ class FmuVariable:
 
     Attributes:
         name: as other tools show it; a part that is no identifier gets quotes, as
-            `mbs.export.fmu.names.structured` has it.
+            `mbs.export.fmu.description.structured` has it.
         unit: a name of `mbs.units.UNITS`.
         start: value at the start; of a dependent coordinate, a guess that chooses the posture.
         nominal: typical size, positive.

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
-from mbs.export.fmu.about import PageTable
-from mbs.export.fmu.description import WITH_START, FmuModel, FmuVariable, Kind
+import casadi
+from casadi import SX
+
+from mbs.assembly import System
+from mbs.assembly.tables import JointRow, LinkRow
+from mbs.assembly.tree import Link
+from mbs.export.fmu.description import WITH_START, About, FmuModel, FmuVariable, Kind, PageTable
 from mbs.expressions import MORE_THAN_ZERO
 from mbs.operations import count
+from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.units import UNITS
+from mbs.view.drawing import drawing
 from mbs.view.drawing_files import svg
 
 _PAGE = """\
@@ -183,3 +190,183 @@ def _operations(model: FmuModel) -> PageTable:
     columns = ("function", "×", "+ −", "÷", "√", "sin, cos, ..", "others")
     note = "What depends on parameters alone is left out."
     return PageTable("Operations of the equations", columns, tuple(rows), note)
+
+
+# What the documentation of an FMU says of a mechanism: its drawing and its tables.
+
+
+_LONGEST = 24
+"""Letters of an expression that a cell of a table holds."""
+
+
+def about(system: System) -> About:
+    """The drawing at the assembled posture, and tables of joints, links, bodies and loops.
+
+    Args:
+        system: open or closed; every symbol has a value.
+    """
+    tables = (
+        _joints(system),
+        _geometry(system),
+        _inertias(system),
+        _bodies(system),
+        _loops(system),
+    )
+    return About(tuple(table for table in tables if table.rows), drawing(system))
+
+
+def _joints(system: System) -> PageTable:
+    return PageTable(
+        "Joints",
+        ("joint", "kind", "between", "coordinates", "driven", "limits"),
+        tuple(_joint(system, row) for row in system.joints),
+        "A closing joint was cut to open a loop; its coordinates are not among the positions.",
+    )
+
+
+def _joint(system: System, row: JointRow) -> tuple[str, ...]:
+    own = [c for c in (*system.coordinates, *system.cut_coordinates) if c.joint == row.name]
+    limits = ", ".join(
+        f"{c.limits[0]:g} .. {c.limits[1]:g} {c.unit}" for c in own if c.limits is not None
+    )
+    return (
+        row.name,
+        f"{row.kind}, closing" if row.cut else row.kind,
+        f"{_place(row.frame_a[0])} and {_place(row.frame_b[0])}",
+        ", ".join(f"{c.name} [{c.unit}]" for c in own),
+        "yes" if any(c.actuated for c in own) else "no",
+        limits,
+    )
+
+
+def _place(link: int) -> str:
+    return "base" if link < 0 else f"link {link + 1}"
+
+
+def _geometry(system: System) -> PageTable:
+    return PageTable(
+        "Placement of the links",
+        ("link", "moved by", "on", "γ [rad]", "b [m]", "α [rad]", "d [m]", "θ [rad]", "r [m]"),
+        tuple(placement for row in system.links for placement in _placements(system, row)),
+        "Parameters of Khalil and Kleinfinger at the zero of the coordinate, which is added to θ"
+        " or r. A fixed frame on the way to link 4 is numbered 4.1.",
+    )
+
+
+def _placements(system: System, row: LinkRow) -> Iterator[tuple[str, ...]]:
+    """The fixed frames that lead to a link, then the link."""
+    before = _place(row.antecedent - 1)
+    for number, fixed in enumerate(row.via, 1):
+        name = f"{row.number}.{number}"
+        yield name, "fixed", before, *_texts(system, (SX(x) for x in fixed))
+        before = f"frame {name}"
+    numbers = (row.gamma, row.b, row.alpha, row.d, row.theta, row.r)
+    what = f"{row.motion} {row.name}"
+    yield str(row.number), what, before, *_texts(system, (SX(x) for x in numbers))
+
+
+def _inertias(system: System) -> PageTable:
+    return PageTable(
+        "Inertial parameters of the links",
+        ("link", *TEN_PARAMETERS, "Ia", "Fv", "Fs"),
+        tuple(_inertia(system, k, link) for k, link in enumerate(system.tree.links, start=1)),
+        "Inertia [kg m²] and first moments [kg m] about the origin of the frame of the link and in"
+        " its axes, mass [kg]; of the joint, inertia of the rotor, viscous and dry friction.",
+    )
+
+
+def _inertia(system: System, number: int, link: Link) -> tuple[str, ...]:
+    ten = casadi.vertsplit(link.inertia.parameters)
+    return (str(number), *_texts(system, (*ten, link.Ia, link.Fv, link.Fs)))
+
+
+def _bodies(system: System) -> PageTable:
+    rows = tuple(
+        (row.name, _place(row.link - 1), "" if row.mass is None else f"{row.mass:.6g}")
+        for row in system.bodies
+    )
+    return PageTable("Bodies", ("body", "carried by", "mass [kg]"), rows)
+
+
+def _loops(system: System) -> PageTable:
+    rows = tuple(
+        (
+            row.name,
+            row.closing,
+            ", ".join(row.joints),
+            ", ".join(row.rows),
+            ", ".join(row.dropped),
+        )
+        for row in system.loops
+    )
+    columns = ("closed at", "by", "through", "rows", "rows that depend on the others")
+    return PageTable("Loops", columns, rows)
+
+
+def _texts(system: System, values: Iterable[SX]) -> list[str]:
+    """Numbers, or short expressions of symbols with their value."""
+    every = list(values)
+    found = casadi.Function("values", [system.p], [casadi.vertcat(*every)])
+    numbers = casadi.DM(found(system.parameter_values())).full().ravel()
+    return [
+        f"{number:.6g}" if value.is_constant() else _symbolic(value, float(number))
+        for value, number in zip(every, numbers, strict=True)
+    ]
+
+
+def _symbolic(value: SX, number: float) -> str:
+    text = str(value)
+    return f"{text} = {number:.6g}" if len(text) <= _LONGEST else f"{number:.6g}"
+
+
+# The licences of what an FMU contains beside its equations.
+
+
+MBS = """\
+MIT License
+
+Copyright (c) 2026 mbs contributors
+
+Permission is hereby granted, free of charge, to any person obtaining a copy
+of this software and associated documentation files (the "Software"), to deal
+in the Software without restriction, including without limitation the rights
+to use, copy, modify, merge, publish, distribute, sublicense, and/or sell
+copies of the Software, and to permit persons to whom the Software is
+furnished to do so, subject to the following conditions:
+
+The above copyright notice and this permission notice shall be included in all
+copies or substantial portions of the Software.
+
+THE SOFTWARE IS PROVIDED "AS IS", WITHOUT WARRANTY OF ANY KIND, EXPRESS OR
+IMPLIED, INCLUDING BUT NOT LIMITED TO THE WARRANTIES OF MERCHANTABILITY,
+FITNESS FOR A PARTICULAR PURPOSE AND NONINFRINGEMENT. IN NO EVENT SHALL THE
+AUTHORS OR COPYRIGHT HOLDERS BE LIABLE FOR ANY CLAIM, DAMAGES OR OTHER
+LIABILITY, WHETHER IN AN ACTION OF CONTRACT, TORT OR OTHERWISE, ARISING FROM,
+OUT OF OR IN CONNECTION WITH THE SOFTWARE OR THE USE OR OTHER DEALINGS IN THE
+SOFTWARE.
+"""
+"""Of the C files of this package."""
+
+_START, _END = "Copyright (C)", "*/"
+
+_OVERVIEW = """\
+The equations in model.c and model.h, the description and the documentation of this FMU belong to
+its author. The other files of the folder sources are compiled into its libraries too:
+
+mbs.txt            the C files of the package mbs
+fmi-standard.txt   the headers fmi*.h of the FMI standard
+{own}"""
+_OWN = "                   {name}: see there, it came with the model\n"
+
+
+def licence_files(standard_header: str, own: list[str]) -> dict[str, str]:
+    """The files of the folder of licences: name to text.
+
+    Args:
+        standard_header: text of a header of the FMI standard, which carries its licence.
+        own: names of the C files that came with the model.
+    """
+    start = standard_header.index(_START)
+    lines = standard_header[start : standard_header.index(_END, start)].rstrip()
+    overview = _OVERVIEW.format(own="".join(_OWN.format(name=name) for name in own))
+    return {"license.txt": overview, "mbs.txt": MBS, "fmi-standard.txt": lines + "\n"}

@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
-from mbs.export.fmu.dependencies import Known
 from mbs.export.fmu.description import FmuModel
-from mbs.export.fmu.xml_parts import (
+from mbs.export.fmu.xml import (
     TOOL,
+    Known,
     ModelStructure,
     add_categories_and_experiment,
     add_units,

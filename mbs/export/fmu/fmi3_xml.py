@@ -4,11 +4,10 @@ from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
 from mbs.export.fmu.arrays import dependencies_of_arrays, listed, of_arrays
-from mbs.export.fmu.dependencies import Known
-from mbs.export.fmu.description import FmuModel
-from mbs.export.fmu.description_checks import TIME
-from mbs.export.fmu.xml_parts import (
+from mbs.export.fmu.description import TIME, FmuModel
+from mbs.export.fmu.xml import (
     TOOL,
+    Known,
     ModelStructure,
     add_categories_and_experiment,
     add_units,

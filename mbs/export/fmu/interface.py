@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import casadi
+from casadi import SX, Function
+
 from mbs.assembly import System
+from mbs.assembly.tree import Frame
 from mbs.errors import ModelError
 from mbs.export.fmu.controller import Controller
-from mbs.export.fmu.description import FmuVariable, Member, Terminal
-from mbs.export.fmu.names import once, structured
-from mbs.export.fmu.variables import POSE, WRENCH
-from mbs.messages import did_you_mean, quoted
+from mbs.export.fmu.description import FmuVariable, Member, Terminal, once, structured
+from mbs.export.fmu.variables import POSE, WRENCH, frame_text, pose
+from mbs.loops.closure import closure_rows
+from mbs.models.energy import energy
 from mbs.models.geometry import terminal_frame
-from mbs.models.minimal_state import DriveInputs
+from mbs.models.joint_wrenches import wrenches_of_joints
+from mbs.models.measurements import readings
+from mbs.models.state.independent import DriveInputs, Seen
+from mbs.models.symbols import ModelSymbols, Surroundings, outputs_of, symbols_of
+from mbs.recursions.poses import link_poses
+from mbs.recursions.route import BASE, relative_acceleration, relative_motion, relative_pose
+from mbs.recursions.velocities import link_accelerations, link_velocities, resting_base
+from mbs.spatial import zeros
+from mbs.text import did_you_mean, quoted
 
 MOTION = tuple(f"{kind}{axis}" for kind in ("v", "w", "a", "wd") for axis in "xyz")
 """Elements of velocity, angular velocity and accelerations of a frame."""
@@ -145,3 +157,256 @@ def _flange(label: str) -> Terminal:
     flows = (Member(name, f"{label}.{name}", "inflow") for name in WRENCH)
     text = f"motion of {label} in the base frame, and the wrench on it"
     return Terminal(label, "mbs.flange", (*signals, *flows), description=text)
+
+
+# What an FMU shows on request: sensors, energies, poses, wrenches of joints, open loops.
+
+
+Labels = Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A kind of outputs, each of them known by a label, such as the name of a frame.
+
+    Attributes:
+        labels: all that a system has.
+        variables: of one label.
+        values: of the variables of some labels, one after the other.
+        group: name for all of them together; empty where each is asked for alone.
+    """
+
+    labels: Callable[[System], list[str]]
+    variables: Callable[[System, str], Iterator[FmuVariable]]
+    values: Callable[[System, Seen, Labels], list[SX]]
+    group: str = ""
+
+
+Request = Mapping[str, Labels]
+"""Labels of every kind of `KINDS`, each once."""
+
+
+def requested(system: System, names: Sequence[str], flanges: Labels = ()) -> Request:
+    """What is shown on request, each once.
+
+    Args:
+        system: open or closed.
+        names: groups such as "poses", or single ones such as "pose:tool".
+        flanges: frames whose pose and motion is shown.
+
+    Raises:
+        ModelError: there is nothing of that name, or it is given twice.
+    """
+    wanted: dict[str, dict[str, None]] = {kind: {} for kind in KINDS}
+    groups = {shown.group: kind for kind, shown in KINDS.items() if shown.group}
+    for name in once(system, "outputs", names):
+        kind, _, label = name.partition(":")
+        if name in groups:
+            wanted[groups[name]] |= dict.fromkeys(_all(system, groups[name]))
+        elif label and kind in KINDS and _has(system, kind, label):
+            wanted[kind][label] = None
+        else:
+            raise ModelError(
+                f"{system.name}: the FMU has no outputs {name!r};"
+                f" {did_you_mean(name, [*groups, *_single(system)])}"
+            )
+    for kind in ("pose", "motion"):
+        wanted[kind] |= dict.fromkeys(flanges)
+    wanted["pose"].pop("tool", None)  # always shown
+    return {kind: list(labels) for kind, labels in wanted.items() if labels}
+
+
+def observed_variables(system: System, request: Request) -> tuple[FmuVariable, ...]:
+    """The variables of a request."""
+    return tuple(
+        variable
+        for kind, labels in request.items()
+        for label in labels
+        for variable in KINDS[kind].variables(system, label)
+    )
+
+
+def observed_values(system: System, request: Request, seen: Seen) -> list[SX]:
+    """Their values."""
+    return [
+        value
+        for kind, labels in request.items()
+        for value in KINDS[kind].values(system, seen, labels)
+    ]
+
+
+def _all(system: System, kind: str) -> list[str]:
+    labels = KINDS[kind].labels(system)
+    if kind == "sensor" and not labels:
+        raise ModelError(
+            f"{system.name}: there is no sensor to show; add one to the mechanism, such as"
+            " AbsoluteSensor('tip', body)"
+        )
+    return labels
+
+
+def _has(system: System, kind: str, label: str) -> bool:
+    frames = ("tool", *system.frames) if kind in _OF_FRAMES else ()
+    return label in KINDS[kind].labels(system) or label in frames
+
+
+def _single(system: System) -> Iterator[str]:
+    for kind, shown in KINDS.items():
+        yield from (f"{kind}:{label}" for label in shown.labels(system) if label)
+
+
+def _sensors(system: System) -> list[str]:
+    return [attached.sensor.name for attached in system.sensors]
+
+
+def _sensor_variables(system: System, label: str) -> Iterator[FmuVariable]:
+    for attached in system.sensors:
+        if attached.sensor.name == label:
+            for name, unit in attached.columns:
+                yield FmuVariable(name=name, unit=unit, description=f"read by {label}")
+
+
+def _sensor_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+    for attached in system.sensors:
+        if attached.joint is not None and attached.sensor.name in labels:
+            _check_weld(system, seen, attached.joint)
+
+    def read(s: ModelSymbols, a: SX, tau: SX, around: Surroundings) -> list[SX]:
+        every = iter(readings(system, s, a, tau, around))
+        found = {
+            attached.sensor.name: [next(every)[1] for _ in attached.outputs]
+            for attached in system.sensors
+        }
+        return [value for label in labels for value in found[label]]
+
+    return _loaded(system, seen, read)
+
+
+def _energy_variables(system: System, label: str) -> Iterator[FmuVariable]:
+    yield FmuVariable(name=f"energy.{label}", unit="J", description=f"{label} energy")
+
+
+def _energy_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+    values = outputs_of(system, energy(system, "tree"), seen.q, seen.v)
+    return [dict(zip(_ENERGIES, values, strict=True))[label] for label in labels]
+
+
+_ENERGIES = ("kinetic", "potential")
+
+
+def _closure_variables(system: System, label: str) -> Iterator[FmuVariable]:
+    text = "largest closure row of the loops, lengths in m and angles in rad"
+    yield FmuVariable(name="closure", description=text)
+
+
+def _closure_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+    rows = closure_rows(system, seen.q) if system.is_closed else SX(0)
+    return [SX(casadi.mmax(casadi.fabs(rows)))]
+
+
+def _bodies(system: System) -> list[str]:
+    return [body.name for body in system.bodies]
+
+
+def _pose_variables(system: System, label: str) -> Iterator[FmuVariable]:
+    return pose(label, frame_text(frame_of(system, label)))
+
+
+def _pose_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+    values = []
+    for label in labels:
+        T = relative_pose(system.tree, seen.q, BASE, _frame(system, label))
+        values += [T.p, casadi.reshape(T.R.T, 9, 1)]
+    return values
+
+
+def _motion_variables(system: System, label: str) -> Iterator[FmuVariable]:
+    kinds = {
+        "v": ("m/s", "velocity"),
+        "w": ("rad/s", "angular velocity"),
+        "a": ("m/s2", "acceleration"),
+        "wd": ("rad/s2", "angular acceleration"),
+    }
+    for element in MOTION:
+        unit, noun = kinds[element[:-1]]
+        text = f"{noun} of {label} along {element[-1]} of the base"
+        yield FmuVariable(name=f"{label}.{element}", unit=unit, description=text)
+
+
+def _motion_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+    tree, poses = system.tree, link_poses(system.tree, seen.q)
+    moving = link_velocities(tree, poses, seen.v)
+    rates = link_accelerations(tree, poses, seen.v, seen.a, resting_base(zeros()))
+    values = []
+    for label in labels:
+        frame = _frame(system, label)
+        motion = relative_motion(tree, BASE, frame, seen.q, moving)
+        rate = relative_acceleration(motion, BASE, frame, rates)
+        values += [motion.V, motion.w, rate.A, rate.wd]
+    return values
+
+
+def _frame(system: System, label: str) -> Frame:
+    return system.frame(frame_of(system, label))
+
+
+def _joints(system: System) -> list[str]:
+    return [joint.name for joint in system.joints]
+
+
+def _wrench_variables(system: System, label: str) -> Iterator[FmuVariable]:
+    for kind, unit, noun in (("f", "N", "force"), ("m", "N.m", "moment")):
+        for axis in "xyz":
+            text = f"{noun} that {label} transmits, along {axis} of its frame_b"
+            yield FmuVariable(name=f"{label}.{kind}.{axis}", unit=unit, description=text)
+
+
+def _wrench_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
+    numbers = [_joints(system).index(label) for label in labels]
+    for number in numbers:
+        _check_weld(system, seen, number)
+
+    def between(s: ModelSymbols, a: SX, tau: SX, around: Surroundings) -> list[SX]:
+        wrenches = wrenches_of_joints(system, s, a, tau, around)
+        return [casadi.vertcat(*wrenches[number]) for number in numbers]
+
+    return _loaded(system, seen, between)
+
+
+def _check_weld(system: System, seen: Seen, number: int) -> None:
+    """Refuse the wrench of a Fixed joint where it is not told on which side a wrench acts."""
+    joint = system.joints[number]
+    if joint.part is not None and joint.frame_b[0] in seen.external:
+        raise ModelError(
+            f"{system.name}: what {joint.name} transmits cannot be shown, since a wrench from"
+            " outside acts on the link that it is part of; leave out one of the two"
+        )
+
+
+def _loaded(
+    system: System,
+    seen: Seen,
+    make: Callable[[ModelSymbols, SX, SX, Surroundings], list[SX]],
+) -> list[SX]:
+    """What is made of positions, velocities, accelerations, efforts and outer wrenches."""
+    s = symbols_of(system, "tree")
+    a, tau = SX.sym("a", system.nv), SX.sym("tau", system.nv)
+    pushes = {link: (SX.sym("f", 3), SX.sym("m", 3)) for link in seen.external}
+    around = Surroundings(resting_base(system.tree.gravity), dict(pushes), [])
+    values = [casadi.vec(value) for value in make(s, a, tau, around)]
+    symbols = [s.q, s.v, a, tau, *(x for push in pushes.values() for x in push), system.p]
+    given = [seen.q, seen.v, seen.a, seen.tau, *(x for w in seen.external.values() for x in w)]
+    model = Function("loaded", symbols, [casadi.vertcat(*values)])
+    return [SX(model(*given, seen.p))]
+
+
+_OF_FRAMES = ("pose", "motion")
+
+KINDS = {
+    "sensor": Shown(_sensors, _sensor_variables, _sensor_values, "sensors"),
+    "energies": Shown(lambda _: list(_ENERGIES), _energy_variables, _energy_values, "energy"),
+    "loops": Shown(lambda _: [""], _closure_variables, _closure_values, "closure"),
+    "pose": Shown(_bodies, _pose_variables, _pose_values, "poses"),
+    "motion": Shown(_bodies, _motion_variables, _motion_values),
+    "wrench": Shown(_joints, _wrench_variables, _wrench_values, "cut_forces"),
+}

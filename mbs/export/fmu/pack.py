@@ -8,18 +8,184 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 
 from mbs.errors import ExportError
-from mbs.export.fmu.contents import description, plain_files, standard_header
-from mbs.export.fmu.description import FmuModel
-from mbs.export.fmu.faces import FACES, folder_of, require_version
+from mbs.export.fmu import fmi2_xml, fmi3_xml
+from mbs.export.fmu.description import FmuModel, Solver
+from mbs.export.fmu.documentation import documentation, licence_files
 from mbs.export.fmu.reference import reference_files
-from mbs.export.fmu.tables import header, source
+from mbs.export.fmu.source import header, source
+from mbs.export.fmu.xml import terminals_and_icons
 from mbs.files import path_of, write_bytes
-from mbs.native.cache import cached_library
-from mbs.native.cross import Platform, cross_compiler, host_platform, platform_named
+from mbs.native.compiler import (
+    Platform,
+    cached_library,
+    cross_compiler,
+    host_platform,
+    platform_named,
+)
 from mbs.native.plain_source import plain_flags
+from mbs.text import quoted
+from mbs.view.drawing_files import icon, standalone
+
+# The versions of FMI that are written, and the C files of each.
+
+
+_CORE = (
+    "core.c",
+    "values.c",
+    "inputs.c",
+    "derivatives.c",
+    "closure.c",
+    "watch.c",
+    "guard.c",
+    "charts.c",
+    "solver.c",
+    "switching.c",
+    "exchange.c",
+    "cosimulation.c",
+    "saved.c",
+)
+_CORE_HEADERS = (
+    "core.h",
+    "internal.h",
+    "real.h",
+    "closure.h",
+    "watch.h",
+    "guard.h",
+    "charts.h",
+    "solver.h",
+)
+_RUNTIME = ("stepper", "events", "dense", "passage")
+_TABLEAU = "dopri5"
+"""What steps through singular configurations take, whichever the solver is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A version of FMI, as a thin face over the core.
+
+    Attributes:
+        sources: C files of the face.
+        headers: its own.
+        standard: headers of the standard, which fmpy brings with their licence inside.
+        adjoint: it has calls for adjoint derivatives.
+    """
+
+    sources: tuple[str, ...]
+    headers: tuple[str, ...]
+    standard: tuple[str, ...]
+    adjoint: bool
+
+    def compiled(self, solver: Solver) -> tuple[str, ...]:
+        """The C files to compile with a solver, in the folder `sources` of the FMU."""
+        return ("model.c", *_CORE, *(f"{name}.c" for name in _runtime(solver)), *self.sources)
+
+    def fixed(self, solver: Solver) -> dict[str, str]:
+        """The files that do not depend on the equations: name to text."""
+        own = resources.files("mbs.export.fmu") / "c"
+        runtime = resources.files("mbs.native") / "runtime"
+        standard = resources.files("fmpy") / "c-code"
+        folders = (
+            (own, (*_CORE, *_CORE_HEADERS, *self.sources, *self.headers)),
+            (runtime, tuple(f"{name}.{end}" for name in _runtime(solver) for end in "ch")),
+            (standard, self.standard),
+        )
+        return {
+            name: (folder / name).read_text(encoding="utf-8")
+            for folder, names in folders
+            for name in names
+        }
+
+
+def _runtime(solver: Solver) -> tuple[str, ...]:
+    return (*_RUNTIME, *dict.fromkeys((_TABLEAU, solver)))
+
+
+FACES = {
+    "2.0": Face(
+        ("fmi2.c",),
+        (),
+        ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+        adjoint=False,
+    ),
+    "3.0": Face(
+        ("fmi3.c", "fmi3_arrays.c", "fmi3_run.c", "fmi3_absent.c"),
+        ("fmi3_face.h",),
+        ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+        adjoint=True,
+    ),
+}
+
+
+def require_version(name: str, fmi: object) -> None:
+    """Refuse a version of FMI that is not written.
+
+    Raises:
+        ExportError: says which ones are.
+    """
+    if fmi not in FACES:
+        known = " or ".join(f"fmi={version!r}" for version in FACES)
+        raise ExportError(f"{name}: FMI version {quoted(fmi)} is not written; use {known}")
+
+
+def folder_of(platform: Platform, fmi: str) -> str:
+    """The folder of a platform's library among the binaries."""
+    return platform.fmi2 if fmi == "2.0" else platform.name
+
+
+# The files of an FMU that no compiler reads: descriptions, documentation, icon, licences.
+
+
+def description(model: FmuModel, fmi: str, identity: str, compiled: Sequence[str]) -> str:
+    """The file modelDescription.xml.
+
+    Args:
+        model: what the FMU is.
+        fmi: version of the standard.
+        identity: what its library asks for.
+        compiled: C files to compile.
+    """
+    if fmi == "2.0":
+        return fmi2_xml.model_description(model, identity, compiled)
+    return fmi3_xml.model_description(model, identity)
+
+
+def plain_files(
+    model: FmuModel, fmi: str, standard_header: str, compiled: Sequence[str]
+) -> dict[str, bytes]:
+    """All other files beside sources and libraries: name in the FMU to content.
+
+    Args:
+        model: what the FMU is.
+        fmi: version of the standard.
+        standard_header: text of a header of the standard.
+        compiled: C files to compile.
+    """
+    files = {"documentation/index.html": documentation(model).encode()}
+    own = [name for name, _ in model.sources]
+    for name, text in licence_files(standard_header, own).items():
+        files[f"documentation/licenses/{name}"] = text.encode()
+    drawn = model.about.drawing if model.about else None
+    if fmi == "2.0":
+        return files | ({"model.png": icon(drawn)} if drawn else {})
+    build = fmi3_xml.build_description(model, compiled)
+    files["sources/buildDescription.xml"] = build.encode()
+    if drawn or model.terminals:
+        files["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model).encode()
+    if drawn:
+        files["terminalsAndIcons/icon.png"] = icon(drawn)
+        files["terminalsAndIcons/icon.svg"] = standalone(drawn, model.name).encode()
+    return files
+
+
+def standard_header(fmi: str) -> str:
+    """Name of the header of the standard that declares its functions."""
+    return FACES[fmi].standard[0]
+
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # equal models give equal files
 
@@ -38,7 +204,7 @@ def write_fmu(
         model: what the FMU is.
         path: file to write; it is replaced as a whole, or left alone.
         fmi: version of the standard, "2.0" or "3.0".
-        platforms: names of `mbs.native.cross.PLATFORMS`, made with ziglang; this computer when
+        platforms: names of `mbs.native.compiler.PLATFORMS`, made with ziglang; this computer when
             left out, with its own compiler.
         reference: whether to put in the results of the default experiment, see
             `mbs.export.fmu.reference`.

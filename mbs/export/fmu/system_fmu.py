@@ -12,23 +12,25 @@ from casadi import SX, Function
 
 from mbs.assembly import System, symbolic
 from mbs.assembly.model_function import require_system
-from mbs.assembly.rates import quaternion_slices
+from mbs.assembly.tree import quaternion_slices
 from mbs.assembly.validity import field_rows, quaternion_rows
 from mbs.errors import ExportError
 from mbs.export.fmu.arrays import Group, in_arrays
-from mbs.export.fmu.c_law import read_sources
-from mbs.export.fmu.controller import Law, controller_of
+from mbs.export.fmu.controller import Law, controller_of, read_sources
 from mbs.export.fmu.description import FmuModel, Origin, Rules, Solver
-from mbs.export.fmu.events import jumps
-from mbs.export.fmu.faces import require_version
-from mbs.export.fmu.interface import interface_of, terminals
-from mbs.export.fmu.observed import observed_values, observed_variables, requested
-from mbs.export.fmu.pack import require_writable, write_fmu
-from mbs.export.fmu.system_about import about
-from mbs.export.fmu.variables import dependents, inputs, outputs, parameters, states
+from mbs.export.fmu.documentation import about
+from mbs.export.fmu.interface import (
+    interface_of,
+    observed_values,
+    observed_variables,
+    requested,
+    terminals,
+)
+from mbs.export.fmu.pack import require_version, require_writable, write_fmu
+from mbs.export.fmu.variables import dependents, inputs, jumps, outputs, parameters, states
 from mbs.files import PathLike, path_of
-from mbs.models.minimal_state import MinimalState, consistent_start, minimal_state
-from mbs.models.tree_state import tree_state
+from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
+from mbs.models.state.tree import tree_state
 
 
 def fmu(

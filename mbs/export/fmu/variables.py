@@ -8,12 +8,13 @@ from collections.abc import Iterator, Sequence
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
 from mbs.errors import ModelError
-from mbs.export.fmu.description import FmuVariable, State
-from mbs.export.fmu.names import once
-from mbs.messages import did_you_mean
+from mbs.export.fmu.description import FmuVariable, Jumps, State, once
+from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
-from mbs.models.minimal_drive import InputMotion
-from mbs.models.minimal_state import MinimalState
+from mbs.models.state.drive import InputMotion
+from mbs.models.state.events import element_names
+from mbs.models.state.independent import MinimalState
+from mbs.text import did_you_mean
 
 POSE = ("x", "y", "z", *(f"R{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)))
 """Elements of the pose of a frame in the base."""
@@ -212,3 +213,33 @@ def _acceleration(speed: Coordinate, how: str = "") -> FmuVariable:
 
 def _effort(speed: Coordinate, text: str) -> FmuVariable:
     return FmuVariable(name=f"{speed.name}.tau", unit=EFFORT_UNIT[speed.unit], description=text)
+
+
+# Events of a mechanism's FMU: its rigid stops and dry friction.
+
+
+def jumps(system: System, state: MinimalState) -> Jumps | None:
+    """Modes, indicators and jumps of a state equation; None where nothing jumps.
+
+    Args:
+        system: open or closed.
+        state: its state equation.
+    """
+    events = state.events
+    if events is None:
+        return None
+    stops = [stop for stop in contacts_of(system).stops if stop is not None]
+    modes = []
+    for number, name in enumerate(element_names(contacts_of(system))):
+        text = "place: -1 at the lower limit, 1 at the upper one, 0 between them"
+        if number >= len(stops):
+            text = "direction of sliding, -1 or 1, and 0 where friction holds"
+        described = f"of {name}, {text}"
+        modes.append(FmuVariable(name=f"{name}.mode", min=-1, max=1, description=described))
+    return Jumps(
+        modes=tuple(modes),
+        first=events.first,
+        indicators=events.indicators,
+        jump=events.jump,
+        names=events.names,
+    )

@@ -6,7 +6,7 @@ import importlib
 
 from mbs.errors import ModelError
 from mbs.export.languages.language import Language
-from mbs.messages import did_you_mean, quoted
+from mbs.text import did_you_mean, quoted
 
 _CLASSES = {
     "c": "C",

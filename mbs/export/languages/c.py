@@ -7,17 +7,18 @@ from typing import Any
 
 from sympy.printing.c import C99CodePrinter
 
-from mbs.comments import in_c_comment
-from mbs.export.c_names import parameter_names
+from mbs.export.c_library import parameter_names
 from mbs.export.languages.language import (
+    Argument,
+    CodeUnit,
     Language,
     kept_inside,
     sections,
     value_text,
     wrapped,
 )
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, CodeUnit
+from mbs.export.languages.symbolic import printer_of
+from mbs.text import in_c_comment
 
 _CHOICE = "({0}) ? {1} : {2}"
 _FORMS = {

@@ -7,10 +7,16 @@ from typing import Any
 
 from sympy.printing.fortran import FCodePrinter
 
-from mbs.export.languages.branches import branches
-from mbs.export.languages.language import Language, commented, sections, wrapped
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, CodeUnit
+from mbs.export.languages.language import (
+    Argument,
+    CodeUnit,
+    Language,
+    branches,
+    commented,
+    sections,
+    wrapped,
+)
+from mbs.export.languages.symbolic import printer_of
 
 _COLUMNS, _CONTINUED = 100, " &"
 _NAMES_A_LINE = 8

@@ -8,6 +8,8 @@ from typing import Any
 from sympy.printing.julia import JuliaCodePrinter
 
 from mbs.export.languages.language import (
+    Argument,
+    CodeUnit,
     Language,
     commented,
     grid_texts,
@@ -15,8 +17,7 @@ from mbs.export.languages.language import (
     value_text,
     wrapped,
 )
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, CodeUnit
+from mbs.export.languages.symbolic import printer_of
 
 _CHOICE = "({0}) ? {1} : {2}"
 _FORMS = {

@@ -8,8 +8,14 @@ from typing import Any
 
 from sympy.printing.latex import LatexPrinter
 
-from mbs.export.languages.language import Language, commented, plain_number, sections
-from mbs.export.languages.unit import CodeLine, CodeUnit
+from mbs.export.languages.language import (
+    CodeLine,
+    CodeUnit,
+    Language,
+    commented,
+    plain_number,
+    sections,
+)
 
 _ACCENTS = {"QP": r"\dot{q}", "QDP": r"\ddot{q}", "GAM": r"\Gamma"}
 _FORMS = {

@@ -8,6 +8,8 @@ from typing import Any
 from sympy.printing.maple import MapleCodePrinter
 
 from mbs.export.languages.language import (
+    Argument,
+    CodeUnit,
     Language,
     commented,
     grid_texts,
@@ -16,8 +18,7 @@ from mbs.export.languages.language import (
     value_text,
     wrapped,
 )
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, CodeUnit
+from mbs.export.languages.symbolic import printer_of
 
 _JOINS = {"both": " and ", "either": " or "}
 _CHOICE = "piecewise({0}, {1}, {2})"

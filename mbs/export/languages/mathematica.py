@@ -8,8 +8,9 @@ from typing import Any
 
 from sympy.printing.mathematica import MCodePrinter
 
-from mbs.comments import in_wolfram_comment
 from mbs.export.languages.language import (
+    Argument,
+    CodeUnit,
     Language,
     grid_texts,
     kept_inside,
@@ -18,8 +19,8 @@ from mbs.export.languages.language import (
     value_text,
     wrapped,
 )
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, CodeUnit
+from mbs.export.languages.symbolic import printer_of
+from mbs.text import in_wolfram_comment
 
 _NAMES = {
     **{"sin": "Sin", "cos": "Cos", "tan": "Tan", "asin": "ArcSin", "acos": "ArcCos"},

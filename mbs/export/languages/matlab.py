@@ -7,16 +7,16 @@ from typing import Any
 
 from sympy.printing.octave import OctaveCodePrinter
 
-from mbs.export.languages.branches import branches
 from mbs.export.languages.language import (
+    CodeUnit,
     Language,
+    branches,
     commented,
     plain_number,
     sections,
     wrapped,
 )
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import CodeUnit
+from mbs.export.languages.symbolic import printer_of
 
 _CONTINUED = " ..."
 _BRANCHES = "if {0}", "else", "end"

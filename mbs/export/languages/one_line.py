@@ -9,8 +9,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from mbs.export.languages.language import plain_number
 from mbs.export.languages.plan import LinePlan, arranged
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.symbolic import SympyWriter
+from mbs.export.languages.symbolic import SympyWriter, printer_of
 from mbs.operations.graph import Graph
 
 _FORMS = {

@@ -8,8 +8,8 @@ from typing import Any
 
 from sympy.printing.pycode import PythonCodePrinter
 
-from mbs.comments import in_docstring
 from mbs.export.languages.language import (
+    CodeUnit,
     Language,
     kept_inside,
     plain_number,
@@ -17,8 +17,8 @@ from mbs.export.languages.language import (
     value_text,
     wrapped,
 )
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import CodeUnit
+from mbs.export.languages.symbolic import printer_of
+from mbs.text import in_docstring
 
 _NUMPY = {
     **{name: name for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},

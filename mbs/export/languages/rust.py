@@ -7,9 +7,16 @@ from typing import Any
 
 from sympy.printing.rust import RustCodePrinter
 
-from mbs.export.languages.language import Language, commented, sections, value_text, wrapped
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import Argument, CodeUnit
+from mbs.export.languages.language import (
+    Argument,
+    CodeUnit,
+    Language,
+    commented,
+    sections,
+    value_text,
+    wrapped,
+)
+from mbs.export.languages.symbolic import printer_of
 
 _METHODS = {
     **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan")},

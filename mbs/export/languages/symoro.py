@@ -7,8 +7,8 @@ from typing import Any
 
 from sympy.printing.pycode import PythonCodePrinter
 
-from mbs.comments import in_bracket_comment
 from mbs.export.languages.language import (
+    CodeUnit,
     Language,
     kept_inside,
     plain_number,
@@ -16,8 +16,8 @@ from mbs.export.languages.language import (
     value_text,
     wrapped,
 )
-from mbs.export.languages.printers import printer_of
-from mbs.export.languages.unit import CodeUnit
+from mbs.export.languages.symbolic import printer_of
+from mbs.text import in_bracket_comment
 
 _SAME = "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf"
 _JOINS = {"both": " and ", "either": " or "}

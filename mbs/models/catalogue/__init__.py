@@ -1,11 +1,11 @@
 """Every model by the name that menus, the command line and the documentation call it by."""
 
 from mbs.errors import ModelError
-from mbs.messages import did_you_mean
 from mbs.models.catalogue.dynamic import DYNAMIC
 from mbs.models.catalogue.entry import Entry, Option
 from mbs.models.catalogue.geometric import GEOMETRIC
 from mbs.models.catalogue.kinematic import KINEMATIC
+from mbs.text import did_you_mean
 
 __all__ = ["Entry", "Option", "entries", "entry"]
 

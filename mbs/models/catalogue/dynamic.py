@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from mbs.models.actuation import actuation_matrix, actuation_null_space
-from mbs.models.catalogue.entry import Entry
-from mbs.models.catalogue.options import COORDINATES, F_EXT, METHODS, MOVING_BASE, choice
+from mbs.models.catalogue.entry import COORDINATES, F_EXT, METHODS, MOVING_BASE, Entry, choice
 from mbs.models.derivatives import direct_dynamics_derivatives, inverse_dynamics_derivatives
 from mbs.models.direct_dynamics import direct_dynamics, inertia_matrix
 from mbs.models.energy import energy

@@ -5,11 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from mbs.assembly import System
-from mbs.models.catalogue.entry import Entry
-from mbs.models.catalogue.options import AXES, COORDINATES, MOVING_BASE, SELECTION, TARGET, choice
+from mbs.models.catalogue.entry import (
+    AXES,
+    COORDINATES,
+    MOVING_BASE,
+    SELECTION,
+    TARGET,
+    Entry,
+    choice,
+)
 from mbs.models.jacobian_inverse import inverse_jacobian, inverse_kinematics, jacobian_determinant
-from mbs.models.kinematics import jacobian
-from mbs.models.link_motion import jacobian_dot_velocity, link_accelerations, link_velocities
+from mbs.models.kinematics import (
+    jacobian,
+    jacobian_dot_velocity,
+    link_accelerations,
+    link_velocities,
+)
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
 from mbs.models.singularities import singularities
 

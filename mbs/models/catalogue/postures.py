@@ -7,11 +7,10 @@ from collections.abc import Callable, Sequence
 from casadi import Function
 
 from mbs.assembly import System
-from mbs.components.motion import Motion
+from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
 from mbs.models import inverse_geometry
-from mbs.models.catalogue.entry import NOTHING, Chosen, Entry, Values
-from mbs.models.catalogue.options import TARGET, several
+from mbs.models.catalogue.entry import NOTHING, TARGET, Chosen, Entry, Values, several
 from mbs.models.geometry import terminal_frame
 
 SIX = 6

@@ -1,12 +1,12 @@
 """Inverse geometric models: the postures that take a frame of a robot to a pose."""
 
-from mbs.models.inverse_geometry.answers.families import Family
-from mbs.models.inverse_geometry.answers.solutions import Solution, Solutions
-from mbs.models.inverse_geometry.batches.many import ManySolutions, solve_many
-from mbs.models.inverse_geometry.equations.function import InverseGeometry, function
-from mbs.models.inverse_geometry.equations.text import text
-from mbs.models.inverse_geometry.numeric.nearest import Nearest
-from mbs.models.inverse_geometry.paths.follow import Followed, follow
+from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
+from mbs.models.inverse_geometry.follow import Followed, follow
+from mbs.models.inverse_geometry.many import ManySolutions, solve_many
+from mbs.models.inverse_geometry.search import Nearest
+from mbs.models.inverse_geometry.self_motions import Family
+from mbs.models.inverse_geometry.sheet import text
+from mbs.models.inverse_geometry.solutions import Solution, Solutions
 from mbs.models.inverse_geometry.solve import solve
 
 __all__ = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi
 import numpy as np
@@ -13,14 +14,15 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import Link
-from mbs.components.motion import Motion
+from mbs.closed_forms.arm import Arm
+from mbs.closed_forms.ring import Gap, Ring, Unknown
+from mbs.closed_forms.sequence import Problem
+from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.loops.closed_form.ring import Gap, Ring, Unknown
-from mbs.loops.sequence import Problem
-from mbs.messages import did_you_mean, quoted
+from mbs.loops.pose import defect, pose_numbers, rounded, wanted_pose
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.arm import Arm
 from mbs.spatial import Pose, axis_turn, vector
+from mbs.text import did_you_mean, quoted
 
 _SAMPLES, _SEED = 4, 20260105
 _LARGEST = 6
@@ -239,3 +241,56 @@ def _proposal(system: System, free: list[Link], surplus: int) -> str:
     first = (len(free) - surplus - 1) // 2
     held = free[first : first + surplus]
     return ", ".join(f"{link.name!r}: {system.posture[link.q.start]:.6g}" for link in held)
+
+
+# Poses as a user gives them: one, or many at once.
+
+
+__all__ = ["wanted_pose", "wanted_poses"]
+
+
+def wanted_poses(system: System, T: Any) -> NDArray[np.float64]:
+    """The poses that are wanted, their orientations exactly orthonormal.
+
+    Args:
+        system: named in messages.
+        T: (N, 4, 4) homogeneous transforms [m], as one array or a sequence of poses; rounded as
+            `wanted_pose` does.
+
+    Returns:
+        (N, 4, 4) numbers.
+
+    Raises:
+        ModelError: one of them is no rigid transform; the message tells which, counted from 0.
+    """
+    matrices = _stacked(system, T)
+    if matrices is None or matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
+        shape = "" if matrices is None else f" of shape {matrices.shape}"
+        raise ModelError(f"{system.name}: the poses are {quoted(T)}{shape}; give them as (N, 4, 4)")
+    poses, good = rounded(matrices)
+    if not np.all(good):
+        number = int(np.argmin(good))
+        raise ModelError(
+            f"{_title(system, number, len(good))} {defect(matrices[number])}; give rigid"
+            " transforms, orthonormal and right-handed"
+        )
+    return poses
+
+
+def _stacked(system: System, T: Any) -> NDArray[np.float64] | None:
+    """The numbers in an array of whatever shape; None where there is more than numbers."""
+    if not isinstance(T, list | tuple):
+        return pose_numbers(T)
+    parts = list[NDArray[np.float64]]()
+    for number, part in enumerate(T):
+        matrix = pose_numbers(part)
+        if matrix is None or matrix.shape != (4, 4):
+            raise ModelError(
+                f"{_title(system, number, len(T))} it is {quoted(part)}; give (4, 4) numbers"
+            )
+        parts.append(matrix)
+    return np.array(parts).reshape(-1, 4, 4)
+
+
+def _title(system: System, number: int, count: int) -> str:
+    return f"{system.name}: pose {number} of {count}, counted from 0:"

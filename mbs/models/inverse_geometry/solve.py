@@ -10,17 +10,13 @@ import numpy as np
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.answers.answer import Question, answer
-from mbs.models.inverse_geometry.answers.gathering import Gathered, further, gather
-from mbs.models.inverse_geometry.answers.limits import Given, bounds, leaves_out
-from mbs.models.inverse_geometry.answers.roots import ChainRoot, roots
-from mbs.models.inverse_geometry.answers.solutions import Solutions
-from mbs.models.inverse_geometry.answers.target import Target
-from mbs.models.inverse_geometry.answers.wishes import Wishes
-from mbs.models.inverse_geometry.chain import Chain, chain
-from mbs.models.inverse_geometry.equations.closed_form import CLOSED_FORMS
-from mbs.models.inverse_geometry.pose_input import wanted_pose
-from mbs.models.inverse_geometry.whole_robots.parallel import parallel
+from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
+from mbs.models.inverse_geometry.chain import Chain, chain, wanted_pose
+from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
+from mbs.models.inverse_geometry.gathering import Gathered, further, gather
+from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
+from mbs.models.inverse_geometry.target import Target
+from mbs.models.inverse_geometry.whole_robot import parallel
 
 _NEARLY_SINGULAR = 1e-4
 

@@ -9,8 +9,8 @@ import pytest
 from support.browser_desk import Visitor, browser, served
 
 import mbs
-from mbs.app.desk.document.cells import Cell
 from mbs.app.desk.document.document import Document
+from mbs.app.desk.document.tables import Cell
 from mbs.operations import simplify
 
 POSTURE = [0.3, -0.6, 0.8, 0.4, 0.9, -0.5]

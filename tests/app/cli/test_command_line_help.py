@@ -7,7 +7,7 @@ import pytest
 from typer.main import get_command
 
 from mbs.app.cli.application import application
-from mbs.messages import install_command
+from mbs.text import install_command
 
 _BRACKETS = re.compile(r"\S*\[[^\[\]]*\]\S*")
 

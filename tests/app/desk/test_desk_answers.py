@@ -5,9 +5,9 @@ import html
 
 from support.panel_pages import PATIENT, visited
 
-from mbs.app.desk.document.cells import Cell
+import mbs.app.desk.jobs as jobs
 from mbs.app.desk.document.document import Document
-from mbs.app.desk.jobs import jobs
+from mbs.app.desk.document.tables import Cell
 from mbs.app.desk.menus import build_menus
 from mbs.app.desk.panels.export import open_export
 

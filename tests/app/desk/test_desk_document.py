@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.app.desk.document.cells import COLUMNS, Cell, scalar, written
 from mbs.app.desk.document.document import Document
+from mbs.app.desk.document.tables import COLUMNS, Cell, scalar, written
 from mbs.errors import DescriptionError, MbsError
 from mbs.formats import from_dict
 from mbs.robots import catalogue

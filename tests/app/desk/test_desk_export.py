@@ -8,8 +8,7 @@ import zipfile
 from support.panel_pages import PATIENT, visited
 
 import mbs
-from mbs.app.desk.panels.export import open_export
-from mbs.app.desk.panels.export_fmu import FmuAsked
+from mbs.app.desk.panels.export import FmuAsked, open_export
 
 
 async def _downloaded(user, marker):

@@ -9,9 +9,9 @@ import pytest
 from support import desk_tasks
 from support.processes import IN_PROC, is_alive
 
-from mbs.app.desk.document.cells import Cell
+import mbs.app.desk.jobs as jobs
 from mbs.app.desk.document.document import Document
-from mbs.app.desk.jobs import jobs
+from mbs.app.desk.document.tables import Cell
 from mbs.errors import DescriptionError, Unclosable
 
 ARM = Document.of_name("planar_2r")
@@ -77,7 +77,7 @@ def test_a_child_does_not_outlive_the_server(tmp_path):
     code = (
         "import asyncio, sys\n"
         "from support import desk_tasks\n"
-        "from mbs.app.desk.jobs import jobs\n"
+        "import mbs.app.desk.jobs as jobs\n"
         "from mbs.app.desk.document.document import Document\n"
         "if __name__ == '__main__':\n"
         "    arm = Document.of_name('planar_2r')\n"

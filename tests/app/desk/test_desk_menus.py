@@ -10,7 +10,7 @@ from support.panel_pages import PATIENT, visited
 import mbs
 from mbs.app.desk.menus import build_menus
 from mbs.app.desk.panels.form import frame_label
-from mbs.app.desk.panels.optimizer_settings import optimizer_settings, passes_of
+from mbs.app.desk.panels.optimizer import optimizer_settings, passes_of
 from mbs.app.desk.session import Session
 from mbs.app.tasks.equations import EVERY_PASS, MENUS, entries, equations
 from mbs.app.tasks.postures import pose_of

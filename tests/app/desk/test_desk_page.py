@@ -18,9 +18,9 @@ from support.panel_pages import run_visit
 from support.processes import IN_PROC, is_alive
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.document.cells import Cell
 from mbs.app.desk.document.document import Document
-from mbs.app.desk.files_menu import FilesMenu
+from mbs.app.desk.document.tables import Cell
+from mbs.app.desk.menus import FilesMenu
 from mbs.app.desk.page import page_of
 
 PATIENCE = 20.0

@@ -3,14 +3,13 @@ import math
 import numpy as np
 import pytest
 
-from mbs.app.desk.document.cells import Cell
 from mbs.app.desk.document.document import Document
-from mbs.app.desk.session import Session
-from mbs.app.desk.session_posture import assembly_modes, carried, handles, mode_of, moved
+from mbs.app.desk.document.tables import Cell
+from mbs.app.desk.session import Session, assembly_modes, carried, handles, mode_of, moved
 from mbs.components import Free, Mechanism, PointMass
 from mbs.errors import MbsError, Unclosable
 from mbs.loops import examine
-from mbs.loops.posture import require_closed
+from mbs.loops.configuration import require_closed
 
 
 def edited(document, text):

@@ -10,9 +10,13 @@ from support.panel_pages import PATIENT, visited
 import mbs
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.panels.plots import kept_rows, line_chart
-from mbs.app.desk.panels.simulation import open_simulation
-from mbs.app.desk.panels.simulation_groups import groups_of
-from mbs.app.desk.panels.simulation_settings import TYPED, first_texts, settings_of
+from mbs.app.desk.panels.simulation import (
+    TYPED,
+    first_texts,
+    groups_of,
+    open_simulation,
+    settings_of,
+)
 from mbs.app.tasks.simulation import SimulationSettings, run_arguments, simulate
 
 

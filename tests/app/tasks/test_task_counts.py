@@ -3,7 +3,7 @@
 import pytest
 
 import mbs
-from mbs.app.tasks.counts import counts
+from mbs.app.tasks.equations import counts
 from mbs.errors import ModelError
 from mbs.operations import count, simplify
 

@@ -13,8 +13,13 @@ from hypothesis import strategies as st
 from support.messages import refused
 
 import mbs
-from mbs.app.tasks.identification import IdentificationSettings, identify
-from mbs.app.tasks.identification_record import LARGEST, record_columns, record_of
+from mbs.app.tasks.identification import (
+    LARGEST,
+    IdentificationSettings,
+    identify,
+    record_columns,
+    record_of,
+)
 from mbs.app.tasks.simulation import SimulationSettings, csv_bytes, simulate
 from mbs.errors import ExpressionError, ModelError
 

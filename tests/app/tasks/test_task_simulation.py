@@ -12,13 +12,15 @@ from support.messages import refused
 import mbs
 from mbs.app.tasks.simulation import (
     SimulationSettings,
+    assignments,
     csv_bytes,
+    film,
     known_values,
+    law_of_time,
+    number,
     run_arguments,
     simulate,
 )
-from mbs.app.tasks.simulation_film import film
-from mbs.app.tasks.simulation_laws import assignments, law_of_time, number
 from mbs.errors import DescriptionError, ExpressionError, ModelError
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.app.tasks.singular import singular
-from mbs.app.tasks.singular_words import condition
+from mbs.app.tasks.singular import condition, singular
 from mbs.errors import ModelError
 from mbs.models import jacobian, jacobian_determinant
 

@@ -10,7 +10,7 @@ import mbs
 from mbs.components import Body, Prismatic, Revolute, Rod, Spring
 from mbs.errors import ModelError
 from mbs.identification import regressor
-from mbs.identification.base.base_parameters import base_parameters
+from mbs.identification.base_parameters import base_parameters
 
 INERTIA = (0.02, 0, 0, 0.03, 0, 0.04)
 
@@ -194,7 +194,7 @@ def test_everything_that_a_system_holds_knows_the_constants():
 
 def test_rules_that_are_not_exact_leave_no_parameter_that_they_ignore(monkeypatch):
     """The rank then decides, at the defaults: lengths are constants as in the numeric method."""
-    from mbs.identification.base import base_parameters as module
+    from mbs.identification.base_parameters import base_parameters as module
 
     rules = module.grouped_by_rules
 

@@ -6,8 +6,8 @@ from support.base_counts import CATALOGUE, ELBOW, OBLIQUE, OPEN, TWO_ROOTS, unde
 from support.base_robots import system
 
 import mbs
-from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.regressors.columns import columns_of
+from mbs.identification.base_parameters import base_parameters
+from mbs.identification.regressors import columns_of
 
 CHOICES = ({"rotors": False, "friction": False}, {"friction": False}, {})
 

@@ -7,11 +7,10 @@ from support.base_counts import ALONG_Y, LEVEL, PARALLELOGRAM, parallelogram, un
 
 import mbs
 from mbs.components import Body, Prismatic, Revolute
-from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.base.sampled_regressor import sampled_regressor
-from mbs.identification.base.samples import default_parameters
-from mbs.identification.base.states import closed_positions, random_states
-from mbs.identification.regressors.columns import columns_of
+from mbs.identification.base_parameters import base_parameters
+from mbs.identification.grouping.grouping import default_parameters
+from mbs.identification.grouping.numeric import closed_positions, random_states, sampled_regressor
+from mbs.identification.regressors import columns_of
 
 CHOICES = ({"rotors": False, "friction": False}, {"friction": False}, {})
 COUNTS = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from mbs.identification.base.quotient import quotient
+from mbs.identification.grouping.grouping import quotient
 
 A, B = SX.sym("A"), SX.sym("B")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mbs.identification.base.rank import dependence
+from mbs.identification.grouping.numeric import dependence
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from support.base_trees import KINDS, grouped_tree
 from support.plain_newton_euler import plain_efforts
 
 import mbs
-from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.base.lambda_transform import lambda_transform
+from mbs.identification.base_parameters import base_parameters
+from mbs.identification.grouping.rules import lambda_transform
 from mbs.spatial import Khalil
 
 

@@ -12,19 +12,19 @@ from support.measured_arm import (
 )
 
 from mbs.errors import ModelError
-from mbs.identification.bodies.consistent import (
+from mbs.identification.bodies import (
+    Prior,
     consistent,
+    consistent_links,
     consistent_weighted,
+    pseudo_inertias,
+    recovered,
     unconstrained_error,
 )
-from mbs.identification.bodies.physical_set import consistent_links, pseudo_inertias
-from mbs.identification.bodies.prior import Prior
-from mbs.identification.bodies.recovery import recovered
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.observations.observations import observe, observe_filtered
-from mbs.identification.records.filters import smoothed
-from mbs.identification.records.record import Record
-from mbs.identification.regressors.dynamic import regressor
+from mbs.identification.least_squares import least_squares
+from mbs.identification.observations import observe, observe_filtered
+from mbs.identification.record import Record, smoothed
+from mbs.identification.regressors import regressor
 
 DEVIATIONS = np.array([0.3, 0.1, 0.02])
 

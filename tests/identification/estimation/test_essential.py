@@ -5,11 +5,9 @@ import pytest
 from support.measured_arm import equations, noisy_samples
 
 from mbs.errors import ModelError
-from mbs.identification.estimation.essential import essential
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.estimation.robust import robust
-from mbs.identification.estimation.weighted import weighted
-from mbs.identification.observations.observations import observe
+from mbs.identification.least_squares import least_squares, robust, weighted
+from mbs.identification.methods import essential
+from mbs.identification.observations import observe
 
 
 def observations(deviation):

@@ -6,15 +6,12 @@ from support.measured_arm import equations, mbs_values, motion, noisy_samples
 
 import mbs
 from mbs.errors import ModelError
-from mbs.identification.bodies.consistent import consistent
-from mbs.identification.estimation.instrumental import instrumental
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.estimation.simulated_motion import simulated_motion
-from mbs.identification.observations.observations import observe
-from mbs.identification.postures import active_places, positions
-from mbs.identification.records.filters import Samples
-from mbs.identification.regressors.columns import numbers_of
-from mbs.identification.regressors.dynamic import regressor
+from mbs.identification.bodies import consistent
+from mbs.identification.leading import active_places, positions
+from mbs.identification.least_squares import instrumental, least_squares, simulated_motion
+from mbs.identification.observations import observe
+from mbs.identification.record import Samples
+from mbs.identification.regressors import numbers_of, regressor
 
 _ACCELERATION = 3.0
 

@@ -6,14 +6,16 @@ import pytest
 from support.measured_arm import equations, noisy_record, noisy_samples
 
 from mbs.errors import ModelError, SolverError
-from mbs.identification.estimation.estimate import cross_validated, held_out
-from mbs.identification.estimation.instrumental import instrumental
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.estimation.residuals import repetition
-from mbs.identification.estimation.robust import robust
-from mbs.identification.estimation.weighted import reweighted, weighted
-from mbs.identification.observations.observations import observe, observe_filtered
-from mbs.identification.records.filters import smoothed, zero_phase
+from mbs.identification.estimate import cross_validated, held_out, repetition
+from mbs.identification.least_squares import (
+    instrumental,
+    least_squares,
+    reweighted,
+    robust,
+    weighted,
+)
+from mbs.identification.observations import observe, observe_filtered
+from mbs.identification.record import smoothed, zero_phase
 
 DEVIATIONS = np.array([0.3, 0.1, 0.02])
 

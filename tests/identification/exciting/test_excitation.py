@@ -12,10 +12,10 @@ from mbs.assembly import System
 from mbs.components import Body, Revolute
 from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
-from mbs.identification.base.base_parameters import base_parameters
-from mbs.identification.exciting.excitation import Plane, Series, Trajectory, excitation
-from mbs.identification.exciting.limits import Margin, MotionLimit, limits_of
-from mbs.identification.postures import active_places
+from mbs.identification.base_parameters import base_parameters
+from mbs.identification.excitation import Plane, Series, Trajectory, excitation
+from mbs.identification.leading import active_places
+from mbs.identification.trajectory import Margin, MotionLimit, limits_of
 from mbs.loops.closing import Closing
 
 FORM = Series(period=6.0, harmonics=3, samples=40)
@@ -188,7 +188,7 @@ def test_loops_without_closed_form_are_followed(monkeypatch: pytest.MonkeyPatch)
         "rounds": 3,
     }
     explicit = excitation(system, **options)
-    monkeypatch.setattr("mbs.identification.postures.closed_form", refused)
+    monkeypatch.setattr("mbs.identification.leading.closed_form", refused)
     followed = excitation(system, **options)
     t = np.linspace(0, 6, 9)
     assert followed.posture(t) == pytest.approx(explicit.posture(t), abs=1e-4)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from mbs.errors import ModelError
-from mbs.identification.exciting.criterion import CRITERIA, CriterionFunction
-from mbs.identification.exciting.fourier_series import (
+from mbs.identification.excitation import CRITERIA, CriterionFunction
+from mbs.identification.trajectory import (
     FourierSeries,
     between_samples,
     harmonic_terms,

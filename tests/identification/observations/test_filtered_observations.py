@@ -5,9 +5,9 @@ import pytest
 from support.measured_arm import arm, equations, noisy_samples
 
 from mbs.errors import ModelError
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.observations.momentum import observe_momentum
-from mbs.identification.regressors.filtered import filtered_regressor
+from mbs.identification.least_squares import least_squares
+from mbs.identification.observations import observe_momentum
+from mbs.identification.regressors import filtered_regressor
 
 
 def test_filtered_equations_hold_without_accelerations():

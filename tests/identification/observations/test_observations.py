@@ -7,11 +7,15 @@ from support.measured_arm import arm, equations, mbs_values, noisy_record, noisy
 import mbs
 from mbs.components import Body, Prismatic
 from mbs.errors import ModelError
-from mbs.identification.estimation.least_squares import least_squares
-from mbs.identification.observations.observations import observe, observe_filtered
-from mbs.identification.observations.quality import excitation_quality, require_visible
-from mbs.identification.records.filters import Samples, smoothed
-from mbs.identification.regressors.dynamic import regressor
+from mbs.identification.least_squares import least_squares
+from mbs.identification.observations import (
+    excitation_quality,
+    observe,
+    observe_filtered,
+    require_visible,
+)
+from mbs.identification.record import Samples, smoothed
+from mbs.identification.regressors import regressor
 
 
 def full():

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 
 from mbs.errors import ModelError
-from mbs.identification.records.filters import (
+from mbs.identification.record import (
+    Record,
     central_difference,
     resampled,
     smoothed,
     smoothed_with_velocity,
     zero_phase,
 )
-from mbs.identification.records.record import Record
 
 RATE = 500.0
 TIME = np.arange(5000) / RATE

@@ -4,8 +4,7 @@ from support.measured_arm import arm, motion, noisy_record, true_efforts
 
 import mbs
 from mbs.errors import ModelError
-from mbs.identification.records.filters import smoothed
-from mbs.identification.records.record import Record, joint_side
+from mbs.identification.record import Record, joint_side, smoothed
 from mbs.result import Result
 
 TIME, Q, V, A = motion()

@@ -6,7 +6,7 @@ import pytest
 from support.postures import active, same, searched
 from support.ring_loops import MADE_OF, ring_loop
 
-from mbs.assembly.rates import quaternion_slices
+from mbs.assembly.tree import quaternion_slices
 from mbs.errors import Unclosable
 from mbs.loops import function, modes, reduction_matrix, solve
 

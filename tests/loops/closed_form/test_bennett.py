@@ -8,7 +8,7 @@ from support.postures import active, same, searched
 
 from mbs import Parameter
 from mbs.loops import function, modes, reduction_matrix
-from mbs.loops.closed_form.plan import plan
+from mbs.loops.plan import plan
 
 
 @pytest.mark.parametrize(("driven", "cut"), [(0, 3), (1, 3), (2, 0), (3, 1)])

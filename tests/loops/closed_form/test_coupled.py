@@ -12,7 +12,7 @@ from mbs import Parameter
 from mbs.components import Body, Coupling, Mechanism, Revolute
 from mbs.errors import LoopError
 from mbs.loops import closure, function, modes, reduction_matrix, solve
-from mbs.loops.closed_form.plan import plan
+from mbs.loops.plan import plan
 
 LENGTHS = {"crank": 0.5, "coupler": 1.0, "rocker": 0.7, "ground": 0.9}
 EQUAL = {"crank": 0.5, "coupler": 1.0, "rocker": 0.5, "ground": 1.0}

@@ -22,7 +22,7 @@ from mbs.components import (
 )
 from mbs.errors import NoClosedForm
 from mbs.loops import function, modes, reduction_matrix, solve
-from mbs.loops.closed_form.plan import plan
+from mbs.loops.plan import plan
 
 LOOPS = [
     ("RRRR", (0,)),

@@ -9,7 +9,7 @@ from support.random_trees import random_body, random_rotation
 from mbs import Parameter
 from mbs.components import Mechanism, Prismatic, Revolute, Rod, Spherical, Universal
 from mbs.loops import function, modes, reduction_matrix, solve
-from mbs.loops.closed_form.plan import plan
+from mbs.loops.plan import plan
 
 
 def spherical_loop(seed, count, driven, joint=None):

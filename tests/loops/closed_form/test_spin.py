@@ -6,12 +6,12 @@ from support.postures import same
 from support.ring_loops import ring_loop
 
 import mbs
-from mbs.assembly.rates import quaternion_slices
+from mbs.assembly.tree import quaternion_slices
 from mbs.components import Body, Mechanism, Revolute, Spherical
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops import function, modes, solve
-from mbs.loops.closed_form.plan import plan
 from mbs.loops.closing import Closing
+from mbs.loops.plan import plan
 from mbs.models import direct_geometry
 
 CASES = [("RSSR", None), ("RSSR", 1), ("RSSR", 3), ("RSSP", None), ("PSSR", 3), ("RWSR", 2)]

@@ -11,7 +11,7 @@ from mbs import Parameter
 from mbs.components import Body, Mechanism, Revolute, Spherical
 from mbs.errors import NoClosedForm, Unclosable
 from mbs.loops import function, modes, reduction_matrix, solve
-from mbs.loops.closed_form.plan import plan
+from mbs.loops.plan import plan
 
 PARALLEL = ((1, 2), (1, 3))
 

@@ -9,7 +9,7 @@ from mbs import Parameter
 from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod, Universal
 from mbs.errors import Unclosable
 from mbs.loops import function, modes, reduction_matrix, solve
-from mbs.loops.closed_form.plan import plan
+from mbs.loops.plan import plan
 
 GUESS = {"x": 0.05, "y": -0.02, "z": -0.7, "a0": 0.3, "a1": 0.3, "a2": 0.3}
 

@@ -9,9 +9,7 @@ import pytest
 import mbs
 from mbs.errors import NoClosedForm
 from mbs.loops import modes
-from mbs.loops.closed_form.plan import plan
-from mbs.loops.closed_form.stage import started_at
-from mbs.loops.closed_form.verified import verified
+from mbs.loops.plan import plan, started_at, verified
 
 
 def changed(stage, labels, change):

@@ -7,7 +7,7 @@ from support.arms import general_6r
 import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.equations.closed_form import sequence_of
+from mbs.models.inverse_geometry.closed_form import sequence_of
 
 
 def equations(sequence):

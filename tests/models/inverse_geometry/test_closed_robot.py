@@ -7,12 +7,12 @@ from support.postures import same
 
 import mbs
 from mbs.components import Body, Mechanism, Revolute, Spherical
-from mbs.loops.closed_form.known import completed
 from mbs.loops.closing import Closing
-from mbs.loops.multi_start import closed_postures
+from mbs.loops.modes import closed_postures
+from mbs.loops.plan import completed
 from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.numeric.search import search
-from mbs.models.inverse_geometry.whole_robots.closed_robot import close, posed, why_searched
+from mbs.models.inverse_geometry.search import search
+from mbs.models.inverse_geometry.whole_robot import close, posed, why_searched
 
 NONE = np.zeros(0)
 FRAMES = {"sr400": 6, "akr3000": 10, "five_bar": "tool", "differential_wrist": "tool"}

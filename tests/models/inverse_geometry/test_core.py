@@ -2,12 +2,8 @@ import numpy as np
 import pytest
 from support.plain_arms import apart, manseur_doty, puma, random_arm
 
-from mbs.models.inverse_geometry.numeric import core
-from mbs.models.inverse_geometry.numeric.general import general, general_of
-from mbs.models.inverse_geometry.numeric.merge import merged
-from mbs.models.inverse_geometry.numeric.nearest import nearest
-from mbs.models.inverse_geometry.numeric.polish import polish
-from mbs.models.inverse_geometry.numeric.search import search
+import mbs.models.inverse_geometry.core as core
+from mbs.models.inverse_geometry.search import general, general_of, merged, nearest, polish, search
 from mbs.native import compiler_found
 
 

@@ -3,11 +3,9 @@
 import numpy as np
 
 import mbs
-from mbs.models.inverse_geometry.answers.curves import curve, freedoms
-from mbs.models.inverse_geometry.answers.multiplicity import reduction
-from mbs.models.inverse_geometry.answers.surfaces import connected
-from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.self_motions import connected, curve, freedoms
+from mbs.models.inverse_geometry.target import Target, reduction
 
 
 def planar(count):

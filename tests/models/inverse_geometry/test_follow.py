@@ -8,8 +8,8 @@ import pytest
 import mbs
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.numeric.search import search
-from mbs.models.inverse_geometry.paths.follow import follow
+from mbs.models.inverse_geometry.follow import follow
+from mbs.models.inverse_geometry.search import search
 
 ELBOW_UP = np.array([0.3, -0.8, 0.4, 0.2, 0.6, 0.1])
 

@@ -12,7 +12,7 @@ from support.arms import general_6r
 import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.export.languages import LANGUAGES
-from mbs.models.inverse_geometry.equations.function import InverseGeometry, function
+from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
 from mbs.native import compile_library, compiled
 from mbs.robots.rows import frame, robot
 

@@ -7,9 +7,9 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.answers.gathering import further, gather
-from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.gathering import further, gather
+from mbs.models.inverse_geometry.target import Target
 
 NONE = np.zeros(0)
 

@@ -3,13 +3,13 @@ import pytest
 from support.plain_arms import apart, khalil, manseur_doty, puma, random_arm
 
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.numeric.general import (
+from mbs.models.inverse_geometry.search import (
     general,
     general_many,
     general_of,
     general_with_numpy,
+    search,
 )
-from mbs.models.inverse_geometry.numeric.search import search
 from mbs.native import compiler_found
 
 WAYS = [

@@ -8,7 +8,7 @@ import pytest
 
 import mbs
 from mbs.models.inverse_geometry import solve
-from mbs.models.inverse_geometry.answers.labels import Anatomy, anatomy, labels
+from mbs.models.inverse_geometry.answer import Anatomy, anatomy, labels
 from mbs.models.inverse_geometry.chain import chain
 
 

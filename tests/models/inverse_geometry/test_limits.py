@@ -9,7 +9,7 @@ import pytest
 import mbs
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry import solve
-from mbs.models.inverse_geometry.answers.limits import bounds
+from mbs.models.inverse_geometry.solutions import bounds
 
 TURN = 2 * math.pi
 

@@ -8,7 +8,7 @@ from support.arms import general_5r, general_6r
 import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.batches.many import ManySolutions, solve_many
+from mbs.models.inverse_geometry.many import ManySolutions, solve_many
 from mbs.models.inverse_geometry.solve import solve
 
 LOCKED = {"panda": {"q3": 0.4}}
@@ -61,7 +61,7 @@ def test_rows_are_branches():
     system = assembled("puma560")
     _, _, T = poses(system, 3, 2)
     many = solve_many(system, T, method="pieper")
-    from mbs.models.inverse_geometry.equations.function import function
+    from mbs.models.inverse_geometry.closed_form import function
 
     igm = function(system, "pieper")
     assert many.labels == igm.labels

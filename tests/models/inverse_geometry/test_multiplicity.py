@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.models.inverse_geometry.answers.multiplicity import multiplicity, reduction
-from mbs.models.inverse_geometry.answers.target import Target
-from mbs.models.inverse_geometry.arm import Arm
+from mbs.closed_forms.arm import Arm
 from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.target import Target, multiplicity, reduction
 
 
 def planar(*lengths):

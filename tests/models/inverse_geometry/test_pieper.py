@@ -16,7 +16,7 @@ from support.pieper_arms import (
     with_wrist,
 )
 
-from mbs.loops.sequence import Problem
+from mbs.closed_forms.sequence import Problem
 from mbs.models.inverse_geometry.chain import chain
 
 H = np.pi / 2

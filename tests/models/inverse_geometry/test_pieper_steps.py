@@ -17,9 +17,9 @@ from support.pieper_arms import (
     with_wrist,
 )
 
+from mbs.closed_forms.pieper import pieper
 from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.pieper import pieper
 
 H = np.pi / 2
 

@@ -7,7 +7,7 @@ from support.random_trees import random_rotation
 
 import mbs
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.pose_input import wanted_pose, wanted_poses
+from mbs.models.inverse_geometry.chain import wanted_pose, wanted_poses
 from mbs.spatial import Pose
 
 

@@ -3,20 +3,20 @@ import pytest
 from support.arms import general_6r, placements, slides_and_turns, spherical, three_parallel
 
 import mbs
-from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.arm import Arm, gap_to, motion
-from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.raghavan_roth import (
-    candidates,
-    candidates_many,
-    prepare,
-)
-from mbs.models.inverse_geometry.raghavan_roth.pairs import (
+from mbs.closed_forms.arm import Arm, gap_to, motion
+from mbs.closed_forms.raghavan_roth.numbers import (
     back_parts,
     half_parts,
     motion_parts,
     pair,
     rho,
+)
+from mbs.errors import ModelError, NoClosedForm
+from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.raghavan_roth import (
+    candidates,
+    candidates_many,
+    prepare,
 )
 
 ROBOTS = (

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.models.inverse_geometry.answers.distinct import distinct
-from mbs.models.inverse_geometry.answers.target import Target
 from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.target import Target, distinct
 
 Q = np.array([0.3, 0.5, 0.2, 0.1, 0.4, 0.6])
 

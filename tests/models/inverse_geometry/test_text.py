@@ -10,9 +10,8 @@ from casadi import SX, Function
 
 import mbs
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.equations.expression_text import expression_lines
-from mbs.models.inverse_geometry.equations.function import function
-from mbs.models.inverse_geometry.equations.text import text
+from mbs.models.inverse_geometry.closed_form import function
+from mbs.models.inverse_geometry.sheet import expression_lines, text
 from mbs.operations.graph import graph_of
 
 

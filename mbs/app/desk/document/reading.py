@@ -7,18 +7,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
-from mbs.app.desk.document.mjcf import close_mjcf
-from mbs.components import (
-    Joint,
-    KhalilBody,
-    Mechanism,
-    Point,
-    Prismatic,
-    Revolute,
-    RigidBody,
-)
-from mbs.components.placement import KhalilStep
+from casadi import SX, Function
+
+from mbs.app.desk.document.tables import GEOMETRY_COLUMNS, INERTIA_COLUMNS, Tables, Texts, written
+from mbs.assembly import System
+from mbs.assembly.tables import LinkRow
+from mbs.components import Joint, KhalilBody, Mechanism, Point, Prismatic, Revolute, RigidBody
+from mbs.components.component import KhalilStep
 from mbs.errors import DescriptionError
 from mbs.formats import (
     CutRow,
@@ -31,9 +29,51 @@ from mbs.formats import (
     read_urdf,
     to_mechanism,
 )
-from mbs.formats.rows import DRIVE, GEOMETRY, LOOP_JOINTS
-from mbs.messages import did_you_mean
+from mbs.formats.table import DRIVE, GEOMETRY, LOOP_JOINTS
+from mbs.formats.urdf import parse_xml
 from mbs.spatial.inertia import TEN_PARAMETERS
+from mbs.text import did_you_mean, quoted
+
+# MJCF files that were sent: what MuJoCo would read from other files is refused beforehand.
+
+
+_PARTS = ("include", "model", "attach")
+"""Elements that stand for parts of the model in another file."""
+
+
+def close_mjcf(path: Path) -> None:
+    """Write the file anew as its parser understood it, once it is sure to name no other place.
+
+    MuJoCo reads XML in a way of its own; it gets what was checked. Meshes may be named by plain
+    relative paths: bodies whose inertia is given need none of them.
+
+    Args:
+        path: of the file, alone in its folder.
+
+    Raises:
+        DescriptionError: it is not XML, or names files at other places.
+    """
+    root = parse_xml(path)
+    for element in root.iter():
+        _check(path, element)
+    path.write_bytes(ElementTree.tostring(root, encoding="utf-8"))
+
+
+def _check(path: Path, element: Element) -> None:
+    for name, value in element.attrib.items():
+        is_path = name.startswith("file") or name.endswith("dir")
+        if is_path and (element.tag in _PARTS or not _is_inside(value)):
+            raise DescriptionError(
+                f"{path}: <{element.tag}> names other files, {quoted(value)}, which were not sent"
+                " with it; put the whole model in one file, with the inertias of its bodies"
+            )
+
+
+def _is_inside(value: str) -> bool:
+    """Whether a path stays in the folder of the file."""
+    plain = value.replace("\\", "/")
+    return not plain.startswith("/") and ":" not in plain and ".." not in plain.split("/")
+
 
 LARGEST_UPLOAD = 5_000_000
 """Bytes that an uploaded file may have."""
@@ -228,3 +268,75 @@ def _cut_kind(joint: Joint) -> str:
     if kind not in LOOP_JOINTS:
         raise DescriptionError(f"{joint.name}: a table of frames closes no loop with a {kind}")
     return kind
+
+
+# What the tables show of a mechanism that was composed: the links that it was assembled into.
+
+
+_DIGITS = 9
+
+
+def shown_tables(system: System, tables: Tables) -> Tables:
+    """The frames and inertias of the links, and the loops, as texts that are only read.
+
+    Args:
+        system: the assembled mechanism.
+        tables: with its name and the values of its symbols.
+    """
+    return Tables(
+        geometry=tuple(_geometry(system, row) for row in system.links),
+        inertia=tuple(_inertia(system, j) for j in range(len(system.links))),
+        loops=tuple((loop.name, "", loop.closing) for loop in system.loops),
+        general=tables.general,
+        values=tables.values,
+        attached=((None, False),) * len(system.links),
+    )
+
+
+def _geometry(system: System, row: LinkRow) -> Texts:
+    speeds = system.speeds[system.tree.links[row.number - 1].v]
+    places = system.coordinates[system.tree.links[row.number - 1].q]
+    cells = dict.fromkeys(GEOMETRY_COLUMNS, "")
+    cells |= {key: _text(getattr(row, key)) for key in GEOMETRY}
+    cells |= {
+        "antecedent": " + ".join((str(row.antecedent), *map(_fixed_frame, row.via))),
+        "joint": row.motion,
+        "actuated": "yes" if any(speed.actuated for speed in speeds) else "no",
+        "name": row.name,
+    }
+    if len(places) == 1 and places[0].limits is not None:
+        cells["limits"] = ", ".join(map(_text, places[0].limits))
+    return tuple(cells[column] for column in GEOMETRY_COLUMNS)
+
+
+def _fixed_frame(six: tuple[float | SX, ...]) -> str:
+    """A fixed frame on the way to a link, by its parameters that are not zero."""
+    values = (f"{k} {_text(x)}" for k, x in zip(GEOMETRY, six, strict=True) if not _is_zero(x))
+    return f"fixed frame ({', '.join(values)})"
+
+
+def _is_zero(value: float | SX) -> bool:
+    return not isinstance(value, SX) and value == 0
+
+
+def _inertia(system: System, j: int) -> Texts:
+    link = system.tree.links[j]
+    values = dict(zip(TEN_PARAMETERS, (link.inertia.parameters[k] for k in range(10)), strict=True))
+    cells = dict.fromkeys(INERTIA_COLUMNS, "")
+    cells |= {name: _number(system, value) for name, value in values.items()}
+    bodies = [body.name for body in system.bodies if body.link == j + 1]
+    cells["name"] = ", ".join(bodies)
+    return tuple(cells[column] for column in INERTIA_COLUMNS)
+
+
+def _number(system: System, value: SX) -> str:
+    """The number at the defaults of the symbols, or the expression where one has none."""
+    at = float(Function("value", [system.p], [value])(system.p_default))
+    return str(value) if at != at else _text(at)
+
+
+def _text(value: float | SX) -> str:
+    if isinstance(value, SX):
+        return str(value)
+    exact = written(float(value))
+    return exact if "pi" in exact else f"{float(value):.{_DIGITS}g}"

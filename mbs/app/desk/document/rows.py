@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mbs.app.desk.document.cells import GEOMETRY_COLUMNS, RANGES
-from mbs.app.desk.document.tables import Tables, Texts
+from mbs.app.desk.document.tables import GEOMETRY_COLUMNS, RANGES, Tables, Texts
 from mbs.errors import DescriptionError
-from mbs.formats.rows import BODY_SCALARS, InertiaRow
+from mbs.formats.table import BODY_SCALARS, InertiaRow
 
 _LAST = 200
 """Frames that a table may have."""

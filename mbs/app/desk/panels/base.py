@@ -8,7 +8,6 @@ from typing import cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.panels.count_table import column, plain_table
 from mbs.app.desk.panels.equations import open_equations
 from mbs.app.desk.panels.form import Given, OptionForm
 from mbs.app.desk.panels.layout import (
@@ -20,13 +19,13 @@ from mbs.app.desk.panels.layout import (
     two_sides,
     waiting_note,
 )
-from mbs.app.desk.panels.text_view import text_buttons
+from mbs.app.desk.panels.text_view import column, plain_table, text_buttons
 from mbs.app.tasks.base import BaseTable, base
 from mbs.app.tasks.equations import entry
 
 KEY = "base-parameters"
 
-_COLUMNS = (
+_BASE_COLUMNS = (
     ("name", "parameter", "left"),
     ("unit", "unit", "left"),
     ("value", "value", "right"),
@@ -73,7 +72,7 @@ def _show(desk: Desk, made: BaseTable) -> None:
     ).style("font-weight: 600").mark("found")
     ui.label(made.check + ".").classes("desk-note")
     text_buttons(desk, made.csv(), f"{made.system}_base_parameters.csv")
-    columns = [column(*one) for one in _COLUMNS]
+    columns = [column(*one) for one in _BASE_COLUMNS]
     rows = [
         {
             "name": row.name,

@@ -7,7 +7,6 @@ from typing import cast
 from nicegui import ui
 
 from mbs.app.desk.desk import Desk
-from mbs.app.desk.panels.count_table import BEFORE, count_table, steps_table
 from mbs.app.desk.panels.form import FIELD, Given, OptionForm
 from mbs.app.desk.panels.layout import (
     in_a_row,
@@ -16,8 +15,8 @@ from mbs.app.desk.panels.layout import (
     tell_of_changes,
     two_sides,
 )
-from mbs.app.desk.panels.optimizer_settings import passes_of
-from mbs.app.desk.panels.text_view import text_view
+from mbs.app.desk.panels.optimizer import passes_of
+from mbs.app.desk.panels.text_view import BEFORE, count_table, steps_table, text_view
 from mbs.app.tasks.equations import EVERY_PASS, WORDS, WrittenEquations, entry, equations, languages
 from mbs.models.catalogue import Entry
 

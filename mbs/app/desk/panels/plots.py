@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
+from nicegui import ui
+from nicegui.client import Client
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -118,3 +122,130 @@ def _axis(title: str, *, below: bool = False) -> dict[str, Any]:
         "splitLine": {"lineStyle": {"color": _FAINT}},
         **ends,
     }
+
+
+# Small fields of forms that hand on what is typed or chosen, without polling.
+
+
+_PROPS = "dense outlined hide-bottom-space"
+_MENU = f"{_PROPS} options-dense"
+
+Take = Callable[[Any], object]
+
+
+@dataclass(frozen=True, slots=True)
+class FieldLook:
+    """How a field looks, and what tests find it by.
+
+    Attributes:
+        label: in its frame, "" for none.
+        width: of CSS.
+        marker: its name in the page.
+    """
+
+    label: str
+    width: str
+    marker: str
+
+
+def text_field(look: FieldLook, value: str, take: Take) -> ui.input:
+    """A line of text.
+
+    Args:
+        look: of the field.
+        value: at first.
+        take: called with each text.
+    """
+    field = ui.input(look.label or None, value=value, on_change=lambda e: take(e.value or ""))
+    field.props(_PROPS).style(f"width: {look.width}").mark(look.marker)
+    _named(field, look)
+    return field
+
+
+def choice_field(look: FieldLook, options: Mapping[str, str], value: str, take: Take) -> ui.select:
+    """One of some values.
+
+    Args:
+        look: of the field.
+        options: value to what is shown for it.
+        value: at first.
+        take: called with each choice.
+    """
+    field = ui.select(
+        dict(options), label=look.label or None, value=value, on_change=lambda e: take(e.value)
+    )
+    field.props(_MENU).style(f"width: {look.width}").mark(look.marker)
+    _named(field, look)
+    return field
+
+
+def several_field(
+    look: FieldLook, options: Mapping[str, str], value: Sequence[str], take: Take
+) -> ui.select:
+    """Some of several values.
+
+    Args:
+        look: of the field.
+        options: value to what is shown for it.
+        value: at first.
+        take: called with a list at each choice.
+    """
+    field = ui.select(
+        dict(options),
+        label=look.label or None,
+        value=list(value),
+        multiple=True,
+        on_change=lambda e: take(list(e.value)),
+    )
+    field.props(f"{_MENU} use-chips").style(f"width: {look.width}").mark(look.marker)
+    return field
+
+
+def _named(field: ui.element, look: FieldLook) -> None:
+    """A name for those who do not see the field, where it has no label."""
+    if not look.label:
+        field.props(f'aria-label="{look.marker}"')
+
+
+# The look of panels with forms and plots: small fields in rows and grids.
+
+
+_CSS = """
+.desk-small .q-field__control, .desk-small .q-field__marginal { height: 30px; min-height: 30px; }
+.desk-small .q-field__native { min-height: 30px; padding: 0; font-size: 13px;
+  font-variant-numeric: tabular-nums; }
+.desk-small .q-field__control { padding: 0 8px; }
+.desk-laws { display: grid; gap: 4px 8px; align-items: center; width: 100%;
+  grid-template-columns: minmax(34px, auto) 82px 82px 112px minmax(170px, 1fr); }
+.desk-cards { display: grid; gap: 14px; width: 100%; align-items: start;
+  grid-template-columns: repeat(auto-fit, minmax(330px, 1fr)); }
+.desk-card { border: 1px solid var(--d-line); border-radius: 10px; padding: 12px 14px; gap: 9px;
+  display: flex; flex-direction: column; align-items: start; min-width: 0; }
+.desk-card-title { font-weight: 600; font-size: 14.5px; }
+.desk-halves { display: flex; align-items: flex-start; gap: 22px; width: 100%; }
+.desk-half { display: flex; flex-direction: column; gap: 8px; min-width: 0; }
+.desk-stays { flex: 1 1 0; align-self: flex-start; position: sticky; top: 12px; width: 100%; }
+.desk-result-head { display: flex; align-items: center; gap: 8px; width: 100%; flex-wrap: wrap; }
+.desk-residuals { display: grid; width: 100%; gap: 4px 12px;
+  grid-template-columns: minmax(0, 3fr) minmax(0, 2fr); }
+.desk-panel .q-table__card { background: transparent; color: inherit; }
+.desk-player { display: flex; align-items: center; gap: 12px; width: 100%; }
+.desk-player .q-slider * { transition: none !important; }
+@media (max-width: 1100px) { .desk-halves { flex-direction: column; }
+  .desk-stays { position: static; flex: none; } }
+"""
+
+_DONE: WeakSet[Client] = WeakSet()
+
+
+def add_look() -> None:
+    """Give the page these styles, once."""
+    client = ui.context.client
+    if client not in _DONE:
+        _DONE.add(client)
+        ui.add_css(_CSS)
+
+
+def come_into_view(element: ui.element) -> None:
+    """Scroll what was filled into sight, where the page is too narrow to show it beside a form."""
+    ui.run_javascript(f"getHtmlElement({element.id})?.scrollIntoView({{block: 'nearest'}})")

@@ -28,12 +28,11 @@ several postures share, and near double ones neither.
 Source: Raghavan & Roth 1993; Manocha & Canny 1994.
 """
 
-from mbs.models.inverse_geometry.raghavan_roth.candidates import candidates, candidates_many
-from mbs.models.inverse_geometry.raghavan_roth.characteristic import (
+from mbs.closed_forms.raghavan_roth.expressions import (
     Characteristic,
     characteristic,
 )
-from mbs.models.inverse_geometry.raghavan_roth.prepare import Prepared, prepare
+from mbs.closed_forms.raghavan_roth.numbers import Prepared, candidates, candidates_many, prepare
 
 __all__ = [
     "Characteristic",

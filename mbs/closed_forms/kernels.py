@@ -1,0 +1,62 @@
+"""The kernel for a loop: the first that finds some of its unknown joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from casadi import SX
+
+from mbs.closed_forms.planar import along_normal, planar
+from mbs.closed_forms.ring import Ring
+from mbs.closed_forms.roots import Root
+from mbs.closed_forms.spatial import (
+    aim,
+    at_distance,
+    ball,
+    bennett,
+    confined,
+    free_body,
+    orientation,
+    slides,
+    spin,
+)
+from mbs.closed_forms.split import split
+from mbs.components.joints import Motion
+
+_KERNELS: tuple[Callable[[Ring, SX, SX], Root | None], ...] = (
+    free_body,
+    ball,
+    spin,
+    slides,
+    planar,
+    at_distance,
+    aim,
+    bennett,
+    orientation,
+    along_normal,
+    confined,
+)
+
+
+def closed_form(ring: Ring, q: SX, p: SX) -> Root | str:
+    """The ways to find some of the positions of a loop, or why no kernel fits.
+
+    The others follow once these are known.
+
+    Args:
+        ring: the loop.
+        q: symbols of positions, those of cut joints included.
+        p: (np, 1) symbols of parameters.
+    """
+    if any(joint.motion is Motion.FREE for joint in ring.joints) and len(ring.joints) > 1:
+        return "a free body is in it"
+    for kernel in _KERNELS:
+        root = kernel(ring, q, p)
+        if root is not None and any(root.ways.values()):
+            return root
+    found = split(ring, q, p)
+    if isinstance(found, Root):
+        return found
+    unknown = ", ".join(joint.name for joint in ring.joints)
+    count = len(ring.joints)
+    return f"{count} positions are unknown ({unknown}) and no kernel fits their axes: {found}"

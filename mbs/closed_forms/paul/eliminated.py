@@ -1,0 +1,85 @@
+"""One equation of type 2, or linear, left when other unknowns are eliminated by linear rows.
+
+From k + 1 equations linear in k columns of other unknowns the determinant is free of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import casadi
+import numpy as np
+from casadi import SX
+
+from mbs.closed_forms.paul.equation import Equation
+from mbs.closed_forms.paul.linear import Matrix, Variables, columns, row_factors, row_values
+from mbs.closed_forms.paul.one_unknown import Candidate, Stage, angle_step, unsteady
+from mbs.closed_forms.paul.splits import Variable
+from mbs.closed_forms.sequence import Step
+
+_SMALL = 1e-5
+_MOST = 2
+_ROWS = 8
+
+
+def eliminated(stage: Stage) -> Iterator[Candidate]:
+    """Steps of type 2 from several linear equations."""
+    rows = [equation for equation in stage.equations if equation.linear]
+    for variables in dict.fromkeys(e.variables for e in rows if len(e.variables) > 1):
+        inside = sorted(
+            (e for e in rows if set(e.variables) <= set(variables)), key=lambda e: e.cost
+        )[:_ROWS]
+        for variable in variables:
+            others = tuple(v for v in variables if v is not variable)
+            if variable.slides or len(columns(others)) > _MOST:
+                continue
+            yield from _of(stage, inside, variable, others)
+
+
+def _of(
+    stage: Stage, rows: list[Equation], variable: Variable, others: Variables
+) -> Iterator[Candidate]:
+    width = len(columns(others))
+    for chosen in combinations(rows, width + 1):
+        K = _stacked(chosen, others)
+        minors = _minors(K)
+        if np.min(np.max(np.abs(minors), axis=-1)) < _SMALL or np.any(
+            np.max(np.abs(minors), axis=0) < _SMALL
+        ):
+            continue
+        own = _stacked(chosen, (variable,))
+        XY = np.einsum("...k,...kc->...c", minors, own)
+        size = np.linalg.norm(XY, axis=-1)
+        if np.min(size) < _SMALL:
+            continue
+        cost = float(sum(row.cost for row in chosen))
+
+        def build(chosen: tuple[Equation, ...] = chosen) -> Step:
+            return _built(stage, chosen, variable, others)
+
+        order = 5.5 if variable.single else 5.7
+        yield Candidate((order, unsteady(size), cost), (variable,), build)
+
+
+def _stacked(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
+    return np.stack(np.broadcast_arrays(*(row_values(row, variables) for row in rows)), axis=-2)
+
+
+def _minors(K: Matrix) -> Matrix:
+    """(samples, k + 1) cofactors of a column beside K."""
+    count = K.shape[-2]
+    values = [(-1) ** row * np.linalg.det(np.delete(K, row, axis=-2)) for row in range(count)]
+    return np.stack(values, axis=-1)
+
+
+def _built(stage: Stage, rows: tuple[Equation, ...], variable: Variable, others: Variables) -> Step:
+    K = [row_factors(stage, row, others)[:-1] for row in rows]
+    own = [row_factors(stage, row, (variable,)) for row in rows]
+    X, Y, Z = (
+        casadi.det(casadi.vertcat(*(casadi.horzcat(*k, o[c]) for k, o in zip(K, own, strict=True))))
+        for c in range(3)
+    )
+    slides = sum(v.slides for v in others)
+    power = sum(row.row.power for row in rows) - slides
+    return angle_step(stage, variable, (SX(X), SX(Y), SX(-Z)), power)

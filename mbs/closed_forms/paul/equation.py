@@ -1,0 +1,398 @@
+"""Equations of a split loop that have few unknowns, by their terms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+
+import casadi
+import numpy as np
+from casadi import DM, SX
+from numpy.typing import NDArray
+
+from mbs.closed_forms.paul.splits import (
+    MOST_VARIABLES,
+    SIZE,
+    ZERO,
+    Knowledge,
+    Members,
+    Row,
+    Values,
+    Variable,
+    joint_basis,
+    represented_pose,
+    simple_rows,
+    splits,
+)
+
+Key = tuple[int, ...]
+
+PRODUCTS = 2
+"""The most variables of an equation with products of them."""
+
+_ALIKE = 2
+"""How many equations are kept that are multiples of each other: which of them is cheapest is seen
+once steps are built of them."""
+
+_WEIGHT = (0, 3, 2, 2, 2, 2, 1, 1, 1, 4, 4, 4, 6, 6, 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A term of the joints.
+
+    Attributes:
+        term: number of each joint and its power, of an angle the multiple.
+        known: number of each known sum that is taken out of it, and its multiple.
+        conjugate: whether what is left of the angles stands with the opposite sign.
+    """
+
+    term: Members
+    known: tuple[tuple[int, int], ...] = ()
+    conjugate: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """What stands with one product of variables.
+
+    Attributes:
+        values: (samples) G of Re(G e^i(angle)) times the slides; real where there is no angle.
+        sources: what it is the sum of.
+    """
+
+    values: Values
+    sources: tuple[Source, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equation:
+    """The sum of the parts is zero.
+
+    Attributes:
+        row: where it comes from.
+        variables: its unknowns.
+        parts: by the power of each variable, of angles the multiple; none stands twice, as its
+            conjugate.
+        patterns: every term of joints in it.
+        cost: of its coefficients, by estimate.
+    """
+
+    row: Row
+    variables: tuple[Variable, ...]
+    parts: Mapping[Key, Part]
+    patterns: frozenset[Members]
+    cost: int
+
+    @property
+    def linear(self) -> bool:
+        """Whether it is one in the cosines, the sines and the lengths of its variables."""
+        return all(sum(abs(power) for power in key) <= 1 for key in self.parts)
+
+    def at(self, key: Key) -> Values:
+        """The values of a part; zero where there is none."""
+        part = self.parts.get(key)
+        return np.zeros(1, dtype=complex) if part is None else part.values
+
+
+def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...]:
+    """The equations of all splits with few unknowns, the cheapest of those that are equal.
+
+    Args:
+        knowledge: what is known.
+        most: variables of an equation with products of them, before known sums are taken out.
+    """
+    slides = frozenset(k for k, joint in enumerate(knowledge.ring.joints) if not joint.turns)
+    sums = [(known.members, at) for known, _, at in knowledge.open_sums()]
+    found = dict[object, list[Equation]]()
+    for split in splits(knowledge):
+        for row, terms in simple_rows(split, slides, most):
+            new = _equation(row, terms, slides, sums)
+            if new is not None:
+                found.setdefault(_mark(new), []).append(new)
+    return tuple(
+        equation
+        for equal in found.values()
+        for equation in sorted(equal, key=lambda own: own.cost)[:_ALIKE]
+    )
+
+
+def _mark(equation: Equation) -> object:
+    """The same for equations that are multiples of each other."""
+    keys = sorted(equation.parts)
+    samples = max(len(part.values) for part in equation.parts.values())
+    table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
+    size = np.linalg.norm(table, axis=0)
+    table /= np.where(size > 0, size, 1.0) * np.where(_leading(table) < 0, -1.0, 1.0)
+    return equation.variables, tuple(keys), (np.round(table, 6) + 0.0).tobytes()  # -0.0 is 0.0
+
+
+def _leading(table: Values) -> NDArray[np.float64]:
+    """At each sample a number that changes sign with the column and is not small."""
+    parts = np.concatenate([table.real, table.imag])
+    largest = np.max(np.abs(parts), axis=0)
+    first = np.argmax(np.abs(parts) > 0.3 * largest, axis=0)
+    leading: NDArray[np.float64] = np.take_along_axis(parts, first[None], axis=0)[0]
+    return leading
+
+
+def _equation(
+    row: Row,
+    terms: Mapping[Members, Values],
+    slides: frozenset[int],
+    sums: list[tuple[Members, NDArray[np.float64]]],
+) -> Equation | None:
+    """The equation with its variables, if they are few."""
+    reduced = dict[Members, tuple[Values, list[Source]]]()
+    for term, given in terms.items():
+        turns = any(k not in slides for k, _ in term)
+        rest, source, values = _folded(term, given * (2 if turns else 1), slides, sums)
+        before = reduced.get(rest)
+        if before is None:
+            reduced[rest] = values, [source]
+        else:
+            reduced[rest] = before[0] + values, [*before[1], source]
+    if sums:
+        reduced = {term: own for term, own in reduced.items() if np.max(np.abs(own[0])) > ZERO}
+    variables = _variables([*reduced], slides)
+    if not variables or len(variables) > MOST_VARIABLES:
+        return None
+    parts = {
+        _key(term, variables): Part(values, tuple(sources))
+        for term, (values, sources) in reduced.items()
+    }
+    if len(parts) < len(reduced):
+        return None
+    cost = _WEIGHT[row.element] + sum(len(part.sources) for part in parts.values())
+    equation = Equation(row, variables, parts, frozenset(terms), cost)
+    return equation if len(variables) <= PRODUCTS or equation.linear else None
+
+
+def _folded(
+    term: Members,
+    values: Values,
+    slides: frozenset[int],
+    sums: list[tuple[Members, NDArray[np.float64]]],
+) -> tuple[Members, Source, Values]:
+    """What is left of a term when the known sums of angles are taken out of it."""
+    rest, known = term, list[tuple[int, int]]()
+    for number, (members, at) in enumerate(sums):
+        powers = dict(rest)
+        way = powers.get(members[0][0], 0) if members else 0
+        if way and all(powers.get(k, 0) == way * sign for k, sign in members):
+            rest = tuple(member for member in rest if member[0] not in dict(members))
+            values = values * np.exp(1j * way * at)
+            known.append((number, way))
+    if not known:
+        return term, Source(term), values
+    leading = next((e for k, e in rest if k not in slides), 0)
+    if leading < 0:
+        rest = tuple((k, e if k in slides else -e) for k, e in rest)
+        values = values.conj()
+    elif leading == 0:
+        values = values.real.astype(complex)
+    return rest, Source(term, tuple(known), leading < 0), values
+
+
+def _variables(terms: list[Members], slides: frozenset[int]) -> tuple[Variable, ...]:
+    """The joints, those put together whose angles always come with the same ratio."""
+    columns = dict[int, list[int]]()
+    for number, term in enumerate(terms):
+        for k, power in term:
+            columns.setdefault(k, [0] * len(terms))[number] = power
+    groups = list[tuple[list[int], Variable]]()
+    for k in sorted(columns):
+        column = columns[k]
+        for at, (leader, variable) in enumerate(groups):
+            ratio = 1 if leader == column else -1 if leader == [-e for e in column] else 0
+            if ratio and k not in slides and not variable.slides:
+                groups[at] = (leader, Variable(False, (*variable.members, (k, ratio))))
+                break
+        else:
+            groups.append((column, Variable(k in slides, ((k, 1),))))
+    return tuple(variable for _, variable in groups)
+
+
+def _key(term: Members, variables: tuple[Variable, ...]) -> Key:
+    powers = dict(term)
+    return tuple(powers.get(variable.members[0][0], 0) for variable in variables)
+
+
+# Coefficients of an equation of a split loop, as expressions of what is known.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ways:
+    """The matrices of the gaps of a loop, forwards and backwards, and a length of it.
+
+    Attributes:
+        on, back: (15, 15) each.
+        length: of the size of the loop [m].
+    """
+
+    on: tuple[SX, ...]
+    back: tuple[SX, ...]
+    length: SX
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Factor:
+    """X cos(angle) + Y sin(angle), or X alone where there is no angle."""
+
+    X: SX
+    Y: SX
+
+
+def ways(knowledge: Knowledge) -> Ways:
+    """The matrices of the gaps of a loop."""
+    poses = [gap.pose for gap in knowledge.ring.gaps]
+    opposite = [gap.inverse().pose for gap in knowledge.ring.gaps]
+    on = tuple(map(represented_pose, poses, opposite))
+    back = tuple(map(represented_pose, opposite, poses))
+    squares = [SX(casadi.sumsqr(pose.p)) for pose in poses]
+    numbers = [square for square in squares if square.is_constant() and float(square) > 0]
+    length = casadi.sqrt(sum(numbers or squares, SX(0 if numbers else 1e-60)))
+    return Ways(on, back, SX(length))
+
+
+def factor(knowledge: Knowledge, ways: Ways, equation: Equation, key: Key) -> Factor:
+    """What stands with a product of the variables of an equation."""
+    total, part = Factor(SX(0), SX(0)), equation.parts.get(key)
+    if part is None:
+        return total
+    sums = [value for _, value, _ in knowledge.open_sums()]
+    for source in part.sources:
+        own = _own(knowledge, ways, equation, source.term)
+        if source.known:
+            angle = sum((way * sums[number] for number, way in source.known), SX(0))
+            own = _turned(own, angle, source.conjugate)
+        total = Factor(total.X + own.X, total.Y + own.Y)
+    x, y = np.max(np.abs(part.values.real)), np.max(np.abs(part.values.imag))
+    return Factor(total.X if x > ZERO else SX(0), total.Y if y > ZERO else SX(0))
+
+
+def _turned(own: Factor, angle: SX, conjugate: bool) -> Factor:
+    """X and Y of G = X - i Y times e^i(angle), or of its conjugate."""
+    c, s = casadi.cos(angle), casadi.sin(angle)
+    X, Y = own.X * c + own.Y * s, own.Y * c - own.X * s
+    return Factor(SX(X), SX(-Y if conjugate else Y))
+
+
+def _own(knowledge: Knowledge, ways: Ways, equation: Equation, term: Members) -> Factor:
+    """X and Y of one product of powers of the joints."""
+    joints = knowledge.ring.joints
+    slides = {k: power for k, power in term if not joints[k].turns}
+    angles = [(k, sign) for k, sign in term if joints[k].turns]
+    if not angles:
+        return Factor(_coefficient(knowledge, ways, equation.row, slides), SX(0))
+    if not _has_partner(equation, slides, angles, term):
+        cosines = {k: 1 for k, _ in angles}
+        with_sine = cosines | {angles[0][0]: 2}
+        return Factor(
+            _coefficient(knowledge, ways, equation.row, slides | cosines),
+            _coefficient(knowledge, ways, equation.row, slides | with_sine),
+        )
+    return _mixed(knowledge, ways, equation.row, (slides, angles))
+
+
+def _has_partner(
+    equation: Equation,
+    slides: Mapping[int, int],
+    angles: list[tuple[int, int]],
+    term: Members,
+) -> bool:
+    """Whether the same joints come together with other signs too."""
+    pattern = {k for k, _ in angles} | set(slides)
+    return any(
+        other != term
+        and {k for k, _ in other} == pattern
+        and all(slides.get(k, power) == power for k, power in other)
+        for other in equation.patterns
+    )
+
+
+def _mixed(
+    knowledge: Knowledge,
+    ways: Ways,
+    row: Row,
+    term: tuple[Mapping[int, int], list[tuple[int, int]]],
+) -> Factor:
+    """G = X - i Y from all products of cosines and sines of the joints."""
+    slides, angles = term
+    X, Y = SX(0), SX(0)
+    for choice in product((1, 2), repeat=len(angles)):
+        weight = 2 * np.prod(
+            [0.5 if c == 1 else -0.5j * e for c, (_, e) in zip(choice, angles, strict=True)]
+        )
+        chosen = {k: c for c, (k, _) in zip(choice, angles, strict=True)}
+        value = _coefficient(knowledge, ways, row, dict(slides) | chosen)
+        X, Y = X + weight.real * value, Y - weight.imag * value
+    return Factor(SX(X), SX(Y))
+
+
+def _coefficient(knowledge: Knowledge, ways: Ways, row: Row, chosen: Mapping[int, int]) -> SX:
+    """What stands with a product of the elementary functions of the joints.
+
+    Args:
+        knowledge: whose known joints are put in.
+        ways: the gaps.
+        row: of the equation.
+        chosen: number of the function of each joint of the product: see `joint_basis`.
+    """
+    total = SX(0)
+    for way in (1, -1):
+        steps = list(_steps(row, len(ways.on), way))
+        if all(("joint", k) in steps for k in chosen):
+            total += way * _along(knowledge, ways, (row, steps, way), chosen)
+    return SX(total)
+
+
+def _steps(row: Row, n: int, way: int) -> Iterator[tuple[str, int]]:
+    """The joints and the gaps between two frames, on one way around the loop."""
+    point = row.start
+    while point != row.end:
+        at = point if way > 0 else (point - 1) % (2 * n)
+        yield ("joint", at // 2) if at % 2 == 0 else ("gap", (at // 2 + 1) % n)
+        point = (point + way) % (2 * n)
+
+
+def _along(
+    knowledge: Knowledge,
+    ways: Ways,
+    path: tuple[Row, list[tuple[str, int]], int],
+    chosen: Mapping[int, int],
+) -> SX:
+    """The element of w at the end of a way."""
+    row, steps, way = path
+    r = SX(1, SIZE)
+    r[0, row.element] = 1
+    for kind, k in steps:
+        if kind == "gap":
+            matrix = (ways.on if way > 0 else ways.back)[k]
+        else:
+            matrix = _joint(knowledge, k, chosen.get(k, 0), way)
+        r = SX(casadi.sparsify(casadi.mtimes(r, matrix)))
+        if r.nnz() == 0:
+            return SX(0)
+    return SX(r[0, 0] + r[0, 6 + row.seed])
+
+
+def _joint(knowledge: Knowledge, k: int, number: int, way: int) -> SX:
+    """One of the factors of an unknown joint, or the whole of a known one."""
+    joint = knowledge.ring.joints[k]
+    sign = way * joint.sign
+    if k not in knowledge.known:
+        return _sparse_basis(joint.turns, sign)[number]
+    basis, q = _sparse_basis(joint.turns, 1), knowledge.position(k)
+    if joint.turns:
+        return SX(basis[0] + casadi.cos(q) * basis[1] + (sign * casadi.sin(q)) * basis[2])
+    return SX(basis[0] + (sign * q) * basis[1] + (q * q) * basis[2])
+
+
+@cache
+def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
+    """The factors of a joint that moves with or against the way."""
+    one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in joint_basis(not turns))
+    return (one, first, sign * second) if turns else (one, sign * first, second)

@@ -1,0 +1,168 @@
+"""Equations linear in lengths, cosines and sines, as many as there are of these: one root.
+
+Type 1 is X r = Y; type 3 is two equations X cos q + Y sin q = Z; more unknowns need more rows.
+
+Source: Khalil & Dombre 2002, table 4.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import casadi
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from mbs.closed_forms.paul.equation import Equation, Key
+from mbs.closed_forms.paul.one_unknown import Candidate, Stage, divided, unsteady
+from mbs.closed_forms.paul.splits import Variable
+from mbs.closed_forms.sequence import Found, Step, angle_of, step
+from mbs.solvers.rank import graded
+
+Matrix = NDArray[np.float64]
+Variables = tuple[Variable, ...]
+
+_SMALL = 1e-5
+_CHOICES = 8
+_ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
+
+
+def linear(stage: Stage) -> Iterator[Candidate]:
+    """Steps that solve as many linear equations as there are columns."""
+    rows = [equation for equation in stage.equations if equation.linear]
+    for variables in dict.fromkeys(equation.variables for equation in rows):
+        inside = [e for e in rows if set(e.variables) <= set(variables)]
+        sums = any(not variable.single for variable in variables)
+        order = 3.0 if sums else float(min(len(variables), 2))
+        for chosen, rank in _best(inside, variables):
+
+            def build(chosen: tuple[Equation, ...] = chosen, v: Variables = variables) -> Step:
+                return _built(stage, chosen, v)
+
+            yield Candidate((order, *rank), variables, build)
+
+
+def columns(variables: Variables) -> list[tuple[Variable, str]]:
+    """What the equations are linear in."""
+    return [
+        (variable, kind) for variable in variables for kind in ("r" if variable.slides else "cs")
+    ]
+
+
+def key_of(variable: Variable, equation: Equation) -> Key | None:
+    """The key of a variable alone in an equation; None where it does not stand in it."""
+    if variable not in equation.variables:
+        return None
+    at = equation.variables.index(variable)
+    return tuple(int(k == at) for k in range(len(equation.variables)))
+
+
+def row_values(equation: Equation, variables: Variables) -> Matrix:
+    """(samples, columns) of the coefficients."""
+    values = []
+    for variable, kind in columns(variables):
+        key = key_of(variable, equation)
+        G = np.zeros(1, dtype=complex) if key is None else equation.at(key)
+        values.append(-G.imag if kind == "s" else G.real)
+    return np.stack(np.broadcast_arrays(*values), axis=-1)
+
+
+def row_factors(stage: Stage, equation: Equation, variables: Variables) -> list[SX]:
+    """The coefficients, then the constant."""
+    factors = list[SX]()
+    for variable in variables:
+        key = key_of(variable, equation)
+        if key is None:
+            factors += [SX(0)] * (1 if variable.slides else 2)
+            continue
+        own = stage.factor(equation, key)
+        factors += [own.X] if variable.slides else [own.X, own.Y]
+    return [*factors, stage.factor(equation, (0,) * len(equation.variables)).X]
+
+
+def _best(
+    rows: list[Equation], variables: Variables
+) -> list[tuple[tuple[Equation, ...], tuple[float, ...]]]:
+    """The rows to be solved: steady, cheap, well conditioned; the first few choices."""
+    width = len(columns(variables))
+    first = sorted(rows, key=lambda e: e.cost)[: _ROWS.get(width, 0)]
+    if len(first) < width:
+        return []
+    values = np.stack(
+        np.broadcast_arrays(*(row_values(equation, variables) for equation in first)), axis=-2
+    )
+    norms = np.linalg.norm(values, axis=-1)
+    choices = list[tuple[tuple[Equation, ...], tuple[float, ...]]]()
+    for chosen in combinations(range(len(first)), width):
+        det = np.linalg.det(values[:, chosen])
+        size = np.maximum(np.prod(norms[:, chosen], axis=-1), 1e-300)
+        if np.min(np.abs(det) / size) < _SMALL:
+            continue
+        cost = sum(first[k].cost for k in chosen)
+        rank = (unsteady(det), float(cost), -graded(float(np.min(np.abs(det)))))
+        choices.append((tuple(first[k] for k in chosen), rank))
+    return sorted(choices, key=lambda choice: choice[1])[:_CHOICES]
+
+
+def _built(stage: Stage, rows: tuple[Equation, ...], variables: Variables) -> Step:
+    """The step by Cramer's rule."""
+    table = [row_factors(stage, row, variables) for row in rows]
+    A = casadi.vertcat(*(casadi.horzcat(*row[:-1]) for row in table))
+    b = casadi.vertcat(*(-row[-1] for row in table))
+    named, equation = _text(stage, table, variables)
+    D, solved = _cramer(A, b)
+    values, regular, at = dict[int, SX](), list[SX](), 0
+    power = sum(row.row.power for row in rows) - sum(variable.slides for variable in variables)
+    for variable in variables:
+        place = stage.knowledge.place(variable)
+        if variable.slides:
+            values[place] = divided(solved[at], D)
+        else:
+            values[place] = angle_of(solved[at + 1] * D, solved[at] * D).value
+        at += 1 if variable.slides else 2
+    if not D.is_constant():
+        regular.append(SX((D / stage.ways.length**power) ** 2))
+    kind = _kind(variables)
+    found = Found(values, (), tuple(regular), named)
+    return step(stage.knowledge.problem, kind, equation, {}, found)
+
+
+def _kind(variables: Variables) -> str:
+    if len(variables) > 1:
+        return "linear"
+    return "type 1" if variables[0].slides else "type 3"
+
+
+def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
+    """The determinant, and the solutions times it."""
+    n = A.shape[0]
+    numerators = []
+    for k in range(n):
+        changed = SX(A)
+        changed[:, k] = b
+        numerators.append(SX(casadi.det(changed)))
+    return SX(casadi.det(A)), numerators
+
+
+def _text(stage: Stage, table: list[list[SX]], variables: Variables) -> tuple[dict[str, SX], str]:
+    named, lines = dict[str, SX](), list[str]()
+    for letter, row in zip(_letters(len(table)), table, strict=True):
+        pieces, right = list[str](), "0"
+        for (variable, kind), value in zip(columns(variables), row[:-1], strict=True):
+            if not value.is_zero():
+                name = {"c": "X", "s": "Y", "r": "W"}[kind] + stage.number(variable) + letter
+                named[name] = value
+                term = stage.term(variable)
+                shown = {"c": f"cos({term})", "s": f"sin({term})", "r": term}[kind]
+                pieces.append(f"{name} {shown}")
+        if not row[-1].is_zero():
+            right = f"Z{stage.number(variables[0])}{letter}"
+            named[right] = -row[-1]
+        lines.append(f"{' + '.join(pieces) or '0'} = {right}")
+    return named, ", ".join(lines)
+
+
+def _letters(count: int) -> list[str]:
+    return [""] if count == 1 else list("abcdefgh"[:count])

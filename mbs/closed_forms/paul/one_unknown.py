@@ -1,0 +1,173 @@
+"""One equation in one unknown: X cos q + Y sin q = Z, or a r^2 + b r + c = 0."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from mbs.closed_forms.paul.equation import Equation, Factor, Key, Ways, factor
+from mbs.closed_forms.paul.splits import ZERO, Knowledge, Variable
+from mbs.closed_forms.sequence import Found, Step, angle_of, cosine_root, square_root, step
+
+# Ways to go on at one stage of a search, and how they are told in text.
+
+
+STEADY = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """What is known, and the equations in few unknowns that are left.
+
+    Attributes:
+        knowledge: what is known.
+        ways: the gaps of the loop.
+        equations: that hold.
+    """
+
+    knowledge: Knowledge
+    ways: Ways
+    equations: tuple[Equation, ...]
+
+    def factor(self, equation: Equation, key: Key) -> Factor:
+        """What stands with a product of the variables of an equation."""
+        return factor(self.knowledge, self.ways, equation, key)
+
+    def number(self, variable: Variable) -> str:
+        """What tells the coefficients of a variable from others."""
+        return str(self.knowledge.place(variable) + 1)
+
+    def term(self, variable: Variable) -> str:
+        """The variable as an equation shows it."""
+        if variable.single:
+            return self.knowledge.name(variable)
+        signed = [
+            ("+" if sign > 0 else "-") + self.knowledge.ring.joints[k].name
+            for k, sign in variable.members
+        ]
+        return "".join(signed).removeprefix("+")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A step that could be taken.
+
+    Attributes:
+        rank: the lowest is taken first.
+        variables: that it gives.
+        build: of the step.
+    """
+
+    rank: tuple[float, ...]
+    variables: tuple[Variable, ...]
+    build: Callable[[], Step]
+
+
+def unsteady(values: NDArray[np.float64]) -> float:
+    """0 where a quantity is the same at all samples, else 1."""
+    spread = float(np.max(values) - np.min(values))
+    return float(spread > STEADY * float(np.max(np.abs(values))))
+
+
+def divided(numerator: SX, denominator: SX) -> SX:
+    """The ratio; finite where the denominator is zero."""
+    if denominator.is_constant():
+        return SX(numerator / denominator)
+    return SX(numerator * denominator / (denominator * denominator + 1e-300))
+
+
+def one_unknown(stage: Stage) -> Iterator[Candidate]:
+    """Steps of type 2 and quadratic ones."""
+    for equation in stage.equations:
+        if len(equation.variables) != 1:
+            continue
+        if not equation.variables[0].slides and set(equation.parts) <= {(0,), (1,)}:
+            yield _type_2(stage, equation)
+        elif equation.variables[0].slides and (2,) in equation.parts:
+            yield _quadratic(stage, equation)
+
+
+def _type_2(stage: Stage, equation: Equation) -> Candidate:
+    G, Z = equation.at((1,)), equation.at((0,))
+    order = 4.0 if equation.variables[0].single else 5.0
+    shifted = float(np.max(np.abs(Z)) > ZERO)
+    rank = (order, shifted, unsteady(np.abs(G)), float(equation.cost), -float(np.min(np.abs(G))))
+
+    def build() -> Step:
+        variable = equation.variables[0]
+        own, Z = stage.factor(equation, (1,)), -stage.factor(equation, (0,)).X
+        return angle_step(stage, variable, (own.X, own.Y, Z), equation.row.power)
+
+    return Candidate(rank, equation.variables, build)
+
+
+def angle_step(
+    stage: Stage,
+    variable: Variable,
+    XYZ: tuple[SX, SX, SX],
+    power: int,
+    kind: str = "type 2",
+) -> Step:
+    """The step that solves X cos q + Y sin q = Z, of which the unit is a power of a length."""
+    X, Y, Z = XYZ
+    number, shown = stage.number(variable), stage.term(variable)
+    names = {f"X{number}": X, f"Y{number}": Y, f"Z{number}": Z}
+    named = {name: value for name, value in names.items() if not value.is_zero()}
+    pieces = [
+        f"{name} {function}({shown})"
+        for name, function in ((f"X{number}", "cos"), (f"Y{number}", "sin"))
+        if name in named
+    ]
+    right = f"Z{number}" if f"Z{number}" in named else "0"
+    sign = SX.sym("sign")
+    found = _roots(stage.knowledge.place(variable), XYZ, sign, stage.ways.length**power)
+    found = replace(found, coefficients=named)
+    signs = {stage.knowledge.name(variable): sign}
+    equation = f"{' + '.join(pieces)} = {right}"
+    return step(stage.knowledge.problem, kind, equation, signs, found)
+
+
+def _roots(place: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
+    """Both roots; where Z is zero they are opposite, and always real."""
+    X, Y, Z = XYZ
+    if not Z.is_zero():
+        root = cosine_root(X, Y, Z, sign, scale)
+        return Found({place: root.value}, (root.real,), (root.regular,))
+    root = angle_of(sign * X, -sign * Y, scale)
+    return Found({place: root.value}, (), () if root.regular.is_constant() else (root.regular,))
+
+
+def _quadratic(stage: Stage, equation: Equation) -> Candidate:
+    order = (4.0, 1.0, unsteady(equation.at((2,)).real), float(equation.cost))
+
+    def build() -> Step:
+        return length_step(
+            stage,
+            equation.variables[0],
+            [stage.factor(equation, (k,)).X for k in (2, 1, 0)],
+        )
+
+    return Candidate(order, equation.variables, build)
+
+
+def length_step(stage: Stage, variable: Variable, abc: list[SX], kind: str = "quadratic") -> Step:
+    """The step that solves a r^2 + b r + c = 0."""
+    a, b, c = abc
+    number, shown = stage.number(variable), stage.term(variable)
+    middle = divided(b, 2 * a)
+    sign = SX.sym("sign")
+    root = square_root(middle * middle - divided(c, a), sign, stage.ways.length)
+    named = {f"A{number}": a, f"B{number}": b, f"C{number}": c}
+    named = {name: value for name, value in named.items() if not value.is_zero()}
+    powers = {f"A{number}": f" {shown}^2", f"B{number}": f" {shown}", f"C{number}": ""}
+    equation = " + ".join(name + powers[name] for name in named) + " = 0"
+    regular = () if a.is_constant() else (SX(a * a),)
+    found = Found(
+        {stage.knowledge.place(variable): root.value - middle}, (root.real,), regular, named
+    )
+    signs = {stage.knowledge.name(variable): sign}
+    return step(stage.knowledge.problem, kind, equation, signs, found)

@@ -1,0 +1,200 @@
+"""Paul's method as a search: at every stage the simplest equation that some split offers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import casadi
+import numpy as np
+from casadi import SX
+
+from mbs.closed_forms.paul.eliminated import eliminated
+from mbs.closed_forms.paul.equation import PRODUCTS, equations, ways
+from mbs.closed_forms.paul.linear import linear
+from mbs.closed_forms.paul.one_unknown import Candidate, Stage, one_unknown
+from mbs.closed_forms.paul.splits import Knowledge, Variable, beginning
+from mbs.closed_forms.paul.two_unknowns import two_unknowns
+from mbs.closed_forms.ring import Gap, Ring
+from mbs.closed_forms.sequence import Found, Problem, Step, StepSequence, step
+from mbs.components.joints import Motion
+from mbs.errors import NoClosedForm
+from mbs.spatial import Pose, vector
+
+# The last angle of a sum that is known.
+
+
+def sums(stage: Stage) -> Iterator[Candidate]:
+    """Steps that take known angles away from a known sum, or one sum away from another."""
+    for rest, value, text in _alone(stage):
+
+        def build(rest: Variable = rest, value: SX = value, text: str = text) -> Step:
+            turns = casadi.floor((value + casadi.pi) / (2 * casadi.pi))
+            found = Found({stage.knowledge.place(rest): SX(value - 2 * casadi.pi * turns)})
+            return step(stage.knowledge.problem, "sum", text, {}, found)
+
+        yield Candidate((0.0,), (rest,), build)
+
+
+def _alone(stage: Stage) -> Iterator[tuple[Variable, SX, str]]:
+    """Single angles, their values, and the equation."""
+    knowledge = stage.knowledge
+    opened = [
+        (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[place]}")
+        for (rest, value, _), (whole, place) in zip(
+            knowledge.open_sums(), knowledge.sums, strict=True
+        )
+    ]
+    yield from (own for own in opened if own[0].single)
+    for (first, a, text), (second, b, other) in combinations(opened, 2):
+        for way in (1, -1):
+            rest = _combined(first, second, way)
+            if len(rest) == 1:
+                ((k, sign),) = rest.items()
+                value = SX(a + way * b) / sign
+                yield _angle(knowledge, k), value, f"{text}, {other}"
+
+
+def _angle(knowledge: Knowledge, k: int) -> Variable:
+    return Variable(not knowledge.ring.joints[k].turns, ((k, 1),))
+
+
+def _combined(first: Variable, second: Variable, way: int) -> dict[int, int]:
+    total = dict(first.members)
+    for k, sign in second.members:
+        total[k] = total.get(k, 0) + way * sign
+    return {k: sign for k, sign in total.items() if sign in (1, -1)} if _unit(total) else {}
+
+
+def _unit(total: dict[int, int]) -> bool:
+    return all(abs(sign) <= 1 for sign in total.values())
+
+
+# The frames of a loop put where neighbouring axes are nearest to each other.
+#
+# Points where axes meet are then origins of frames, however the loop was described.
+#
+# Source: Khalil & Kleinfinger 1986, whose frames have their origins so.
+
+
+_ZERO = 1e-9
+
+
+def at_feet(problem: Problem) -> Ring:
+    """The loop of a problem, the frame of each turning joint moved along its axis.
+
+    The foot of the common normal with the axis that follows becomes the origin, where that way is
+    not the first one of the loop, through the known pose.
+    """
+    ring = problem.ring
+    for k in range(len(ring.joints) - 1):
+        here, after = ring.joints[k], ring.joints[k + 1]
+        if here.turns and after.turns and not ring.gaps[k + 1].pivots:
+            ring = _moved(problem, ring, k)
+    return ring
+
+
+def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
+    """The loop with the origin of joint k at the foot of the normal to the next axis."""
+    pose = ring.gaps[k + 1].pose
+    axis, cosine = pose.R[:, 2], pose.R[2, 2]
+    sine2 = axis[0] ** 2 + axis[1] ** 2
+    across = pose.p[2] * sine2 - (pose.p[0] * axis[0] + pose.p[1] * axis[1]) * cosine
+    values = np.array(problem.at_samples(casadi.vertcat(sine2, across)))
+    if np.max(np.abs(values[:, 1])) < _ZERO or np.min(np.abs(values[:, 0])) < _ZERO:
+        return ring
+    along = SX(across / sine2)
+    to, back = (Gap(Pose.moved(vector([0, 0, sign * along]))) for sign in (1, -1))
+    gaps = list(ring.gaps)
+    gaps[k] = to.after(gaps[k])
+    gaps[k + 1] = gaps[k + 1].after(back)
+    return replace(ring, gaps=tuple(gaps))
+
+
+_KERNELS = ((sums, linear, one_unknown), (eliminated, two_unknowns))
+_CHOICES = 8
+_SIMPLE = (Motion.REVOLUTE, Motion.PRISMATIC)
+
+
+def paul(problem: Problem) -> StepSequence:
+    """The joints of a loop, one after the other, by equations of few unknowns.
+
+    The loop is split in every way. Which equations hold, and what stands in them, is read off at
+    the samples; the cheapest one is then built in symbols, its joints are known from there on, and
+    the search begins again. Equations with one root come first, then those with two, with four.
+
+    Source: Paul 1981, section 3.7; Khalil & Dombre 2002, section 4.4.
+
+    Args:
+        problem: the loop. Its symbols stay symbols.
+
+    Returns:
+        the steps. Every posture that closes the loop is among its leaves, some of which may not
+        close it.
+
+    Raises:
+        NoClosedForm: no equation known here gives the joints that are left; names them.
+    """
+    _require_simple(problem)
+    knowledge = beginning(problem, at_feet(problem))
+    loop, steps = ways(knowledge), list[Step]()
+    while knowledge.unknown:
+        stage = Stage(knowledge, loop, equations(knowledge))
+        candidate = _cheapest(stage)
+        if candidate is None and knowledge.sums:
+            stage = Stage(knowledge, loop, equations(knowledge, PRODUCTS + 1))
+            candidate = _cheapest(stage)
+        if candidate is None:
+            raise NoClosedForm(_refusal(stage, steps))
+        step, variables = candidate
+        steps.append(step)
+        for variable in variables:
+            knowledge = knowledge.with_joint(variable)
+    return StepSequence(problem.size, tuple(steps))
+
+
+def _cheapest(stage: Stage) -> tuple[Step, tuple[Variable, ...]] | None:
+    """The step of the fewest operations among the first of the simplest kind."""
+    for kernels in _KERNELS:
+        every = [
+            candidate
+            for kernel in kernels
+            for candidate in kernel(stage)
+            if all(stage.knowledge.can_hold(variable) for variable in candidate.variables)
+        ]
+        if every:
+            every.sort(key=lambda candidate: candidate.rank)
+            equal = [own for own in every if own.rank[:2] == every[0].rank[:2]][:_CHOICES]
+            built = [(own.build(), own.variables) for own in equal]
+            return min(built, key=lambda own: own[0].function.n_instructions())
+    return None
+
+
+def _require_simple(problem: Problem) -> None:
+    for joint in problem.ring.joints:
+        if joint.motion not in _SIMPLE or joint.place is None:
+            raise NoClosedForm(
+                f"joint {joint.name} is {joint.motion.name.lower()}, and Paul's method knows"
+                " revolute and prismatic joints"
+            )
+
+
+def _refusal(stage: Stage, steps: Sequence[Step]) -> str:
+    """Which joints are left, and what the simplest equations in them are like."""
+    knowledge = stage.knowledge
+    left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
+    given = ", ".join(name for step in steps for name in step.names)
+    after = f" once {given} are known" if given else ""
+    return f"no equation gives {left}{after}: {_simplest(stage)}"
+
+
+def _simplest(stage: Stage) -> str:
+    if not stage.equations:
+        return "every equation of every split of the loop has more than two unknowns"
+    groups = dict.fromkeys(
+        " and ".join(stage.term(variable) for variable in equation.variables)
+        for equation in sorted(stage.equations, key=lambda e: (len(e.variables), e.cost))
+    )
+    shown = "; ".join(list(groups)[:3])
+    return f"the simplest equations of all splits of the loop, in {shown}, fit no type of equation"

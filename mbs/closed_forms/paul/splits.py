@@ -1,0 +1,551 @@
+"""Every way to split a loop, in numbers: what one side is, seen from each frame of the other.
+
+Seen from the frame before or after joint i, a point and the axes of joint e are the same whether
+one walks there forwards or backwards: each pair of frames gives a set of equations, left = right,
+that no joint stands on both sides of.
+
+Source: Paul 1981, section 3.7; the invariants: Raghavan & Roth 1993, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import combinations, product
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.closed_forms.ring import Ring
+from mbs.closed_forms.sequence import Problem
+from mbs.spatial import Pose
+
+# What a search knows of a loop: joints, and sums of the angles of joints.
+
+
+Matrix = NDArray[np.float64]
+Members = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A slide, an angle, or a sum of angles with signs.
+
+    Attributes:
+        slides: whether it is the length of a slide.
+        members: number of each joint in the ring, and its sign; the first sign is +1.
+    """
+
+    slides: bool
+    members: Members
+
+    @property
+    def single(self) -> bool:
+        """Whether it is the variable of one joint."""
+        return len(self.members) == 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """The loop in numbers, lengths divided by one of its own.
+
+    Attributes:
+        gaps: (samples, n, 4, 4) poses of the gaps.
+        q: (samples, n) positions of the joints, in the order of the ring.
+    """
+
+    gaps: Matrix
+    q: Matrix
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Knowledge:
+    """What is known at one stage of the search.
+
+    Attributes:
+        problem: of the loop, whose joints stand in the order of `ring`.
+        ring: the loop, the origins of its frames where neighbouring axes are nearest.
+        samples: the same in numbers.
+        known: numbers of the known joints in the ring.
+        sums: known sums of angles, and their places in x.
+    """
+
+    problem: Problem
+    ring: Ring
+    samples: Samples
+    known: frozenset[int] = frozenset()
+    sums: tuple[tuple[Variable, int], ...] = ()
+
+    @property
+    def unknown(self) -> list[int]:
+        """Numbers of the unknown joints."""
+        return [k for k in range(len(self.ring.joints)) if k not in self.known]
+
+    def place(self, variable: Variable) -> int:
+        """The place of a variable in x; of a sum the next free one."""
+        if variable.single:
+            place = self.ring.joints[variable.members[0][0]].place
+            return -1 if place is None else place
+        return self.problem.size + len(self.sums)
+
+    def can_hold(self, variable: Variable) -> bool:
+        """Whether a variable is new, and there is a place for it."""
+        held = [known.members for known, _, _ in self.open_sums()]
+        return variable.single or (
+            variable.members not in held and self.place(variable) < self.problem.x.numel()
+        )
+
+    def name(self, variable: Variable) -> str:
+        """The name of a variable as an equation shows it."""
+        if variable.single:
+            return self.ring.joints[variable.members[0][0]].name
+        return str(self.problem.x[self.place(variable)])
+
+    def with_joint(self, variable: Variable) -> Knowledge:
+        """The same with one more variable."""
+        if variable.single:
+            return replace(self, known=self.known | {variable.members[0][0]})
+        return replace(self, sums=(*self.sums, (variable, self.place(variable))))
+
+    def open_sums(self) -> list[tuple[Variable, SX, Matrix]]:
+        """Known sums of the unknown joints: expression, and values at the samples."""
+        return [_rest(self, *known) for known in self.sums]
+
+    def position(self, k: int) -> SX:
+        """The symbol of joint number k."""
+        return SX(self.problem.x[self.place(Variable(False, ((k, 1),)))])
+
+
+def _rest(knowledge: Knowledge, variable: Variable, place: int) -> tuple[Variable, SX, Matrix]:
+    """What is left of a sum when its known members are taken away."""
+    value = SX(knowledge.problem.x[place])
+    members = [member for member in variable.members if member[0] not in knowledge.known]
+    for k, sign in variable.members:
+        if k in knowledge.known:
+            value -= sign * knowledge.position(k)
+    if members and members[0][1] < 0:
+        members, value = [(k, -sign) for k, sign in members], -value
+    at_samples = np.zeros(len(knowledge.samples.q))
+    for k, sign in members:
+        at_samples = at_samples + sign * knowledge.samples.q[:, k]
+    return Variable(False, tuple(members)), value, at_samples
+
+
+def beginning(problem: Problem, ring: Ring) -> Knowledge:
+    """Nothing is known yet."""
+    return Knowledge(problem, ring, _samples(problem, ring))
+
+
+def _samples(problem: Problem, ring: Ring) -> Samples:
+    stacked = casadi.vertcat(*(gap.pose.matrix for gap in ring.gaps))
+    function = Function("gaps", [problem.given], [casadi.densify(stacked)])
+    n, places = len(ring.joints), [joint.place or 0 for joint in ring.joints]
+    gaps = np.array([np.array(function(given)).reshape(n, 4, 4) for _, given in problem.samples])
+    q = np.array([x[places] for x, _ in problem.samples])
+    length = float(np.mean(np.linalg.norm(gaps[..., :3, 3], axis=-1))) or 1.0
+    gaps[..., :3, 3] /= length
+    slides = [not joint.turns for joint in ring.joints]
+    return Samples(gaps, np.where(slides, q / length, q))
+
+
+# Rigid transforms as 15 x 15 matrices that act on the invariants of a point and a line.
+#
+# For a point p and a direction l the vector w = (1, p.p, p.l, p, l, p x l, (p.p) l - 2 (p.l) p)
+# is linear in its image under any rigid transform, so that a product of transforms is one of
+# matrices.
+#
+# Source: Raghavan & Roth 1993, section 4, whose fourteen equations are the rows of w.
+
+
+SIZE = 15
+POWERS = (0, 2, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 2, 2, 2)
+"""The powers of a length in the elements of w."""
+
+_P, _L, _X, _M = slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
+
+
+def represented(T: Matrix) -> Matrix:
+    """(..., 15, 15) of rigid transforms (..., 4, 4)."""
+    R, t = T[..., :3, :3], T[..., :3, 3]
+    tt, cross = np.sum(t * t, axis=-1)[..., None, None], _skew(t)
+    back = np.einsum("...ji,...j->...i", R, t)
+    D = np.zeros((*T.shape[:-2], SIZE, SIZE))
+    D[..., range(3), range(3)] = 1.0
+    for block in (_P, _L, _X, _M):
+        D[..., block, block] = R
+    D[..., 1, 0], D[..., 1, _P] = tt[..., 0, 0], 2 * back
+    D[..., 2, _L], D[..., _P, 0], D[..., _X, _L] = back, t, cross @ R
+    outer = t[..., :, None] * back[..., None, :]
+    D[..., _M, _X], D[..., _M, _L], D[..., _M, 2] = -2 * cross @ R, tt * R - 2 * outer, -2 * t
+    return D
+
+
+def represented_pose(pose: Pose, opposite: Pose) -> SX:
+    """(15, 15) of a pose, sparse; its inverse is given too, which may be shorter to write."""
+    R, t, back = pose.R, pose.p, -opposite.p
+    tt = min((casadi.sumsqr(p) for p in (t, opposite.p)), key=casadi.n_nodes)
+    cross = casadi.skew(t)
+    turned = casadi.mtimes(cross, R)
+    D = SX(SIZE, SIZE)
+    D[0, 0] = D[1, 1] = D[2, 2] = 1
+    for block in (_P, _L, _X, _M):
+        D[block, block] = R
+    D[1, 0], D[1, _P], D[2, _L] = tt, 2 * back.T, back.T
+    D[_P, 0], D[_X, _L], D[_M, 2] = t, turned, -2 * t
+    D[_M, _X] = -2 * turned
+    D[_M, _L] = tt * R - 2 * casadi.mtimes(t, back.T)
+    return SX(casadi.sparsify(D))
+
+
+def joint_basis(slides: bool) -> Matrix:
+    """(3, 15, 15) factors of 1, cos q, sin q of a turn about z; of 1, r, r^2 of a slide along z."""
+    T = np.broadcast_to(np.eye(4), (3, 4, 4)).copy()
+    if slides:
+        T[1, 2, 3], T[2, 2, 3] = 1.0, -1.0
+        one, up, down = represented(T)
+        return np.array([one, (up - down) / 2, (up + down) / 2 - one])
+    T[1, :2, :2], T[2, :2, :2] = [[0, -1], [1, 0]], [[-1, 0], [0, -1]]
+    one, quarter, half = represented(T)
+    mean = (one + half) / 2
+    return np.array([mean, (one - half) / 2, quarter - mean])
+
+
+def motion(q: Matrix, slides: bool) -> Matrix:
+    """(..., 4, 4) slide along z, or turn about z."""
+    T = np.zeros((*q.shape, 4, 4))
+    T[..., range(4), range(4)] = 1.0
+    if slides:
+        T[..., 2, 3] = q
+        return T
+    c, s = np.cos(q), np.sin(q)
+    T[..., 0, 0], T[..., 0, 1], T[..., 1, 0], T[..., 1, 1] = c, -s, s, c
+    return T
+
+
+def inverse(T: Matrix) -> Matrix:
+    """(..., 4, 4) inverse of rigid transforms."""
+    back = np.zeros_like(T)
+    R = np.swapaxes(T[..., :3, :3], -1, -2)
+    back[..., :3, :3], back[..., 3, 3] = R, 1.0
+    back[..., :3, 3] = -np.einsum("...ij,...j->...i", R, T[..., :3, 3])
+    return back
+
+
+def _skew(t: Matrix) -> Matrix:
+    S = np.zeros((*t.shape, 3))
+    S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -t[..., 2], t[..., 1], -t[..., 0]
+    return S - np.swapaxes(S, -1, -2)
+
+
+Tensor = NDArray[np.complex128]
+
+_MOST = 4
+_DIRECTION = slice(6, 9)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One side of an equation as a polynomial in the unknown joints on it.
+
+    Attributes:
+        joints: their numbers in the ring.
+        values: (samples, rows, 3^k) its coefficients; each joint has the factors e^-iq, 1, e^iq,
+            or r, 1, r^2, the last joint those that change fastest.
+    """
+
+    joints: tuple[int, ...]
+    values: Tensor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Split:
+    """The equations of two frames: left = right, row by row.
+
+    Attributes:
+        start: the frame from which one looks: 2 k before joint k, 2 k + 1 after it.
+        end: the frame at which one looks.
+        seed: 0, 1, 2: which axis of it; of its point only with the z axis.
+        rows: of the 15 elements of w those that are meant.
+        left: the way forwards.
+        right: the way backwards.
+    """
+
+    start: int
+    end: int
+    seed: int
+    rows: tuple[int, ...]
+    left: Side
+    right: Side
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pieces:
+    """Matrices of the joints and of the ways between them, of one representation."""
+
+    joints: list[int]
+    gaps: list[Matrix]
+    back: list[Matrix]
+    turns: list[Tensor]
+    turns_back: list[Tensor]
+    slides: frozenset[int]
+
+
+def splits(knowledge: Knowledge) -> Iterator[Split]:
+    """Every split of the loop whose sides have few unknown joints each."""
+    whole = _pieces(knowledge, slice(0, SIZE))
+    turning = _pieces(knowledge, _DIRECTION)
+    w = np.zeros((SIZE, 1))
+    w[[0, 8]] = 1.0
+    for e, k in enumerate(whole.joints):
+        slides = k in whole.slides
+        for end in (2 * k, 2 * k + 1) if slides else (2 * k,):
+            yield from _of_end(whole, w, (e, slides), (end, 2))
+        for end in (2 * k,) if slides else (2 * k, 2 * k + 1):
+            yield from _of_end(turning, np.eye(3)[:, :2], (e, not slides), (end, 0))
+
+
+def _of_end(
+    pieces: _Pieces, seed: Matrix, joint: tuple[int, bool], end: tuple[int, int]
+) -> Iterator[Split]:
+    """The splits that look at one frame.
+
+    Args:
+        pieces: of the loop.
+        seed: what is looked at.
+        joint: its number among the unknown ones, and whether it moves the seed.
+        end: number of the frame and first axis.
+    """
+    (e, moves), (point, axis) = joint, end
+    samples = len(pieces.gaps[0])
+    first = np.broadcast_to(seed, (samples, *seed.shape)).astype(complex)
+    left = _walk_back(pieces, first, e, moves and point % 2 == 1)
+    right = _walk_on(pieces, first, e, moves and point % 2 == 0)
+    for start, side in left.items():
+        other = right.get(start)
+        if other is None or start == point:
+            continue
+        for column in range(seed.shape[1]):
+            sides = (Side(s.joints, s.values[:, :, column]) for s in (side, other))
+            rows = _rows(axis, start, start // 2 in pieces.slides)
+            yield Split(start, point, axis + column, rows, *sides)
+
+
+def _rows(axis: int, start: int, slides: bool) -> tuple[int, ...]:
+    """The elements that are new: a turn of the frame about its z axis leaves the others."""
+    after = start % 2 == 1
+    if axis == 2:
+        return (3, 4, 6, 7, 9, 10, 12, 13) if after and not slides else tuple(range(1, SIZE))
+    if after and slides:
+        return ()
+    return (6, 7) if after else (6, 7, 8)
+
+
+def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
+    """What is seen from the frames before joint e, by their numbers."""
+    m, found = len(pieces.joints), dict[int, Side]()
+    side = Side((), first[..., None])
+    if turned:
+        side = _through(side, pieces.joints[e], pieces.turns[e])
+    for step in range(m):
+        j = (e - step) % m
+        found[2 * pieces.joints[j]] = side
+        side = _over(side, pieces.gaps[j])
+        before = (j - 1) % m
+        found.setdefault(2 * pieces.joints[before] + 1, side)
+        if len(side.joints) == _MOST:
+            break
+        side = _through(side, pieces.joints[before], pieces.turns[before])
+    return found
+
+
+def _walk_on(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
+    """What is seen from the frames after joint e, by their numbers."""
+    m, found = len(pieces.joints), dict[int, Side]()
+    side = Side((), first[..., None])
+    if turned:
+        side = _through(side, pieces.joints[e], pieces.turns_back[e])
+    for step in range(m):
+        j = (e + step) % m
+        found[2 * pieces.joints[j] + 1] = side
+        after = (j + 1) % m
+        side = _over(side, pieces.back[after])
+        found.setdefault(2 * pieces.joints[after], side)
+        if len(side.joints) == _MOST:
+            break
+        side = _through(side, pieces.joints[after], pieces.turns_back[after])
+    return found
+
+
+def _over(side: Side, matrix: Matrix) -> Side:
+    S, d = matrix.shape[:2]
+    values = matrix @ side.values.reshape(S, d, -1)
+    return Side(side.joints, values.reshape(side.values.shape))
+
+
+def _through(side: Side, k: int, basis: Tensor) -> Side:
+    """The side with the powers of one more joint, (3, d, d), before it."""
+    S, d, columns, K = side.values.shape
+    moved = basis[:, None] @ side.values.reshape(S, d, -1)
+    values = np.moveaxis(moved.reshape(3, S, d, columns, K), 0, -1)
+    return Side((*side.joints, k), values.reshape(S, d, columns, 3 * K))
+
+
+def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
+    joints = knowledge.unknown
+    gaps = [_merged(knowledge, k) for k in joints]
+    ways = [represented(T)[:, block, block] for T in gaps]
+    back = [represented(inverse(T))[:, block, block] for T in gaps]
+    turns = [_basis(knowledge, k, 1)[:, block, block] for k in joints]
+    turns_back = [_basis(knowledge, k, -1)[:, block, block] for k in joints]
+    slides = frozenset(k for k in joints if not knowledge.ring.joints[k].turns)
+    return _Pieces(joints, ways, back, turns, turns_back, slides)
+
+
+def _merged(knowledge: Knowledge, k: int) -> Matrix:
+    """(samples, 4, 4) the way to joint k from the unknown joint before it."""
+    ring, samples = knowledge.ring, knowledge.samples
+    T, n = samples.gaps[:, k], len(ring.joints)
+    before = (k - 1) % n
+    while before in knowledge.known:
+        joint = ring.joints[before]
+        moved = motion(joint.sign * samples.q[:, before], not joint.turns)
+        T = samples.gaps[:, before] @ moved @ T
+        before = (before - 1) % n
+    return T
+
+
+def _basis(knowledge: Knowledge, k: int, way: int) -> Tensor:
+    """(3, 15, 15) factors of e^-iq, 1, e^iq, or of r, 1, r^2."""
+    joint = knowledge.ring.joints[k]
+    one, first, second = joint_basis(not joint.turns)
+    if not joint.turns:
+        return np.array([way * joint.sign * first, one, second], dtype=complex)
+    up = (first - 1j * way * joint.sign * second) / 2
+    return np.array([up.conj(), one, up])
+
+
+# The rows of a split loop that may have few unknowns, by their terms in the joints.
+
+
+Values = NDArray[np.complex128]
+
+ZERO = 1e-9
+MOST_VARIABLES = 3
+_MOST_JOINTS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Where an equation comes from: see `Split`.
+
+    Attributes:
+        start: the frame from which one looks.
+        end: the frame at which one looks.
+        seed: which axis of it.
+        element: of w.
+    """
+
+    start: int
+    end: int
+    seed: int
+    element: int
+
+    @property
+    def power(self) -> int:
+        """The power of a length that its terms are."""
+        return POWERS[self.element]
+
+
+def simple_rows(
+    split: Split, slides: frozenset[int], most: int
+) -> Iterator[tuple[Row, dict[Members, Values]]]:
+    """The rows that may have few unknowns, and their terms.
+
+    Args:
+        split: of the loop.
+        slides: numbers of its slides.
+        most: variables of a row with products of them.
+    """
+    offset = 0 if split.seed == 2 else -6
+    rows = [r + offset for r in split.rows]
+    if not rows:
+        return
+    sides = (split.left, split.right)
+    tables = [_table(side.joints, slides) for side in sides]
+    masks = [np.max(np.abs(side.values[:, rows]), axis=0) > ZERO for side in sides]
+    counts = np.sum([_counts(t, mask) for t, mask in zip(tables, masks, strict=True)], axis=0)
+    variables, joints, long = counts
+    few = (variables <= most) | ((variables <= MOST_VARIABLES) & (long == 0))
+    for number in np.flatnonzero((joints > 0) & (joints <= _MOST_JOINTS) & few):
+        row = Row(split.start, split.end, split.seed, split.rows[number])
+        found = dict[Members, Values]()
+        for side, table, mask, sign in zip(sides, tables, masks, (1, -1), strict=True):
+            _collect(found, (side, table.terms, mask[number]), rows[number], sign)
+        yield row, found
+
+
+def _counts(table: _Table, mask: NDArray[np.bool_]) -> NDArray[np.int_]:
+    """(3, rows) how many variables, at least, joints, and products there are in each row."""
+    weights = mask.astype(int)
+    joints = (weights @ table.has) > 0
+    together = np.zeros(joints.shape, dtype=bool)
+    for (a, b), apart in zip(table.pairs, (weights @ table.apart).T, strict=True):
+        together[:, b] |= joints[:, a] & joints[:, b] & (apart == 0)
+    count = joints.sum(axis=1)
+    return np.array([count - together.sum(axis=1), count, weights @ table.long])
+
+
+def _collect(
+    found: dict[Members, Values],
+    source: tuple[Side, list[Members | None], NDArray[np.bool_]],
+    row: int,
+    sign: int,
+) -> None:
+    side, terms, mask = source
+    for k in np.flatnonzero(mask):
+        term = terms[k]
+        if term is None:
+            continue
+        values = sign * side.values[:, row, k]
+        found[term] = found[term] + values if term in found else values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Table:
+    """The terms of a side of given joints.
+
+    Attributes:
+        terms: by number; None for those that are conjugates of others.
+        has: (terms, joints) 1 where a joint stands in a term.
+        pairs: of joints.
+        apart: (terms, pairs) 1 where one of the two stands in a term without the other.
+        long: (terms) 1 where there are several joints.
+    """
+
+    terms: list[Members | None]
+    has: NDArray[np.int_]
+    pairs: list[tuple[int, int]]
+    apart: NDArray[np.int_]
+    long: NDArray[np.int_]
+
+
+@lru_cache(maxsize=4096)
+def _table(joints: tuple[int, ...], slides: frozenset[int]) -> _Table:
+    every = list(product((-1, 0, 1), repeat=len(joints)))
+    terms = list[Members | None]()
+    for row in every:
+        term = tuple(
+            (k, {-1: 1, 1: 2}[e] if k in slides else e)
+            for k, e in sorted(zip(joints, row, strict=True))
+            if e
+        )
+        leading = next((e for k, e in term if k not in slides), 1)
+        terms.append(term if leading > 0 else None)
+    has = (np.array(every, dtype=int).reshape(len(every), len(joints)) != 0).astype(int)
+    pairs = list(combinations(range(len(joints)), 2))
+    apart = np.array([has[:, a] != has[:, b] for a, b in pairs], dtype=int)
+    apart = apart.reshape(len(pairs), len(every)).T
+    return _Table(terms, has, pairs, apart, (has.sum(axis=1) > 1).astype(int))

@@ -1,0 +1,245 @@
+"""Two equations in two unknowns, of which one, an angle, is eliminated: types 4 to 8, and quartics.
+
+Both have the form Re(k_i h(y) e^iq) + B_i(y) = 0 with two numbers k_i. They give w = h e^iq as a
+function of y, and |w|^2 = |h|^2 is an equation in y alone: of type 2 or quadratic, or of degree 2
+or 4 otherwise. Then q is found from two equations of type 3.
+
+Source: Khalil & Dombre 2002, table 4.1; a product h(y) is that of Pieper 1968.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX
+
+from mbs.closed_forms.paul.equation import Equation, Key
+from mbs.closed_forms.paul.one_unknown import Candidate, Stage, angle_step, length_step, unsteady
+from mbs.closed_forms.paul.splits import Variable
+from mbs.closed_forms.sequence import Found, Step, real_quartic, step, trigonometric_quartic
+
+_SMALL = 1e-7
+_ROWS = 8
+
+Numbers = list[Any]
+Complex = tuple[Any, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Form:
+    """One equation as Re(G(y) e^iq) + B(y) = 0.
+
+    Attributes:
+        G: complex, from the lowest power of y on: of e^-iy, 1, e^iy, or of 1, r, r^2.
+        B: factors of 1, cos y, sin y, or of 1, r, r^2.
+    """
+
+    G: list[Complex]
+    B: Numbers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Two equations, the unknown that stays, and the one that goes.
+
+    Attributes:
+        rows: the equations.
+        stays: number of the unknown that stays among the variables.
+        power: of which G is not zero.
+    """
+
+    rows: tuple[Equation, Equation]
+    stays: int
+    power: int
+
+    @property
+    def variable(self) -> Variable:
+        """The unknown that stays."""
+        return self.rows[0].variables[self.stays]
+
+
+def two_unknowns(stage: Stage) -> Iterator[Candidate]:
+    """Steps that give one of two unknowns."""
+    groups = dict[tuple[Variable, ...], list[Equation]]()
+    for equation in stage.equations:
+        if len(equation.variables) == 2:
+            groups.setdefault(equation.variables, []).append(equation)
+    for variables, rows in groups.items():
+        for stays in (0, 1):
+            if variables[1 - stays].slides:
+                continue
+            fit = [row for row in rows if _fits(row, stays)]
+            fit = sorted(fit, key=lambda row: row.cost)[:_ROWS]
+            for first, second in combinations(fit, 2):
+                candidate = _candidate(stage, (first, second), stays)
+                if candidate is not None:
+                    yield candidate
+
+
+def _fits(row: Equation, stays: int) -> bool:
+    most = 2 if row.variables[stays].slides else 1
+    return any(key[1 - stays] for key in row.parts) and all(
+        abs(key[1 - stays]) <= 1 and abs(key[stays]) <= most for key in row.parts
+    )
+
+
+def _candidate(stage: Stage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
+    forms = [_form_of_values(row, stays) for row in rows]
+    power = _common_power(forms)
+    if power is None:
+        return None
+    F = np.array(np.broadcast_arrays(*_resultant(forms, power, rows[0].variables[stays].slides)))
+    size = np.max(np.abs(F), axis=0)
+    if np.min(size) < 1e-14:
+        return None
+    shares = np.max(np.abs(F) / size, axis=1) > _SMALL
+    if not np.any(shares[1:]):
+        return None
+    quartic = bool(np.any(shares[3:]))
+    pair = _Pair(rows, stays, power)
+    leading = np.sum(F[1:] ** 2, axis=0)
+    cost = float(sum(row.cost for row in rows))
+    sums = 0.0 if pair.variable.single else 0.5
+    rank = (6.0 + quartic + sums, unsteady(leading), cost)
+    return Candidate(rank, (pair.variable,), lambda: _built(stage, pair, shares))
+
+
+def _common_power(forms: Sequence[_Form]) -> int | None:
+    """A power whose factors are independent, if those of all others are in their ratio."""
+    first, second = (np.array([re + 1j * im for re, im in _spread(form.G)]) for form in forms)
+    sizes = np.min(np.abs(first), axis=1)
+    power = 1 if len(sizes) == 3 and sizes[1] > _SMALL else int(np.argmax(sizes))
+    if sizes[power] < _SMALL:
+        return None
+    ratio = second[power] / first[power]
+    if np.min(np.abs(ratio.imag)) < 1e-5 or np.max(np.abs(second - ratio * first)) > _SMALL:
+        return None
+    return power
+
+
+def _spread(G: list[Complex]) -> list[Complex]:
+    arrays = np.broadcast_arrays(*(part for pair in G for part in pair))
+    return [(arrays[2 * k], arrays[2 * k + 1]) for k in range(len(G))]
+
+
+def _form_of_values(row: Equation, stays: int) -> _Form:
+    def part(key: Key) -> Complex:
+        values = row.at(key)
+        return values.real, -values.imag
+
+    return _form(row, stays, part)
+
+
+def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
+    """The form from X and Y of each part."""
+    slides = row.variables[stays].slides
+
+    def key(y: int, q: int) -> Key:
+        return (y, q) if stays == 0 else (q, y)
+
+    def G(y: int) -> Complex:
+        conjugate = stays == 0 and y < 0
+        X, Y = part(key(-y, -1) if conjugate else key(y, 1))
+        if conjugate:
+            return X, Y
+        return X, -Y
+
+    if slides:
+        return _Form([G(y) for y in (0, 1, 2)], [part(key(y, 0))[0] for y in (0, 1, 2)])
+    X, Y = part(key(1, 0))
+    return _Form([G(y) for y in (-1, 0, 1)], [part(key(0, 0))[0], X, Y])
+
+
+def _resultant(forms: Sequence[_Form], power: int, slides: bool) -> Numbers:
+    """The equation in y alone, from the lowest power on: 1, y .. y^4, or 1, c, s, c2, s2."""
+    (x, y), (u, v) = forms[0].G[power], forms[1].G[power]
+    n, a, b = x * x + y * y, u * x + v * y, v * x - u * y
+    other = [a * one - n * two for one, two in zip(forms[0].B, forms[1].B, strict=True)]
+    squares = [_square(forms[0].B, slides), _square(other, slides)]
+    size = _size(forms[0].G, slides)
+    return [
+        b * b * one + two - b * b * three for one, two, three in zip(*squares, size, strict=True)
+    ]
+
+
+def _square(B: Numbers, slides: bool) -> Numbers:
+    z, x, y = B
+    if slides:
+        return [z * z, 2 * z * x, x * x + 2 * z * y, 2 * x * y, y * y]
+    return [z * z + (x * x + y * y) / 2, 2 * z * x, 2 * z * y, (x * x - y * y) / 2, x * y]
+
+
+def _size(G: list[Complex], slides: bool) -> Numbers:
+    if slides:
+        parts = [_square([part[k] for part in G], True) for k in (0, 1)]
+        return [one + two for one, two in zip(*parts, strict=True)]
+    (a, b), (c, d), (e, f) = G
+    first = (c * a + d * b + e * c + f * d, d * a - c * b + f * c - e * d)
+    second = (e * a + f * b, f * a - e * b)
+    constant = a * a + b * b + c * c + d * d + e * e + f * f
+    return [constant, 2 * first[0], -2 * first[1], 2 * second[0], -2 * second[1]]
+
+
+def _built(stage: Stage, pair: _Pair, shares: Any) -> Step:
+    """The step."""
+
+    def forms(row: Equation) -> _Form:
+        def part(key: Key) -> Complex:
+            own = stage.factor(row, key)
+            return own.X, own.Y
+
+        return _form(row, pair.stays, part)
+
+    slides = pair.variable.slides
+    F = _resultant([forms(row) for row in pair.rows], pair.power, slides)
+    F = [SX(value) if share else SX(0) for value, share in zip(F, shares, strict=True)]
+    powers = [row.row.power for row in pair.rows]
+    unit = 4 * powers[0] + 2 * powers[1] - (4 * pair.power if slides else 0)
+    if np.any(shares[3:]):
+        return _quartic(stage, pair.variable, F, unit)
+    if slides:
+        return length_step(stage, pair.variable, F[2::-1], _kind(pair))
+    return angle_step(stage, pair.variable, (F[1], F[2], -F[0]), unit, _kind(pair))
+
+
+def _kind(pair: _Pair) -> str:
+    """The type of the two equations in the table of Khalil."""
+    goes = 1 - pair.stays
+    factors = {abs(key[pair.stays]) for row in pair.rows for key in row.parts if key[goes]}
+    if pair.variable.slides:
+        return "type 4" if factors == {1} else "type 5"
+    if factors != {0}:
+        return "type 8"
+    own = [part.values for row in pair.rows for key, part in row.parts.items() if key[goes]]
+    plain = all(np.max(np.abs(G.real)) * np.max(np.abs(G.imag)) < _SMALL for G in own)
+    return "type 6" if plain else "type 7"
+
+
+def _quartic(stage: Stage, variable: Variable, F: list[SX], unit: int) -> Step:
+    """The step with four roots."""
+    number, shown = stage.number(variable), stage.term(variable)
+    signs = SX.sym("sign", 2)
+    scale = stage.ways.length**unit if unit else SX(1)
+    if variable.slides:
+        root = real_quartic(casadi.vertcat(*F[::-1]), signs, stage.ways.length, scale)
+        pieces = ["", f" {shown}", f" {shown}^2", f" {shown}^3", f" {shown}^4"]
+    else:
+        ordered = casadi.vertcat(F[3], F[4], F[1], F[2], F[0])
+        root = trigonometric_quartic(ordered, signs, scale)
+        angles = (f"({shown})", f"(2 ({shown}))" if not variable.single else f"(2 {shown})")
+        pieces = ["", *(f" {f}{angle}" for angle in angles for f in ("cos", "sin"))]
+    names = [f"{letter}{number}" for letter in "ABCDE"]
+    named = {n: value for n, value in zip(names, F, strict=True) if not value.is_zero()}
+    text = [n + piece for n, piece in zip(names, pieces, strict=True) if n in named]
+    found = Found(
+        {stage.knowledge.place(variable): root.value}, (root.real,), (root.regular,), named
+    )
+    name = stage.knowledge.name(variable)
+    symbols = {f"{name}a": SX(signs[0]), f"{name}b": SX(signs[1])}
+    equation = f"{' + '.join(text[::-1])} = 0"
+    return step(stage.knowledge.problem, "quartic", equation, symbols, found)

@@ -1,0 +1,713 @@
+"""Pieper's method: arms with three axes through one point, or with three joints that slide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import SX
+
+from mbs.closed_forms.ring import Gap, Ring, Unknown
+from mbs.closed_forms.sequence import (
+    Found,
+    Problem,
+    Root,
+    Step,
+    StepSequence,
+    cosine_root,
+    real_quartic,
+    square_root,
+    step,
+    trigonometric_quartic,
+)
+from mbs.errors import NoClosedForm
+from mbs.spatial import Pose, axis_turn, vector
+
+# Quantities that depend on one joint, and equations X e^(i q) = U in another.
+#
+# A linear form holds three factors: of cos q, sin q and 1 for a joint that turns, of r^2, r and 1
+# for one that slides. A symmetric (3, 3) matrix A of such factors stands for the sum of the
+# products, b^T A b with b = (cos q, sin q, 1) or (r^2, r, 1).
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PieperLoop:
+    """The loop as Pieper sees it.
+
+    Attributes:
+        problem: to be solved.
+        ring: the loop, begun and walked so that the joints to be found last are its last ones.
+        length: of the size of the arm and of the pose [m].
+    """
+
+    problem: Problem
+    ring: Ring
+    length: SX
+
+    def x(self, k: int) -> SX:
+        """The symbol of the position of joint k of the ring."""
+        return SX(self.problem.x[self.place(k)])
+
+    def place(self, k: int) -> int:
+        """The place of joint k of the ring."""
+        place = self.ring.joints[k].place
+        assert place is not None
+        return place
+
+    def after(self, k: int) -> Gap:
+        """The way from joint k to the next."""
+        return self.ring.gaps[(k + 1) % len(self.ring.gaps)]
+
+    def motion(self, k: int) -> Pose:
+        """The motion of joint k, walked along the ring."""
+        joint, x = self.ring.joints[k], self.x(k)
+        if joint.turns:
+            return Pose.turned(axis_turn("z", joint.sign * x).matrix)
+        return Pose.moved(vector([0, 0, joint.sign * x]))
+
+    def suffix(self, k: int) -> str:
+        """What the names of the coefficients of joint k end with: its number."""
+        joints = self.problem.ring.joints
+        digits = ["".join(c for c in joint.name if c.isdigit()) for joint in joints]
+        number = joints.index(self._named(k))
+        distinct = all(digits) and len(set(digits)) == len(digits)
+        return digits[number] if distinct else str(number + 1)
+
+    def _named(self, k: int) -> Unknown:
+        name = self.ring.joints[k].name
+        return next(joint for joint in self.problem.ring.joints if joint.name == name)
+
+    def zero(self, values: SX) -> bool:
+        """Whether the values, free of units, vanish wherever the loop closes."""
+        return self.problem.always_zero(values)
+
+
+def basis(scene: PieperLoop, k: int) -> SX:
+    """(3, 1) what the factors of a form in joint k multiply."""
+    x = scene.x(k)
+    if scene.ring.joints[k].turns:
+        return casadi.vertcat(casadi.cos(x), casadi.sin(x), 1)
+    return casadi.vertcat(x * x, x, 1)
+
+
+def moved_point(joint: Unknown, point: SX) -> SX:
+    """(3, 3) forms of the coordinates of a point that the joint moves."""
+    x, y, z, sign = point[0], point[1], point[2], joint.sign
+    if joint.turns:
+        return casadi.vertcat(
+            casadi.horzcat(x, -sign * y, 0), casadi.horzcat(y, sign * x, 0), casadi.horzcat(0, 0, z)
+        )
+    return casadi.vertcat(
+        casadi.horzcat(0, 0, x), casadi.horzcat(0, 0, y), casadi.horzcat(0, sign, z)
+    )
+
+
+def constant(value: SX) -> SX:
+    """The form of what does not depend on the joint."""
+    return casadi.vertcat(0, 0, value)
+
+
+def product(a: SX, b: SX) -> SX:
+    """(3, 3) of the product of two forms."""
+    outer = casadi.mtimes(a, b.T)
+    return SX((outer + outer.T) / 2)
+
+
+# Three turns whose axes meet, or are taken by themselves, from the rotation they make.
+#
+# Z(q1) A Z(q2) B Z(q3) = G; the element G_zz holds the middle one alone.
+#
+# Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
+
+
+def three_turns(scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G: SX) -> list[Step]:
+    """The steps of three joints that turn.
+
+    Args:
+        scene: whose joints they are.
+        turns: their numbers in the ring.
+        A: (3, 3) rotation between the first two; no turn about z.
+        B: (3, 3) rotation between the last two, likewise.
+        G: (3, 3) what they make, of joints that are known.
+    """
+    first, middle, last = turns
+    Z1, Z2 = (_turn(scene, k) for k in (first, middle))
+    seen = casadi.mtimes([A, Z2, B])
+    column = casadi.mtimes([Z1, seen]).T @ G[:, 0]
+    return [
+        _middle(scene, middle, A[2, :].T, B[:, 2], G),
+        _outer(scene, first, seen[:2, 2], G[:2, 2]),
+        _outer(scene, last, SX(casadi.vertcat(1, 0)), column[:2]),
+    ]
+
+
+def _turn(scene: PieperLoop, k: int) -> SX:
+    return SX(axis_turn("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
+
+
+def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> Step:
+    """The joint in the middle, from row^T Z column = G_zz."""
+    joint = scene.ring.joints[k]
+    sign = SX.sym(joint.name)
+    X = row[0] * column[0] + row[1] * column[1]
+    Y = joint.sign * (row[1] * column[0] - row[0] * column[1])
+    Z = G[2, 2] - row[2] * column[2]
+    square = scene.zero(casadi.vertcat(row[2], column[2]))
+    root = _square_angle(X, Y, Z, sign, G) if square else cosine_root(X, Y, Z, sign)
+    end = scene.suffix(k)
+    found = Found(
+        {scene.place(k): root.value},
+        () if square else (root.real,),
+        (root.regular,),
+        {f"X{end}": X, f"Y{end}": Y, f"Z{end}": Z},
+    )
+    q = joint.name
+    text = f"X{end} cos({q}) + Y{end} sin({q}) = Z{end}"
+    return step(scene.problem, "type 2", text, {q: sign}, found)
+
+
+def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
+    """The root where both neighbours are at right angles: X^2 + Y^2 = 1, Z^2 + W^2 = 1."""
+    W = sign * casadi.sqrt(G[0, 2] * G[0, 2] + G[1, 2] * G[1, 2])
+    angle = casadi.atan2(Y * Z + X * W, X * Z - Y * W)
+    return Root(SX(angle), SX(1), SX(1))
+
+
+def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> Step:
+    return turn_onto(scene, k, (start, end), 1.0)
+
+
+def turn_onto(
+    scene: PieperLoop, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
+) -> Step:
+    """The turn of joint k that brings one vector of the plane onto the direction of another.
+
+    Args:
+        scene: whose joint it is.
+        k: its number in the ring.
+        vectors: (2, 1) before the turn, and (2, 1) after it, of the same length.
+        scale: of the size of both, in their unit.
+        regular: what else must not vanish, free of units.
+    """
+    joint = scene.ring.joints[k]
+    start, end = vectors
+    s = joint.sign
+    X, Y, U, V = start[0], s * start[1], end[0], s * end[1]
+    value = SX(casadi.atan2(V * X - U * Y, U * X + V * Y))
+    size = (U * U + V * V) / (scale * scale)
+    q, n = joint.name, scene.suffix(k)
+    text = f"X{n} cos({q}) - Y{n} sin({q}) = U{n}, Y{n} cos({q}) + X{n} sin({q}) = V{n}"
+    coefficients = {f"X{n}": X, f"Y{n}": Y, f"U{n}": U, f"V{n}": V}
+    found = Found({scene.place(k): value}, (), (size, *regular), coefficients)
+    return step(scene.problem, "type 3", text, {}, found)
+
+
+# Steps that find one joint from one equation: of degree 1 or 2 in its form.
+
+
+_TINY = 1e-280
+_SMALL = 1e-30
+
+
+def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
+    """Joint k from form = 0; None where the form does not depend on the joint.
+
+    Args:
+        scene: whose joint it is.
+        k: its number in the ring.
+        form: (3, 1) factors, see `forms`.
+        unit: of the size of what the form is a sum of, in its unit.
+    """
+    if not scene.ring.joints[k].turns:
+        return _polynomial(scene, k, [form[0], form[1], form[2]], unit)
+    if scene.zero(form[:2] / unit):
+        return None
+    joint = scene.ring.joints[k]
+    q, n, sign = joint.name, scene.suffix(k), SX.sym(joint.name)
+    root = cosine_root(form[0], form[1], -form[2], sign, unit)
+    found = Found(
+        {scene.place(k): root.value},
+        (root.real,),
+        (root.regular,),
+        {f"X{n}": form[0], f"Y{n}": form[1], f"Z{n}": -form[2]},
+    )
+    return step(scene.problem, "type 2", f"X{n} cos({q}) + Y{n} sin({q}) = Z{n}", {q: sign}, found)
+
+
+def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
+    """Joint k from b^T A b = 0; None where it does not depend on the joint.
+
+    Args:
+        scene: whose joint it is.
+        k: its number in the ring.
+        A: (3, 3) symmetric, factors of the products, see `forms`.
+        unit: of the size of what it is a sum of, in its unit.
+    """
+    if not scene.ring.joints[k].turns:
+        powers = [A[0, 0], 2 * A[0, 1], A[1, 1] + 2 * A[0, 2], 2 * A[1, 2], A[2, 2]]
+        return _polynomial(scene, k, powers, unit)
+    mean = (A[0, 0] + A[1, 1]) / 2
+    a = casadi.vertcat((A[0, 0] - A[1, 1]) / 2, A[0, 1], 2 * A[0, 2], 2 * A[1, 2], A[2, 2] + mean)
+    if scene.zero(a[:2] / unit):
+        return root_of_form(scene, k, a[2:], unit)
+    joint = scene.ring.joints[k]
+    q, n = joint.name, scene.suffix(k)
+    signs = {f"{q}a": SX.sym(f"{q}a"), q: SX.sym(q)}
+    root = trigonometric_quartic(a, casadi.vertcat(*signs.values()), unit)
+    named = dict(zip((f"A{n}", f"B{n}", f"X{n}", f"Y{n}"), casadi.vertsplit(a[:4]), strict=True))
+    named[f"Z{n}"] = -a[4]
+    text = f"A{n} cos(2 {q}) + B{n} sin(2 {q}) + X{n} cos({q}) + Y{n} sin({q}) = Z{n}"
+    found = Found({scene.place(k): root.value}, (root.real,), (root.regular,), named)
+    return step(scene.problem, "quartic", text, signs, found)
+
+
+def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0) -> Step:
+    """A joint that slides, from factor x = value.
+
+    Args:
+        scene: whose joint it is.
+        k: its number in the ring.
+        factor: of the position.
+        value: the right side [m], times the unit of the factor.
+        scale: of the size of the factor, in its unit.
+    """
+    joint = scene.ring.joints[k]
+    r, n, size = joint.name, scene.suffix(k), factor / scale
+    x = value / scale * size / (size * size + _TINY)
+    regular = () if factor.is_constant() else (size * size,)
+    found = Found({scene.place(k): x}, (), regular, {f"X{n}": factor, f"Y{n}": value})
+    return step(scene.problem, "type 1", f"X{n} {r} = Y{n}", {}, found)
+
+
+def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Step | None:
+    """A joint that slides, from a polynomial; factors from the highest power."""
+    degree = len(factors) - 1
+    while degree and scene.zero(factors[0] * scene.length**degree / unit):
+        factors, degree = factors[1:], degree - 1
+    if not degree:
+        return None
+    joint = scene.ring.joints[k]
+    r, n = joint.name, scene.suffix(k)
+    named = {f"{letter}{n}": factor for letter, factor in zip("ABCDE", factors, strict=False)}
+    if degree == 1:
+        return linear(scene, k, factors[0], -factors[1], unit / scene.length)
+    text = _polynomial_text(list(named), r)
+    signs = {name: SX.sym(name) for name in ((r,) if degree == 2 else (f"{r}a", r))}
+    if degree == 2:
+        root = _quadratic_root(factors, signs[r], scene.length, unit)
+    else:
+        five = casadi.vertcat(*[SX(0)] * (4 - degree), *factors)
+        both = casadi.vertcat(*signs.values())
+        root = real_quartic(five, both, scene.length, unit)
+    found = Found({scene.place(k): root.value}, (root.real,), (root.regular,), named)
+    kind = "quadratic" if degree == 2 else "quartic"
+    return step(scene.problem, kind, text, signs, found)
+
+
+def _polynomial_text(names: list[str], r: str) -> str:
+    """The equation, such as "A3 r3^2 + B3 r3 + C3 = 0"."""
+    powers = [f" {r}^{k}" if k > 1 else f" {r}" for k in range(len(names) - 1, 0, -1)]
+    return (
+        " + ".join(f"{name}{power}" for name, power in zip(names, [*powers, ""], strict=True))
+        + " = 0"
+    )
+
+
+def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
+    """The root of a r^2 + b r + c on one side of the middle, finite for every a."""
+    a, b, c = factors[0] * length**2 / unit, factors[1] * length / unit, factors[2] / unit
+    inverse = a / (a * a + _SMALL)
+    middle = -b * inverse / 2
+    root = square_root(middle * middle - c * inverse, sign)
+    size = middle * middle + casadi.fabs(c * inverse) + _TINY
+    return Root(SX((middle + root.value) * length), SX(root.real / size), SX(a * a))
+
+
+# Three joints that carry a point to where it is wanted.
+#
+# J1 [R1 t1] J2 f = p, where f(q3) is the point seen after joint 2. What joint 1 leaves unchanged
+# gives two equations in which joint 2 stands linearly, and joint 2 is eliminated from them; what
+# remains holds joint 3 alone.
+#
+# Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """The wanted position of a point.
+
+    Attributes:
+        scene: whose first three joints carry it.
+        way: (R1, t1) from joint 1 to joint 2.
+        f: (3, 3) forms in joint 3 of the point seen after joint 2.
+        square: (3, 1) form of |f|^2.
+        p: (3, 1) the wanted position [m].
+    """
+
+    scene: PieperLoop
+    way: Pose
+    f: SX
+    square: SX
+    p: SX
+
+
+def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[Step] | None:
+    """The steps of joints 3, 2 and 1; None where these three cannot be found so.
+
+    Args:
+        scene: whose first three joints they are.
+        point: (3, 1) seen after joint 3 [m].
+        p: (3, 1) where it is wanted, seen before joint 1 [m].
+    """
+    joint, way = scene.ring.joints[2], scene.after(1).pose
+    f = casadi.mtimes(way.R, moved_point(joint, point))
+    f[:, 2] += way.p
+    square = _square(f, way.p, point) if joint.turns else _slid_square(f)
+    reach = Reach(scene, scene.after(0).pose, f, square, p)
+    steps = _by_turning(reach) if scene.ring.joints[1].turns else _by_sliding(reach)
+    return None if steps is None else [*steps, _first(reach)]
+
+
+def _square(f: SX, t: SX, point: SX) -> SX:
+    """The form of |f|^2, of a point that turns."""
+    middle = 2 * casadi.mtimes(f.T, t)
+    return SX(middle + constant(casadi.sumsqr(point) - casadi.sumsqr(t)))
+
+
+def _slid_square(f: SX) -> SX:
+    """The form of |f|^2, of a point that slides."""
+    u, v = f[:, 1], f[:, 2]
+    return casadi.vertcat(casadi.sumsqr(u), 2 * casadi.dot(u, v), casadi.sumsqr(v))
+
+
+def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
+    """Two equations a . (J2 f) = h: vectors a, forms h, and the units of h."""
+    scene, R, t = reach.scene, reach.way.R, reach.way.p
+    if not scene.ring.joints[0].turns:
+        rows = [R[k, :].T for k in (0, 1)]
+        return rows, [constant(reach.p[k] - t[k]) for k in (0, 1)], [scene.length] * 2
+    known = casadi.sumsqr(reach.p) - casadi.sumsqr(t)
+    turned = casadi.mtimes(R.T, t)
+    forms = [(constant(known) - reach.square) / 2, constant(reach.p[2] - t[2])]
+    return [turned, R[2, :].T], forms, [scene.length**2, scene.length]
+
+
+def _by_turning(reach: Reach) -> list[Step] | None:
+    """Joints 3 and 2 where joint 2 turns."""
+    scene = reach.scene
+    (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
+    Z1, Z2 = h - a[2] * reach.f[2, :].T, k - b[2] * reach.f[2, :].T
+    K = a[1] * b[0] - a[0] * b[1]
+    unit_K = unit_h * unit_k / scene.length**2
+    if scene.zero(K / unit_K):
+        return _parallel(reach, (a, Z1, unit_h), (b, Z2, unit_k))
+    U, V = a[1] * Z2 - b[1] * Z1, b[0] * Z1 - a[0] * Z2
+    fx, fy = reach.f[0, :].T, reach.f[1, :].T
+    A = product(U, U) + product(V, V) - K * K * (product(fx, fx) + product(fy, fy))
+    third = root_of_square(scene, 2, A, (unit_K * scene.length) ** 2)
+    if third is None:
+        return None
+    b3 = basis(scene, 2)
+    point = casadi.mtimes(reach.f[:2, :], b3)
+    wanted = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + _TINY)
+    regular = () if K.is_constant() else (K / unit_K,)
+    return [third, turn_onto(scene, 1, (point, wanted), scene.length, regular)]
+
+
+def _parallel(
+    reach: Reach, first: tuple[SX, SX, SX], second: tuple[SX, SX, SX]
+) -> list[Step] | None:
+    """Joints 3 and 2 where joint 2 stands in both equations in the same way, or in one alone."""
+    scene, (a, Z1, unit), (b, Z2, unit_b) = reach.scene, first, second
+    if scene.zero(b[:2] * scene.length / unit_b):
+        if scene.zero(a[:2] * scene.length / unit):
+            return None
+        remaining, row, Z, unit_row = Z2, a, Z1, unit
+        unit = unit_b
+    else:
+        square, mixed = casadi.sumsqr(b[:2]), casadi.dot(a[:2], b[:2])
+        remaining, row, Z, unit_row = Z1 - mixed / square * Z2, b, Z2, unit_b
+    third = root_of_form(scene, 2, remaining, unit)
+    if third is None:
+        return None
+    b3 = basis(scene, 2)
+    fx, fy = (casadi.dot(reach.f[k, :].T, b3) for k in (0, 1))
+    s = scene.ring.joints[1].sign
+    X, Y = row[0] * fx + row[1] * fy, s * (row[1] * fx - row[0] * fy)
+    form = casadi.vertcat(X, Y, -casadi.dot(Z, b3))
+    joint = root_of_form(scene, 1, form, unit_row)
+    return None if joint is None else [third, joint]
+
+
+def _by_sliding(reach: Reach) -> list[Step] | None:
+    """Joints 3 and 2 where joint 2 slides."""
+    rows, forms, _ = _rows(reach)
+    left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
+    if reach.scene.ring.joints[0].turns:
+        return _slide_in_turn(reach, rows[0], rows[1][2], (left[0], left[1]))
+    return _two_slides(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
+
+
+def _two_slides(reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]) -> list[Step] | None:
+    """Joints 3 and 2 from along[k] x2 = left[k], two equations in the plane across joint 1."""
+    scene, sign = reach.scene, reach.scene.ring.joints[1].sign
+    third = root_of_form(scene, 2, along[1] * left[0] - along[0] * left[1], scene.length)
+    if third is None:
+        return None
+    value = casadi.dot(along[0] * left[0] + along[1] * left[1], basis(scene, 2))
+    square = along[0] * along[0] + along[1] * along[1]
+    return [third, linear(scene, 1, square, sign * value)]
+
+
+def _slide_in_turn(reach: Reach, a: SX, along: SX, left: tuple[SX, SX]) -> list[Step] | None:
+    """Joints 3 and 2 where joint 1 turns and joint 2 slides.
+
+    With r the way of joint 2: r^2 / 2 + (f_z + a_z) r = left[0] and along r = left[1].
+    """
+    scene, sign = reach.scene, reach.scene.ring.joints[1].sign
+    height, b3 = reach.f[2, :].T + constant(a[2]), basis(scene, 2)
+    if scene.zero(along):
+        third = root_of_form(scene, 2, left[1], scene.length)
+        form = casadi.vertcat(1, 2 * sign * casadi.dot(height, b3), -2 * casadi.dot(left[0], b3))
+        second = root_of_form(scene, 1, form, scene.length**2)
+        return None if third is None or second is None else [third, second]
+    A = product(left[1], left[1]) + 2 * along * product(height, left[1])
+    A -= 2 * along**2 * product(left[0], constant(SX(1)))
+    third = root_of_square(scene, 2, A, scene.length**2)
+    if third is None:
+        return None
+    return [third, linear(scene, 1, along, sign * casadi.dot(left[1], b3))]
+
+
+def _first(reach: Reach) -> Step:
+    """Joint 1, once the other two are known."""
+    scene = reach.scene
+    f = Pose.moved(casadi.mtimes(reach.f, basis(scene, 2)))
+    w = (reach.way @ scene.motion(1) @ f).p
+    joint = scene.ring.joints[0]
+    if joint.turns:
+        return turn_onto(scene, 0, (w[:2], reach.p[:2]), scene.length)
+    return linear(scene, 0, SX(1), joint.sign * (reach.p[2] - w[2]))
+
+
+# Three joints that slide, anywhere in the loop: the turns first, then three linear equations.
+#
+# Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
+
+
+def three_slides(scene: PieperLoop) -> list[Step]:
+    """The steps of a loop of three joints that turn and three that slide.
+
+    Raises:
+        NoClosedForm: two of the turning axes are always parallel, or the slides coplanar.
+    """
+    turns = scene.ring
+    for k in reversed([k for k, joint in enumerate(turns.joints) if not joint.turns]):
+        turns = turns.without(k)
+    names = ", ".join(joint.name for joint in turns.joints)
+    if any(scene.zero(gap.pose.R[:2, 2]) for gap in turns.gaps):
+        raise NoClosedForm(
+            f"joints {names} turn and the others slide, but two of the three axes stay parallel,"
+            " so that the turns are not determined"
+        )
+    first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in turns.gaps]))
+    begun = PieperLoop(scene.problem, turns.rotated(first), scene.length)
+    A, B, G = begun.after(0).pose.R, begun.after(1).pose.R, begun.after(2).pose.R.T
+    return [*three_turns(begun, (0, 1, 2), A, B, G), _slides(scene)]
+
+
+def _slides(scene: PieperLoop) -> Step:
+    """The joints that slide, from the sum of all ways around the loop."""
+    way, places, columns = Pose.identity(), list[int](), list[SX]()
+    for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
+        way = way @ gap.pose
+        if joint.turns:
+            way = way @ scene.motion(k)
+        else:
+            columns.append(joint.sign * way.R[:, 2])
+            places.append(k)
+    M = casadi.horzcat(*columns)
+    adjugate = casadi.horzcat(*(_cross(M, k) for k in range(3))).T
+    determinant = casadi.dot(M[:, 0], _cross(M, 0))
+    if scene.zero(determinant):
+        names = ", ".join(scene.ring.joints[k].name for k in places)
+        raise NoClosedForm(f"joints {names} slide in one plane, so that they are not determined")
+    r = -casadi.mtimes(adjugate, way.p) * determinant / (determinant * determinant + _TINY)
+    ends = [scene.suffix(k) for k in places]
+    values = {scene.place(k): r[m] for m, k in enumerate(places)}
+    return step(
+        scene.problem,
+        "linear",
+        _text(scene, places, ends),
+        {},
+        Found(values, (), (determinant * determinant,), _named(M, way.p, ends)),
+    )
+
+
+def _cross(M: SX, k: int) -> SX:
+    """(3, 1) the vector product of the two columns after column k."""
+    return SX(casadi.cross(M[:, (k + 1) % 3], M[:, (k + 2) % 3]))
+
+
+def _named(M: SX, p: SX, ends: list[str]) -> dict[str, SX]:
+    named = {f"{axis}{end}": M[m, k] for k, end in enumerate(ends) for m, axis in enumerate("XYZ")}
+    return named | {f"{axis}0": p[m] for m, axis in enumerate("XYZ")}
+
+
+def _text(scene: PieperLoop, places: list[int], ends: list[str]) -> str:
+    names = [scene.ring.joints[k].name for k in places]
+    rows = (
+        " + ".join(f"{axis}{end} {name}" for end, name in zip(ends, names, strict=True))
+        for axis in "XYZ"
+    )
+    return ", ".join(f"{row} + {axis}0 = 0" for row, axis in zip(rows, "XYZ", strict=True))
+
+
+# The arrangement of the loop that Pieper's method takes, and its steps.
+#
+# Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
+
+
+_JOINTS = 6
+_ZERO = 1e-9
+
+
+def pieper(problem: Problem) -> StepSequence:
+    """The steps of a loop of six joints by Pieper's method.
+
+    Wherever in the loop three neighbouring axes meet in a point, the loop is begun and walked so
+    that they come last; the first three joints carry the point, then the last three turn.
+
+    Args:
+        problem: of six joints.
+
+    Raises:
+        NoClosedForm: no three neighbouring axes meet and no three joints slide, or the arm is
+            singular in every posture.
+    """
+    names = [joint.name for joint in problem.ring.joints]
+    if problem.size != _JOINTS:
+        raise NoClosedForm(
+            f"the loop has {problem.size} unknown joints ({', '.join(names)}), and Pieper's method"
+            " takes six"
+        )
+    if sum(not joint.turns for joint in problem.ring.joints) == 3:
+        return StepSequence(
+            _JOINTS, three_slides(PieperLoop(problem, problem.ring, _length(problem)))
+        )
+    scenes = _arrangements(problem)
+    if not scenes:
+        raise NoClosedForm(_refusal(names))
+    found = [steps for scene in scenes if (steps := _steps(scene)) is not None]
+    regular = [steps for steps in found if _regular(problem, steps)]
+    if not regular:
+        raise NoClosedForm(_degenerate(scenes))
+    return min((StepSequence(_JOINTS, steps) for steps in regular), key=_cost)
+
+
+def _cost(sequence: StepSequence) -> tuple[int, int]:
+    """The number of branches, then of quartics."""
+    return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
+
+
+def _steps(scene: PieperLoop) -> list[Step] | None:
+    """The steps where the axes of the last three joints meet; None where the first three differ."""
+    ring = scene.ring
+    first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
+    point = (scene.after(2).pose @ Pose.moved(vector([0, 0, first]))).p
+    wanted = (scene.after(5).inverse().pose @ Pose.moved(vector([0, 0, last]))).p
+    steps = three_joints(scene, point, wanted)
+    if steps is None:
+        return None
+    before = Pose.identity()
+    for k in range(3):
+        before = before @ scene.motion(k) @ scene.after(k).pose
+    G = casadi.mtimes(ring.gaps[0].pose.R, before.R).T
+    A, B = scene.after(3).pose.R, scene.after(4).pose.R
+    return [*steps, *three_turns(scene, (3, 4, 5), A, B, G)]
+
+
+def _length(problem: Problem) -> SX:
+    """Of the size of the arm and of the pose [m]."""
+    squares = [casadi.sumsqr(gap.pose.p) for gap in problem.ring.gaps]
+    return SX(casadi.sqrt(sum(squares, SX(_TINY))))
+
+
+def _arrangements(problem: Problem) -> list[PieperLoop]:
+    """The loop begun and walked so that three axes that meet come last."""
+    length = _length(problem)
+    found = list[PieperLoop]()
+    for k in _concurrent(problem, length):
+        forward = problem.ring.rotated((k + 3) % _JOINTS)
+        backward = forward.reversed().rotated(3)
+        found += [PieperLoop(problem, ring, length) for ring in (forward, backward)]
+    return sorted(found, key=_pose_comes_first)
+
+
+def _pose_comes_first(scene: PieperLoop) -> bool:
+    """Whether the way with the most symbols, that of the pose, lies after the first joint."""
+    counts = [len(casadi.symvar(gap.pose.matrix)) for gap in scene.ring.gaps]
+    return counts[1] == max(counts)
+
+
+def _regular(problem: Problem, steps: list[Step]) -> bool:
+    """Whether the steps determine every joint of a generic posture."""
+    x, given = problem.x, problem.given
+    return not any(
+        problem.always_zero(quantity)
+        for one in steps
+        for quantity in casadi.vertsplit(one.function(x, given, SX.ones(len(one.signs)))[2])
+    )
+
+
+def _concurrent(problem: Problem, length: SX) -> list[int]:
+    """The numbers k such that joints k, k + 1 and k + 2 turn about axes through one point."""
+    gaps, joints = problem.ring.gaps, problem.ring.joints
+    after = [gaps[(k + 1) % _JOINTS].pose for k in range(_JOINTS)]
+    ahead, behind = [_height(way) for way in after], [_height(way.inverse()) for way in after]
+    rows = []
+    for k in range(_JOINTS):
+        (_, along, miss, bend), (_, back, lost, turn) = ahead[k], behind[(k + 1) % _JOINTS]
+        rows.append(
+            casadi.horzcat(bend, turn, *(far / length for far in (miss, lost, along - back)))
+        )
+    values = np.array(problem.at_samples(casadi.vertcat(*rows)))
+    meet = np.all(np.abs(values[:, :, 2:]) < _ZERO, axis=(0, 2))
+    bent = np.all(np.abs(values[:, :, :2]) > _ZERO, axis=(0, 2))
+    three = [all(joints[(k + m) % _JOINTS].turns for m in range(3)) for k in range(_JOINTS)]
+    return [k for k in (3, 0, 1, 2, 4, 5) if meet[k] and bent[k] and three[k]]
+
+
+def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
+    """Where an axis comes next to the z axis, and how.
+
+    Args:
+        way: pose of a frame whose z axis is that axis.
+
+    Returns:
+        The height on the z axis, that on the axis itself, the miss, and the bend between them,
+        which vanishes where they are parallel.
+    """
+    p, a = way.p, way.R[:, 2]
+    bend = a[0] * a[0] + a[1] * a[1]
+    along = -(a[0] * p[0] + a[1] * p[1]) / bend
+    return p[2] + along * a[2], along, p[0] * a[1] - p[1] * a[0], bend
+
+
+def _refusal(names: list[str]) -> str:
+    return (
+        f"no three neighbouring axes of {names[0]} .. {names[-1]} meet in a point and no three"
+        " joints slide, so that Pieper's method does not apply; use the general method"
+    )
+
+
+def _degenerate(scenes: list[PieperLoop]) -> str:
+    """Which joints do not determine where the axes meet."""
+    joints = scenes[0].ring.joints
+    first, last = (", ".join(joint.name for joint in part) for part in (joints[:3], joints[3:]))
+    return (
+        f"the axes of {last} meet in a point, but the positions of {first} do not follow from"
+        " where it is wanted: the arm is singular in every posture"
+    )

@@ -1,0 +1,506 @@
+"""A loop solved joint by joint: each step one equation, its roots told apart by signs."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.closed_forms.ring import Ring
+
+# What is to be solved: a loop, the symbols in it, and numbers at which it closes.
+
+
+Matrix = NDArray[np.float64]
+
+_ZERO = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """A loop whose joints are looked for.
+
+    Attributes:
+        ring: the loop; the place of each joint is its number in x.
+        x: (2 n, 1) symbols of the positions of its n joints [rad or m], then of as many further
+            angles that a solution may use, such as sums of joint angles.
+        given: (m, 1) symbols of everything that is known: parameters, and the pose to be reached.
+        samples: values of x[:n] and given, (n,) and (m,), at which the loop closes; the positions
+            are generic, and so are symbolic lengths.
+    """
+
+    ring: Ring
+    x: SX
+    given: SX
+    samples: Sequence[tuple[Matrix, Matrix]]
+
+    @property
+    def size(self) -> int:
+        """The number of joints."""
+        return len(self.ring.joints)
+
+    def at_samples(self, values: SX) -> list[Matrix]:
+        """The values of an expression of x and given at every sample; further angles are zero."""
+        function = Function("values", [self.x, self.given], [values])
+        rest = np.zeros(self.x.numel() - self.size)
+        return [
+            np.array(DM(function(np.concatenate([x, rest]), given))) for x, given in self.samples
+        ]
+
+    def always_zero(self, values: SX) -> bool:
+        """Whether an expression of x and given vanishes wherever the loop closes."""
+        return all(bool(np.all(np.abs(sample) < _ZERO)) for sample in self.at_samples(values))
+
+
+# One step of a solution: an equation that gives some joints, and the signs of its roots.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """Some joints of a loop, from the given and from the joints found before.
+
+    Attributes:
+        places: numbers in x of what it gives; beyond the joints those of further angles.
+        names: of these, as they stand in the equation.
+        kind: of the equation, such as "type 2" or "quartic".
+        equation: as one reads it, in terms of the coefficients, such as
+            "X3 cos(q3) + Y3 sin(q3) = Z3".
+        signs: what tells its roots apart, each +1 or -1; empty where there is one root.
+        coefficients: names of the coefficients in the equation.
+        function: (x, given, s) -> (values, real, regular, coefficients). `values` has a row a
+            place and is finite for every argument; `real` has a row a radicand, made free of
+            units, and the root is real where none is negative; `regular` has a row a quantity
+            free of units that vanishes where the step leaves a joint undetermined.
+    """
+
+    places: tuple[int, ...]
+    names: tuple[str, ...]
+    kind: str
+    equation: str
+    signs: tuple[str, ...]
+    coefficients: tuple[str, ...]
+    function: Function
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """Expressions of x, given and signs that make up a step.
+
+    Attributes:
+        values: by place.
+        real: radicands, free of units; negative where the root is not real.
+        regular: free of units, zero where a joint is left undetermined.
+        coefficients: by name.
+    """
+
+    values: Mapping[int, SX]
+    real: Sequence[SX] = ()
+    regular: Sequence[SX] = ()
+    coefficients: Mapping[str, SX] | None = None
+
+
+def step(problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], found: Found) -> Step:
+    """A step from the expressions that make it up.
+
+    Args:
+        problem: of which it solves a part.
+        kind: of the equation.
+        equation: as one reads it.
+        signs: the symbol of each sign by its name.
+        found: the expressions.
+    """
+    s = casadi.vertcat(*signs.values())
+    coefficients = dict(found.coefficients or {})
+    columns = (found.values.values(), found.real, found.regular, coefficients.values())
+    outputs = [casadi.densify(SX(casadi.vertcat(*column))) for column in columns]
+    function = Function("step", [problem.x, problem.given, SX(s)], outputs, {"cse": True})
+    places = tuple(found.values)
+    names = tuple(_name(problem, place) for place in places)
+    return Step(places, names, kind, equation, tuple(signs), tuple(coefficients), function)
+
+
+def _name(problem: Problem, place: int) -> str:
+    names = {joint.place: joint.name for joint in problem.ring.joints}
+    return names.get(place, str(problem.x[place]))
+
+
+# Steps one after the other: a posture for every choice of their signs.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leaf:
+    """A posture for one choice of all signs.
+
+    Attributes:
+        x: (n, 1) positions of the joints.
+        real: (r, 1) every radicand on the way.
+        regular: (e, 1) every quantity that must not vanish.
+        coefficients: by name, those of every step.
+    """
+
+    x: SX
+    real: SX
+    regular: SX
+    coefficients: dict[str, SX]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepSequence:
+    """A solution of a loop in steps.
+
+    Branch number b chooses the signs: sign number k, in the order of `signs`, is +1 where bit
+    number k of b, counted from the highest, is zero.
+
+    Attributes:
+        size: number of joints.
+        steps: in their order; together they give every joint.
+    """
+
+    size: int
+    steps: Sequence[Step]
+
+    @property
+    def signs(self) -> tuple[str, ...]:
+        """The names of all signs, in the order of the steps."""
+        return tuple(name for step in self.steps for name in step.signs)
+
+    @property
+    def branches(self) -> int:
+        """How many choices of signs there are."""
+        return int(2 ** len(self.signs))
+
+    def choice(self, branch: int) -> tuple[int, ...]:
+        """The signs, +1 or -1, of a branch."""
+        count = len(self.signs)
+        return tuple(-1 if branch >> (count - 1 - k) & 1 else 1 for k in range(count))
+
+    def label(self, branch: int) -> str:
+        """The signs of a branch by their names, such as "q3:+ q2:- q5:+"."""
+        signs = zip(self.signs, self.choice(branch), strict=True)
+        return " ".join(f"{name}:{'+' if sign > 0 else '-'}" for name, sign in signs)
+
+    def leaf(self, given: SX, s: SX) -> Leaf:
+        """The posture of one branch whose signs, (number of signs, 1), are expressions."""
+        leaf, first = self._start(), 0
+        for step in self.steps:
+            chosen = s[first : first + len(step.signs)]
+            leaf, first = _taken(leaf, step, given, chosen), first + len(step.signs)
+        return self._cropped(leaf)
+
+    def leaves(self, given: SX) -> list[Leaf]:
+        """The postures of all branches, in their order; what branches share is computed once."""
+        leaves = [self._start()]
+        for step in self.steps:
+            choices = list(itertools.product((1, -1), repeat=len(step.signs)))
+            leaves = [
+                _taken(leaf, step, given, SX(casadi.DM(choice)))
+                for leaf in leaves
+                for choice in choices
+            ]
+        return [self._cropped(leaf) for leaf in leaves]
+
+    def _start(self) -> Leaf:
+        return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
+
+    def _cropped(self, leaf: Leaf) -> Leaf:
+        return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
+
+
+def _taken(leaf: Leaf, step: Step, given: SX, s: SX) -> Leaf:
+    """The posture with one more step."""
+    values, real, regular, coefficients = step.function(leaf.x, given, s)
+    x = SX(leaf.x)
+    x[list(step.places)] = values
+    named = dict(zip(step.coefficients, casadi.vertsplit(coefficients), strict=True))
+    return Leaf(
+        x,
+        casadi.vertcat(leaf.real, real),
+        casadi.vertcat(leaf.regular, regular),
+        leaf.coefficients | named,
+    )
+
+
+# Equations with two roots, by the sign of one of them: X cos t + Y sin t = Z, a r^2 + b r + c =
+# 0.
+#
+# Both give a finite number for every argument: where the roots are not real, the point of the
+# fold between them.
+
+
+_TINY = 1e-300
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Root:
+    """A root and what tells whether it may be used.
+
+    Attributes:
+        value: the angle in (-pi, pi] [rad], or the number.
+        real: radicand, free of units; the root is real where it is not negative.
+        regular: free of units; zero where every number is a root, or none.
+    """
+
+    value: SX
+    real: SX
+    regular: SX
+
+
+def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
+    """The root of X cos t + Y sin t = Z on one side of the direction (X, Y).
+
+    Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
+
+    Args:
+        X: factor of cos t.
+        Y: factor of sin t.
+        Z: the right side.
+        sign: +1 for the root at a positive angle from that direction, -1 for the other.
+        scale: of the size of what the coefficients are sums of, in their unit.
+    """
+    size = X * X + Y * Y
+    radicand = size - Z * Z
+    W = sign * casadi.sqrt(casadi.fmax(radicand, _TINY))
+    angle = casadi.atan2(Y * Z + X * W, X * Z - Y * W)
+    return Root(SX(angle), SX(radicand / (size + Z * Z + _TINY)), SX(size / (scale * scale)))
+
+
+def angle_of(s: SX, c: SX, scale: SX | float = 1.0) -> Root:
+    """The angle whose sine and cosine are s and c times one positive factor."""
+    return Root(SX(casadi.atan2(s, c)), SX(1), SX((s * s + c * c) / (scale * scale)))
+
+
+def square_root(square: SX, sign: SX, scale: SX | float = 1.0) -> Root:
+    """The root of r^2 = square of the given sign; scale is of the size of r, in its unit."""
+    value = sign * casadi.sqrt(casadi.fmax(square, _TINY))
+    return Root(SX(value), SX(square / (scale * scale)), SX(1))
+
+
+# Equations with four roots, told apart by two signs: quartics, as two conics that meet.
+#
+# A trigonometric polynomial of degree 2 is a conic in the plane of (cos t, sin t), and its roots
+# are the points where it meets the unit circle; the roots of a quartic in r are where a conic in
+# the plane of (r^2, r) meets the parabola. Some conic of the pencil of the two is a pair of real
+# lines, through all four points; a cubic finds it. The first sign chooses the line, the second
+# the point of it: the one where the polynomial rises, or the one where it falls. A few Newton
+# steps on the polynomial itself end the search.
+#
+# Everything is finite for every argument; where the roots are not real the radicands say so.
+#
+# Source: Richter-Gebert 2011, chapter 11, for the pencil and its lines.
+
+
+_TINY_SQUARE, _SMALL = (
+    1e-280,
+    1e-140,
+)  # added to squares, and to numbers, so that nothing divides by zero
+_NOISE = 1e-11  # of a trace that decides whether the lines are real
+_FAR = 1e8  # largest root, in its scale
+_STEPS = 3  # of Newton
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """The conic that carries the roots.
+
+    Attributes:
+        C: (3, 3) its symmetric matrix, of determinant `determinant`.
+        side: a vector that tells a pair of lines l, m from m, l by the sign of side . (l x m).
+    """
+
+    C: DM
+    determinant: float
+    side: tuple[float, float, float]
+
+
+_CIRCLE = _Curve(DM([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), -1.0, (1.0, 0.6, 0.0))
+_PARABOLA = _Curve(DM([[0, 0, -0.5], [0, 1, 0], [-0.5, 0, 0]]), -0.25, (0.0, 0.0, 1.0))
+
+
+def trigonometric_quartic(a: SX, signs: SX, scale: SX | float = 1.0) -> Root:
+    """The root of a0 cos 2t + a1 sin 2t + a2 cos t + a3 sin t + a4 = 0 that two signs choose.
+
+    Where the second sign is +1 the polynomial rises with t there.
+
+    Args:
+        a: (5, 1) coefficients.
+        signs: (2, 1) each +1 or -1.
+        scale: of the size of what the coefficients are sums of, in their unit.
+
+    Returns:
+        The angle in (-pi, pi] [rad]; `real` has two rows.
+    """
+    size = casadi.sumsqr(a[:4])
+    b = a / casadi.sqrt(casadi.sumsqr(a) + _TINY_SQUARE)
+    A = _symmetric((b[0] + b[4] / 3, b[1], b[2] / 2), (b[4] / 3 - b[0], b[3] / 2), 2 * b[4] / 3)
+    line, other, split = _line(A, _CIRCLE, signs[0])
+    X, Y, Z = line[0], line[1], -line[2]
+    square = X * X + Y * Y
+    radicand = square - Z * Z
+    foot = (other[0] * X + other[1] * Y) * Z + other[2] * square
+    W = signs[1] * _minus_sign(foot) * casadi.sqrt(casadi.fmax(radicand, _TINY_SQUARE))
+    t = casadi.atan2(Y * Z + X * W, X * Z - Y * W + _SMALL)
+    for _ in range(_STEPS):
+        t = t + _newton(*_trigonometric(b, t), 0.1)
+    t = casadi.atan2(casadi.sin(t), casadi.cos(t))
+    real = casadi.vertcat(split, radicand / (square + Z * Z + _TINY_SQUARE))
+    return Root(SX(t), SX(real), SX(size / (scale * scale)))
+
+
+def real_quartic(
+    coefficients: SX, signs: SX, scale: SX | float = 1.0, unit: SX | float = 1.0
+) -> Root:
+    """The root of a0 r^4 + a1 r^3 + a2 r^2 + a3 r + a4 = 0 that two signs choose.
+
+    Where the second sign is +1 the polynomial rises with r there. Of four real roots, where the
+    first coefficient is positive, the first sign +1 chooses the larger two, and the second the
+    larger of these. The first coefficient may vanish; a root that is infinite stays at a large
+    number, and is not regular.
+
+    Args:
+        coefficients: (5, 1) from the highest power.
+        signs: (2, 1) each +1 or -1.
+        scale: of the size of r, in its unit.
+        unit: of the size of what the coefficients are sums of, in the unit of the polynomial.
+
+    Returns:
+        The number, in the unit of scale; `real` has two rows.
+    """
+    powers = casadi.vertcat(*(scale**k for k in (4, 3, 2, 1, 0)))
+    scaled = coefficients * powers
+    size = casadi.sumsqr(scaled[:4])
+    b = scaled / casadi.sqrt(casadi.sumsqr(scaled) + _TINY_SQUARE)
+    A = _symmetric((b[0], b[1] / 2, b[2] / 6), (2 * b[2] / 3, b[3] / 2), b[4])
+    line, other, split = _line(A, _PARABOLA, signs[0])
+    radicand = line[1] * line[1] - 4 * line[0] * line[2]
+    foot = (
+        other[0] * (line[1] * line[1] - 2 * line[0] * line[2])
+        - other[1] * line[0] * line[1]
+        + 2 * other[2] * line[0] * line[0]
+    )
+    sign = -signs[1] * _minus_sign(foot)
+    r = _quadratic(line, sign * casadi.sqrt(casadi.fmax(radicand, _TINY_SQUARE)))
+    for _ in range(_STEPS):
+        r = r + _newton(*_quartic(b, r), 0.1 * casadi.sqrt(1 + r * r))
+    r = casadi.fmax(casadi.fmin(r, _FAR), -_FAR)
+    size_line = line[1] * line[1] + 4 * casadi.fabs(line[0] * line[2])
+    real = casadi.vertcat(split, radicand / (size_line + _TINY_SQUARE))
+    finite = (line[0] ** 2 + line[1] ** 2) / (casadi.sumsqr(line) + _TINY_SQUARE) / (1 + r * r) ** 2
+    return Root(SX(r * scale), SX(real), SX(finite * size / (unit * unit)))
+
+
+def _symmetric(row: tuple[SX, SX, SX], second: tuple[SX, SX], last: SX) -> SX:
+    (a, b, c), (d, e) = row, second
+    return casadi.reshape(casadi.vertcat(a, b, c, b, d, e, c, e, last), 3, 3)
+
+
+def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
+    """One line of the pencil of A and the curve, the other one, and the radicand of the split.
+
+    Args:
+        A: (3, 3) symmetric, of norm 1 or so, and without a part along the curve: the trace of
+            adj(C) A is zero.
+        curve: the other conic.
+        sign: which line.
+    """
+    M = _degenerate(A, curve)
+    adjugate = _adjugate(M)
+    sizes = [casadi.fabs(adjugate[k, k]) for k in range(3)]
+    column = _largest(sizes, [adjugate[:, k] for k in range(3)])
+    minor = -_largest(sizes, [adjugate[k, k] for k in range(3)])
+    root = casadi.sqrt(casadi.fmax(minor, 0) + _TINY_SQUARE)
+    p = -column * root / (casadi.fabs(minor) + _TINY_SQUARE)
+    side = p[0] * curve.side[0] + p[1] * curve.side[1] + p[2] * curve.side[2]
+    p = -sign * _minus_sign(side) * p
+    N = M - casadi.skew(p)
+    sums = [casadi.sumsqr(N[:, k]) for k in range(3)]
+    line = _largest(sums, [N[:, k] for k in range(3)])
+    weights = [casadi.fabs(line[k]) for k in range(3)]
+    other = _largest(weights, [N[k, :].T * -_minus_sign(line[k]) for k in range(3)])
+    return SX(line), SX(other), SX(minor / (casadi.sumsqr(M) + _TINY_SQUARE))
+
+
+def _degenerate(A: SX, curve: _Curve) -> SX:
+    """A plus the multiple of the curve that makes it a pair of lines, real where there is one."""
+    adjugate = _adjugate(A)
+    linear = casadi.sum1(casadi.sum2(adjugate * SX(curve.C))) / curve.determinant
+    constant = casadi.dot(A[:, 0], adjugate[:, 0]) / curve.determinant
+    pairs = [A + root * SX(curve.C) for root in _outer_roots(linear, constant)]
+    first, second = (casadi.trace(_adjugate(M)) for M in pairs)
+    keep = casadi.logic_or(first < -_NOISE, first <= second)
+    return SX(casadi.if_else(keep, pairs[0], pairs[1]))
+
+
+def _outer_roots(c: SX, d: SX) -> list[SX]:
+    """The smallest and the largest real root of x^3 + c x + d = 0."""
+    Q, R = -c / 3, d / 2
+    D = R * R - Q * Q * Q
+    angle = casadi.atan2(casadi.sqrt(casadi.fmax(-D, _TINY_SQUARE)), R)
+    size = -2 * casadi.sqrt(casadi.fmax(Q, _TINY_SQUARE))
+    cube = casadi.fabs(R) + casadi.sqrt(casadi.fmax(D, _TINY_SQUARE))
+    large = _minus_sign(R) * cube ** (1 / 3)
+    single = large + Q * large / (large * large + _TINY_SQUARE)
+    several = [size * casadi.cos((angle + 2 * math.pi) / 3), size * casadi.cos(angle / 3)]
+    roots = []
+    for x in (casadi.if_else(D > 0, single, root) for root in several):
+        for _ in range(2):
+            x = x + _newton((x * x + c) * x + d, 3 * x * x + c, 0.1)
+        roots.append(SX(x))
+    return roots[::-1]
+
+
+def _adjugate(M: SX) -> SX:
+    """(3, 3) adjugate of a symmetric matrix."""
+    a, b, c, d, e, f = M[0, 0], M[0, 1], M[0, 2], M[1, 1], M[1, 2], M[2, 2]
+    off = (c * e - b * f, b * e - c * d, b * c - a * e)
+    return _symmetric((d * f - e * e, off[0], off[1]), (a * f - c * c, off[2]), a * d - b * b)
+
+
+def _largest(sizes: list[SX], values: list[SX]) -> SX:
+    """The value of the largest size of three."""
+    late = casadi.if_else(sizes[2] > sizes[1], values[2], values[1])
+    first = casadi.logic_and(sizes[0] >= sizes[1], sizes[0] >= sizes[2])
+    return SX(casadi.if_else(first, values[0], late))
+
+
+def _minus_sign(value: SX) -> SX:
+    """-1 where the value is positive or zero, else 1."""
+    return SX(casadi.if_else(value >= 0, -1.0, 1.0))
+
+
+def _newton(value: SX, slope: SX, most: SX | float) -> SX:
+    """A Newton step that is never larger than half of `most`."""
+    step = -value * slope / (slope * slope + 1e-30)
+    return SX(step / (1 + (step / most) ** 2))
+
+
+def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
+    """The polynomial and its slope."""
+    c, s = casadi.cos(t), casadi.sin(t)
+    c2, s2 = c * c - s * s, 2 * s * c
+    value = b[0] * c2 + b[1] * s2 + b[2] * c + b[3] * s + b[4]
+    return value, 2 * (b[1] * c2 - b[0] * s2) + b[3] * c - b[2] * s
+
+
+def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
+    """The polynomial and its slope, both divided by (1 + r^2)^2."""
+    value = (((b[0] * r + b[1]) * r + b[2]) * r + b[3]) * r + b[4]
+    slope = ((4 * b[0] * r + 3 * b[1]) * r + 2 * b[2]) * r + b[3]
+    size = (1 + r * r) ** 2
+    return value / size, slope / size
+
+
+def _quadratic(line: SX, root: SX) -> SX:
+    """(-b + root) / (2 a) of a r^2 + b r + c, without loss of digits and bounded."""
+    a, b, c = line[0], line[1], line[2]
+    up, down = root - b, -b - root
+    steady = b * root <= 0
+    over = casadi.if_else(steady, up, 2 * c)
+    under = casadi.if_else(steady, 2 * a, down)
+    r = over / (under - _minus_sign(under) * _SMALL)
+    return SX(casadi.fmax(casadi.fmin(r, _FAR), -_FAR))

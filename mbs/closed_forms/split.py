@@ -1,0 +1,110 @@
+"""Any loop of turns and slides, by Paul's method: split in every way, its simplest equations first.
+
+Source: Paul 1981, section 3.7; Khalil & Dombre 2002, section 4.4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import casadi
+from casadi import DM, SX
+
+from mbs.closed_forms.paul import paul
+from mbs.closed_forms.ring import Gap, Ring, Unknown, closed_samples
+from mbs.closed_forms.roots import Root
+from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
+from mbs.components.joints import Motion
+from mbs.errors import NoClosedForm
+from mbs.spatial import Pose
+
+_MOST = 6
+_ENOUGH = 3
+_AXES = Pose.turned(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
+
+
+def split(ring: Ring, q: SX, p: SX) -> Root | str:
+    """The ways to find the turns and slides of a loop, or why there is none.
+
+    A ball counts as three turns, of which nothing is asked. The label of a way has the signs of
+    all steps with several roots, each named after its joint.
+
+    Args:
+        ring: the loop.
+        q: symbols of positions, those of cut joints included.
+        p: symbols of parameters.
+    """
+    simple = _without_balls(ring)
+    if len(simple.joints) > _MOST:
+        return f"a loop determines {_MOST} turns and slides at most"
+    if all(joint.place is None for joint in simple.joints):
+        return "nothing but balls is unknown"
+    problem = _problem(simple, q, p)
+    if isinstance(problem, str):
+        return problem
+    try:
+        sequence = paul(problem)
+    except NoClosedForm as error:
+        return str(error)
+    return _root(simple, problem, sequence)
+
+
+def _without_balls(ring: Ring) -> Ring:
+    """The loop with three turns about crossed axes in the place of each ball."""
+    joints, gaps = list[Unknown](), list[Gap]()
+    for joint, gap in zip(ring.joints, ring.gaps, strict=True):
+        gaps.append(gap)
+        if joint.motion is not Motion.SPHERICAL:
+            joints.append(joint)
+            continue
+        turn = Unknown(joint.name, Motion.REVOLUTE, None, 1)
+        joints += [replace(turn, name=f"{joint.name}{k}") for k in (1, 2, 3)]
+        gaps += [Gap(_AXES)] * 2
+    return Ring(tuple(joints), tuple(gaps))
+
+
+def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
+    """The loop with its joints numbered from zero, or why it leaves them undetermined."""
+    gaps = SX(casadi.vertcat(*(casadi.vec(gap.pose.matrix) for gap in ring.gaps)))
+    symbols = {symbol.name() for symbol in casadi.symvar(gaps)}
+    every = [*casadi.vertsplit(q), *casadi.vertsplit(p)]
+    given = SX(casadi.vertcat(SX(0, 1), *(s for s in every if s.name() in symbols)))
+    samples, n = closed_samples(ring, given, p), len(ring.joints)
+    if max((sample.rank for sample in samples), default=n) < n:
+        return "they can move while all that is known stays"
+    if len(samples) < _ENOUGH:
+        return "no posture that closes it was found"
+    joints = tuple(replace(joint, place=k) for k, joint in enumerate(ring.joints))
+    names = [joint.name for joint in joints] + [f"x{k + 1}" for k in range(n)]
+    x = casadi.vertcat(*map(SX.sym, names))
+    own = replace(ring, joints=joints)
+    return Problem(own, x, given, [(sample.x, sample.given) for sample in samples])
+
+
+def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> Root:
+    places = {k: joint.place for k, joint in enumerate(ring.joints) if joint.place is not None}
+    needed = _up_to(sequence, set(places))
+    ways = dict[str, dict[int, SX]]()
+    for branch, leaf in enumerate(needed.leaves(problem.given)):
+        x = _where_real(leaf)
+        ways[needed.label(branch)] = {place: SX(x[k]) for k, place in places.items()}
+    return Root(ways)
+
+
+def _up_to(sequence: StepSequence, wanted: set[int]) -> StepSequence:
+    """The first steps, until they have given what is wanted."""
+    steps = list[Step]()
+    for step in sequence.steps:
+        if wanted:
+            steps.append(step)
+            wanted = wanted - set(step.places)
+    return replace(sequence, steps=tuple(steps))
+
+
+def _where_real(leaf: Leaf) -> SX:
+    """The positions; NaN where a radicand is negative."""
+    real = leaf.real
+    if real.numel() == 0:
+        return leaf.x
+    return SX(casadi.if_else(casadi.mmin(real) >= 0, leaf.x, math.nan))

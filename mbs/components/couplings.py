@@ -1,0 +1,131 @@
+"""Relations between the coordinates of joints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+from mbs.components.component import Component
+from mbs.components.joints import Motion
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Scalar, expression, to_float
+from mbs.text import quoted
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling(Component):
+    """A relation between the positions of two joints: driven = sum of c_k driver^k.
+
+    Gears, mimic joints and joint equalities; one row on the coordinates.
+
+    Attributes:
+        driven: name of the coordinate that follows.
+        driver: name of the coordinate that leads.
+        coefficients: c_0, c_1, ... of the polynomial.
+    """
+
+    driven: str = ""
+    driver: str = ""
+    coefficients: tuple[Scalar, ...] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        if isinstance(self.coefficients, str) or not hasattr(self.coefficients, "__iter__"):
+            raise DescriptionError(
+                f"{self.name}: coefficients {quoted(self.coefficients)} are not a sequence;"
+                " give c_0, c_1, ..., such as (0, ratio) for a gear"
+            )
+        terms = tuple(expression(c, f"{self.name}, coefficients") for c in self.coefficients)
+        object.__setattr__(self, "coefficients", terms)
+        if self.driven == self.driver:
+            raise DescriptionError(
+                f"{self.name}: the coordinate {self.driven!r} cannot follow itself; name two"
+            )
+
+    def scoped(self, prefix: str) -> Coupling:
+        """The same relation inside a mechanism that is placed in another one."""
+        inner = Component.scoped(self, prefix)
+        return replace(inner, driven=f"{prefix}.{self.driven}", driver=f"{prefix}.{self.driver}")
+
+
+# Gears, racks and screws: couplings of coordinates, with the ratio that their names suggest.
+
+
+@dataclass(frozen=True, slots=True)
+class Transmission(Coupling):
+    """driven = offset + k driver, between coordinates of the kinds that it is made for.
+
+    Attributes:
+        offset: position of driven where the driver is at zero [rad or m].
+    """
+
+    kinds: ClassVar[tuple[Motion, Motion]]
+    """What driven and driver have to be."""
+
+    coefficients: tuple[Scalar, ...] = field(init=False, default=(0.0, 1.0))
+    offset: Scalar = field(kw_only=True, default=0.0)
+
+    def _set_factor(self, given: str, factor: Expression) -> None:
+        """Couple by `factor`, which comes from the attribute `given` and may not be zero."""
+        if to_float(factor) == 0:
+            raise DescriptionError(
+                f"{self.name}: {given} is 0, which ties nothing; give another number, less than"
+                " zero where the two turn in opposite ways"
+            )
+        object.__setattr__(self, "coefficients", (self.offset, factor))
+        Coupling.__post_init__(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Gear(Transmission):
+    """A pair of gears: the driven angle is `ratio` times the driving one.
+
+    Attributes:
+        ratio: turns of driven for a turn of the driver; less than zero for wheels that mesh from
+            outside about parallel axes.
+    """
+
+    kinds = (Motion.REVOLUTE, Motion.REVOLUTE)
+    ratio: Scalar = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._normalise("ratio", "offset")
+        self._set_factor("ratio", expression(self.ratio))
+
+
+@dataclass(frozen=True, slots=True)
+class RackAndPinion(Transmission):
+    """A rack, the driven displacement, that a pinion moves by `radius` times its angle.
+
+    A wheel that rolls along a straight line is the same relation.
+
+    Attributes:
+        radius: of the pitch circle of the pinion [m]; less than zero where the rack moves the
+            other way.
+    """
+
+    kinds = (Motion.PRISMATIC, Motion.REVOLUTE)
+    radius: Scalar = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._normalise("radius", "offset")
+        self._set_factor("radius", expression(self.radius))
+
+
+@dataclass(frozen=True, slots=True)
+class Screw(Transmission):
+    """A nut, the driven displacement, that moves by `pitch` for a turn of the driving angle.
+
+    On the coordinates `.s` and `.phi` of one Cylindrical joint it makes a screw joint.
+
+    Attributes:
+        pitch: advance for a whole turn [m]; less than zero for a left-hand thread.
+    """
+
+    kinds = (Motion.PRISMATIC, Motion.REVOLUTE)
+    pitch: Scalar = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._normalise("pitch", "offset")
+        self._set_factor("pitch", expression(self.pitch) / (2 * math.pi))

@@ -1,0 +1,522 @@
+"""The generated C of an FMU: its tables and the functions that it evaluates."""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
+
+import casadi
+import numpy as np
+
+from mbs.errors import ExportError, ModelError
+from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
+from mbs.models.state.tree import TreeState
+from mbs.native.compiled import generated, unwritten
+from mbs.native.plain_source import plain_source
+from mbs.solvers.block_triangular import Block, block_triangular
+
+# The functions that an FMU evaluates, under the names that its C calls.
+
+
+def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
+    """The functions under the names that core.c calls, every input and output dense.
+
+    Args:
+        model: what the FMU computes.
+        adjoint: with `mbs_adjoint`, which FMI 2.0 cannot call.
+
+    Returns:
+        `mbs_rhs(t, x, z, u, p) -> (xdot, y)`, p with the modes at its end;
+        `mbs_tangent(t, x, z, u, p, dt, dx, du, dp) -> (dxdot, dy, dz, dg)`, g the indicators and dp
+        of the parameters alone; `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu,
+        gp)`.
+        Where loops are closed, `mbs_closure(x, z, p) -> (z, residual)` and
+        `mbs_sensitivity(x, z, p) -> steepness`, and `mbs_slopes(x, z, p) -> J` where J is watched.
+        Of a tree, `mbs_tree_rhs` and others as `TreeState` has them. Where there are events,
+        `mbs_first`, `mbs_indicators` and `mbs_jump` as `Jumps` has them, and
+        `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs; the
+        last three also of a tree, as `mbs_tree_indicators` and so on. Where states and parameters
+        have rules, `mbs_excess(x, p)`. For an implicit solver
+        `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
+    """
+    t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
+    z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
+    p = casadi.MX.sym("p", len(model.parameters) + len(model.modes))
+    point, du = [t, x, z, u, p], casadi.MX.sym("du", u.numel())
+    answers = [
+        casadi.Function("mbs_rhs", point, _dense(model.rhs.call(point))),
+        _tangent(model, point),
+    ]
+    if adjoint:
+        answers.append(_adjoint(model, point))
+    if model.closure is not None:
+        loop, whole = [x, z, _own(model, p)], [x, z, p]
+        answers.append(casadi.Function("mbs_closure", whole, _dense(model.closure.call(loop))))
+        answers.append(casadi.Function("mbs_sensitivity", whole, [_steep(model, loop)]))
+        if model.slopes is not None:
+            J = casadi.densify(model.slopes.call(loop)[0])
+            answers.append(casadi.Function("mbs_slopes", whole, [J]))
+    if (tree := model.tree) is not None:
+        X = casadi.MX.sym("X", tree.start.numel_out(0))
+        answers.extend(_tree(tree, [t, X, x, z, u, p]))
+        if tree.events is not None:
+            answers.extend(_tree_events(model, tree, [t, X, z, u, p], du))
+    if model.jumps is not None:
+        answers.extend(_events(model.jumps, point))
+        rates = _rates(model, point, du)
+        answers.append(casadi.Function("mbs_rates", [*point, du], _dense([rates])))
+    if model.rules is not None:
+        excess = _dense(model.rules.excess.call([x, _own(model, p)]))
+        answers.append(casadi.Function("mbs_excess", [x, p], excess))
+    if model.solver == "rodas":
+        slopes = _dense(_jacobian(model, point, du))
+        answers.append(casadi.Function("mbs_jacobian", [*point, du], slopes))
+    return tuple(answers)
+
+
+def _tree(tree: TreeState, symbols: list[casadi.MX]) -> list[casadi.Function]:
+    """The functions `mbs_tree_..(t, X, z, u, p)` of the tree, z ignored.
+
+    Beside them `mbs_tree_start(t, x, z, u, p)` and `mbs_tree_rate(X) -> q'`.
+    """
+    t, X, x, z, u, p = symbols
+    through = tree.passage
+    named = {
+        "rhs": tree.rhs,
+        "project": tree.project,
+        "rows": through.rows,
+        "forces": through.forces,
+        "regularity": through.regularity,
+    }
+    empty, point, first = [t, X, casadi.MX(0, 1), u, p], [t, X, z, u, p], [t, x, z, u, p]
+    functions = [
+        casadi.Function(f"mbs_tree_{name}", point, _dense(function.call(empty)))
+        for name, function in named.items()
+    ]
+    start = casadi.Function("mbs_tree_start", first, _dense(tree.start.call(first)))
+    return [*functions, start, casadi.Function("mbs_tree_rate", [X], _dense([tree.rate(X)]))]
+
+
+def _tree_events(
+    model: FmuModel, tree: TreeState, point: list[casadi.MX], du: casadi.MX
+) -> list[casadi.Function]:
+    """The functions of events `mbs_tree_..(t, X, z, u, p)`, z ignored."""
+    t, X, _, u, p = point
+    events, own = tree.events, [t, X, casadi.MX(0, 1), u, p]
+    assert events is not None
+    fired = casadi.MX.sym("fired", len(events.names))
+    along = [casadi.MX(1), tree.rhs.call(own)[0], own[2], du, casadi.MX(p.numel(), 1)]
+    named = {
+        "indicators": (point, events.indicators.call(own)),
+        "rates": ([*point, du], _forward(events.indicators, own, along)),
+        "jump": ([*point, fired], events.jump.call([*own, fired])),
+    }
+    return [
+        casadi.Function(f"mbs_tree_{name}", taken, _dense(values))
+        for name, (taken, values) in named.items()
+    ]
+
+
+def watched(model: FmuModel) -> tuple[str, ...]:
+    """What its event indicators watch, for messages.
+
+    Args:
+        model: what the FMU computes.
+    """
+    return model.jumps.names if model.jumps else ()
+
+
+def _jacobian(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> list[casadi.MX]:
+    """How xdot changes with x, column by column and through the closure, and with t."""
+    t, x, z, u, p = point
+    xdot = model.rhs.call(point)[0]
+    J = casadi.densify(casadi.jacobian(xdot, x))
+    if model.closure is not None:
+        moved = casadi.jacobian(model.closure.call([x, z, _own(model, p)])[0], x)
+        J += casadi.mtimes(casadi.jacobian(xdot, z), moved)
+    return [J, casadi.jacobian(xdot, t) + casadi.jtimes(xdot, u, du)]
+
+
+def _events(jumps: Jumps, point: list[casadi.MX]) -> list[casadi.Function]:
+    fired = casadi.MX.sym("fired", len(jumps.names))
+    g = jumps.indicators.call(point)
+    return [
+        casadi.Function("mbs_first", point, _dense(jumps.first.call(point))),
+        casadi.Function("mbs_indicators", point, _dense(g)),
+        casadi.Function("mbs_jump", [*point, fired], _dense(jumps.jump.call([*point, fired]))),
+    ]
+
+
+def _rates(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> casadi.MX:
+    """How fast the indicators rise along the motion."""
+    xdot, p = model.rhs.call(point)[0], casadi.MX(len(model.parameters), 1)
+    return _directions(model, point, [casadi.MX(1), xdot, du, p])[3]
+
+
+def _tangent(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
+    t, x, _, u, _ = point
+    sizes = (("dt", t), ("dx", x), ("du", u))
+    seeds = [casadi.MX.sym(name, v.numel()) for name, v in sizes]
+    seeds.append(casadi.MX.sym("dp", len(model.parameters)))
+    moves = _directions(model, point, seeds)
+    return casadi.Function("mbs_tangent", [*point, *seeds], _dense(moves))
+
+
+def _directions(
+    model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]
+) -> tuple[casadi.MX, casadi.MX, casadi.MX, casadi.MX]:
+    """dxdot, dy, dz and dg along a direction, the modes held.
+
+    At a solution of the closure, the derivative of one Newton step z - J^-1 r is -J^-1 dr: that
+    of the dependent coordinates themselves.
+    """
+    _, x, z, _, p = point
+    dt, dx, du, dp = seeds
+    dz, dg = casadi.MX(z.numel(), 1), casadi.MX(0, 1)
+    if model.closure is not None:
+        dz = _forward(model.closure, [x, z, _own(model, p)], [dx, dz, dp])[0]
+    along = [dt, dx, dz, du, casadi.vertcat(dp, casadi.MX(len(model.modes), 1))]
+    dxdot, dy = _forward(model.rhs, point, along)
+    if model.jumps is not None:
+        dg = _forward(model.jumps.indicators, point, along)[0]
+    return dxdot, dy, dz, dg
+
+
+def _adjoint(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
+    """The transpose of the tangent, by first derivatives: a foreign function has no others."""
+    _, x, z, _, p = point
+    sizes = (len(model.states), len(model.outputs), z.numel(), len(watched(model)))
+    names = ("wxdot", "wy", "wz", "wg")
+    weights = [casadi.MX.sym(name, size) for name, size in zip(names, sizes, strict=True)]
+    wxdot, wy, wz, wg = weights
+    back = _backward(model.rhs, point, [wxdot, wy])
+    if model.jumps is not None:
+        more = _backward(model.jumps.indicators, point, [wg])
+        back = [a + b for a, b in zip(back, more, strict=True)]
+    gt, gx, gz, gu, gp = back
+    gp = _own(model, gp)
+    if model.closure is not None:
+        loop = [x, z, _own(model, p)]
+        hx, _, hp = _backward(model.closure, loop, [gz + wz, casadi.MX(1, 1)])
+        gx, gp = gx + hx, gp + hp
+    return casadi.Function("mbs_adjoint", [*point, *weights], _dense([gt, gx, gu, gp]))
+
+
+def _own(model: FmuModel, p: casadi.MX) -> casadi.MX:
+    """The parameters, without the modes behind them."""
+    own: casadi.MX = casadi.vertsplit(p, [0, len(model.parameters), p.numel()])[0]
+    return own
+
+
+def _steep(model: FmuModel, loop: list[casadi.MX]) -> casadi.MX:
+    assert model.closure is not None
+    return steepness(model.closure, loop, (model.states, model.parameters, model.dependents))
+
+
+def steepness(
+    closure: casadi.Function,
+    loop: list[casadi.MX],
+    variables: tuple[Sequence[FmuVariable], Sequence[FmuVariable], Sequence[FmuVariable]],
+) -> casadi.MX:
+    """How many nominal sizes z moves when x and p change by about their own size.
+
+    It is huge where rank is lost; p is there for postures where x and z lose it together.
+
+    Args:
+        closure: `closure(x, z, p)` as `FmuModel` has it.
+        loop: x, z and p.
+        variables: of x, p and z.
+    """
+    _, z, p = loop
+    states, parameters, dependents = variables
+    dx = casadi.DM([v.nominal * w for v, w in zip(states, _weights(states), strict=True)])
+    dp = p * casadi.DM(_weights(parameters))
+    dz = _forward(closure, loop, [casadi.MX(dx), casadi.MX(z.numel(), 1), dp])[0]
+    sizes = casadi.DM([v.nominal for v in dependents])
+    return casadi.norm_inf(casadi.vec(dz) / sizes)
+
+
+def _weights(variables: Sequence[FmuVariable]) -> list[float]:
+    """Unequal numbers about one, so that effects of the variables do not cancel."""
+    return [1 + k / len(variables) for k in range(len(variables))]
+
+
+def _forward(
+    function: casadi.Function, point: list[casadi.MX], seeds: list[casadi.MX]
+) -> list[casadi.MX]:
+    values = function.call(point)
+    answer: list[casadi.MX] = function.forward(1).call([*point, *values, *seeds])
+    return answer
+
+
+def _backward(
+    function: casadi.Function, point: list[casadi.MX], weights: list[casadi.MX]
+) -> list[casadi.MX]:
+    values = function.call(point)
+    answer: list[casadi.MX] = function.reverse(1).call([*point, *values, *weights])
+    return answer
+
+
+def _dense(values: Iterable[casadi.MX]) -> list[casadi.MX]:
+    return [casadi.densify(casadi.vec(value)) for value in values]
+
+
+_OPEN = ("mbs_rhs", "mbs_tangent")
+_LOOPS = ("mbs_closure", "mbs_sensitivity")
+_TREE = tuple(
+    f"mbs_tree_{name}"
+    for name in ("rhs", "project", "rows", "forces", "regularity", "start", "rate")
+)
+_EVENTS = ("mbs_first", "mbs_indicators", "mbs_rates", "mbs_jump")
+_TREE_EVENTS = ("mbs_tree_indicators", "mbs_tree_rates", "mbs_tree_jump")
+
+_HEADER = """\
+/* Sizes and tables of the model, generated together with modelDescription.xml. */
+#ifndef MBS_MODEL_H
+#define MBS_MODEL_H
+
+#define MODEL_GUID {guid}
+#define MODEL_TOLERANCE {tolerance}
+#define NX {nx}
+#define NU {nu}
+#define NY {ny}
+#define NP {np}
+#define NM {nm}
+#define NZ {nz}
+#define NK {nk}
+#define NB {nb}
+#define PASSIVE_V {passive_v}
+#define PASSIVE_A {passive_a}
+#define N_PASSIVE {n_passive}
+#define NS {ns}
+#define NC {nc}
+{options}
+extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
+extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
+extern const char MODEL_FIXED[];
+/* 1 for states that the dependents follow from */
+extern const int MODEL_LEADS[];
+{arrays}/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
+extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
+
+{prototypes}
+#endif
+"""
+_ARRAYS = """\
+#define MODEL_ARRAYS
+/* elements of each variable, none of one that stands within an array */
+extern const int MODEL_SIZES[];
+"""
+_PROTOTYPE = """\
+int {name}(const double **arg, double **res, long long *iw, double *w, int mem);
+int {name}_work(long long *arg, long long *res, long long *iw, long long *w);
+"""
+
+
+def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
+    """The file model.h.
+
+    Args:
+        model: what the FMU is.
+        guid: identity that the library asks for.
+        adjoint: the version of FMI calls adjoint derivatives.
+
+    Returns:
+        its text.
+    """
+    names: tuple[str, ...] = _OPEN
+    options = ""
+    if adjoint:
+        names, options = (*names, "mbs_adjoint"), "#define MODEL_ADJOINT\n"
+    if model.closure is not None:
+        names = (*names, *_LOOPS, *(("mbs_slopes",) if model.slopes is not None else ()))
+    if (tree := model.tree) is not None:
+        names = (*names, *_TREE, *(_TREE_EVENTS if tree.events is not None else ()))
+    if model.jumps is not None:
+        names = (*names, *_EVENTS)
+    if (rules := model.rules) is not None:
+        names = (*names, "mbs_excess")
+        options += f"#define MODEL_RULES_AT_START {rules.at_start}\n"
+        options += f"#define MODEL_RULES {len(rules.sentences)}\n"
+        options += "extern const char *const MODEL_SENTENCES[];\n"
+    if model.solver == "rodas":
+        names = (*names, "mbs_jacobian")
+        options += "#define MODEL_RODAS\n"
+    elif model.solver == "rk4":
+        options += f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
+    return _HEADER.format(
+        guid=_quoted(guid),
+        tolerance=repr(float(model.tolerance)),
+        nx=len(model.states),
+        nu=len(model.inputs),
+        ny=len(model.outputs),
+        np=len(model.parameters),
+        nm=len(model.modes),
+        nk=len(watched(model)),
+        nz=len(model.dependents),
+        nb=len(_blocks(model)),
+        passive_v=model.passive[0],
+        passive_a=model.passive[1],
+        n_passive=model.passive[2],
+        ns=len(model.slots),
+        nc=int(model.charted),
+        arrays=_ARRAYS if model.arrays else "",
+        options=options + ("" if tree is None else _tree_sizes(model, tree)),
+        prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
+    )
+
+
+def source(model: FmuModel, *, adjoint: bool) -> str:
+    """The file model.c.
+
+    Args:
+        model: what the FMU is.
+        adjoint: the version of FMI calls adjoint derivatives.
+
+    Returns:
+        its text.
+
+    Raises:
+        ExportError: a function holds a node that CasADi cannot write as C.
+    """
+    code = _code(functions(model, adjoint=adjoint))
+    if problem := unwritten(code):
+        raise ExportError(f"FMU {model.name}: {problem}")
+    variables = [entry.variable for entry in model.entries]
+    low = (-math.inf if v.min is None else v.min for v in variables)
+    high = (math.inf if v.max is None else v.max for v in variables)
+    tables = [
+        _numbers("MODEL_START", (v.start for v in variables)),
+        _numbers("MODEL_NOMINAL", (v.nominal for v in variables)),
+        _numbers("MODEL_MIN", low),
+        _numbers("MODEL_MAX", high),
+        _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
+        _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
+        _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
+        *_sentences(model),
+        *_lead_tables(model),
+        *_size_tables(model),
+        *_block_tables(_blocks(model)),
+        *_tree_tables(model),
+    ]
+    return (
+        '#include <math.h>\n\n#include "model.h"\n\n'
+        + "\n".join(tables)
+        + "\n/* The functions stay inside the library. */\n#define CASADI_SYMBOL_EXPORT\n"
+        + code
+    )
+
+
+def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
+    sizes = ", ".join(map(str, tree.passage.size))
+    return (
+        f"#define MODEL_TREE {tree.start.numel_out(0)} /* its states */\n"
+        f"#define MODEL_TREE_INSIDE {int(model.solver == 'dopri5')} /* co-simulation has them */\n"
+        f"#define MODEL_TREE_OUTSIDE {int(model.charted)} /* model exchange has charts of them */\n"
+        f"#define MODEL_PASSAGE {{{sizes}}}\n"
+        f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
+        "/* where states, dependents and velocities of dependent joints stand in it, and the\n"
+        " * independent joints among its velocities; typical sizes of these */\n"
+        "extern const int MODEL_TREE_STATES[], MODEL_TREE_DEPENDENTS[], MODEL_TREE_PASSIVE[];\n"
+        "extern const int MODEL_TREE_HELD[];\n"
+        "extern const double MODEL_TREE_UNITS[];\n"
+    )
+
+
+def _tree_tables(model: FmuModel) -> list[str]:
+    """Where the states, and the dependents, of the FMU stand among the states of its tree."""
+    if (tree := model.tree) is None:
+        return []
+    return [
+        _table("const int MODEL_TREE_STATES", map(str, tree.states)),
+        _table("const int MODEL_TREE_DEPENDENTS", map(str, tree.dependents)),
+        _table("const int MODEL_TREE_PASSIVE", map(str, tree.passive)),
+        _table("const int MODEL_TREE_HELD", map(str, tree.held)),
+        _numbers("MODEL_TREE_UNITS", (1 / unit for unit in tree.units)),
+    ]
+
+
+def _sentences(model: FmuModel) -> list[str]:
+    """What is said where a rule is broken."""
+    if model.rules is None:
+        return []
+    return [_table("const char *const MODEL_SENTENCES", map(_quoted, model.rules.sentences))]
+
+
+def _lead_tables(model: FmuModel) -> list[str]:
+    if model.closure is None:
+        return []
+    return [_table("const int MODEL_LEADS", map(str, leading_states(model.closure)))]
+
+
+def leading_states(closure: casadi.Function) -> list[int]:
+    """1 for each state that dependents follow from, as positions do, 0 for the others.
+
+    Args:
+        closure: `closure(x, z, p)`, one Newton step of z.
+    """
+    pattern = np.array(casadi.DM(closure.jac_sparsity(0, 0), 1))
+    return [int(count > 0) for count in pattern.sum(axis=0)]
+
+
+def _size_tables(model: FmuModel) -> list[str]:
+    """How many elements a variable has, where some are arrays."""
+    if not model.arrays:
+        return []
+    sizes = [1] * len(model.entries)
+    for array in model.arrays:
+        sizes[array.first : array.first + array.size] = [array.size] + [0] * (array.size - 1)
+    return [_table("const int MODEL_SIZES", map(str, sizes))]
+
+
+def _blocks(model: FmuModel) -> tuple[Block, ...]:
+    return diagonal_blocks(model.slopes)
+
+
+def diagonal_blocks(slopes: casadi.Function | None) -> tuple[Block, ...]:
+    """The diagonal blocks of the slopes of a closure; none where they are not watched."""
+    if slopes is None:
+        return ()
+    pattern = np.array(casadi.DM(slopes.sparsity_out(0), 1)) != 0
+    return block_triangular(pattern) or ()
+
+
+def _block_tables(blocks: Sequence[Block]) -> list[str]:
+    ends = accumulate(block.size for block in blocks)
+    rows = (row for block in blocks for row in block.rows)
+    columns = (column for block in blocks for column in block.columns)
+    names = ("MODEL_BLOCKS", "MODEL_ROWS", "MODEL_COLUMNS")
+    return [
+        _table(f"const int {name}", map(str, values))
+        for name, values in zip(names, (ends, rows, columns), strict=True)
+    ]
+
+
+def _code(functions: Iterable[casadi.Function]) -> str:
+    """Scalar operations in short pieces, which compile fast; the rest as CasADi has it."""
+    pieces, others = [], []
+    for function in functions:
+        try:
+            pieces.append(plain_source([function]))
+        except ModelError:  # it calls a foreign function, say
+            others.append(function)
+    return "\n".join([*pieces, *([generated(others)] if others else [])])
+
+
+def _numbers(name: str, values: Iterable[float]) -> str:
+    return _table(f"const double {name}", (_number(v) for v in values))
+
+
+def _number(value: float) -> str:
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
+    return repr(float(value))
+
+
+def _table(declaration: str, items: Iterable[str]) -> str:
+    texts = list(items) or ["0"]
+    return f"{declaration}[] = {{\n" + "".join(f"    {text},\n" for text in texts) + "};\n"
+
+
+def _quoted(text: str) -> str:
+    plain = {byte: chr(byte) for byte in range(32, 127) if chr(byte) not in '"\\?'}
+    return '"' + "".join(plain.get(byte, f"\\{byte:03o}") for byte in text.encode()) + '"'

@@ -1,0 +1,537 @@
+"""What the model descriptions of FMI 2.0 and 3.0 have in common."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Literal
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import casadi
+
+from mbs.export.fmu.description import WITH_START, FmuEntry, FmuModel, Kind, State, is_structured
+from mbs.units import UNITS
+from mbs.version import __version__
+
+# How the outputs of a function depend on each of its inputs: by a constant factor, or by others.
+#
+# Every scalar operation hands on which inputs its result depends on, and of what kind the factor
+# is.
+
+
+DependencyKind = Literal["constant", "fixed", "tunable", "discrete", "dependent"]
+KINDS: tuple[DependencyKind, ...] = ("constant", "fixed", "tunable", "discrete", "dependent")
+"""Least to greatest: a sum has the greatest kind of its terms."""
+
+_WORST = len(KINDS) - 1
+_Masks = tuple[int, ...]
+"""For each kind the inputs of that kind or a greater one, as bits; the first holds all."""
+
+_NONE: _Masks = (0,) * len(KINDS)
+_SUMS = (casadi.OP_ADD, casadi.OP_SUB)
+_SCALED = (casadi.OP_NEG, casadi.OP_TWICE, casadi.OP_ASSIGN)
+
+
+def linearity(
+    function: casadi.Function, levels: Sequence[DependencyKind]
+) -> list[list[dict[int, DependencyKind]]]:
+    """What every element of every output depends on, and how.
+
+    An input that enters by a factor is as "constant", "fixed", "tunable" or "discrete" as the
+    factor; in every other way it is "dependent". Where the function is no graph of scalars, all
+    that the sparsity shows is "dependent".
+
+    Args:
+        function: any.
+        levels: for each element of all inputs, in order, what it is as a factor of others.
+
+    Returns:
+        for each output and each element of it, numbers of the elements of all inputs, and kinds.
+    """
+    if not function.is_a("SXFunction"):
+        return _by_sparsity(function)
+    weights = [KINDS.index(level) for level in levels]
+    found = _walk(function, _levels_of(weights))
+    return [[_read(masks) for masks in rows] for rows in found]
+
+
+def _walk(function: casadi.Function, level: Callable[[int], int]) -> list[list[_Masks]]:
+    work = [_NONE] * function.sz_w()
+    sizes = [function.numel_in(k) for k in range(function.n_in())]
+    first = [sum(sizes[:k]) for k in range(len(sizes))]
+    places_in = [_places(function.sparsity_in(k)) for k in range(function.n_in())]
+    places_out = [_places(function.sparsity_out(k)) for k in range(function.n_out())]
+    answer = [[_NONE] * function.numel_out(k) for k in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        op, out = function.instruction_id(k), function.instruction_output(k)
+        given = function.instruction_input(k)
+        if op == casadi.OP_INPUT:
+            bit = 1 << (first[given[0]] + places_in[given[0]][given[1]])
+            work[out[0]] = (bit, *_NONE[1:])
+        elif op == casadi.OP_OUTPUT:
+            answer[out[0]][places_out[out[0]][out[1]]] = work[given[0]]
+        elif op == casadi.OP_CONST:
+            work[out[0]] = _NONE
+        else:
+            work[out[0]] = _combined(op, [work[i] for i in given], level)
+    return answer
+
+
+def _combined(op: int, terms: list[_Masks], level: Callable[[int], int]) -> _Masks:
+    a, b = terms[0], terms[-1]
+    if op in _SCALED:
+        return a
+    if op in _SUMS:
+        return _sum(a, b)
+    if op == casadi.OP_MUL:
+        return _product(a, b, level)
+    if op == casadi.OP_DIV:
+        return _product(a, _bent(b), level)
+    if op == casadi.OP_IF_ELSE_ZERO:
+        return _product(_bent(a), b, level)
+    return _sum(_bent(a), _bent(b))
+
+
+def _sum(a: _Masks, b: _Masks) -> _Masks:
+    return tuple(x | y for x, y in zip(a, b, strict=True))
+
+
+def _bent(a: _Masks) -> _Masks:
+    """All of it as through a function that is not linear."""
+    return (a[0],) * len(KINDS)
+
+
+def _product(a: _Masks, b: _Masks, level: Callable[[int], int]) -> _Masks:
+    """Each factor is as constant as the other one; what is in both is not linear."""
+    both = a[0] & b[0]
+    raised = _sum(_raised(a, level(b[0])), _raised(b, level(a[0])))
+    return tuple(mask | both for mask in raised)
+
+
+def _raised(a: _Masks, kind: int) -> _Masks:
+    return tuple(a[0] if k <= kind else mask for k, mask in enumerate(a))
+
+
+def _levels_of(weights: Sequence[int]) -> Callable[[int], int]:
+    """What a set of inputs is as a factor: the greatest of its members."""
+    groups = [sum(1 << k for k, w in enumerate(weights) if w == kind) for kind in range(len(KINDS))]
+
+    def level(mask: int) -> int:
+        return next((kind for kind in range(_WORST, 0, -1) if mask & groups[kind]), 0)
+
+    return level
+
+
+def _places(pattern: casadi.Sparsity) -> list[int]:
+    """The element that each nonzero is, counted column by column."""
+    rows, columns = pattern.get_triplet()
+    return [r + c * pattern.size1() for r, c in zip(rows, columns, strict=True)]
+
+
+def _read(masks: _Masks) -> dict[int, DependencyKind]:
+    found: dict[int, DependencyKind] = {}
+    for kind, mask in zip(KINDS, masks, strict=True):
+        while mask:
+            bit = mask & -mask
+            found[bit.bit_length() - 1] = kind
+            mask ^= bit
+    return dict(sorted(found.items()))
+
+
+def _by_sparsity(function: casadi.Function) -> list[list[dict[int, DependencyKind]]]:
+    answer: list[list[dict[int, DependencyKind]]] = []
+    for output in range(function.n_out()):
+        rows: list[dict[int, DependencyKind]] = [{} for _ in range(function.numel_out(output))]
+        first = 0
+        for k in range(function.n_in()):
+            pattern = function.jac_sparsity(output, k)
+            for row, column in zip(*pattern.get_triplet(), strict=True):
+                rows[row][first + column] = "dependent"
+            first += function.numel_in(k)
+        answer.append(rows)
+    return answer
+
+
+# Which calculated values of an FMU depend on which states, inputs, parameters and on time.
+
+
+Known = Mapping[int, DependencyKind]
+"""Value references of what a value depends on, in increasing order, and of what kind each is."""
+
+_ORDER: tuple[Kind, ...] = ("state", "dependent", "input", "parameter", "mode")
+
+
+@dataclass(frozen=True, slots=True)
+class Dependencies:
+    """What depends on states, inputs, parameters, modes and time, through the loops too.
+
+    The reference of time is the number of entries.
+
+    Attributes:
+        running: of each derivative, output and indicator, by its value reference.
+        first: of each mode, when the initialization finds it.
+        jumping: of each state, its value after an event by those before it.
+    """
+
+    running: Mapping[int, Known]
+    first: Mapping[int, Known]
+    jumping: Mapping[int, Known]
+
+
+def dependencies(model: FmuModel) -> Dependencies:
+    """What each calculated value of a model depends on.
+
+    A dependent coordinate stands for what moves it: through the block of its own loop, not
+    through all loops.
+
+    Args:
+        model: what the FMU computes.
+    """
+    through = _through_loops(model)
+    running = _rows(model, model.rhs, ("derivative", "output"), through)
+    if model.jumps is None:
+        return Dependencies(running, {}, {})
+    running |= _rows(model, model.jumps.indicators, ("indicator",), through)
+    first = _rows(model, model.jumps.first, ("mode",), through)
+    jumping = _rows(model, model.jumps.jump, ("state",), through)
+    return Dependencies(running, first, jumping)
+
+
+def _rows(
+    model: FmuModel,
+    function: casadi.Function,
+    kinds: Sequence[Kind],
+    through: Sequence[Known],
+) -> dict[int, Known]:
+    """The first outputs of a function of (t, x, z, u, p), which are variables of these kinds."""
+    references = [len(model.entries)]
+    levels: list[DependencyKind] = ["dependent"]
+    for kind in _ORDER:
+        found = _references(model, kind)
+        references += found
+        levels += [_level(model, kind, reference) for reference in found]
+    extra = sum(function.numel_in(k) for k in range(function.n_in())) - len(references)
+    levels += ["dependent"] * extra
+    rows = linearity(function, levels)
+    z = range(model.first("dependent"), model.first("indicator"))
+    answer: dict[int, Known] = {}
+    for kind, output in zip(kinds, rows, strict=False):
+        for row, found_in in enumerate(output):
+            direct = {references[k]: how for k, how in found_in.items() if k < len(references)}
+            answer[model.first(kind) + row] = _resolved(direct, z, through)
+    return answer
+
+
+def _references(model: FmuModel, kind: Kind) -> range:
+    sizes = {
+        "state": len(model.states),
+        "dependent": len(model.dependents),
+        "input": len(model.inputs),
+        "parameter": len(model.parameters),
+        "mode": len(model.modes),
+    }
+    return range(model.first(kind), model.first(kind) + sizes[kind])
+
+
+def _level(model: FmuModel, kind: Kind, reference: int) -> DependencyKind:
+    """What a variable is as a factor of others."""
+    if kind == "mode":
+        return "discrete"
+    if kind != "parameter":
+        return "dependent"
+    return "fixed" if _is_fixed(model, reference) else "tunable"
+
+
+def _is_fixed(model: FmuModel, reference: int) -> bool:
+    return model.parameters[reference - model.first("parameter")].fixed
+
+
+def _resolved(direct: Known, z: range, through: Sequence[Known]) -> Known:
+    """Dependent coordinates replaced by what moves them."""
+    known = {reference: how for reference, how in direct.items() if reference not in z}
+    for reference in direct:
+        if reference in z:
+            known |= through[reference - z.start]
+    return dict(sorted(known.items()))
+
+
+def _through_loops(model: FmuModel) -> list[Known]:
+    """The states and parameters that move each dependent coordinate."""
+    if model.closure is None:
+        return []
+    moved = [set[int]() for _ in model.dependents]
+    for k, kind in ((0, "state"), (2, "parameter")):
+        first = model.first("state" if kind == "state" else "parameter")
+        for row, column in zip(*model.closure.jac_sparsity(0, k).get_triplet(), strict=True):
+            moved[row].add(first + column)
+    return [
+        dict.fromkeys(sorted(set[int]().union(*(moved[k] for k in reached))), "dependent")
+        for reached in _reached(model.closure)
+    ]
+
+
+def _reached(closure: casadi.Function) -> list[set[int]]:
+    """For each element of z, those of z that its Newton step reads, at first or second hand."""
+    reads = [{k} for k in range(closure.numel_out(0))]
+    for row, column in zip(*closure.jac_sparsity(0, 1).get_triplet(), strict=True):
+        reads[row].add(column)
+    for _ in reads:
+        wider = [set().union(*(reads[k] for k in row)) for row in reads]
+        if wider == reads:
+            break
+        reads = wider
+    return reads
+
+
+_CAUSALITY = {"input": "input", "output": "output", "parameter": "parameter", "mode": "output"}
+_VARIABILITY = {"parameter": "tunable", "mode": "discrete"}
+_INITIAL = {
+    "state": "exact",
+    "derivative": "calculated",
+    "output": "calculated",
+    "parameter": "exact",
+    "mode": "calculated",
+    "dependent": "approx",
+    "indicator": "calculated",
+    "slot": "exact",
+    "rate": "calculated",
+    "chart": "calculated",
+}
+_NOTHING: Known = {}
+TOOL = f"mbs {__version__}"
+CATEGORIES = {
+    "logAll": "all messages",
+    "logStatusDiscard": "a step or an evaluation without an answer",
+    "logStatusError": "calls that were refused",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ModelStructure:
+    """Which calculated values there are, and what they depend on; all by value references.
+
+    That of time is the number of entries.
+
+    Attributes:
+        outputs: every output, states and modes among them.
+        derivatives: of the states.
+        indicators: of events.
+        initial: what initialization calculates.
+        running: what each output, derivative and indicator needs, without what is frozen between
+            events: modes, which need nothing then, and fixed parameters.
+        starting: likewise of `initial`, and how modes begin; only "constant" and "dependent".
+        reset: the states that events set anew.
+    """
+
+    outputs: list[int]
+    derivatives: list[int]
+    indicators: list[int]
+    initial: list[int]
+    running: Mapping[int, Known]
+    starting: Mapping[int, Known]
+    reset: list[int]
+
+
+def structure(model: FmuModel) -> ModelStructure:
+    """The structure of a model."""
+    found = dependencies(model)
+    modes = range(model.first("mode"), model.first("dependent"))
+    places = enumerate(model.parameters, start=model.first("parameter"))
+    frozen = {*modes, *(ref for ref, parameter in places if parameter.fixed)}
+    running: dict[int, Known] = {
+        ref: _without(frozen, known) for ref, known in found.running.items()
+    }
+    shown = [k for k, state in enumerate(model.states) if state.output]
+    running |= dict.fromkeys(modes, _NOTHING)
+    reset = [k for k, known in found.jumping.items() if dict(known) != {k: "constant"}]
+    running.update({k: {k: "constant"} for k in shown})
+    starting = dict(found.running)
+    if model.slots:
+        reset = list(model.derived.values())
+        running |= _by_joints(model, running)
+        running = {ref: _through_all(model, known) for ref, known in running.items()}
+        starting |= _by_joints(model, found.running)
+    calculated = [*range(model.first("output"), model.first("parameter")), *modes]
+    derivatives = list(model.derived)
+    return ModelStructure(
+        outputs=shown + calculated,
+        derivatives=derivatives,
+        indicators=[
+            *range(model.first("indicator"), model.first("slot")),
+            *range(model.first("chart"), len(model.entries)),
+        ],
+        initial=derivatives + calculated,
+        running=running,
+        starting={
+            ref: _starting(
+                found.first.get(ref) or starting.get(ref, {}), found, modes, ref in modes
+            )
+            for ref in derivatives + calculated
+        },
+        reset=reset,
+    )
+
+
+def _by_joints(model: FmuModel, running: Mapping[int, Known]) -> dict[int, Known]:
+    """Of derivatives of the states and of their indicator: all that moves derivatives of joints."""
+    n, every = len(model.states), dict[int, DependencyKind]()
+    for known in (running[n + k] for k in range(n)):
+        every |= dict.fromkeys(known, KINDS[-1])
+    return {ref: every for ref in (*model.derived, model.first("chart"))}
+
+
+def _through_all(model: FmuModel, known: Known) -> Known:
+    """Near singular configurations every state moves what one of the joints moves."""
+    states, slots = range(len(model.states)), model.derived.values()
+    if not any(ref in states for ref in known):
+        return known
+    rest = {ref: kind for ref, kind in known.items() if ref not in states}
+    return dict(sorted((rest | dict.fromkeys(slots, KINDS[-1])).items()))
+
+
+def _without(references: Container[int], known: Known) -> dict[int, DependencyKind]:
+    return {ref: kind for ref, kind in known.items() if ref not in references}
+
+
+def _starting(known: Known, found: Dependencies, modes: range, whole: bool) -> Known:
+    """What a value depends on at the start, where modes stand for what finds them.
+
+    An integer, such as a mode, is never said to be linear in something.
+    """
+    direct: dict[int, DependencyKind] = {
+        ref: "constant" if kind == "constant" and not whole else "dependent"
+        for ref, kind in known.items()
+        if ref not in modes
+    }
+    for mode in (ref for ref in known if ref in modes):
+        direct |= dict.fromkeys((ref for ref in found.first[mode] if ref not in modes), "dependent")
+    return dict(sorted(direct.items()))
+
+
+def texts(model: FmuModel) -> dict[str, str]:
+    """What people read of a model: description, author, version, copyright and license."""
+    said = {"description": model.description, **asdict(model.origin)}
+    return {name: text for name, text in said.items() if text}
+
+
+def naming_convention(model: FmuModel) -> str:
+    """Whether names are paths such as `j1.q`, which tools show as a tree, or flat."""
+    fits = all(is_structured(entry.variable.name) for entry in model.entries)
+    return "structured" if fits else "flat"
+
+
+def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
+    """Name, reference, causality, variability, description and initial of a variable."""
+    v = entry.variable
+    attributes = {
+        "name": v.name,
+        "valueReference": str(reference),
+        "causality": _CAUSALITY.get(entry.kind, "local"),
+        "variability": "fixed" if v.fixed else _VARIABILITY.get(entry.kind, "continuous"),
+    }
+    if v.description:
+        attributes["description"] = v.description
+    if isinstance(v, State) and v.output:
+        attributes["causality"] = "output"
+    if entry.kind in _INITIAL:
+        attributes["initial"] = _INITIAL[entry.kind]
+    return attributes
+
+
+def real_attributes(entry: FmuEntry) -> dict[str, str]:
+    """Units, bounds, nominal and start of a variable."""
+    v = entry.variable
+    real = {"unit": v.unit}
+    display = UNITS[v.unit].display
+    if display:
+        real["displayUnit"] = display
+    for name, bound in (("min", v.min), ("max", v.max)):
+        if bound is not None and math.isfinite(bound):
+            real[name] = repr(float(bound))
+    real["nominal"] = repr(float(v.nominal))
+    if entry.kind in WITH_START:
+        real["start"] = repr(float(v.start))
+    return real
+
+
+def integer_attributes(entry: FmuEntry) -> dict[str, str]:
+    """Bounds of a mode, which is an integer."""
+    bounds = (("min", entry.variable.min), ("max", entry.variable.max))
+    return {name: str(int(bound)) for name, bound in bounds if bound is not None}
+
+
+def add_units(root: Element, model: FmuModel) -> None:
+    """The definitions of all units that occur, by base units."""
+    definitions = SubElement(root, "UnitDefinitions")
+    for name in sorted({entry.variable.unit for entry in model.entries} | {"s"}):
+        unit = UNITS[name]
+        element = SubElement(definitions, "Unit", name=name)
+        SubElement(element, "BaseUnit", {k: str(n) for k, n in unit.exponents.items() if n})
+        if unit.display:
+            factor = repr(unit.display_factor)
+            SubElement(element, "DisplayUnit", name=unit.display, factor=factor)
+
+
+def add_categories_and_experiment(root: Element, model: FmuModel) -> None:
+    """The log categories, and how long, how exact and in which steps one simulates by default."""
+    categories = SubElement(root, "LogCategories")
+    for name, text in CATEGORIES.items():
+        SubElement(categories, "Category", name=name, description=text)
+    SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0",
+        stopTime=repr(model.stop_time),
+        tolerance=repr(model.tolerance),
+        stepSize=repr(model.step_size),
+    )
+
+
+def text_of(root: Element) -> str:
+    """An XML file."""
+    indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
+
+
+# terminalsAndIcons.xml of FMI 3.0: what is connected together, and the icon.
+
+
+_EXTENT = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+
+
+def terminals_and_icons(model: FmuModel) -> str:
+    """The file terminalsAndIcons.xml.
+
+    Args:
+        model: what the FMU is.
+
+    Returns:
+        its text.
+    """
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    if model.about is not None and model.about.drawing is not None:
+        graphics = SubElement(root, "GraphicalRepresentation")
+        SubElement(graphics, "CoordinateSystem", _EXTENT, suggestedScalingFactorTo_mm="0.1")
+        SubElement(graphics, "Icon", _EXTENT)
+    if model.terminals:
+        group = SubElement(root, "Terminals")
+    for terminal in model.terminals:
+        element = SubElement(
+            group,
+            "Terminal",
+            name=terminal.name,
+            matchingRule=terminal.matching,
+            terminalKind=terminal.kind,
+        )
+        if terminal.description:
+            element.set("description", terminal.description)
+        for member in terminal.members:
+            SubElement(
+                element,
+                "TerminalMemberVariable",
+                variableName=member.variable,
+                memberName=member.name,
+                variableKind=member.kind,
+            )
+    return text_of(root)

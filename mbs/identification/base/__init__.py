@@ -1,1 +1,0 @@
-"""How base inertial parameters are found: rules of trees and of loops, and the rank of samples."""

@@ -1,0 +1,553 @@
+"""Full sets of parameters that bodies can have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi
+import numpy as np
+import numpy.typing as npt
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.errors import ModelError, SolverError
+from mbs.identification.estimate import Estimate, NamedValues, repetition
+from mbs.identification.excitation import SolverFollower, Watch
+from mbs.identification.observations import Observations, excitation_quality
+from mbs.identification.regressors import INERTIAL, Column
+from mbs.identification.triangle import compressed
+from mbs.spatial.inertia import Inertia, PseudoInertia
+from mbs.text import quoted
+
+# What is known of the bodies before anything was measured.
+
+
+Array = npt.NDArray[np.float64]
+
+HEAVIEST = 100.0
+"""Bound on the mass of a link where none is given [kg]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """Bounds on masses, and a set of parameters to stay near where a record says nothing.
+
+    Source: Lee, Wensing & Park 2020 (divergence from a guess).
+
+    Attributes:
+        guess: (k,) parameters such as those of a drawing, in the order of the columns; balls of
+            1 kg at the origins of the links when None.
+        emphasis: weight of the divergence from the guess; 1 lets it count as one equation.
+        heaviest: bound on the mass of every link, or of each in turn [kg].
+        total_mass: of all links together [kg], or None where it was not weighed.
+    """
+
+    guess: npt.ArrayLike | None = None
+    emphasis: float = 1.0
+    heaviest: float | Sequence[float] = HEAVIEST
+    total_mass: float | None = None
+
+    def __post_init__(self) -> None:
+        masses = np.atleast_1d(np.asarray(self.heaviest, dtype=float))
+        if not ((masses > 0).all() and self.emphasis > 0):
+            raise ModelError(
+                f"prior: heaviest is {quoted(self.heaviest)} kg and emphasis {self.emphasis:g};"
+                " give more than zero"
+            )
+        if self.guess is not None and not np.isfinite(np.asarray(self.guess, dtype=float)).all():
+            raise ModelError("prior: a number of the guess is not finite; give one for each column")
+        if self.total_mass is not None and not self.total_mass > 0:
+            raise ModelError(
+                f"prior: the total mass is {self.total_mass:g} kg; give what was weighed"
+            )
+
+    def masses(self, links: int) -> Array:
+        """(links,) bounds on the masses [kg].
+
+        Raises:
+            ModelError: there are not as many bounds as links, or the total mass is beyond them.
+        """
+        given = np.atleast_1d(np.asarray(self.heaviest, dtype=float))
+        if given.size not in (1, links):
+            raise ModelError(
+                f"prior: {given.size} bounds on masses are given for {links} links; give one for"
+                " each, or one for all"
+            )
+        bounds = np.array(np.broadcast_to(given, links))
+        if self.total_mass is not None and self.total_mass >= bounds.sum():
+            raise ModelError(
+                f"prior: the total mass is {self.total_mass:g} kg and the links may have"
+                f" {bounds.sum():g} kg; raise heaviest, or check the total mass"
+            )
+        return bounds
+
+
+# Full sets of parameters that some distribution of mass has: the search for the likeliest.
+#
+# Every link has the pseudo-inertia P = C L L' C', where C C' is that of a link guessed beforehand
+# and L is lower triangular with the exponentials of free numbers on its diagonal, so that P stays
+# positive definite without any constraint.
+#
+# Source: Wensing, Kim & Slotine 2018 (pseudo-inertia); Rucker & Wensing 2022 (log-Cholesky); Lee,
+# Wensing & Park 2020 (entropic divergence from the guess).
+
+
+FREE_KINDS = ("offset",)
+"""Kinds that may be negative though they belong to a joint."""
+
+_MASS = 1.0
+_RADIUS = 0.1
+_ROUNDS = 500
+_OPTIONS = {
+    "ipopt": {
+        "print_level": 0,
+        "sb": "yes",
+        "max_iter": _ROUNDS,
+        "tol": 1e-7,
+        "bound_relax_factor": 0.0,
+    },
+    "print_time": False,
+    "error_on_fail": False,
+}
+_SMALLEST_ROOT = -7.0
+_LARGEST_ROOT = 7.0
+_OFF_DIAGONAL = tuple((r, c) for r in range(4) for c in range(r))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Misfit:
+    """Half the square of R K - rho, in standard deviations.
+
+    Attributes:
+        R: (rows, k).
+        rho: (rows,).
+    """
+
+    R: Array
+    rho: Array
+
+    @classmethod
+    def of_rows(cls, A: Array, b: Array) -> Misfit:
+        """The same sum of squares, but for a constant, in at most k + 1 rows."""
+        return cls(*compressed(A, b))
+
+
+def whole_links(columns: Sequence[Column]) -> list[int]:
+    """Numbers of the links of which all ten inertial parameters are among the columns.
+
+    Raises:
+        ModelError: a link has some of them only.
+    """
+    kinds: dict[int, set[str]] = {}
+    for column in columns:
+        if column.kind in INERTIAL:
+            kinds.setdefault(column.link, set()).add(column.kind)
+    for link, have in kinds.items():
+        missing = [kind for kind in INERTIAL if kind not in have]
+        if missing:
+            raise ModelError(
+                f"physical consistency: link {link} is without {', '.join(missing)}; give the"
+                " observations of the full set, not of base parameters"
+            )
+    return list(kinds)
+
+
+def pseudo_inertias(columns: Sequence[Column], values: Array) -> dict[int, Array]:
+    """For each link its (4, 4) pseudo-inertia [kg m^2, kg m, kg]; a body has a positive one.
+
+    Args:
+        columns: with all ten inertial parameters of every link.
+        values: (k,) of the columns.
+    """
+    at = {(column.kind, column.link): k for k, column in enumerate(columns)}
+    found = {}
+    for link in whole_links(columns):
+        ten = SX(DM([float(values[at[kind, link]]) for kind in INERTIAL]))
+        found[link] = _numbers(_matrix(PseudoInertia.of(Inertia.from_parameters(ten))))
+    return found
+
+
+def consistent_links(columns: Sequence[Column], values: Array) -> list[int]:
+    """Numbers of the links whose pseudo-inertia is positive definite: a body may have it."""
+    pairs = pseudo_inertias(columns, values).items()
+    return [link for link, P in pairs if np.linalg.eigvalsh(P)[0] > 0]
+
+
+def likeliest(
+    misfit: Misfit, columns: Sequence[Column], prior: Prior, watch: Watch | None = None
+) -> tuple[Array, Array]:
+    """The set of parameters of least misfit plus the weighted divergence from the guess.
+
+    Args:
+        misfit: of the k columns.
+        columns: with all ten inertial parameters of every link; rotors and friction are kept from
+            being negative.
+        prior: guess and bounds.
+        watch: is told the part of the search that is over, between 0 and 1.
+
+    Returns:
+        (k,) values and (k, k) their covariance, the guess taken as a measurement.
+
+    Raises:
+        ModelError: the guess is no consistent set, or the bounds do not fit.
+        SolverError: the search did not end.
+    """
+    problem = _PhysicalProblem(misfit, tuple(columns), _guessed_roots(columns, prior.guess), prior)
+    values = problem.solved(watch)
+    return values, _covariance(misfit, columns, values, prior.emphasis)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PhysicalProblem:
+    """The non-linear programme in the logarithms of the roots."""
+
+    misfit: Misfit
+    columns: tuple[Column, ...]
+    roots: dict[int, Array]
+    prior: Prior
+
+    def solved(self, watch: Watch | None) -> Array:
+        """(k,) the parameters at the minimum."""
+        own = [c for c in self.columns if c.kind not in INERTIAL]
+        scale = self._scales(own)
+        x, z = SX.sym("x", 10, len(self.roots)), SX.sym("z", len(own))
+        links = {link: self._link(link, x[:, k]) for k, link in enumerate(self.roots)}
+        K = self._parameters(links, {c.name: z[k] * scale[k] for k, c in enumerate(own)})
+        error = casadi.mtimes(DM(self.misfit.R), K) - DM(self.misfit.rho)
+        distance = sum((_divergence(x[:, k]) for k in range(x.shape[1])), SX(0))
+        masses = casadi.vertcat(SX(0, 1), *(ten[9] for ten in links.values()))
+        variables = casadi.vertcat(casadi.vec(x), z)
+        cost = 0.5 * casadi.sumsqr(error) + self.prior.emphasis * distance
+        at = casadi.Function("parameters", [variables], [K])
+        if self.prior.total_mass is not None:
+            masses = casadi.vertcat(masses, casadi.sum1(masses))
+        programme = {"x": variables, "f": cost, "g": masses}
+        return _numbers(at(self._minimum(programme, own, watch)))[:, 0]
+
+    def _minimum(self, programme: dict[str, SX], own: list[Column], watch: Watch | None) -> DM:
+        links = len(self.roots)
+        total = [] if self.prior.total_mass is None else [self.prior.total_mass]
+        follower = SolverFollower(programme, _ROUNDS, watch)
+        solver = casadi.nlpsol("physical", "ipopt", programme, follower.options | _OPTIONS)
+        lower = [_SMALLEST_ROOT] * 4 + [-np.inf] * 6
+        upper = [_LARGEST_ROOT] * 4 + [np.inf] * 6
+        least = [-np.inf if c.kind in FREE_KINDS else 0.0 for c in own]
+        answer = solver(
+            x0=[0.0] * (10 * links) + [0.0 if low < 0 else 0.1 for low in least],
+            lbx=lower * links + least,
+            ubx=upper * links + [np.inf] * len(own),
+            lbg=[-np.inf] * links + total,
+            ubg=[*self.prior.masses(links), *total],
+        )
+        status = solver.stats()
+        if not status["success"]:
+            raise SolverError(
+                f"physical consistency: IPOPT ended with {status['return_status']} after"
+                f" {status['iter_count']} steps; check the units of the record, or give a guess"
+            )
+        return DM(answer["x"])
+
+    def _scales(self, own: list[Column]) -> list[float]:
+        """What each parameter of a joint has to be to move the misfit by one."""
+        lengths = np.linalg.norm(self.misfit.R, axis=0)
+        at = {c.name: float(lengths[k]) or 1.0 for k, c in enumerate(self.columns)}
+        return [max(float(np.linalg.norm(self.misfit.rho)), 1.0) / at[c.name] for c in own]
+
+    def _link(self, link: int, x: SX) -> SX:
+        """(10, 1) parameters of the pseudo-inertia C L L' C'."""
+        root = casadi.mtimes(DM(self.roots[link]), _triangle(x))
+        P = casadi.mtimes(root, root.T)
+        return PseudoInertia(P[:3, :3], P[:3, 3], P[3, 3]).inertia().parameters
+
+    def _parameters(self, links: dict[int, SX], own: dict[str, SX]) -> SX:
+        every = (
+            links[c.link][INERTIAL.index(c.kind)] if c.kind in INERTIAL else own[c.name]
+            for c in self.columns
+        )
+        return casadi.vertcat(*every)
+
+
+def _triangle(x: SX) -> SX:
+    """(4, 4) lower triangle: four logarithms of its diagonal, then the six others row by row."""
+    L = SX(4, 4)
+    for k in range(4):
+        L[k, k] = casadi.exp(x[k])
+    for k, (row, column) in enumerate(_OFF_DIAGONAL):
+        L[row, column] = x[4 + k]
+    return L
+
+
+def _divergence(x: SX) -> SX:
+    """tr(P0^-1 P) - log det(P0^-1 P) - 4, zero where P is the guess P0."""
+    return casadi.sumsqr(_triangle(x)) - 2 * casadi.sum1(x[:4]) - 4
+
+
+def _guessed_roots(columns: Sequence[Column], guess: npt.ArrayLike | None) -> dict[int, Array]:
+    """For each link C with C C' the guessed pseudo-inertia."""
+    if guess is None:
+        ball = np.diag([np.sqrt(_MASS / 5) * _RADIUS] * 3 + [np.sqrt(_MASS)])
+        return {link: ball for link in whole_links(columns)}
+    values = np.asarray(guess, dtype=float)
+    if values.shape != (len(columns),):
+        raise ModelError(
+            f"physical consistency: the guess has the shape {values.shape} for {len(columns)}"
+            " columns; give one value for each"
+        )
+    roots: dict[int, Array] = {}
+    for link, P in pseudo_inertias(columns, values).items():
+        if np.linalg.eigvalsh(P)[0] <= 0:
+            raise ModelError(
+                f"physical consistency: the guess for link {link} is no body, its pseudo-inertia"
+                " has an eigenvalue that is not positive; give it mass and extent"
+            )
+        roots[link] = np.asarray(np.linalg.cholesky(P), dtype=float)
+    return roots
+
+
+def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphasis: float) -> Array:
+    """Inverse of the second derivative of misfit and divergence by the parameters."""
+    H = misfit.R.T @ misfit.R
+    at = {(column.kind, column.link): k for k, column in enumerate(columns)}
+    for link, P in pseudo_inertias(columns, values).items():
+        inverse = np.linalg.inv(P)
+        places = [at[kind, link] for kind in INERTIAL]
+        units = [inverse @ _unit(k) for k in range(10)]
+        H[np.ix_(places, places)] += emphasis * np.array(
+            [[np.trace(X @ Y) for Y in units] for X in units]
+        )
+    size = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    covariance = np.linalg.pinv(H / np.outer(size, size), hermitian=True)
+    return np.asarray(covariance / np.outer(size, size), dtype=float)
+
+
+def _unit(k: int) -> Array:
+    ten = SX(DM([float(k == n) for n in range(10)]))
+    return _numbers(_matrix(PseudoInertia.of(Inertia.from_parameters(ten))))
+
+
+def _matrix(body: PseudoInertia) -> SX:
+    upper = casadi.horzcat(body.S, body.ms)
+    return casadi.densify(casadi.vertcat(upper, casadi.horzcat(body.ms.T, body.m)))
+
+
+def _numbers(value: Any) -> Array:
+    return np.asarray(DM(value).full(), dtype=float)
+
+
+# Identified bodies as drawings have them: mass, centre of mass and central inertia.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyValues:
+    """What moves with a link, in the frame of its first body.
+
+    Attributes:
+        name: of the body; several that are fixed to each other are joined by " + ".
+        mass: [kg].
+        centre: (3,) centre of mass in the frame of the body [m].
+        inertia: (3, 3) about the centre of mass, in the axes of the frame [kg m2].
+    """
+
+    name: str
+    mass: float
+    centre: Array
+    inertia: Array
+
+
+def body_values(system: System, columns: Sequence[Column], values: Array) -> tuple[BodyValues, ...]:
+    """Every body that moves, at the defaults of the symbols.
+
+    Args:
+        system: whose bodies they are.
+        columns: with all ten inertial parameters of its links.
+        values: (k,) of the columns, masses positive.
+    """
+    found = []
+    for link, P in pseudo_inertias(columns, values).items():
+        names = [row.name for row in system.bodies if row.link == link]
+        first = names[0] if names else link
+        T = _pose(system, first)
+        R, p, mass = T[:3, :3], T[:3, 3], float(P[3, 3])
+        centre = P[:3, 3] / mass
+        second = R.T @ (P[:3, :3] - mass * np.outer(centre, centre)) @ R
+        inertia = np.trace(second) * np.eye(3) - second
+        name = " + ".join(names) or f"link {link}"
+        found.append(BodyValues(name, mass, R.T @ (centre - p), inertia))
+    return tuple(found)
+
+
+def bodies_table(system: System, columns: Sequence[Column], values: Array) -> str:
+    """The same in plain lines, kg, m and kg m2."""
+    rows = body_values(system, columns, values)
+    width = max([len("body"), *(len(row.name) for row in rows)])
+    heads = ("mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+    head = f"{'body':<{width}}" + "".join(f"{name:>11}" for name in heads)
+    lines = ["Bodies in their own frames, inertia about the centre of mass [kg, m, kg m2]", head]
+    for row in rows:
+        J = row.inertia
+        six = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
+        numbers = (row.mass, *row.centre, *six)
+        lines.append(f"{row.name:<{width}}" + "".join(f"{x:>11.4g}" for x in numbers))
+    return "\n".join(lines)
+
+
+def _pose(system: System, frame: str | int) -> Array:
+    """(4, 4) of a frame seen from its link."""
+    pose = system.frame(frame)[1].matrix
+    at = Function("pose", [system.p], [pose])(DM(system.parameter_values()))
+    return np.asarray(DM(at).full(), dtype=float)
+
+
+# Identification of a full set of parameters that bodies can have.
+
+
+_RANK = 1e-9
+
+_EXACT = 1e-3
+"""Part of an effort below which its error is not believed: what simulations give fits too well
+for the search to end, and no sensor is that good."""
+
+
+def consistent(
+    observations: Observations, prior: Prior | None = None, watch: Watch | None = None
+) -> Estimate:
+    """The likeliest full set of parameters that bodies can have, with errors alike in all joints.
+
+    Every pseudo-inertia is positive definite, masses keep their bounds, rotors and friction are
+    not negative. What the record does not show comes from the guess. Deviations are those of
+    errors that repeat themselves from row to row as the residuals do.
+
+    Source: Wensing, Kim & Slotine 2018; Rucker & Wensing 2022; Lee, Wensing & Park 2020.
+
+    Args:
+        observations: in the full set of parameters.
+        prior: guess and bounds; `Prior()` when None.
+        watch: is told the part of the search that is over, between 0 and 1.
+
+    Raises:
+        ModelError: a rotor or friction cannot be seen, or the set is not a full one.
+        SolverError: the search did not end.
+    """
+    error = unconstrained_error(observations)
+    freedom = max(error.size - observations.W.shape[2], 1)
+    deviation = float(np.linalg.norm(error)) / np.sqrt(freedom)
+    weights = np.full(error.shape[1], 1 / _positive(deviation, observations.y))
+    return _with_weights(observations, weights, prior or Prior(), watch)
+
+
+def consistent_weighted(
+    observations: Observations, prior: Prior | None = None, watch: Watch | None = None
+) -> Estimate:
+    """As `consistent`, every effort divided by the deviation of its own error.
+
+    Args:
+        observations: in the full set of parameters.
+        prior: as for `consistent`.
+        watch: as for `consistent`.
+    """
+    error = unconstrained_error(observations)
+    rms = np.sqrt(np.mean(error**2, axis=0))
+    weights = np.array(
+        [1 / _positive(float(x), y) for x, y in zip(rms, observations.y.T, strict=True)]
+    )
+    return _with_weights(observations, weights, prior or Prior(), watch)
+
+
+def unconstrained_error(observations: Observations) -> Array:
+    """(n, m) what least squares leave of the efforts, whether or not the set is minimal."""
+    W, y = observations.rows
+    lengths = np.linalg.norm(W, axis=0)
+    x = np.linalg.lstsq(W / np.where(lengths > 0, lengths, 1.0), y, rcond=_RANK)[0]
+    error = y - (W / np.where(lengths > 0, lengths, 1.0)) @ x
+    return np.asarray(error.reshape(observations.y.shape), dtype=float)
+
+
+def _positive(deviation: float, efforts: Array) -> float:
+    """The deviation, or a small part of the efforts where the equations fit exactly."""
+    return max(deviation, _EXACT * float(np.sqrt(np.mean(efforts**2))), 1e-12)
+
+
+def _with_weights(
+    observations: Observations, weights: Array, prior: Prior, watch: Watch | None
+) -> Estimate:
+    unseen = set(excitation_quality(observations).unseen)
+    hidden = [c.name for c in observations.columns if c.kind not in INERTIAL and c.name in unseen]
+    if hidden:
+        raise ModelError(
+            f"observations: {', '.join(hidden)} cannot be seen in this record; move the joint, or"
+            " select the other parameters"
+        )
+    W, y = observations.rows
+    w = np.broadcast_to(weights, observations.y.shape).reshape(-1)
+    misfit = Misfit.of_rows(W * w[:, None], y * w)
+    values, covariance = likeliest(misfit, observations.columns, prior, watch)
+    method, error = "physically consistent", observations.y - observations.W @ values
+    repeated = weights * np.sqrt(repetition(error) - 1)
+    spread = (W * np.broadcast_to(repeated, error.shape).reshape(-1, 1)) @ covariance
+    covariance = covariance + spread.T @ spread
+    return Estimate(method, observations.columns, values, covariance, weights, observations)
+
+
+# From identified base parameters to a full set of parameters that bodies can have.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FullSet(NamedValues):
+    """A full set of parameters and how far it is from the base parameters it was made of.
+
+    Attributes:
+        columns: the k parameters.
+        values: (k,) in the unit of each.
+        covariance: (k, k) of the values, the guess taken as a measurement.
+        base_names: of the base parameters.
+        misfit: (count,) its base parameters minus the identified ones, in standard deviations.
+    """
+
+    what: ClassVar[str] = "full set"
+
+    columns: tuple[Column, ...]
+    values: Array
+    covariance: Array
+    base_names: tuple[str, ...]
+    misfit: Array
+
+
+def recovered(
+    estimate: Estimate,
+    columns: Sequence[Column],
+    matrix: Array,
+    prior: Prior | None = None,
+) -> FullSet:
+    """The full set nearest to the guess among those that explain the base parameters.
+
+    Nearest in the entropic divergence; it yields to the base parameters in the measure of their
+    covariance.
+
+    Source: Lee, Wensing & Park 2020; Gautier & Venture 2013 (standard parameters from base ones).
+
+    Args:
+        estimate: of base parameters.
+        columns: the full set.
+        matrix: (count, k) base parameters from full ones, `BaseParameters.matrix`.
+        prior: full set to stay near, and bounds; `Prior()` when None.
+
+    Raises:
+        ModelError: the matrix does not fit, or the estimate has no covariance.
+        SolverError: the search did not end.
+    """
+    if matrix.shape != (len(estimate.values), len(columns)):
+        raise ModelError(
+            f"recovery: the matrix has the shape {matrix.shape} for {len(estimate.values)} base"
+            f" parameters of {len(columns)}; give that of the base parameters identified"
+        )
+    if not np.isfinite(estimate.covariance).all():
+        raise ModelError(f"recovery: {estimate.method} has no covariance; use weighted()")
+    deviations = estimate.deviations
+    correlation = estimate.covariance / np.outer(deviations, deviations)
+    root = np.linalg.inv(np.linalg.cholesky(correlation)) / deviations
+    data = Misfit(root @ matrix, root @ estimate.values)
+    values, covariance = likeliest(data, columns, prior or Prior())
+    misfit = (matrix @ values - estimate.values) / deviations
+    return FullSet(tuple(columns), values, covariance, estimate.names, misfit)

@@ -1,1 +1,0 @@
-"""Full sets of parameters that bodies can have."""

@@ -1,1 +1,0 @@
-"""Motions that show the parameters as well as the limits of a robot allow."""

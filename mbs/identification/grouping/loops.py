@@ -1,0 +1,282 @@
+"""Relations between the parameters of a mechanism with closed loops.
+
+Either side of a cut joint may carry a body that looks the same from both, and links that never
+turn relative to each other share their inertia tensors. For the rates of links and joints see
+`turning`.
+
+Source: Khalil & Bennis 1995 and Bennis & Khalil 1990 for parallelograms; cut joints as there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.tree import Link
+from mbs.components import ConstantVelocity, Fixed
+from mbs.components.constraints import Constraint
+from mbs.components.joints import Freedom, Motion
+from mbs.identification.grouping.numeric import dependence, plain
+from mbs.identification.grouping.rules import Key, lambda_transform, on_link
+from mbs.loops.reduction import reduction_matrix
+from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.velocities import link_velocities
+from mbs.solvers.rank import first_best
+from mbs.spatial import Pose, align_z, nearest_rotation
+from mbs.spatial.inertia import TEN_PARAMETERS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosedPostures:
+    """Postures that close the loops.
+
+    Attributes:
+        q: (nq, postures).
+        p: (np,) the parameters for which they do.
+    """
+
+    q: Array
+    p: Array
+
+
+Relation = dict[Key, SX]
+"""Coefficients of parameters whose effects cancel."""
+
+_SAME = 1e-9
+
+_TENSOR = TEN_PARAMETERS[:6]
+_SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))
+"""Of a body that looks the same after any turn about z: each tuple varies together."""
+
+
+def cut_relations(system: System) -> Iterator[Relation]:
+    """What a body in the common frame of a cut joint does is the same on either side of it."""
+    for cut in system.cuts:
+        axis, shared = _shared(cut)
+        sides = [(cut.link_a, cut.pose_a, 1), (cut.link_b, cut.pose_b, -1)]
+        through = {
+            link: (lambda_transform(pose @ axis), sign) for link, pose, sign in sides if link >= 0
+        }
+        for kinds in shared:
+            relation: Relation = {}
+            for link, (matrix, sign) in through.items():
+                numbers = [TEN_PARAMETERS.index(kind) for kind in kinds]
+                relation |= on_link(link, sign * casadi.sum2(matrix[:, numbers]))
+            yield relation
+
+
+def _shared(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
+    """The frame in which a body is taken, and combinations that both sides see alike."""
+    joint = cut.edge.joint
+    freedoms = joint.freedoms
+    if cut.welded or isinstance(joint, Fixed):
+        return Pose.identity(), tuple((name,) for name in TEN_PARAMETERS)
+    if isinstance(joint, Constraint):
+        held = isinstance(joint, ConstantVelocity)
+        return Pose.identity(), _SYMMETRIC[2:] if held else ()
+    turning = [freedom for freedom in freedoms if freedom.motion is not Motion.PRISMATIC]
+    if not turning:
+        return Pose.identity(), tuple((name,) for name in _TENSOR)
+    if any(freedom.motion is Motion.FREE for freedom in freedoms):
+        return Pose.identity(), ()
+    slides = len(turning) < len(freedoms)
+    if len(turning) == 1 and turning[0].motion is Motion.REVOLUTE:
+        return _along(turning[0]), _SYMMETRIC[:1] if slides else _SYMMETRIC
+    return Pose.identity(), () if slides else _SYMMETRIC[2:]
+
+
+def _along(freedom: Freedom) -> Pose:
+    return Pose.turned(align_z(freedom.axis))
+
+
+def pair_relations(
+    system: System, postures: Sequence[ClosedPostures], *, base_moves: bool = False
+) -> Iterator[Relation]:
+    """Links whose orientations stay the same relative to each other or to the base.
+
+    Args:
+        system: with closed loops.
+        postures: on the branch; more than one set where lengths are symbols.
+        base_moves: whether the base turns, so that origins that keep their distance move apart.
+    """
+    poses = [_link_poses(system, each) for each in postures]
+    R = np.concatenate([turns for turns, _ in poses], axis=1)
+    for b in range(1, len(R)):
+        for a in range(b):
+            relative = np.einsum("sji,sjk->sik", R[a], R[b])
+            if _constant(relative):
+                same = not base_moves and (a == 0 or _side_by_side(poses, a, b))
+                yield from _shared_by_pair(a - 1, b - 1, _rotation(relative[0]), same)
+
+
+def _rotation(R: Array) -> SX:
+    """A constant rotation as measured at closed configurations, which are open by some 1e-13."""
+    return SX(DM(nearest_rotation(R.tolist(), noise=1e-12)))
+
+
+def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
+    """Whether two origins keep their distance and its direction, so that they move alike."""
+    return all(_constant(origins[b] - origins[a]) for _, origins in poses)
+
+
+def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
+    """What link b shares with link a, or loses to the base."""
+    through = lambda_transform(Pose.turned(R))
+    names = TEN_PARAMETERS[: (9 if a < 0 else 10) if moments else 6]
+    for k, name in enumerate(names):
+        yield {(b, name): SX(1), **(on_link(a, -through[:, k]) if a >= 0 else {})}
+
+
+def _link_poses(system: System, postures: ClosedPostures) -> tuple[Array, Array]:
+    """Orientations (1 + links, postures, 3, 3) and origins (.., 3) of the base and all links."""
+    q = SX.sym("q", system.nq)
+    poses = [Pose.identity(), *base_poses(system.tree, link_poses(system.tree, q))]
+    at = Function("poses", [q, system.p], [casadi.horzcat(*(pose.matrix for pose in poses))])
+    T = [np.array(at(position, postures.p)) for position in postures.q.T]
+    matrices = np.array(T).reshape(len(T), 4, len(poses), 4).transpose(2, 0, 1, 3)
+    return matrices[..., :3, :3], matrices[..., :3, 3]
+
+
+def _constant(values: Array) -> bool:
+    return bool(np.max(np.abs(values - values[0])) < _SAME)
+
+
+# What the rates at which links and joints of a closed mechanism turn say of its parameters.
+#
+# Along an angular velocity that keeps one direction in its link a first moment has no effect.
+# Rotational energies and dissipations are dependent where the products of the rates are; links
+# that turn about one direction and joints with a constant ratio of velocities are cases of it.
+#
+# Source: Khalil & Bennis 1995 for joints of equal velocity; Gautier 1991 for the dependence.
+
+
+_MOMENTS = TEN_PARAMETERS[6:9]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Effect:
+    """What one parameter does, up to a factor that all of its kind share.
+
+    Attributes:
+        parameter: it.
+        column: (values,) in all postures.
+    """
+
+    parameter: Key
+    column: Array
+
+
+def turning_relations(
+    system: System, postures: Sequence[ClosedPostures], *, base_moves: bool = False
+) -> Iterator[Relation]:
+    """What the rates of links and joints say.
+
+    Args:
+        system: with closed loops.
+        postures: on the branch, more than one set where lengths are symbols; at least
+            `postures_needed`.
+        base_moves: whether the base turns, so that the rates of links are not those of joints.
+    """
+    G = np.concatenate([_slopes(system, each) for each in postures])
+    links = system.tree.links
+    joints = {j: G[:, link.v.start] for j, link in enumerate(links) if link.motion.nv == 1}
+    angular = [] if base_moves else list(_angular(system, postures, G))
+    for j, rows in enumerate(angular):
+        axis = _one_direction(rows)
+        if axis is not None:
+            yield {(j, _MOMENTS[k]): SX(axis[k]) for k in np.flatnonzero(axis)}
+    energies = [e for j, rows in enumerate(angular) for e in _rotational(j, rows)]
+    energies += (Effect((j, "Ia"), _product(rows, rows)) for j, rows in joints.items())
+    yield from _dependent(energies)
+    yield from _dependent([Effect((j, "Fv"), _product(g, g)) for j, g in joints.items()])
+    yield from _dependent([Effect((j, "offset"), g.ravel()) for j, g in joints.items()])
+    yield from _dry_friction(links, joints)
+
+
+def postures_needed(system: System) -> int:
+    """So many that products of rates are not dependent by chance."""
+    effects = 6 * len(system.tree.links) + system.nv
+    m = max(len(system.active), 1)
+    return max(12, -(-3 * effects // (m * (m + 1))))
+
+
+def _slopes(system: System, postures: ClosedPostures) -> Array:
+    """(postures, nv, m) velocities of the tree from the independent ones."""
+    at = reduction_matrix(system)
+    p = [postures.p] if postures.p.size else []
+    return np.array([np.array(at(position, *p)) for position in postures.q.T])
+
+
+def _angular(system: System, postures: Sequence[ClosedPostures], G: Array) -> Array:
+    """(links, postures, 3, m) angular velocities in the frames of the links."""
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    motions = link_velocities(system.tree, link_poses(system.tree, q), v)
+    slopes = [casadi.densify(casadi.jacobian(motion.w, v)) for motion in motions]
+    at = Function("angular", [q, system.p], slopes)
+    every = [at(position, each.p) for each in postures for position in each.q.T]
+    numbers = np.array([[np.array(slope) for slope in slopes] for slopes in every])
+    rows: Array = np.einsum("njav,nvm->jnam", numbers, G)
+    return rows
+
+
+def _one_direction(rows: Array) -> Array | None:
+    """(3,) the only direction of an angular velocity (postures, 3, m); None when it changes."""
+    columns = rows.transpose(1, 0, 2).reshape(3, -1)
+    U, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    if sizes[0] < _SAME or sizes[1] > _SAME * sizes[0]:
+        return None
+    axis: Array = U[:, 0] * np.sign(U[first_best(np.abs(U[:, 0])), 0])
+    axis[np.abs(axis) < _SAME] = 0.0
+    unit: Array = axis / np.linalg.norm(axis)
+    return unit
+
+
+def _rotational(j: int, rows: Array) -> Iterator[Effect]:
+    """Energies of the inertia tensor of link j, from its angular velocity (postures, 3, m)."""
+    for name, (k, i) in zip(TEN_PARAMETERS, zip(*np.triu_indices(3), strict=True), strict=False):
+        yield Effect((j, name), (1 if k == i else 2) * _product(rows[:, k], rows[:, i]))
+
+
+def _product(first: Array, second: Array) -> Array:
+    """Coefficients of a product of two rates, (postures, m) each, in all postures."""
+    k, i = np.triu_indices(first.shape[1])
+    return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])
+
+
+def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
+    """Relations of parameters with dependent effects."""
+    if not effects:
+        return
+    found = dependence(np.column_stack([e.column for e in effects]), range(len(effects)))
+    if found.residual > _SAME:
+        return
+    for k, number in enumerate(found.dependent):
+        relation = {effects[number].parameter: SX(1)}
+        for independent, factor in zip(found.independent, found.factors[:, k], strict=True):
+            if abs(factor) > _SAME:
+                relation[effects[independent].parameter] = SX(-plain(factor))
+        yield relation
+
+
+def _dry_friction(links: Sequence[Link], joints: dict[int, Array]) -> Iterator[Relation]:
+    """Dry friction of joints at rest, and of joints whose velocities keep a constant ratio."""
+    for k, rows in joints.items():
+        if np.max(np.abs(rows)) < _SAME:
+            yield {(k, "Fs"): SX(1)}
+            continue
+        for j, other in joints.items():
+            square = float(np.sum(other * other))
+            ratio = float(np.sum(rows * other)) / square if j < k and square > _SAME else 0.0
+            same = np.max(np.abs(rows - ratio * other)) < _SAME * max(1.0, abs(ratio))
+            share = plain(abs(ratio))
+            if same and (links[k].Fs_width - share * links[j].Fs_width).is_zero():
+                yield {(k, "Fs"): SX(1), (j, "Fs"): SX(-share)}

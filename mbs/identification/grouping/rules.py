@@ -1,0 +1,435 @@
+"""Which inertial parameters of a tree have no effect of their own, joint by joint.
+
+A parameter of link j either does no work at all, or its effect is a combination of the effects of
+other parameters: of link j itself and, moved by the lambda matrix, of its antecedent i.
+
+Source: Gautier & Khalil 1990; Khalil & Bennis 1995; Khalil & Dombre 2002, section 9.4. Prismatic
+joints between turning ones and rotors of prismatic joints differ from the sources, whose rules
+leave out a parameter that has an effect or keep one that has none of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.tree import Link, Tree
+from mbs.components.joints import Motion
+from mbs.identification.grouping.grouping import parameter_samples
+from mbs.spatial import Inertia, MatrixTurn, Pose, cross, elements
+from mbs.spatial.inertia import TEN_PARAMETERS
+
+# Which axes of a tree are parallel, perpendicular or on one line, and where gravity points.
+#
+# The answers come from numbers: poses at the zero position for some values of the symbols. What
+# holds within 1e-9 for all of them holds by structure.
+
+
+Array = NDArray[np.float64]
+
+_SAME = 1e-9
+_TURNING = (Motion.REVOLUTE, Motion.SPHERICAL, Motion.FREE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Structure:
+    """Axes of a tree at its zero position.
+
+    Attributes:
+        tree: the links.
+        orientations: (samples, links, 3, 3) of each frame seen from the base.
+        origins: (samples, links, 3) origin of each frame in the base [m].
+        gravity: (samples, 3) in the base [m/s^2].
+        base_moves: whether the base has a motion of its own, so that nothing is known of it.
+    """
+
+    tree: Tree
+    orientations: Array
+    origins: Array
+    gravity: Array
+    base_moves: bool
+
+    @property
+    def axes(self) -> Array:
+        """(samples, links, 3) z axis of each frame in the base."""
+        return self.orientations[..., 2]
+
+    def turning(self, links: list[int]) -> list[int]:
+        """Those of the links whose joints turn."""
+        return [k for k in links if self.tree.links[k].motion in _TURNING]
+
+    def sliding(self, links: list[int]) -> list[int]:
+        """Those of the links whose joints slide."""
+        return [k for k in links if self.tree.links[k].motion is Motion.PRISMATIC]
+
+    def before(self, j: int) -> list[int]:
+        """The links between the base and link j, itself left out."""
+        return self.tree.path(j)[:-1]
+
+    def rests(self, links: list[int]) -> bool:
+        """Whether a chain of these links never turns."""
+        return not self.base_moves and not self.turning(links)
+
+    def one_direction(self, links: list[int]) -> bool:
+        """Whether a chain of these links turns about one direction at most."""
+        turning = self.turning(links)
+        if self.base_moves:
+            return False
+        if any(self.tree.links[k].motion is not Motion.REVOLUTE for k in turning):
+            return False
+        return all(self.parallel(turning[0], k) for k in turning)
+
+    def parallel(self, j: int, k: int) -> bool:
+        """Whether two axes have the same direction at the zero position."""
+        return _vanishes(np.cross(self.axes[:, j], self.axes[:, k]))
+
+    def never_parallel(self, j: int, k: int) -> bool:
+        """Whether two axes have different directions at the zero position, for every sample."""
+        normal = np.cross(self.axes[:, j], self.axes[:, k])
+        return bool(np.min(np.linalg.norm(normal, axis=1)) > _SAME)
+
+    def perpendicular(self, j: int, k: int) -> bool:
+        """Whether two axes are at right angles at the zero position."""
+        return _vanishes(np.sum(self.axes[:, j] * self.axes[:, k], axis=1))
+
+    def coaxial(self, j: int, k: int) -> bool:
+        """Whether two axes are on one line at the zero position."""
+        between = np.cross(self.origins[:, k] - self.origins[:, j], self.axes[:, j])
+        return self.parallel(j, k) and _vanishes(between)
+
+    def axes_in(self, k: int, j: int) -> Array:
+        """(samples, 3) the axis of link k in the axes of frame j at the zero position."""
+        seen: Array = np.einsum("sab,sa->sb", self.orientations[:, j], self.axes[:, k])
+        return seen
+
+    def point_rests(self, j: int, points: Array) -> bool:
+        """Whether all joints before link j leave points (samples, 3) of its axis in place."""
+        before = self.before(j)
+        return not self.base_moves and all(self._holds(k, points) for k in before)
+
+    def _holds(self, k: int, points: Array) -> bool:
+        match self.tree.links[k].motion:
+            case Motion.REVOLUTE:
+                return self.on_axis(points, k)
+            case Motion.SPHERICAL:
+                return _vanishes(points - self.origins[:, k])
+        return False
+
+    def on_axis(self, points: Array, k: int) -> bool:
+        """Whether points (samples, 3) of the base lie on the axis of link k."""
+        return _vanishes(np.cross(points - self.origins[:, k], self.axes[:, k]))
+
+    @property
+    def weightless(self) -> bool:
+        """Whether gravity is zero and the base at rest."""
+        return not self.base_moves and _vanishes(self.gravity)
+
+    def gravity_along(self, j: int) -> bool:
+        """Whether gravity is zero or parallel to an axis at the zero position."""
+        return not self.base_moves and _vanishes(np.cross(self.gravity, self.axes[:, j]))
+
+    def gravity_across(self, j: int) -> bool:
+        """Whether gravity is zero or at right angles to an axis at the zero position."""
+        return not self.base_moves and _vanishes(np.sum(self.gravity * self.axes[:, j], axis=1))
+
+    def seen_from_link(self, k: int, j: int) -> Pose:
+        """The frame of link k of the path of j in the frame of link j, at the zero position."""
+        pose = Pose.identity()
+        path = self.tree.path(j)
+        for link in path[path.index(k) + 1 :]:
+            pose = pose @ self.tree.links[link].pose()
+        return pose.inverse()
+
+
+def structure_of(system: System, *, base_moves: bool = False) -> Structure:
+    """The structure of the tree of a system."""
+    tree = system.tree
+    poses: list[Pose] = []
+    for link in tree.links:
+        own = link.pose()
+        poses.append(own if link.antecedent < 0 else poses[link.antecedent] @ own)
+    turns = casadi.horzcat(SX(3, 0), *(pose.R for pose in poses))
+    origins = casadi.horzcat(SX(3, 0), *(pose.p for pose in poses))
+    sampled = parameter_samples(
+        system, casadi.vertcat(casadi.vec(turns), casadi.vec(origins), tree.gravity)
+    )
+    outputs = [casadi.densify(x) for x in (turns, origins, tree.gravity)]
+    at = Function("structure", [system.p], outputs)
+    numbers = [[np.array(x) for x in at(p)] for p in sampled]
+    return Structure(
+        tree,
+        np.array([x[0].T.reshape(-1, 3, 3).transpose(0, 2, 1) for x in numbers]),
+        np.array([x[1].T for x in numbers]),
+        np.array([x[2].ravel() for x in numbers]),
+        base_moves,
+    )
+
+
+def _vanishes(values: Array) -> bool:
+    return bool(np.max(np.abs(values), initial=0.0) < _SAME)
+
+
+# Where all axes before a joint meet its own axis: a point of the link that never moves.
+
+
+def resting_height(structure: Structure, j: int) -> SX | None:
+    """Where on axis j a point rests, from the origin of frame j [m]; None when no point does.
+
+    Args:
+        structure: of the tree.
+        j: number of a revolute link, from 0.
+    """
+    if structure.point_rests(j, structure.origins[:, j]):
+        return SX(0)
+    for k in structure.before(j):
+        turns = structure.tree.links[k].motion is Motion.REVOLUTE
+        if turns and structure.never_parallel(j, k):
+            return _height_where_all_meet(structure, j, k)
+    return None
+
+
+def _height_where_all_meet(structure: Structure, j: int, k: int) -> SX | None:
+    axes = structure.axes
+    between = structure.origins[:, k] - structure.origins[:, j]
+    normal = np.cross(axes[:, j], axes[:, k])
+    square: Array = np.sum(normal**2, axis=1)
+    height = np.sum(np.cross(between, axes[:, k]) * normal, axis=1) / square
+    points = structure.origins[:, j] + height[:, None] * axes[:, j]
+    if not structure.point_rests(j, points):
+        return None
+    pose = structure.seen_from_link(k, j)
+    u = pose.R[:, 2]
+    across = casadi.vertcat(-u[1], u[0], 0)
+    return casadi.dot(cross(pose.p, u), across) / casadi.dot(across, across)
+
+
+# How the ten inertial parameters of a body change when another frame is taken.
+
+
+def lambda_transform(pose: Pose) -> SX:
+    """(10, 10) parameters about frame i, in its axes, of a body known about frame j.
+
+    Column k holds the parameters in frame i of the body whose k-th parameter in frame j is one
+    and whose others are zero.
+
+    Source: Gautier & Khalil 1990; Khalil & Dombre 2002, section 9.4.
+
+    Args:
+        pose: of frame j seen from frame i; lengths and angles may be symbols.
+    """
+    turn = MatrixTurn(pose.R)
+    units = (Inertia.from_parameters(SX(DM.eye(10)[:, k])) for k in range(10))
+    return casadi.horzcat(*(unit.seen_from(turn, pose.p).parameters for unit in units))
+
+
+Key = tuple[int, str]
+"""A parameter: number of the link from 0, and kind."""
+
+Effects = Mapping[Key, SX]
+"""Coefficients of parameters."""
+
+_TENSOR = TEN_PARAMETERS[:6]
+_MOMENTS = TEN_PARAMETERS[6:9]
+_Z = SX(DM([0, 0, 1]))
+_LEAST = 1e-9
+"""An element of a unit vector below this is zero."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Removal:
+    """A parameter that leaves, and the parameters that take its effect over.
+
+    Attributes:
+        parameter: that leaves.
+        effects: the combination of parameters that has the same effect; empty when it has none.
+    """
+
+    parameter: Key
+    effects: Effects
+
+
+def tree_rules(structure: Structure) -> Iterator[Removal]:
+    """The removals of a tree, from its last link to its first, in the order to make them."""
+    for j in reversed(range(len(structure.tree.links))):
+        yield from _moved_to_antecedent(structure, j)
+        yield from _without_effect(structure, j)
+        yield from _rotor(structure, j)
+
+
+def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
+    """What joint j cannot tell from a part of link i, or of the base."""
+    link = structure.tree.links[j]
+    combinations: list[tuple[str, dict[str, float], dict[str, float]]] = []
+    match link.motion:
+        case Motion.REVOLUTE:
+            combinations = [
+                ("YY", {"XX": -1}, {"XX": 1, "YY": 1}),
+                ("MZ", {}, {"MZ": 1}),
+                ("M", {}, {"M": 1}),
+            ]
+        case Motion.PRISMATIC:
+            combinations = [(name, {}, {name: 1}) for name in _TENSOR]
+        case Motion.SPHERICAL:
+            combinations = [("M", {}, {"M": 1})]
+    if not combinations:
+        return
+    pose = link.pose()
+    if link.motion is Motion.PRISMATIC:
+        pose = Pose.turned(pose.R)
+    through = lambda_transform(pose) if link.antecedent >= 0 else None
+    for name, own, moved in combinations:
+        effects: dict[Key, SX] = {(j, kind): SX(x) for kind, x in own.items()}
+        if through is not None:
+            column = sum((x * _column(through, kind) for kind, x in moved.items()), SX(0))
+            effects |= on_link(link.antecedent, column)
+        yield Removal((j, name), effects)
+
+
+def _without_effect(structure: Structure, j: int) -> Iterator[Removal]:
+    match structure.tree.links[j].motion:
+        case Motion.REVOLUTE:
+            yield from _revolute(structure, j)
+        case Motion.PRISMATIC:
+            yield from _prismatic(structure, j)
+        case Motion.SPHERICAL:
+            yield from _spherical(structure, j)
+
+
+def _revolute(structure: Structure, j: int) -> Iterator[Removal]:
+    """A link that turns about one direction shows ZZ alone; on a resting axis no moments."""
+    if structure.one_direction([*structure.before(j), j]):
+        yield from _nothing(j, ("XX", "XY", "XZ", "YZ"))
+    if _on_line(structure, j):
+        yield from _nothing(j, ("MX", "MY"))
+    elif structure.weightless:
+        yield from _about_resting_point(structure, j)
+
+
+def _on_line(structure: Structure, j: int) -> bool:
+    """Whether axis j is a line at rest, along gravity or without it."""
+    before = structure.before(j)
+    return (
+        structure.gravity_along(j)
+        and structure.one_direction(before)
+        and all(structure.coaxial(j, k) for k in structure.turning(before))
+        and all(structure.parallel(j, k) for k in structure.sliding(before))
+    )
+
+
+def _about_resting_point(structure: Structure, j: int) -> Iterator[Removal]:
+    """Without gravity the moments about a point at rest on axis j have no effect."""
+    height = resting_height(structure, j)
+    if height is None:
+        return
+    at_point = lambda_transform(Pose.moved(height * _Z))
+    for name in ("MX", "MY"):
+        effects = on_link(j, -_column(at_point, name))
+        yield Removal((j, name), {key: x for key, x in effects.items() if key != (j, name)})
+
+
+def _prismatic(structure: Structure, j: int) -> Iterator[Removal]:
+    """Behind a prismatic joint moments count only where something before it turns."""
+    before = structure.before(j)
+    turning = structure.turning(before)
+    if structure.rests(before):
+        yield from _nothing(j, _MOMENTS)
+    elif structure.one_direction(before) and structure.parallel(turning[0], j):
+        through = lambda_transform(structure.tree.links[j].pose())
+        for name in ("MX", "MY"):
+            antecedent = structure.tree.links[j].antecedent
+            yield Removal((j, name), on_link(antecedent, _column(through, name)))
+        yield from _nothing(j, ("MZ",))
+    elif structure.one_direction(before):
+        yield _moments_across(structure, turning[0], j)
+
+
+def _moments_across(structure: Structure, first: int, j: int) -> Removal:
+    """Moments along the only direction of turning have no effect.
+
+    With (ax, ay, az) that direction in frame j: ax MX + ay MY + az MZ is the moment that leaves,
+    by its last parameter whose factor is zero for no value of the symbols.
+    """
+    axis = structure.seen_from_link(first, j).R[:, 2]
+    sizes = np.abs(structure.axes_in(first, j))
+    least, most = np.min(sizes, axis=0), np.max(sizes, axis=0)
+    leaving = max(k for k in range(3) if least[k] > _LEAST)
+    others = (k for k in range(3) if k != leaving and most[k] > _LEAST)
+    effects = {(j, _MOMENTS[k]): -axis[k] / axis[leaving] for k in others}
+    return Removal((j, _MOMENTS[leaving]), effects)
+
+
+def _spherical(structure: Structure, j: int) -> Iterator[Removal]:
+    """Without gravity the moments about a centre at rest have no effect."""
+    if structure.weightless and structure.point_rests(j, structure.origins[:, j]):
+        yield from _nothing(j, _MOMENTS)
+
+
+def _rotor(structure: Structure, j: int) -> Iterator[Removal]:
+    """The rotor of a joint, where it has the effect of some parameters of the link."""
+    effects, rotor = _rotor_effects(structure, j), structure.tree.links[j].rotor
+    if effects is not None:
+        yield Removal((j, "Ia"), effects)
+    if rotor is not None and rotor.carrier < 0 and not structure.base_moves:
+        same = {(j, "Ia"): SX(1)} if effects is None else effects
+        scale = rotor.ratio**2
+        yield Removal((j, "Jm"), {key: scale * x for key, x in same.items()})
+
+
+def _rotor_effects(structure: Structure, j: int) -> Effects | None:
+    """What has the effect of Ia; None when nothing has."""
+    link = structure.tree.links[j]
+    match link.motion:
+        case Motion.REVOLUTE if _turns_alone(structure, j):
+            return {(j, "ZZ"): SX(1)}
+        case Motion.SPHERICAL if structure.rests(structure.before(j)):
+            return {(j, name): SX(1) for name in ("XX", "YY", "ZZ")}
+        case Motion.PRISMATIC if _slides_alone(structure, j):
+            return {(j, "M"): SX(1), **_mass_before(link)}
+    return None
+
+
+def _turns_alone(structure: Structure, j: int) -> bool:
+    """Whether the angular velocity of link j along its axis is that of its joint."""
+    before = structure.before(j)
+    turning = structure.turning(before)
+    across = all(structure.perpendicular(k, j) for k in turning)
+    return structure.rests(before) or (structure.one_direction(before) and across)
+
+
+def _slides_alone(structure: Structure, j: int) -> bool:
+    """Whether the velocity of link j along its axis is that of its joint, and weighs nothing."""
+    before = structure.before(j)
+    return (
+        structure.gravity_across(j)
+        and structure.one_direction(before)
+        and all(structure.parallel(k, j) for k in structure.turning(before))
+        and all(structure.perpendicular(k, j) for k in structure.sliding(before))
+    )
+
+
+def _mass_before(link: Link) -> dict[Key, SX]:
+    """A mass at the origin of frame j that is fixed on link i, taken away."""
+    if link.antecedent < 0:
+        return {}
+    through = lambda_transform(link.pose())
+    return on_link(link.antecedent, -_column(through, "M"))
+
+
+def _column(through: SX, name: str) -> SX:
+    return through[:, TEN_PARAMETERS.index(name)]
+
+
+def on_link(link: int, column: SX) -> dict[Key, SX]:
+    """The parameters (10, 1) of a body fixed on a link, those that are zero left out."""
+    pairs = zip(TEN_PARAMETERS, elements(column), strict=True)
+    return {(link, name): x for name, x in pairs if not x.is_zero()}
+
+
+def _nothing(j: int, names: Iterable[str]) -> Iterator[Removal]:
+    yield from (Removal((j, name), {}) for name in names)

@@ -1,1 +1,0 @@
-"""The equations that a record gives, and how well they show the parameters."""

@@ -1,0 +1,801 @@
+"""Measured motions, what they may not be, and their filters."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mbs.assembly import Coordinate, System
+from mbs.assembly.model_function import require_system
+from mbs.assembly.tables import EFFORT_UNIT
+from mbs.errors import ModelError
+from mbs.identification.leading import active_places
+from mbs.result import optional_module
+from mbs.text import did_you_mean, quoted
+
+# What a record may not be: out of order, with holes, in other units, too short.
+
+
+Array = npt.NDArray[np.float64]
+
+SHORTEST = 50
+"""Rows that a record needs at least."""
+
+GAP = 20.0
+"""Usual steps of time that are bridged by default."""
+
+FARTHEST_TURN = 4 * np.pi
+"""Positions beyond it are not taken for those of a revolute joint [rad]."""
+
+_RANGES = 3.0
+_SAME_MOTION = 0.9
+_SAME_RATE = 0.3
+_STILL = 1e-9
+
+
+def check_record(record: Record) -> None:
+    """Refuse what cannot be a record of joints in SI units.
+
+    Raises:
+        ModelError: which column and row, what value, and what to do.
+    """
+    _check_shapes(record)
+    _check_names(record)
+    _check_finite(record)
+    _check_time(record)
+    for k in range(record.q.shape[1]):
+        _check_position(record, k)
+        if record.v is not None:
+            _check_rate(record, k)
+
+
+def _check_shapes(record: Record) -> None:
+    n = record.time.size
+    wanted = {"q": record.q, "tau": record.tau, "v": record.v}
+    if record.time.ndim != 1:
+        raise ModelError(f"record: time has the shape {record.time.shape}; give (n,)")
+    if n < SHORTEST:
+        raise ModelError(
+            f"record: it has {n} rows, which is too short; give {SHORTEST} or more, and some"
+            " periods of the slowest motion"
+        )
+    for name, values in wanted.items():
+        if values is None:
+            continue
+        if values.ndim != 2 or len(values) != n:
+            raise ModelError(
+                f"record: {name} has the shape {values.shape} for {n} instants; give a row for"
+                " each instant and a column for each joint"
+            )
+    if record.v is not None and record.v.shape != record.q.shape:
+        raise ModelError(
+            f"record: v has the shape {record.v.shape} and q {record.q.shape}; give the velocity"
+            " of every position"
+        )
+    widths = {
+        "names": record.q,
+        "units": record.q,
+        "limits": record.q,
+        "efforts": record.tau,
+        "effort_units": record.tau,
+    }
+    for name, values in widths.items():
+        given = len(getattr(record, name))
+        if given != values.shape[1]:
+            raise ModelError(
+                f"record: {given} {name} are given for {values.shape[1]} columns; give one for each"
+            )
+
+
+def _check_names(record: Record) -> None:
+    for what, names in (("positions", record.names), ("efforts", record.efforts)):
+        twice = [name for k, name in enumerate(names) if name in names[:k]]
+        if twice:
+            raise ModelError(
+                f"record: two {what} are called {quoted(twice[0])}; give each its own name"
+            )
+    for name, unit in zip(record.efforts, record.effort_units, strict=True):
+        if unit not in ("N.m", "N"):
+            raise ModelError(
+                f"record: the effort {name} is in {quoted(unit)}; convert it to 'N.m' or 'N'"
+            )
+
+
+def _check_finite(record: Record) -> None:
+    names = {"q": record.names, "tau": record.efforts, "v": record.names}
+    if not np.isfinite(record.time).all():
+        row = int(np.argmin(np.isfinite(record.time)))
+        raise ModelError(f"record: the time of row {row + 1} is {record.time[row]}; drop the row")
+    for kind, labels in names.items():
+        values = getattr(record, kind)
+        if values is None or np.isfinite(values).all():
+            continue
+        row, k = np.argwhere(~np.isfinite(values))[0]
+        raise ModelError(
+            f"record: {kind} of {labels[k]} is {values[row, k]} at {record.time[row]:g} s; drop"
+            " such rows, or cut the record there"
+        )
+
+
+def _check_time(record: Record) -> None:
+    steps = np.diff(record.time)
+    if (steps <= 0).any():
+        row = int(np.argmax(steps <= 0))
+        raise ModelError(
+            f"record: time goes from {record.time[row]:.6g} to {record.time[row + 1]:.6g} s at row"
+            f" {row + 2}; sort the rows, and keep one for each instant"
+        )
+    usual = float(np.median(steps))
+    longest = GAP * usual if record.longest_gap is None else record.longest_gap
+    if steps.max() > longest:
+        row = int(np.argmax(steps))
+        raise ModelError(
+            f"record: nothing was measured from {record.time[row]:.6g} to"
+            f" {record.time[row + 1]:.6g} s, the usual step being {usual:.3g} s; give the two"
+            " sides as two records, identify(system, [r1, r2], ...), or give longest_gap, and the"
+            " list record.pieces()"
+        )
+
+
+def _check_position(record: Record, k: int) -> None:
+    name, unit, limits, q = record.names[k], record.units[k], record.limits[k], record.q[:, k]
+    if unit not in ("rad", "m"):
+        raise ModelError(f"record: {name} is in {unit!r}; convert it to 'rad' or 'm'")
+    largest = float(np.abs(q).max())
+    remedy = (
+        "convert degrees by numpy.radians, and positions of motors by joint_side"
+        if unit == "rad"
+        else "convert it to m on the joint's side of the gear"
+    )
+    if unit == "rad" and largest > FARTHEST_TURN:
+        raise ModelError(
+            f"record: {name} goes to {largest:.4g} rad, more than two turns of a joint; {remedy}"
+        )
+    if limits is None:
+        return
+    low, high = limits
+    middle, half = (low + high) / 2, (high - low) / 2
+    if np.isfinite(half) and half > 0 and float(np.abs(q - middle).max()) > _RANGES * half:
+        raise ModelError(
+            f"record: {name} goes from {q.min():.4g} to {q.max():.4g} {unit}, far beyond its range"
+            f" {low:.4g} .. {high:.4g} {unit}; {remedy}"
+        )
+
+
+def _check_rate(record: Record, k: int) -> None:
+    """Compare the change of a position with the integral of its velocity, both without trend."""
+    assert record.v is not None
+    v, steps = record.v[:, k], np.diff(record.time)
+    travelled = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])
+    moved, by_rate = (_detrended(record.time, x) for x in (record.q[:, k], travelled))
+    size = float(np.linalg.norm(moved))
+    if size <= _STILL or np.linalg.norm(by_rate) <= _STILL:
+        return
+    alike = float(moved @ by_rate) / (size * float(np.linalg.norm(by_rate)))
+    factor = float(np.linalg.norm(by_rate)) / size
+    name, unit = record.names[k], record.units[k]
+    if alike < _SAME_MOTION:
+        raise ModelError(
+            f"record: v of {name} is not the rate of its q (correlation {alike:.2f}); check the"
+            " order of the columns and their signs"
+        )
+    if abs(factor - 1) > _SAME_RATE:
+        raise ModelError(
+            f"record: v of {name} is {factor:.4g} times the rate of its q; give both in {unit} on"
+            " the joint's side of the gear (57.3 is degrees, a gear ratio the motor's side)"
+        )
+
+
+def _detrended(time: Array, values: Array) -> Array:
+    """Without the straight line that fits best."""
+    basis = np.column_stack([np.ones_like(time), time - time.mean()])
+    line = basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    return np.asarray(values - line, dtype=float)
+
+
+# Columns of numbers from tables and text files.
+
+
+def column(table: Any, name: str) -> Array:
+    """(n,) a column of a DataFrame, a `mbs.Result` or a dict.
+
+    Raises:
+        ModelError: there is none of this name, or it holds what is no number.
+    """
+    known = [str(key) for key in table.keys()] if hasattr(table, "keys") else list(table.names)  # noqa: SIM118
+    if name not in known:
+        if name == "time" and hasattr(table, "index") and not isinstance(table, dict):
+            return np.asarray(table.index, dtype=float)
+        raise ModelError(f"record: there is no column {name!r}; {did_you_mean(name, known)}")
+    try:
+        return np.asarray(table[name], dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"record: the column {name!r} does not hold numbers alone; it starts with"
+            f" {quoted(list(table[name])[:3])}"
+        ) from None
+
+
+def columns(table: Any, what: str, names: Sequence[str]) -> Array:
+    """(n, k) some columns of a table side by side.
+
+    Args:
+        table: as for `column`.
+        what: they are, for messages.
+        names: of the columns, one or more.
+
+    Raises:
+        ModelError: there are no names, or as for `column`.
+    """
+    if isinstance(names, str) or not len(names):
+        raise ModelError(
+            f"record: the columns of {what} are {quoted(names)}; give a list of one name or more"
+        )
+    return np.column_stack([column(table, name) for name in names])
+
+
+def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
+    """The columns of a text file by the names in its first row.
+
+    Args:
+        path: file with commas between the columns.
+
+    Raises:
+        ModelError: it cannot be read, a row has not the length of the header, or a field is no
+            number; the line is named.
+    """
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except (OSError, TypeError, UnicodeDecodeError, csv.Error) as error:
+        raise ModelError(f"record: {quoted(str(path))} cannot be read ({error})") from error
+    if len(rows) < 2:
+        raise ModelError(f"record: {quoted(str(path))} has no rows; it needs names, then numbers")
+    header = [name.strip() for name in rows[0]]
+    _check_header(path, header)
+    values = np.empty((len(rows) - 1, len(header)))
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            raise ModelError(
+                f"record: row {number} of {quoted(str(path))} has {len(row)} fields, the header has"
+                f" {len(header)}; write one number for each name"
+            )
+        try:
+            values[number - 2] = [float(field) for field in row]
+        except ValueError:
+            raise ModelError(
+                f"record: row {number} of {quoted(str(path))} holds {quoted(row)};"
+                " write numbers alone"
+            ) from None
+    return {name: values[:, k] for k, name in enumerate(header)}
+
+
+def _check_header(path: str | os.PathLike[str], header: Sequence[str]) -> None:
+    """Refuse other separators than commas, and numbers in the place of names."""
+    for mark in (";", "\t"):
+        if len(header) == 1 and mark in header[0]:
+            raise ModelError(
+                f"record: {quoted(str(path))} has {quoted(mark)} between its columns; write"
+                " commas, and points in the numbers"
+            )
+    if all(_is_number(name) for name in header):
+        raise ModelError(
+            f"record: the first row of {quoted(str(path))} is {quoted(list(header))}, which are"
+            " numbers; write the names of the columns above them"
+        )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+# A measured motion: positions, efforts and perhaps velocities over time.
+
+
+Limits = tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Record:
+    """What sensors gave during a motion, in SI units on the joint's side of the gears.
+
+    The constructor refuses what cannot be a record of a robot; see `check_record`. Positions are
+    those of all joints of the tree, or of the independent ones; efforts those of the independent
+    joints.
+
+    Attributes:
+        time: (n,) [s], increasing, not necessarily in equal steps.
+        q: (n, nq) positions [rad or m].
+        tau: (n, m) efforts of the motors seen at the joints [N m or N].
+        v: (n, nq) measured velocities [rad/s or m/s], or None.
+        names: of the positions; q1, q2, ... by default.
+        units: of the positions, "rad" or "m"; all "rad" by default.
+        limits: range of each position, or None where it is not known.
+        efforts: names of the efforts; those of the positions by default, or tau1, tau2, ... where
+            there are less of them.
+        effort_units: "N.m" or "N"; those that go with the positions by default.
+        longest_gap: largest step of time that is bridged [s]; 20 times the usual step by default.
+    """
+
+    time: Array
+    q: Array
+    tau: Array
+    v: Array | None = None
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    limits: tuple[Limits, ...] = ()
+    efforts: tuple[str, ...] = ()
+    effort_units: tuple[str, ...] = ()
+    longest_gap: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("time", "q", "tau", "v"):
+            if getattr(self, name) is not None or name != "v":
+                object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+        for name in ("names", "units", "efforts", "effort_units"):
+            if isinstance(getattr(self, name), str):
+                raise ModelError(
+                    f"record: {name} is the text {quoted(getattr(self, name))}; give a list with"
+                    " one for each column"
+                )
+        width, m = (x.shape[1] if x.ndim == 2 else 0 for x in (self.q, self.tau))
+        names = self.names or tuple(f"q{k + 1}" for k in range(width))
+        efforts = names if m == width else tuple(f"tau{k + 1}" for k in range(m))
+        units = self.units or ("rad",) * width
+        like = tuple("N" if unit == "m" else "N.m" for unit in units)
+        defaults = {
+            "names": names,
+            "units": units,
+            "limits": (None,) * width,
+            "efforts": efforts,
+            "effort_units": like if m == width else ("N.m",) * m,
+        }
+        for key, value in defaults.items():
+            object.__setattr__(self, key, tuple(getattr(self, key)) or value)
+        check_record(self)
+
+    def __repr__(self) -> str:
+        span = self.time[-1] - self.time[0]
+        return f"<Record: {len(self.time)} rows, {span:g} s, {', '.join(self.names)}>"
+
+    @classmethod
+    def of(
+        cls, system: System, time: Any, q: Any, tau: Any, v: Any = None, **options: Any
+    ) -> Record:
+        """A record of a system: names, units and ranges of the joints are those of the system.
+
+        Args:
+            system: open or closed, its measured joints of one degree of freedom.
+            time: (n,) [s].
+            q: (n, nq) positions, or (n, m) those of the independent joints of a closed system,
+                which the others follow.
+            tau: (n, m) efforts of the independent joints; where motors are others than these, what
+                `mbs.models.actuation_matrix` makes of theirs.
+            v: velocities of the same joints, or None.
+            **options: other attributes of the record.
+
+        Raises:
+            ModelError: the numbers are no record of this system.
+        """
+        require_system(system)
+        width = np.shape(q)[1] if np.ndim(q) == 2 else system.nq
+        alone = system.is_closed and width == len(system.active) != system.nq
+        places = active_places(system) if alone else range(system.nq)
+        joints = [system.coordinates[k] for k in places]
+        _check_joints(system, joints, width)
+        speeds = [system.speeds[k] for k in system.active]
+        _check_efforts(system, [c.name for c in speeds], tau)
+        described = {
+            "names": tuple(c.name for c in joints),
+            "units": tuple(c.unit for c in joints),
+            "limits": tuple(c.limits for c in joints),
+            "efforts": tuple(c.name for c in speeds),
+            "effort_units": tuple(EFFORT_UNIT[c.unit] for c in speeds),
+        }
+        return cls(time, q, tau, v, **(described | options))
+
+    @classmethod
+    def from_table(
+        cls,
+        table: Any,
+        q: Sequence[str],
+        tau: Sequence[str],
+        v: Sequence[str] | None = None,
+        **options: Any,
+    ) -> Record:
+        """A record from named columns.
+
+        Args:
+            table: a pandas DataFrame, a `mbs.Result`, or a dict of columns; its time is the column
+                "time", or the index of a DataFrame.
+            q: names of the columns of positions.
+            tau: names of the columns of efforts.
+            v: names of the columns of velocities, or None.
+            **options: other attributes of the record, or system=System to take them from there.
+
+        Raises:
+            ModelError: a column is missing or not of numbers, or the numbers are no record.
+        """
+        stamps = getattr(table, "time", None) if not hasattr(table, "keys") else None
+        if stamps is None:
+            stamps = column(table, "time")
+        q_, tau_ = columns(table, "q", q), columns(table, "tau", tau)
+        v_ = None if v is None else columns(table, "v", v)
+        system = options.pop("system", None)
+        if system is not None:
+            _check_motors(system)
+            record = cls.of(system, stamps, q_, tau_, v_, **options)
+            for what, names, joints in (
+                ("q", q, record.names),
+                ("tau", tau, record.efforts),
+                ("v", v or (), record.names),
+            ):
+                _check_order(what, names, joints)
+            return record
+        return cls(np.asarray(stamps, dtype=float), q_, tau_, v_, **options)
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | os.PathLike[str],
+        q: Sequence[str],
+        tau: Sequence[str],
+        v: Sequence[str] | None = None,
+        **options: Any,
+    ) -> Record:
+        """A record from a text file: a header of names, one of them "time", then rows of numbers.
+
+        Args:
+            path: the file; commas between the columns.
+            q: names of the columns of positions.
+            tau: names of the columns of efforts.
+            v: names of the columns of velocities, or None.
+            **options: as for `from_table`.
+
+        Raises:
+            ModelError: the file cannot be read, or its numbers are no record.
+        """
+        return cls.from_table(csv_table(path), q, tau, v, **options)
+
+    def between(self, start: float, stop: float) -> Record:
+        """The rows from one instant to another [s]."""
+        return self._rows((self.time >= start) & (self.time <= stop))
+
+    def pieces(self, longest: float | None = None) -> list[Record]:
+        """The records between the gaps, for `identify`; those of too few rows are left out.
+
+        Args:
+            longest: step of time that is no gap [s]; 20 times the usual step when left out.
+
+        Raises:
+            ModelError: no piece is long enough.
+        """
+        steps = np.diff(self.time)
+        most = GAP * float(np.median(steps)) if longest is None else longest
+        ends = [0, *(np.flatnonzero(steps > most) + 1), len(self.time)]
+        at, found = np.arange(len(self.time)), []
+        for first, last in pairwise(ends):
+            if last - first >= SHORTEST:
+                found.append(self._rows((at >= first) & (at < last)))
+        if not found:
+            raise ModelError(
+                f"record: every piece between steps of more than {most:.3g} s has less than"
+                f" {SHORTEST} rows; give a longer step, or a record with less gaps"
+            )
+        return found
+
+    def _rows(self, keep: npt.NDArray[np.bool_]) -> Record:
+        v = None if self.v is None else self.v[keep]
+        return replace(self, time=self.time[keep], q=self.q[keep], tau=self.tau[keep], v=v)
+
+
+def joint_side(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
+    """Positions and efforts of joints from those of motors: q = N^-1 q_m and tau = N' tau_m.
+
+    Source: Khalil & Dombre 2002 (transmissions); the gears lose no power.
+
+    Args:
+        N: (n,) ratios, or (n, n) matrix of motors that drive several joints: q_m = N q.
+        q_motor: (rows, n) positions [rad].
+        tau_motor: (rows, n) efforts on the motors' shafts [N m].
+
+    Returns:
+        (rows, n) positions and (rows, n) efforts of the joints.
+
+    Raises:
+        ModelError: N does not fit, or it has no inverse.
+    """
+    ratios = _numbers("N", N)
+    matrix = np.diag(ratios) if ratios.ndim == 1 else ratios
+    q, tau = _numbers("q_motor", q_motor), _numbers("tau_motor", tau_motor)
+    width = q.shape[1] if q.ndim == 2 else 0
+    if matrix.shape != (width, width) or tau.shape != q.shape:
+        raise ModelError(
+            f"transmission: N has the shape {matrix.shape}, positions {q.shape} and efforts"
+            f" {tau.shape}; give (n, n), (rows, n) and (rows, n)"
+        )
+    if np.linalg.matrix_rank(matrix) < width:
+        raise ModelError(
+            "transmission: N has no inverse, so the motors do not tell where the joints are;"
+            " give the ratio of every joint"
+        )
+    return np.asarray(np.linalg.solve(matrix, q.T).T, dtype=float), tau @ matrix
+
+
+def _check_joints(system: System, joints: Sequence[Coordinate], width: int) -> None:
+    turning = [c for c in joints if c.unit not in ("rad", "m")]
+    if turning:
+        remedy = ", or give the independent joints alone" if system.is_closed else ""
+        raise ModelError(
+            f"{system.name}: {turning[0].name} is a {turning[0].kind}; records are of revolute"
+            f" and prismatic joints{remedy}"
+        )
+    if width != len(joints):
+        names = ", ".join(c.name for c in joints)
+        raise ModelError(
+            f"{system.name}: q has {width} columns, the system has {len(joints)} joints: {names};"
+            " give one column for each, in this order"
+        )
+
+
+def _check_motors(system: System) -> None:
+    if system.motors != system.active:
+        motors = ", ".join(system.speeds[k].name for k in system.motors)
+        raise ModelError(
+            f"{system.name}: its motors ({motors}) are not its independent joints; give Record.of"
+            " the efforts that mbs.models.actuation_matrix makes of theirs"
+        )
+
+
+def _check_efforts(system: System, names: Sequence[str], tau: Any) -> None:
+    """Refuse efforts of more or less than the independent joints."""
+    if np.ndim(tau) == 2 and np.shape(tau)[1] != len(names):
+        raise ModelError(
+            f"{system.name}: tau has {np.shape(tau)[1]} columns, the system has {len(names)}"
+            f" independent joints: {', '.join(names)}; give one column for each, in this order"
+        )
+
+
+def _check_order(what: str, given: Sequence[str], joints: Sequence[str]) -> None:
+    """Refuse columns such as "q2.tau" in the place of another joint."""
+    for name, joint in zip(given, joints, strict=False):
+        stem = name if name in joints else name.rpartition(".")[0]
+        if stem in joints and stem != joint:
+            raise ModelError(
+                f"record: the column {name!r} is given as {what} of joint {joint}; name the columns"
+                f" in the order {', '.join(joints)}"
+            )
+
+
+def _numbers(name: str, values: Any) -> Array:
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ModelError(f"record: {name} is {quoted(values)}; give numbers") from None
+    array.flags.writeable = False
+    return array
+
+
+# From a record to samples in equal steps: the same zero-phase filter on positions and efforts.
+
+
+ORDER = 4
+"""Order of the Butterworth filter, which runs once forwards and once backwards."""
+
+WORKING_RATE = 20.0
+"""Samples in a period of the bandwidth that are kept for the regressor."""
+
+_SLOW = 10.0
+"""Records of less samples in a second may have time in another unit [Hz]."""
+
+DROPPED = 5.0
+"""Periods of the bandwidth that are left out at both ends, where the filter settles."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Positions, their rates, and efforts at equal steps of time.
+
+    Attributes:
+        time: (n,) [s].
+        q: (n, nq) positions [rad or m].
+        v: (n, nq) velocities [rad/s or m/s].
+        a: (n, nq) accelerations [rad/s2 or m/s2].
+        tau: (n, m) efforts [N m or N].
+        efforts: names of the efforts.
+        effort_units: their units.
+        bandwidth: of what was left by the filter [Hz], or None where nothing was filtered.
+        led: (n,) whether a posture of a closed system keeps clear of singular ones; None where
+            that is still to be found.
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    efforts: tuple[str, ...]
+    effort_units: tuple[str, ...]
+    bandwidth: float | None = None
+    led: npt.NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.time)
+        shapes = [x.shape for x in (self.q, self.v, self.a)]
+        if len(set(shapes)) != 1 or shapes[0][0] != n or len(self.tau) != n:
+            raise ModelError(
+                f"samples: q, v, a and tau have the shapes {shapes[0]}, {shapes[1]}, {shapes[2]}"
+                f" and {self.tau.shape} for {n} instants; give a row for each instant"
+            )
+
+    @property
+    def rate(self) -> float:
+        """Samples in a second [Hz]."""
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+
+
+def resampled(record: Record, rate: float | None = None) -> Record:
+    """The record at equal steps of time, on straight lines between its rows.
+
+    Nothing is filtered: at a lower rate than that of the record, noise folds into the motion.
+
+    Args:
+        record: at any steps.
+        rate: samples in a second [Hz]; that of the usual step of the record by default.
+    """
+    usual = 1.0 / float(np.median(np.diff(record.time)))
+    wanted = usual if rate is None else rate
+    span = float(record.time[-1] - record.time[0])
+    if not wanted > 0:
+        raise ModelError(f"resampling: the rate is {wanted:g} Hz; give more than zero")
+    time = record.time[0] + np.arange(int(span * wanted * (1 + 1e-12)) + 1) / wanted
+
+    def at_times(values: Array) -> Array:
+        columns = (np.interp(time, record.time, x) for x in values.T)
+        return np.column_stack(list(columns))
+
+    v = None if record.v is None else at_times(record.v)
+    described = (record.names, record.units, record.limits, record.efforts, record.effort_units)
+    return Record(time, at_times(record.q), at_times(record.tau), v, *described)
+
+
+def zero_phase(values: Array, rate: float, bandwidth: float, order: int = ORDER) -> Array:
+    """Low-pass Butterworth filter run forwards and backwards, so that nothing is delayed.
+
+    Source: Gautier 1997 (filtering of positions and efforts); Gustafsson 1996 (two passes).
+
+    Args:
+        values: (n, ...) samples in equal steps.
+        rate: of the samples [Hz].
+        bandwidth: at which each pass leaves 0.71 of a sine [Hz].
+        order: of one pass.
+
+    Returns:
+        (n, ...) the samples that are left.
+
+    Raises:
+        ModelError: the bandwidth is not between zero and half the rate, or there are too few
+            samples for the filter.
+    """
+    if not 0 < bandwidth < rate / 2:
+        hint = "; time is in s, is that of the record in ms?" if rate < _SLOW else ""
+        raise ModelError(
+            f"filter: the bandwidth is {bandwidth:g} Hz for {rate:g} samples in a second; give more"
+            f" than zero and less than {rate / 2:g} Hz{hint}"
+        )
+    padding = 3 * (2 * ((order + 1) // 2) + 1)
+    if len(values) <= padding:
+        raise ModelError(
+            f"filter: {len(values)} samples are too few for it; give a record of more than"
+            f" {padding} samples"
+        )
+    signal = optional_module("scipy.signal", "identify")
+    sections = signal.butter(order, bandwidth, fs=rate, output="sos")
+    return np.asarray(signal.sosfiltfilt(sections, values, axis=0), dtype=float)
+
+
+def central_difference(values: Array, rate: float) -> Array:
+    """Rate of change by central differences over five samples, of fourth order.
+
+    Args:
+        values: (n, k) samples in equal steps; n is five or more.
+        rate: of the samples [Hz].
+
+    Returns:
+        (n, k) rates; the two at each end are of second order.
+    """
+    slope = np.gradient(values, 1.0 / rate, axis=0, edge_order=2)
+    wide = 8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])
+    slope[2:-2] = wide * (rate / 12)
+    return np.asarray(slope, dtype=float)
+
+
+def smoothed(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
+    """Samples for a regressor: velocities and accelerations are differences of positions.
+
+    Positions and efforts go through the same filter; samples that the bandwidth does not need and
+    those at both ends, where the filter settles, are dropped.
+
+    Source: Gautier 1997; Khalil & Dombre 2002, chapter 12.
+
+    Args:
+        record: at any steps of time.
+        bandwidth: of the filter [Hz]; five to ten times the highest frequency of the motion.
+        order: of one pass of the filter.
+
+    Raises:
+        ModelError: the bandwidth does not suit the rate, or nothing would be left.
+    """
+    even = _without_gaps(record, bandwidth)
+    rate = _rate(even)
+    q = zero_phase(even.q, rate, bandwidth, order)
+    return _trimmed(even, q, central_difference(q, rate), bandwidth, order)
+
+
+def smoothed_with_velocity(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
+    """As `smoothed`, with the measured velocities; accelerations are their differences.
+
+    Args:
+        record: with velocities.
+        bandwidth: of the filter [Hz].
+        order: of one pass of the filter.
+
+    Raises:
+        ModelError: the record has no velocities, or as for `smoothed`.
+    """
+    if record.v is None:
+        raise ModelError("record: no velocities were measured; use smoothed(), or give v")
+    even = _without_gaps(record, bandwidth)
+    assert even.v is not None
+    rate = _rate(even)
+    q, v = (zero_phase(x, rate, bandwidth, order) for x in (even.q, even.v))
+    return _trimmed(even, q, v, bandwidth, order)
+
+
+def _without_gaps(record: Record, bandwidth: float) -> Record:
+    """The record at equal steps; a straight line over a longer gap would be taken for motion."""
+    steps = np.diff(record.time)
+    longest = float(steps.max())
+    usual = float(np.median(steps))
+    if longest > max(0.5 / bandwidth, 2 * usual) and bandwidth > 0:
+        start = float(record.time[int(np.argmax(steps))])
+        raise ModelError(
+            f"record: nothing was measured for {longest:.3g} s from {start:.6g} s, which is more"
+            f" than half a period of the bandwidth of {bandwidth:g} Hz; give identify the"
+            f" list record.pieces({0.5 / bandwidth:.3g}), or a bandwidth that is lower"
+        )
+    return resampled(record)
+
+
+def _rate(record: Record) -> float:
+    return (len(record.time) - 1) / float(record.time[-1] - record.time[0])
+
+
+def _trimmed(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Samples:
+    """Accelerations, filtered efforts, and the rows that are worth keeping."""
+    rate = _rate(even)
+    a = central_difference(v, rate)
+    tau = zero_phase(even.tau, rate, bandwidth, order)
+    ends = int(np.ceil(DROPPED * rate / bandwidth))
+    step = max(int(rate / (WORKING_RATE * bandwidth)), 1)
+    keep = slice(ends, len(even.time) - ends, step)
+    time = even.time[keep]
+    if len(time) < 2 * WORKING_RATE:
+        raise ModelError(
+            f"record: {even.time[-1] - even.time[0]:.3g} s are too short for a bandwidth of"
+            f" {bandwidth:g} Hz, which takes {DROPPED / bandwidth:.3g} s at each end; give a longer"
+            " record"
+        )
+    q, v, a, tau = (x[keep] for x in (q, v, a, tau))
+    return Samples(time, q, v, a, tau, even.efforts, even.effort_units, bandwidth)

@@ -1,1 +1,0 @@
-"""Measured motions, what they may not be, and their filters."""

@@ -1,0 +1,743 @@
+"""Models that are linear in the dynamic parameters, and the parameters as named columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypedDict, Unpack
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
+from mbs.assembly.tree import CarriedRotor, Link, Tree, position_rate
+from mbs.components.joints import Motion
+from mbs.errors import ModelError
+from mbs.models.symbols import (
+    ModelSymbols,
+    check_coordinates,
+    posture_check,
+    surroundings,
+    symbols_of,
+)
+from mbs.recursions.force_elements import element_efforts
+from mbs.recursions.newton_euler import (
+    rotor_and_friction,
+    rotor_efforts,
+    rotor_moments,
+    spring_effort,
+)
+from mbs.recursions.poses import LinkPose
+from mbs.recursions.regressor import (
+    PathTwist,
+    inertial_energy,
+    inertial_regressor,
+    momentum_regressor,
+    path_twist_rates,
+    path_twists,
+    position_regressor,
+    work,
+)
+from mbs.recursions.velocities import Acceleration, Velocity, link_accelerations, link_velocities
+from mbs.spatial import zeros
+from mbs.text import did_you_mean, quoted
+
+# The parameters in which the equations of motion are linear: names, units and present values.
+
+
+INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+"""Kinds of the inertial parameters of a link, about the origin of its frame and in its axes."""
+
+COUPLED = ("Iam", "Fvm", "Fsm")
+"""Kinds of the parameters of a motor that turns with two joints: inertia and both frictions."""
+
+_INERTIAL_UNITS = ("kg.m2",) * 6 + ("kg.m",) * 3 + ("kg",)
+_TURNING = {
+    **{kind: "kg.m2" for kind in ("Ia", "Iam", "Jm")},
+    **{kind: "N.m.s/rad" for kind in ("Fv", "Fvm")},
+    **{kind: "N.m" for kind in ("Fs", "Fsm", "offset")},
+}
+_SLIDING = {
+    **{kind: "kg" for kind in ("Ia", "Iam")},
+    **{kind: "N.s/m" for kind in ("Fv", "Fvm")},
+    **{kind: "N" for kind in ("Fs", "Fsm", "offset")},
+    "Jm": "kg.m2",
+}
+
+Joints = tuple[str | int, str | int]
+"""Two joints of the tree, by name or by the number of their link, from 1."""
+
+
+class ColumnChoice(TypedDict, total=False):
+    """Which parameters to take; see `columns_of`."""
+
+    rotors: bool
+    friction: bool
+    offsets: bool
+    couplings: Sequence[Joints]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A parameter in which the equations of motion are linear.
+
+    Attributes:
+        name: kind and number of the link, such as "XX3".
+        kind: XX XY XZ YY YZ ZZ MX MY MZ M; Ia, Fv, Fs, offset of the joint of the link; Jm, the
+            inertia of a rotor that spins with it; Iam, Fvm, Fsm of a motor of two joints.
+        link: number of the link, from 1.
+        unit: of the parameter.
+        other: number of the link of the second joint of a motor of two joints, else 0.
+    """
+
+    name: str
+    kind: str
+    link: int
+    unit: str
+    other: int = 0
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """What it is the parameter of, whatever its name."""
+        return self.kind, self.link, self.other
+
+
+def columns_of(
+    system: System,
+    *,
+    rotors: bool = True,
+    friction: bool = True,
+    offsets: bool = False,
+    couplings: Sequence[Joints] = (),
+) -> tuple[Column, ...]:
+    """The parameters of a system, link by link, those of motors of two joints last.
+
+    A link has the ten inertial parameters, also where they are zero. Passive joints have Ia, and
+    free joints Ia and friction, only where the system gives them values that are not zero.
+
+    Source: Khalil & Creusot 1997, section 2.2; Gautier, Janot & Vandanjon 2013 for motors of two
+    joints.
+
+    Args:
+        system: open or closed.
+        rotors: whether to take Ia of actuated joints, and Jm of rotors that spin with joints.
+        friction: whether to take Fv and Fs of every joint.
+        offsets: whether to take a constant effort of every joint of one degree of freedom.
+        couplings: for each motor of two joints the joint it belongs to and the other; it turns
+            with the sum of their velocities.
+
+    Raises:
+        ModelError: `system` is not a System, or a coupling does not name two joints of one degree
+            of freedom and of one kind.
+    """
+    require_system(system)
+    columns: list[Column] = []
+    for number, link in enumerate(system.tree.links, start=1):
+        kinds = [
+            *(_rotor_kinds(system, link) if rotors else ()),
+            *(_friction_kinds(link) if friction else ()),
+            *(("offset",) if offsets and link.motion.nv == 1 else ()),
+        ]
+        columns += _inertial(number)
+        columns += [Column(f"{kind}{number}", kind, number, _unit(link, kind)) for kind in kinds]
+    for pair in couplings:
+        columns += _coupled(system, pair)
+    return tuple(columns)
+
+
+def chosen_columns(
+    system: System, columns: Sequence[Column] | None, choice: ColumnChoice
+) -> tuple[Column, ...]:
+    """The columns that are given, or those of `columns_of`.
+
+    Args:
+        system: open or closed.
+        columns: in the order wanted, under any names; None to choose by options.
+        choice: options of `columns_of`.
+
+    Raises:
+        ModelError: both were given, or a column is no parameter of the system or given twice.
+    """
+    if columns is None:
+        return columns_of(system, **choice)
+    require_system(system)
+    if choice:
+        raise ModelError(
+            f"{system.name}: columns were given and {quoted(next(iter(choice)))} too; give the"
+            " columns alone"
+        )
+    require_columns(system, columns)
+    numbers_among(system, every_column(system, columns), columns)
+    if len({column.key for column in columns}) < len(columns):
+        twice = next(c for k, c in enumerate(columns) if c.key in {b.key for b in columns[:k]})
+        raise ModelError(f"{system.name}: {quoted(twice.name)} is given twice; give it once")
+    return tuple(columns)
+
+
+def require_columns(system: System, columns: Sequence[Column]) -> None:
+    """Refuse names, and objects that hold columns, in place of Columns.
+
+    Raises:
+        ModelError: with what was given.
+    """
+    rows = columns if isinstance(columns, list | tuple) else [columns]
+    wrong = [row for row in rows if not isinstance(row, Column)]
+    if wrong:
+        raise ModelError(
+            f"{system.name}: columns holds {quoted(wrong[0])}, which is no Column; give those of"
+            " columns_of(system), or .kept of base parameters"
+        )
+
+
+def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...]:
+    """All parameters of the system of the kinds of some columns, in the order of `columns_of`."""
+    return columns_of(
+        system,
+        offsets=any(column.kind == "offset" for column in columns),
+        couplings=list(dict.fromkeys((c.link, c.other) for c in columns if c.other)),
+    )
+
+
+def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Column]) -> list[int]:
+    """Where some columns stand among all of them.
+
+    Raises:
+        ModelError: a column is not among them.
+    """
+    places = {column.key: k for k, column in enumerate(every)}
+    for column in columns:
+        if column.key not in places:
+            known = did_you_mean(column.name, [c.name for c in every])
+            raise ModelError(
+                f"{system.name}: {quoted(column.name)} is no parameter of the system; {known}"
+            )
+    return [places[column.key] for column in columns]
+
+
+def values_of(system: System, columns: Iterable[Column]) -> SX:
+    """(n, 1) the parameters as the system has them: numbers, or expressions of its symbols.
+
+    Offsets and motors of two joints are zero, since a system has none.
+    """
+    links = system.tree.links
+    ten = [link.inertia.parameters for link in links]
+    values = []
+    for column in columns:
+        link = links[column.link - 1]
+        if column.kind in INERTIAL:
+            values.append(ten[column.link - 1][INERTIAL.index(column.kind)])
+        else:
+            values.append(_joint_value(link, column.kind))
+    return casadi.densify(casadi.vertcat(SX(0, 1), *values))
+
+
+def numbers_of(
+    system: System, columns: Iterable[Column], values: Mapping[str, float] | None = None
+) -> NDArray[np.float64]:
+    """(n,) the parameters as numbers.
+
+    Args:
+        system: open or closed.
+        columns: the parameters.
+        values: of symbols by name, the others at their defaults.
+
+    Raises:
+        ModelError: a symbol has no value, or there is no symbol of that name.
+    """
+    K = Function("K", [system.p], [values_of(system, columns)])
+    return np.asarray(K(DM(system.parameter_values(values))), dtype=float).ravel()
+
+
+def _joint_value(link: Link, kind: str) -> SX:
+    if kind == "Jm":
+        return link.rotor.inertia if link.rotor is not None else SX(0)
+    known = {"Ia": link.Ia, "Fv": link.Fv, "Fs": link.Fs}
+    return known.get(kind, SX(0))
+
+
+def _inertial(number: int) -> list[Column]:
+    pairs = zip(INERTIAL, _INERTIAL_UNITS, strict=True)
+    return [Column(f"{kind}{number}", kind, number, unit) for kind, unit in pairs]
+
+
+def _rotor_kinds(system: System, link: Link) -> list[str]:
+    driven = system.speeds[link.v.start].actuated and link.rotor is None
+    kinds = ["Ia"] if driven or not link.Ia.is_zero() else []
+    return [*kinds, "Jm"] if link.rotor is not None else kinds
+
+
+def _friction_kinds(link: Link) -> list[str]:
+    given = {"Fv": link.Fv, "Fs": link.Fs}
+    return [k for k, x in given.items() if link.motion is not Motion.FREE or not x.is_zero()]
+
+
+def _unit(link: Link, kind: str) -> str:
+    return (_SLIDING if link.motion is Motion.PRISMATIC else _TURNING)[kind]
+
+
+def _coupled(system: System, pair: Joints) -> list[Column]:
+    """The three parameters of a motor of two joints."""
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+        raise ModelError(
+            f"{system.name}: the coupling {quoted(pair)} does not name two joints; give a pair such"
+            " as ('j6', 'j5')"
+        )
+    number, other = (_joint(system, name) for name in pair)
+    link, second = (system.tree.links[k - 1] for k in (number, other))
+    if number == other or link.motion is not second.motion:
+        raise ModelError(
+            f"{system.name}: the coupling {quoted(tuple(pair))} joins {link.name!r}"
+            f" ({link.motion.value}) and {second.name!r} ({second.motion.value}); name two joints"
+            " that both turn or both slide"
+        )
+    return [Column(f"{k}{number}", k, number, _unit(link, k), other) for k in COUPLED]
+
+
+def _joint(system: System, name: str | int) -> int:
+    """Number of the link of a joint of one degree of freedom."""
+    links = system.tree.links
+    names = {link.name: k for k, link in enumerate(links, start=1) if link.motion.nv == 1}
+    if isinstance(name, str) and name in names:
+        return names[name]
+    if isinstance(name, int) and not isinstance(name, bool) and name in names.values():
+        return name
+    raise ModelError(
+        f"{system.name}: the coupling names {quoted(name)}, which is no joint of one degree of"
+        f" freedom of the tree; {did_you_mean(name, names)}"
+    )
+
+
+# What one parameter of a joint or of its motor adds to efforts, momenta and energy.
+
+
+_INERTIAS = ("Ia", "Iam", "Jm")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointColumns:
+    """Columns of joints for one state of the tree.
+
+    Attributes:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        v: (nv, 1) joint velocities.
+        velocities: of the links.
+        base: velocity of the base; None at rest.
+    """
+
+    tree: Tree
+    poses: list[LinkPose]
+    v: SX
+    velocities: list[Velocity]
+    base: Velocity | None
+
+    @staticmethod
+    def of(tree: Tree, poses: list[LinkPose], v: SX, base: Velocity | None = None) -> JointColumns:
+        """With the velocities of the links that follow."""
+        return JointColumns(tree, poses, v, link_velocities(tree, poses, v, base), base)
+
+    def effort(self, column: Column, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
+        """(nv, 1) efforts for a unit of a parameter.
+
+        Args:
+            column: the parameter.
+            a: (nv, 1) joint accelerations.
+            motions: of the links.
+            base: its motion.
+        """
+        if column.kind != "Jm":
+            return self._own(column, self.v, a)
+        alone = self._with_one_rotor(column)
+        total = rotor_efforts(alone, a, motions, base)
+        for c, moment in rotor_moments(alone, self.v, a, motions).items():
+            total += self._along(self._twists(c), moment)
+        return total
+
+    def momentum(self, column: Column) -> SX:
+        """(nv, 1) derivative of kinetic energy in v for a unit of a parameter."""
+        if column.kind not in _INERTIAS:
+            return zeros(self.tree.nv)
+        if column.kind != "Jm":
+            return self._own(column, zeros(self.tree.nv), self.v)
+        link, rotor = self._rotor(column)
+        total = zeros(self.tree.nv)
+        total[link.v] = rotor.seen_at_joint * self.v[link.v] + self._spin(rotor)
+        if rotor.carrier >= 0:
+            spin = rotor.momentum * self.v[link.v]
+            total += self._along(self._twists(rotor.carrier), spin)
+        return total
+
+    def rest(self, column: Column) -> SX:
+        """(nv, 1) what the efforts are beside the rate of the momentum."""
+        if column.kind != "Jm":
+            return self._own(column, self.v, zeros(self.tree.nv))
+        link, rotor = self._rotor(column)
+        if rotor.carrier < 0:
+            return zeros(self.tree.nv)
+        rates = path_twist_rates(self.tree, self.poses, self.velocities)
+        return -self._along(rates[rotor.carrier], rotor.momentum * self.v[link.v])
+
+    def energy(self, column: Column) -> SX:
+        """Kinetic energy of a unit of a parameter; friction and offsets have none."""
+        if column.kind not in _INERTIAS:
+            return SX(0)
+        return SX(0.5 * casadi.dot(self.v, self.momentum(column)))
+
+    def power(self, column: Column) -> SX:
+        """Power that a unit of a parameter takes and does not give back."""
+        if column.kind in _INERTIAS:
+            return SX(0)
+        return SX(casadi.dot(self.v, self.rest(column)))
+
+    def _own(self, column: Column, v: SX, a: SX) -> SX:
+        """The law of the joints, with this parameter alone."""
+        link, total = self.tree.links[column.link - 1], zeros(self.tree.nv)
+        if column.kind == "offset":
+            total[link.v] = 1
+            return total
+        one = {column.kind.removesuffix("m"): SX(1)}
+        Ia, Fv, Fs = (one.get(kind, SX(0)) for kind in ("Ia", "Fv", "Fs"))
+        unit = replace(link, Ia=Ia, Fv=Fv, Fs=Fs)
+        if column.kind not in COUPLED:
+            total[link.v] = _law(unit, v[link.v], a[link.v])
+            return total
+        second = self.tree.links[column.other - 1]
+        effort = _law(unit, v[link.v] + v[second.v], a[link.v] + a[second.v])
+        total[link.v] = total[second.v] = effort
+        return total
+
+    def _with_one_rotor(self, column: Column) -> Tree:
+        links = [
+            replace(link, rotor=self._rotor(column)[1] if number == column.link else None)
+            for number, link in enumerate(self.tree.links, start=1)
+        ]
+        return Tree(tuple(links), self.tree.gravity)
+
+    def _rotor(self, column: Column) -> tuple[Link, CarriedRotor]:
+        """The joint and its rotor with a unit of inertia."""
+        link = self.tree.links[column.link - 1]
+        assert link.rotor is not None
+        return link, replace(link.rotor, inertia=SX(1))
+
+    def _spin(self, rotor: CarriedRotor) -> SX:
+        """Momentum that the turning of the carrier gives the rotor."""
+        carrier = self.velocities[rotor.carrier] if rotor.carrier >= 0 else self.base
+        return SX(0) if carrier is None else SX(casadi.dot(rotor.momentum, carrier.w))
+
+    def _twists(self, carrier: int) -> list[PathTwist]:
+        return path_twists(self.tree, self.poses)[carrier]
+
+    def _along(self, twists: list[PathTwist], moment: SX) -> SX:
+        """(nv, 1) work of a moment in each of some velocities."""
+        total = zeros(self.tree.nv)
+        for twist in twists:
+            total[twist.row] = work(twist, (None, moment))
+        return total
+
+
+def _law(link: Link, v: SX, a: SX) -> SX:
+    alone = replace(link, v=slice(0, link.motion.nv))
+    return rotor_and_friction(Tree((alone,), zeros()), v, a)
+
+
+# The dynamic identification model: efforts as a matrix times the dynamic parameters.
+
+
+class Regressor(ModelFunction):
+    """A model whose outputs have a column for each parameter in which the equations are linear.
+
+    Attributes:
+        columns: the parameters, in the order of the columns of every output.
+    """
+
+    def __init__(self, model: ModelFunction, columns: tuple[Column, ...]) -> None:
+        ModelFunction.__init__(self, model, model.system, model._annotate, model._check_posture)
+        self.columns = columns
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(column.name for column in self.columns)
+
+    @property
+    def effective(self) -> NDArray[np.bool_]:
+        """(n,) whether a column has an element that is not zero by structure."""
+        found = np.zeros(len(self.columns), dtype=bool)
+        for output in self._outputs():
+            pattern = casadi.sparsify(output).sparsity()
+            found[np.unique(pattern.get_triplet()[1])] = True
+        return found
+
+    def elements(self, name: str) -> list[tuple[str, str]]:
+        """Name and unit of every element of an input, or of every column of an output."""
+        if name in self.name_out():
+            return [(column.name, column.unit) for column in self.columns]
+        return ModelFunction.elements(self, name)
+
+    def like(self, function: Function) -> ModelFunction:
+        """Another Function with the inputs of this one and, where they are as many, its columns."""
+        same = function.size_out(0) == self.size_out(0)
+        plain = ModelFunction(function, self.system, None, self._check_posture)
+        return Regressor(plain, self.columns) if same else ModelFunction.like(self, function)
+
+    def _outputs(self) -> list[SX]:
+        inputs = [SX.sym(name, self.sparsity_in(name)) for name in self.name_in()]
+        return list(Function.call(self, inputs, True, False))
+
+
+def regressor(
+    system: System,
+    columns: Sequence[Column] | None = None,
+    *,
+    coordinates: str = "independent",
+    moving_base: bool = False,
+    **choice: Unpack[ColumnChoice],
+) -> Regressor:
+    """``regressor(q, v, a) -> D``: joint efforts as D K, with K the dynamic parameters.
+
+    Springs of the joints and force elements have no column; see `known_efforts`. A base that
+    floats is a free joint, with six rows of its own.
+
+    Source: Khalil & Creusot 1997, eq. 39.
+
+    Args:
+        system: open or closed; q must close the loops.
+        columns: the parameters, such as `BaseParameters.columns_in_base`; left out, those of
+            `columns_of`.
+        coordinates: of a closed system, "independent" for D(q, v_a, a_a) with D = G' D_tree, or
+            "tree".
+        moving_base: add the inputs v_0, a_0 and R_0 of `mbs.models.inverse_dynamics`.
+        choice: rotors, friction, offsets, couplings; see `columns_of`.
+
+    Returns:
+        Function of q (nq, 1), v and a (m, 1), v_0, a_0, R_0; D (m, n) with `columns`.
+
+    Raises:
+        ModelError: as `columns_of`, or a column is no parameter of the system.
+    """
+    taken = chosen_columns(system, columns, choice)
+
+    def build(s: ModelSymbols) -> tuple[Named, Named]:
+        name, a = s.input("a")
+        a_tree, tree = s.tree_acceleration(a), system.tree
+        around = surroundings(system, moves=moving_base)
+        motions = link_accelerations(tree, s.poses, s.v_tree, a_tree, around.base)
+        joints = JointColumns.of(tree, s.poses, s.v_tree)
+        D = side_by_side(
+            taken,
+            inertial_regressor(tree, s.poses, motions),
+            lambda column: joints.effort(column, a_tree, motions, around.base),
+        )
+        return [(name, a), *around.inputs], [("D", s.reduced_effort(D))]
+
+    key = ("regressor", moving_base, coordinates)
+    return regressor_function(system, key, taken, build)
+
+
+def known_efforts(system: System, coordinates: str = "independent") -> Function:
+    """``known_efforts(q, v) -> tau``: what springs, stops and force elements ask of the joints.
+
+    It is what the efforts of `mbs.models.inverse_dynamics` have beside D K.
+
+    Args:
+        system: open or closed; q must close the loops.
+        coordinates: as for `regressor`.
+
+    Returns:
+        Function of q (nq, 1) and v (m, 1); tau (m, 1) [N m or N].
+    """
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        acting = element_efforts(system.tree, system.forces, s.poses, s.q, s.v_tree)
+        tau = s.reduced_effort(acting + spring_effort(system.tree, s.q))
+        return [("q", s.q), ("v" + s.suffix, s.v)], [("tau" + s.suffix, tau)]
+
+    check = posture_check(system, coordinates)
+    return model_function(system, ("known_efforts", coordinates), build, check)
+
+
+def regressor_function(
+    system: System,
+    key: tuple[str, bool, str],
+    columns: tuple[Column, ...],
+    build: Callable[[ModelSymbols], tuple[Named, Named]],
+) -> Regressor:
+    """The model with these columns, made the first time it is asked for.
+
+    Args:
+        system: whose model it is.
+        key: name of the Function, whether the base moves, and the coordinates, of a closed
+            system "independent" or "tree".
+        columns: of its outputs.
+        build: gives the inputs that follow q and v, and the outputs.
+    """
+    coordinates = key[-1]
+    check_coordinates(system, coordinates)
+
+    def both() -> tuple[Named, Named]:
+        s = symbols_of(system, coordinates)
+        inputs, outputs = build(s)
+        return [("q", s.q), ("v" + s.suffix, s.v), *inputs], outputs
+
+    def make() -> Regressor:
+        check = posture_check(system, coordinates)
+        model: Any = model_function(system, (*key, columns), both, check)
+        return Regressor(model, columns)
+
+    made: Regressor = system.cached(("with columns", *key, columns), make)
+    return made
+
+
+def side_by_side(
+    columns: tuple[Column, ...], blocks: list[SX], other: Callable[[Column], SX]
+) -> SX:
+    """The columns of a matrix: of inertial parameters from the blocks of the links."""
+    picked = (
+        blocks[column.link - 1][:, INERTIAL.index(column.kind)]
+        if column.kind in INERTIAL
+        else other(column)
+        for column in columns
+    )
+    return casadi.horzcat(*picked)
+
+
+# The energy identification model: one row, without accelerations.
+
+
+def energy_regressor(
+    system: System,
+    columns: Sequence[Column] | None = None,
+    *,
+    coordinates: str = "independent",
+    **choice: Unpack[ColumnChoice],
+) -> Regressor:
+    """``energy_regressor(q, v) -> h``: kinetic and potential energy as h K, the base at rest.
+
+    The work of the joint efforts over an interval is the change of h K and the integral of P K,
+    with P from `power_regressor`. Columns of friction and offsets are zero.
+
+    Source: Gautier & Khalil 1988; Khalil & Creusot 1997, eq. 47-52.
+
+    Args:
+        system: open or closed; q must close the loops.
+        columns: as for `regressor`.
+        coordinates: of a closed system, "independent" or "tree".
+        choice: rotors, friction, offsets, couplings; see `columns_of`.
+
+    Returns:
+        Function of q (nq, 1) and v (m, 1); h (1, n) with `columns`.
+
+    Raises:
+        ModelError: as `regressor`.
+    """
+    taken = chosen_columns(system, columns, choice)
+
+    def build(s: ModelSymbols) -> tuple[Named, Named]:
+        joints = JointColumns.of(system.tree, s.poses, s.v_tree)
+        blocks = inertial_energy(system.tree, s.poses, joints.velocities)
+        return [], [("h", side_by_side(taken, blocks, joints.energy))]
+
+    return regressor_function(system, ("energy_regressor", False, coordinates), taken, build)
+
+
+def power_regressor(
+    system: System,
+    columns: Sequence[Column] | None = None,
+    *,
+    coordinates: str = "independent",
+    **choice: Unpack[ColumnChoice],
+) -> Regressor:
+    """``power_regressor(q, v) -> P``: what friction and offsets take of the power of the efforts.
+
+    It has the columns of `energy_regressor`; those that store energy are zero. Integrate P over
+    an interval for the columns of friction of the energy model.
+
+    Args:
+        system: open or closed; q must close the loops.
+        columns: as for `regressor`.
+        coordinates: of a closed system, "independent" or "tree".
+        choice: rotors, friction, offsets, couplings; see `columns_of`.
+
+    Returns:
+        Function of q (nq, 1) and v (m, 1); P (1, n) with `columns`.
+
+    Raises:
+        ModelError: as `regressor`.
+    """
+    taken = chosen_columns(system, columns, choice)
+
+    def build(s: ModelSymbols) -> tuple[Named, Named]:
+        joints = JointColumns.of(system.tree, s.poses, s.v_tree)
+        blocks = [zeros(1, 10) for _ in system.tree.links]
+        return [], [("P", side_by_side(taken, blocks, joints.power))]
+
+    return regressor_function(system, ("power_regressor", False, coordinates), taken, build)
+
+
+# The filtered identification model, which needs no accelerations.
+
+
+def filtered_regressor(
+    system: System,
+    columns: Sequence[Column] | None = None,
+    *,
+    coordinates: str = "independent",
+    moving_base: bool = False,
+    **choice: Unpack[ColumnChoice],
+) -> Regressor:
+    """``filtered_regressor(q, v) -> D1, D2``: joint efforts as d(D1 K)/dt + D2 K.
+
+    D1 K is the derivative of the kinetic energy in v, D2 K that of U - E in the positions, with
+    friction and offsets; in independent coordinates D1 = G' D1_tree and
+    D2 = G' D2_tree - dG'/dt D1_tree. One filter over both sides makes the derivative its own. Of
+    a base that moves no acceleration is needed.
+
+    Source: Khalil & Restrepo 1996; Khalil & Creusot 1997, eq. 41-44.
+
+    Args:
+        system: open or closed; q must close the loops.
+        columns: as for `regressor`.
+        coordinates: of a closed system, "independent" or "tree".
+        moving_base: add the inputs v_0 and R_0 of `mbs.models.inverse_dynamics`.
+        choice: rotors, friction, offsets, couplings; see `columns_of`.
+
+    Returns:
+        Function of q (nq, 1), v (m, 1), v_0 and R_0; D1 and D2 (m, n) with `columns`.
+
+    Raises:
+        ModelError: as `regressor`.
+    """
+    taken = chosen_columns(system, columns, choice)
+
+    def build(s: ModelSymbols) -> tuple[Named, Named]:
+        tree, base, inputs = _surroundings(system, moving_base)
+        joints = JointColumns.of(tree, s.poses, s.v_tree, base)
+        momenta = momentum_regressor(tree, s.poses, joints.velocities)
+        rests = position_regressor(tree, s.poses, joints.velocities)
+        D1 = side_by_side(taken, momenta, joints.momentum)
+        D2 = s.reduced_effort(side_by_side(taken, rests, joints.rest))
+        if s.reduction is not None:
+            D2 = D2 - casadi.mtimes(_rate(system, s, s.reduction.G).T, D1)
+        return inputs, [("D1", s.reduced_effort(D1)), ("D2", D2)]
+
+    key = ("filtered_regressor", moving_base, coordinates)
+    return regressor_function(system, key, taken, build)
+
+
+def _surroundings(system: System, moves: bool) -> tuple[Tree, Velocity | None, Named]:
+    """The tree with gravity in the axes of its base, velocity of the base, and their inputs."""
+    if not moves:
+        return system.tree, None, []
+    v_0, R_0 = SX.sym("v_0", 6), SX.sym("R_0", 3, 3)
+    tree = Tree(system.tree.links, casadi.mtimes(R_0.T, system.tree.gravity))
+    return tree, Velocity(v_0[0:3], v_0[3:6]), [("v_0", v_0), ("R_0", R_0)]
+
+
+def _rate(system: System, s: ModelSymbols, G: SX) -> SX:
+    """The rate of a matrix of the positions."""
+    qdot = position_rate(system.tree, s.q, s.v_tree)
+    return casadi.reshape(casadi.jtimes(casadi.vec(G), s.q, qdot), *G.shape)

@@ -1,1 +1,0 @@
-"""Models that are linear in the dynamic parameters, and the parameters as named columns."""

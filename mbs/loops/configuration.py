@@ -1,0 +1,275 @@
+"""Postures that close the loops: followed from the assembled one, or searched for near a guess."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.assembly.tree import quaternion_slices
+from mbs.assembly.validity import plain_fault
+from mbs.errors import LoopError, ModelError, Unclosable
+from mbs.loops.closing import (
+    CLOSED,
+    OPEN,
+    Closed,
+    Closing,
+    Vector,
+    closure_parameters,
+    difference,
+    followed_posture,
+)
+from mbs.loops.function import fixed_positions, independent_names, posture_on
+from mbs.loops.velocity import closure_jacobian
+from mbs.solvers.least_squares import smallest_solution
+from mbs.solvers.rank import RELATIVE_GAP, null_space
+from mbs.text import quoted
+
+_RESTARTS = 60
+_SEED = 20260101
+_LARGEST_ANGLE = np.pi
+_GUESSES = 16
+_NEAR = 0.3
+"""Distance from a guess [rad or m] within which the first posture found is taken."""
+
+
+def solve(
+    system: System,
+    q_active: Mapping[str, float] | Sequence[float] | None = None,
+    *,
+    guess: Mapping[str, float] | None = None,
+    branch: str | Sequence[str] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Vector:
+    """A posture with the given positions that closes the loops.
+
+    Without a guess the assembled posture is moved along a straight line to the given positions,
+    in steps small enough to keep its branch. With a guess the posture next to it is looked for.
+    With a branch the loops are closed by closed forms (`mbs.loops.function`).
+
+    Args:
+        system: the assembled mechanism.
+        q_active: positions of the independent joints in the order of `system.free`, those left
+            out staying as in the assembled posture; or positions of any joints by name.
+        guess: approximate positions of other joints, which choose the branch.
+        branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names
+            stays as it was assembled. Positions are then those of independent joints.
+        parameters: values of symbols, the others at their defaults.
+
+    Returns:
+        q (nq,) [rad or m].
+
+    Raises:
+        Unclosable: no posture was found; the message says by how much the loops stay open, or
+            what can be reached on the branch.
+        NoClosedForm: a branch was named, but a loop is solved by iteration only.
+        ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
+    """
+    require_system(system)
+    if not isinstance(guess, Mapping | None):
+        raise ModelError(
+            f"{system.name}: guess is {quoted(guess)}; give a dict of coordinate names to values"
+        )
+    if branch is not None:
+        if guess:
+            raise ModelError(f"{system.name}: guess and branch both choose the branch; give one")
+        return posture_on(system, q_active, branch, parameters)
+    names = independent_names(system)
+    fixed = fixed_positions(system, q_active)
+    p = closure_parameters(system, parameters)
+    target = np.array(system.position({**(guess or {}), **fixed}))
+    if all(name in names for name in fixed):
+        fixed = {**dict.fromkeys(names, 0.0), **fixed}
+    held = tuple(k for k, c in enumerate(system.coordinates) if c.name in fixed)
+    if not system.is_closed:
+        return target
+    if guess:
+        named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
+        return _guessed_posture(Closing(system, p, held), target, named)
+    return followed_posture(system, target, held, p)
+
+
+def _guessed_posture(closing: Closing, start: Vector, named: list[int]) -> Vector:
+    """The posture whose named positions are nearest to those of `start`, (nq,).
+
+    Newton's method may land far from its start: unless it stays near, starts that differ in the
+    positions that nobody named are tried as well, and the nearest answer is taken.
+    """
+    rng = np.random.default_rng(_SEED)
+    others = [k for k in closing.free if k not in named]
+    found: list[tuple[float, Vector]] = []
+    for _ in range(_GUESSES):
+        trial = start.copy()
+        if found:
+            trial[others] += rng.uniform(-_LARGEST_ANGLE, _LARGEST_ANGLE, len(others))
+        closed = closing.nearest(trial)
+        if not closed.is_closed and found:
+            continue
+        q = _unwound(closing, closed.q, start) if closed.is_closed else None
+        q = closed_posture(closing, start) if q is None else q
+        far = float(np.max(np.abs(q[named] - start[named]), initial=0.0))
+        found.append((far, q))
+        if far < _NEAR:
+            break
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def _unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
+    """The posture with angles within half a turn of the start, where that closes the loops too."""
+    near: Vector = start + difference(closing.system, q, start)
+    for part in quaternion_slices(closing.system.tree):
+        near[part] = q[part]
+    near[list(closing.held)] = q[list(closing.held)]
+    return near if closing.openness(near) < CLOSED else q
+
+
+def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:
+    """The posture nearest to `start`, (nq,), that Gauss-Newton finds, with restarts further away.
+
+    Args:
+        closing: the rows, and the positions that must not change.
+        start: first guess.
+        restarts: how many other starts to try.
+
+    Raises:
+        Unclosable: none was found; the message says by how much the loops stay open.
+    """
+    best: Closed | None = None
+    for q in starts(start, closing.free, restarts):
+        found = closing.nearest(q)
+        if found.is_closed:
+            return found.q
+        if best is None or found.residual < best.residual:
+            best = found
+    assert best is not None
+    at = closing.held_positions(start)
+    raise Unclosable(
+        f"{closing.system.name}: the loop cannot be closed{' with ' + at if at else ''}; the best"
+        f" posture found leaves {closing.gap(best.q)}; change lengths or guesses"
+    )
+
+
+def starts(first: Vector, free: list[int], restarts: int = _RESTARTS) -> Iterator[Vector]:
+    """The guess, then guesses ever further away from it."""
+    rng = np.random.default_rng(_SEED)
+    yield first
+    for k in range(restarts):
+        reach = _LARGEST_ANGLE * min(1.0, (k + 2) / 8)
+        q = first.copy()
+        q[free] += rng.uniform(-reach, reach, len(free))
+        yield q
+
+
+def require_closed(
+    system: System, q: Vector, parameters: Mapping[str, float] | None = None
+) -> None:
+    """Refuse a posture that does not close the loops.
+
+    Raises:
+        LoopError: says how far it is open.
+    """
+    closing = Closing(system, closure_parameters(system, parameters))
+    if closing.openness(q) > OPEN:
+        worst = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
+        raise LoopError(
+            f"{system.name}: the posture leaves the loops open by {worst:.3g};"
+            " use mbs.loops.solve to get one that closes them"
+        )
+
+
+# The start of a motion: positions that close the loops, and velocities that keep them closed.
+
+
+_REFINEMENTS = 3
+"""Solutions added up: the second takes the error of the first away, the third shows no change."""
+
+Values = Mapping[str, float] | Sequence[float] | None
+
+
+def start(
+    system: System, q0: Values, v0: Values, parameters: Mapping[str, float] | None
+) -> tuple[Vector, Vector]:
+    """Positions (nq,) that close the loops and velocities (nv,) that fit them.
+
+    Args:
+        system: open or closed.
+        q0: positions by coordinate name [rad or m], the others as in the assembled posture; in a
+            closed system the loops are closed with the independent ones as given.
+        v0: velocities by name [rad/s or m/s], the others zero; in a closed system they may be of
+            any joints, and the others follow.
+        parameters: values of symbols, the others at their defaults.
+
+    Raises:
+        Unclosable: the loops cannot be closed at these positions.
+        LoopError: q0 holds all positions and leaves the loops open.
+        ModelError: a name is unknown, a quaternion is not of unit length, or the loops allow no
+            motion with these velocities.
+    """
+    q = np.array(system.position(q0))
+    if fault := plain_fault(system, q, None):
+        raise ModelError(f"{system.name}: {fault}")
+    if not system.is_closed:
+        return q, np.array(system.velocity(v0))
+    if isinstance(q0, Mapping) or q0 is None:
+        q = solve(system, dict(q0 or {}), parameters=parameters)
+    else:
+        require_closed(system, q, parameters)
+    return q, _tree_velocity(system, q, v0, parameters)
+
+
+def _tree_velocity(
+    system: System, q: Vector, v0: Values, parameters: Mapping[str, float] | None
+) -> Vector:
+    """The smallest velocities that keep the loops closed and give the joints named in v0 theirs.
+
+    Raises:
+        ModelError: no motion of the loops has these velocities.
+    """
+    p = [system.parameter_values(parameters)] if system.parameters else []
+    v, missed = smallest_velocity(system, np.array(closure_jacobian(system)(q, *p)), v0)
+    if missed:
+        raise ModelError(
+            f"{system.name}: the loops allow no motion with the velocities {missed};"
+            " give those of independent joints: "
+            + ", ".join(system.speeds[k].name for k in system.active)
+        )
+    return v
+
+
+def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, str]:
+    """The smallest velocities with J v = 0 that give the joints named in v0 theirs.
+
+    Args:
+        system: any.
+        J: (m, nv) rows, dependent ones included.
+        v0: velocities by name [rad/s or m/s], or all of them.
+
+    Returns:
+        v (nv,); the velocities of v0 as text where no v has them, else an empty one.
+    """
+    free = null_space(J)
+    wanted = np.array(system.velocity(v0))
+    names = [speed.name for speed in system.speeds]
+    named = v0 is None or isinstance(v0, Mapping)
+    rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
+    v: Vector = free @ np.linalg.lstsq(free[rows], wanted[rows], rcond=None)[0]
+    # what does not fit differs by about its own size, what fits by rounding
+    fits = np.allclose(v[rows], wanted[rows], rtol=1e-6, atol=1e-9)
+    if not fits:
+        return v, ", ".join(f"{names[k]} = {wanted[k]:g}" for k in rows)
+    return _refined(J, rows, wanted[rows]), ""
+
+
+def _refined(J: Vector, rows: list[int], wanted: Vector) -> Vector:
+    """The smallest v (nv,) with J v = 0 and v[rows] = wanted, where there is one, to the last bit.
+
+    A basis of what J leaves free carries 1e-14 of noise, which differs from processor to processor.
+    """
+    K = np.vstack([J, np.eye(J.shape[1])[rows]])
+    goal = np.concatenate([np.zeros(len(J)), wanted])
+    v = np.zeros(J.shape[1])
+    for _ in range(_REFINEMENTS):
+        v += smallest_solution(K, goal - np.sum(K * v, axis=1), RELATIVE_GAP)
+    return v

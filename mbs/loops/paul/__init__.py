@@ -1,5 +1,0 @@
-"""Paul's method: a loop is split in every way, and its simplest equations are solved first."""
-
-from mbs.loops.paul.search import paul
-
-__all__ = ["paul"]

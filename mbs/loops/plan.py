@@ -1,0 +1,627 @@
+"""Loops solved joint by joint without iteration: one kernel a file, chosen by the geometry.
+
+places          where the positions stand of joints, of cut joints and of rods that spin
+trigonometry    sine and cosine of an angle from its equation
+ring            a loop as its unknown joints and the poses between them
+root            what a kernel finds: the ways to close a loop
+survey          what holds of a loop at random positions, from which its class is read
+centre          the points that balls and meeting axes turn about
+distance, aim, spin, ball                               kernels: links between such points
+planar, three_turns, parallelogram, one_slide, two_slides, normal, confined    in a plane
+orientation, sphere, slides                             turns first, then slides
+bennett, trilateration, coupling                        special measures, shared slides, gears
+split, closed_samples    whatever is left, by Paul's method, and numbers at which a loop closes
+free_body       a body whose pose is known
+dispatch        the kernel for a loop
+stage           one step of a plan, and which of its ways lead to a posture
+plan            the loops of a system in the order in which they can be solved
+verified        a plan held against postures
+known           joints that may be known together
+posed           the plan for a frame whose pose is known
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.graph import Edge
+from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.model_function import require_system
+from mbs.assembly.tables import CoordinateCoupling
+from mbs.closed_forms.kernels import closed_form
+from mbs.closed_forms.ring import (
+    Ring,
+    constants,
+    extent,
+    free_pose,
+    independent_places,
+    loop_links,
+    ring_of,
+    spin_places,
+)
+from mbs.closed_forms.roots import Root
+from mbs.closed_forms.spatial import (
+    Span,
+    coupled,
+    held_point,
+    independent_links,
+    slid_places,
+    spans,
+    unit_quaternion,
+)
+from mbs.components import Fixed, PointOnLine, Rod
+from mbs.components.constraints import Constraint
+from mbs.errors import NoClosedForm
+from mbs.loops.closing import OPEN, Closing, Vector, closure_parameters, difference
+from mbs.recursions.route import relative_pose
+from mbs.solvers.rank import null_space, rank
+from mbs.spatial import Pose
+
+# One step of a plan, and which of its ways lead to a posture.
+
+
+_NEAR = 1e-5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """One loop, or one coupling, solved for some of its unknown positions.
+
+    Attributes:
+        name: of the cut joint or of the coupling.
+        places: numbers in q of what it gives; beyond the end of q those of cut joints.
+        labels: of the ways to close it; one empty label where there is a single way.
+        values: Function of q with the positions of cut joints, of which known ones are used, and
+            p; one row a place, one column a way.
+        spun: place of the spin on which these depend, and Function of the same arguments that
+            gives it where the quaternion is known; None where there is none.
+        chosen: number of the way in which the system was assembled.
+    """
+
+    name: str
+    places: tuple[int, ...]
+    labels: tuple[str, ...]
+    values: Function
+    spun: tuple[int, Function] | None = None
+    chosen: int = 0
+
+
+def ways_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tuple[int, ...]:
+    """The ways of all stages that lead to the closed posture q; as far as they do.
+
+    What a stage gives of cut joints is not in q: whether it fits is seen in later stages.
+    """
+    return ways_from(system, stages, started_at(system, q), q, p)
+
+
+def started_at(system: System, q: Vector, known: Collection[int] | None = None) -> Vector:
+    """All positions, the known ones as in the posture q and the others zero.
+
+    Args:
+        system: whose positions they are.
+        q: (nq,) the posture.
+        known: their places, those of the independent joints when left out.
+    """
+    start = np.zeros(extent(system))
+    given = independent_places(system) if known is None else known
+    places = [k for k in given if k < system.nq]
+    start[places] = q[places]
+    return start
+
+
+def ways_from(
+    system: System, stages: Sequence[Stage], start: Vector, q: Vector, p: Vector
+) -> tuple[int, ...]:
+    """The ways of all stages that lead to the closed posture q; as far as they do.
+
+    Args:
+        system: whose loops they are.
+        stages: in their order.
+        start: all positions, the known ones as in q; spins are written into it.
+        q: (nq,) the posture.
+        p: (np,) parameters.
+    """
+    if not stages:
+        return ()
+    stage, longest = stages[0], tuple[int, ...]()
+    if stage.spun:
+        place, angle = stage.spun
+        start[place] = float(angle(np.concatenate([q, start[system.nq :]]), p))
+    values = np.array(stage.values(start, p))
+    for way in range(len(stage.labels)):
+        reached = start.copy()
+        reached[list(stage.places)] = values[:, way]
+        if _agree(system, stage.places, reached, q):
+            ways = (way, *ways_from(system, stages[1:], reached, q, p))
+            longest = max(longest, ways, key=len)
+            if len(longest) == len(stages):
+                break
+    return longest
+
+
+def every_posture(
+    stages: Sequence[Stage], q: Vector, p: Vector, branch: tuple[str, ...] = ()
+) -> Iterator[tuple[Vector, tuple[str, ...]]]:
+    """All positions and the labels of the branch, one loop after the other; NaN ends a branch.
+
+    Args:
+        stages: in their order.
+        q: all positions, of which the known ones count.
+        p: (np,) parameters.
+        branch: labels so far.
+    """
+    if not stages:
+        yield q, branch
+        return
+    stage, rest = stages[0], stages[1:]
+    values = np.array(stage.values(q, p))
+    for way, label in enumerate(stage.labels):
+        if np.all(np.isfinite(values[:, way])):
+            longer = q.copy()
+            longer[list(stage.places)] = values[:, way]
+            yield from every_posture(rest, longer, p, branch + ((label,) if label else ()))
+
+
+def _agree(system: System, places: Sequence[int], reached: Vector, q: Vector) -> bool:
+    """Whether the positions of the tree are those of q, up to whole turns and signs."""
+    gap = difference(system, reached[: system.nq], q)
+    return bool(np.all(np.abs(gap[[k for k in places if k < system.nq]]) < _NEAR))
+
+
+# A plan held against postures: it must give them back, and none of its ways may leave loops open.
+#
+# Kernels use what must hold where a loop closes. In loops that move by their special measures
+# alone that may not be enough: such a plan is refused, and a way that never closes is left out.
+
+
+_SEED = 20260104
+_MOVE = 0.2
+_TRIES = 8
+_CHECKS = 3
+
+
+Start = Callable[[Vector], Vector]
+"""All positions from a posture (nq,), of which the known ones count."""
+
+
+def verified(
+    system: System, stages: Sequence[Stage], started: Start | None = None
+) -> tuple[Stage, ...]:
+    """The stages with the ways of the assembled posture, seen to hold at others as well.
+
+    Args:
+        system: whose loops they are.
+        stages: in their order.
+        started: where the stages start from; from the independent joints when left out.
+
+    Raises:
+        NoClosedForm: a loop does not close so.
+    """
+    start = started or (lambda posture: started_at(system, posture))
+    p = closure_parameters(system)
+    posture = np.array(system.posture)
+    nearby = Closing(system, p).nearby(posture, _MOVE, _TRIES, _SEED)
+    postures = [posture, *islice(nearby, _CHECKS)]
+    ways = [ways_from(system, stages, start(q), q, p) for q in postures]
+    shortest = min(ways, key=len)
+    if len(shortest) < len(stages):
+        raise NoClosedForm(
+            f"{system.name}: the loop of {stages[len(shortest)].name} does not close as the"
+            " directions of its axes suggest; use mbs.loops.solve without branch"
+        )
+    chosen = [replace(stage, chosen=way) for stage, way in zip(stages, ways[0], strict=True)]
+    starts = [start(q) for q in postures]
+    return tuple(_without_open_ways(system, chosen, starts, p))
+
+
+def _without_open_ways(
+    system: System, stages: Sequence[Stage], starts: Sequence[Vector], p: Vector
+) -> list[Stage]:
+    result = list[Stage]()
+    for number, stage in enumerate(stages):
+        kept = [
+            way
+            for way in range(len(stage.labels))
+            if way == stage.chosen
+            or any(_may_close(system, stages, number, way, start, p) for start in starts)
+        ]
+        result.append(stage if len(kept) == len(stage.labels) else _only(stage, kept))
+    return result
+
+
+def _may_close(
+    system: System, stages: Sequence[Stage], number: int, way: int, start: Vector, p: Vector
+) -> bool:
+    """Whether another way of one stage closes the loops or leads nowhere, the others as chosen."""
+    reached = start.copy()
+    for k, stage in enumerate(stages):
+        values = np.array(stage.values(reached, p))
+        reached[list(stage.places)] = values[:, way if k == number else stage.chosen]
+    if not np.all(np.isfinite(reached)):
+        return True
+    return Closing(system, p).openness(reached[: system.nq]) < OPEN
+
+
+def _only(stage: Stage, kept: Sequence[int]) -> Stage:
+    """The stage with these ways alone."""
+    q, p = (casadi.SX.sym(name, stage.values.size1_in(k)) for k, name in enumerate("qp"))
+    values = Function("ways", [q, p], [stage.values(q, p)[:, list(kept)]])
+    labels = tuple(stage.labels[way] for way in kept)
+    return replace(stage, labels=labels, values=values, chosen=kept.index(stage.chosen))
+
+
+# The loops of a system in the order in which they can be solved, and how each of them closes.
+#
+# A loop that shares unknown joints with others waits until these have been solved: their
+# positions are known then.
+
+
+def plan(system: System) -> tuple[Stage, ...]:
+    """The loops and couplings of a system in an order in which each follows from those before.
+
+    Raises:
+        NoClosedForm: says which loop has none, and why.
+        ModelError: `system` is not a System.
+    """
+    require_system(system)
+
+    def build() -> tuple[Stage, ...]:
+        return plan_from(system, independent_places(system)) if system.closure else ()
+
+    stages: tuple[Stage, ...] = system.cached("closed form", build)
+    return stages
+
+
+def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
+    """The loops and couplings in an order in which each follows from what is known.
+
+    Args:
+        system: the assembled mechanism, with loops.
+        known: places of the positions that are known.
+
+    Raises:
+        NoClosedForm: says which loop has none, and why.
+    """
+
+    def build() -> tuple[Stage, ...]:
+        q = SX.sym("q", extent(system))
+        stages = ordered(system, known, q)
+        return verified(system, stages, lambda posture: started_at(system, posture, known))
+
+    stages: tuple[Stage, ...] = system.cached(("closed form from", *sorted(known)), build)
+    return stages
+
+
+@dataclass(slots=True)
+class _Work:
+    """What is solved so far.
+
+    Attributes:
+        system: whose loops they are.
+        q: symbols of all positions.
+        values: the same, with numbers for positions that turned out not to change.
+        known: places of what is known.
+        stages: in their order.
+    """
+
+    system: System
+    q: SX
+    values: SX
+    known: set[int]
+    stages: list[Stage] = field(default_factory=list)
+
+    def take(self, stage: Stage) -> None:
+        """Count what a stage gives as known."""
+        self.stages.append(stage)
+        self.known |= set(stage.places)
+        if len(stage.labels) == 1:
+            p = self.system.p
+            found = constants(stage.values(self.q, p), self.q, p)
+            for place, number in zip(stage.places, found, strict=True):
+                if number is not None:
+                    self.values[place] = number
+
+    def ring(self, number: int) -> Ring:
+        """The loop of a cut joint."""
+        return ring_of(self.system, number, self.known, self.values)
+
+
+def ordered(system: System, known: Collection[int], q: SX) -> list[Stage]:
+    """The stages in their order, not yet held against postures.
+
+    Args:
+        system: whose loops they are.
+        known: places of the positions that are known.
+        q: symbols of all positions.
+
+    Raises:
+        NoClosedForm: a loop cannot be solved, or no loop gives a position.
+    """
+    work = _Work(system, q, SX(q), set(known))
+    pending = list(range(len(system.cuts) + len(system.couplings)))
+    reasons = dict[int, str]()
+    while pending:
+        before, waiting = len(work.stages), list[int]()
+        for number in pending:
+            outcome = _attempt(work, number)
+            while isinstance(outcome, Stage):
+                work.take(outcome)
+                outcome = _attempt(work, number)
+            if outcome is not None:
+                waiting.append(number)
+                reasons[number] = outcome
+        if waiting and len(work.stages) == before:
+            held = _held(work, waiting)
+            if held is None:
+                raise NoClosedForm(_refusal(system, waiting, reasons))
+            work.take(held)
+        pending = waiting
+    _require_all(system, work.known)
+    return work.stages
+
+
+def _attempt(work: _Work, number: int) -> Stage | str | None:
+    """A loop, or a coupling, solved with what is known; why not; None where nothing is unknown."""
+    system = work.system
+    if number >= len(system.cuts):
+        return _coupling_stage(work, system.couplings[number - len(system.cuts)])
+    cut = system.cuts[number]
+    back, out = loop_links(system, cut)
+    if all(system.tree.links[k].q.start in work.known for k in (*back, *out)):
+        return None
+    joint = cut.edge.joint
+    if _is_bound(system, number):
+        return f"a {type(joint).__name__} closes it"
+    root = closed_form(work.ring(number), work.q, system.p)
+    return root if isinstance(root, str) else _stage(work, joint.name, root)
+
+
+def _held(work: _Work, waiting: Sequence[int]) -> Stage | None:
+    """Slides that several loops share and the rigid links in these hold, if there are such."""
+    system, groups = work.system, dict[frozenset[int], dict[int, Span]]()
+    for number in waiting:
+        if number < len(system.cuts) and not _is_bound(system, number):
+            for span in spans(work.ring(number), work.q, system.p):
+                places = slid_places(span)
+                if places:
+                    groups.setdefault(places, {}).setdefault(number, span)
+    for found in groups.values():
+        numbers = independent_links(found, work.q, system.p)
+        if numbers:
+            name = system.cuts[numbers[-1]].edge.joint.name
+            return _stage(work, name, held_point(name, [found[k] for k in numbers]))
+    return None
+
+
+def _is_bound(system: System, number: int) -> bool:
+    """Whether a loop is closed by what is not made of turns, slides and balls."""
+    joint = system.cuts[number].edge.joint
+    return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
+
+
+def _coupling_stage(work: _Work, coupling: CoordinateCoupling) -> Stage | str | None:
+    if {coupling.driven, coupling.driver} <= work.known:
+        return None
+    root = coupled(coupling, work.known, work.q)
+    return root if isinstance(root, str) else _stage(work, coupling.name, root)
+
+
+def _stage(work: _Work, name: str, root: Root) -> Stage:
+    arguments, ways = [work.q, work.system.p], list(root.ways.values())
+    places = tuple(sorted(ways[0]))
+    columns = [casadi.vertcat(*(way[place] for place in places)) for way in ways]
+    values = Function("ways", arguments, [casadi.densify(casadi.horzcat(*columns))])
+    if root.spun is None:
+        return Stage(name, places, tuple(root.ways), values)
+    angle = Function("spin", arguments, [root.spun.angle])
+    return Stage(name, places, tuple(root.ways), values, (root.spun.place, angle))
+
+
+def _refusal(system: System, waiting: Sequence[int], reasons: dict[int, str]) -> str:
+    names = [cut.edge.joint.name for cut in system.cuts]
+    names += [coupling.name for coupling in system.couplings]
+    first = waiting[0]
+    return (
+        f"{system.name}: the loop of {names[first]} has no closed form known here,"
+        f" {reasons[first]}; use mbs.loops.solve without branch"
+    )
+
+
+def _require_all(system: System, known: set[int]) -> None:
+    for k, coordinate in enumerate(system.coordinates):
+        if k not in known:
+            raise NoClosedForm(
+                f"{system.name}: no loop gives {coordinate.name}; use mbs.loops.solve without"
+                " branch"
+            )
+
+
+# Joints whose positions may be known together, and those that complete them.
+
+
+_LOOSE = 1e-6
+_REACH, _KNOWN_TRIES, _KNOWN_SEED = 0.2, 8, 20260106
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """Positions from which all others follow.
+
+    Attributes:
+        independent: those of the given joints that do not depend on each other.
+        dependent: the others of them.
+        held: independent joints that nothing given determines.
+    """
+
+    independent: tuple[int, ...]
+    dependent: tuple[int, ...] = ()
+    held: tuple[int, ...] = ()
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """What is known of q at the start."""
+        return self.independent + self.held
+
+
+def completed(system: System, given: Sequence[int]) -> Known:
+    """The given joints, and independent joints that the loops leave free beside them.
+
+    Args:
+        system: the assembled mechanism.
+        given: numbers in q of turns and slides.
+
+    Raises:
+        NoClosedForm: balls or free bodies beside them move in some of their ways only.
+    """
+    free = null_space(Closing(system, closure_parameters(system)).rows(regular_posture(system))[1])
+    independent = _raising(free, given, ())
+    dependent = tuple(k for k in given if k not in independent)
+    return Known(independent, dependent, held_beside(system, free, independent))
+
+
+def held_beside(system: System, free: Vector, first: tuple[int, ...]) -> tuple[int, ...]:
+    """Joints that determine the rest of a motion: motors, other turns and slides, then balls.
+
+    Args:
+        system: the assembled mechanism.
+        free: (nq, m) directions in which the positions can move.
+        first: numbers in q of what is known, independent.
+
+    Raises:
+        NoClosedForm: balls or free bodies move in some of their ways only.
+    """
+    simple = [link for link in system.tree.links if link.motion.nq == 1]
+    motors = [link.q.start for link in simple if link.v.start in system.free]
+    others = [link.q.start for link in simple if link.q.start not in motors]
+    held = _raising(free, [*motors, *others], first)
+    left = free.shape[1] - len(first) - len(held) - len(spin_places(system))
+    loose = [link for link in system.tree.links if link.motion.nq > 1]
+    for link in loose:
+        places = tuple(range(link.q.start, link.q.stop))
+        if _gain(free, (*first, *held), places) == link.motion.nv:
+            held, left = (*held, *places), left - link.motion.nv
+    if left > 0:
+        names = ", ".join(link.name for link in loose)
+        raise NoClosedForm(
+            f"{system.name}: {names or 'a joint'} can move while all turns and slides stay, in a"
+            " way that no position tells; use mbs.loops.working_modes"
+        )
+    return held
+
+
+def _gain(free: Vector, taken: tuple[int, ...], places: tuple[int, ...]) -> int:
+    """How many more directions the positions tell."""
+    return rank(free[[*taken, *places]], _LOOSE) - (rank(free[list(taken)], _LOOSE) if taken else 0)
+
+
+def regular_posture(system: System) -> Vector:
+    """A closed posture near the assembled one, where nothing is aligned by accident."""
+    posture = np.array(system.posture)
+    closing = Closing(system, closure_parameters(system))
+    return next(closing.nearby(posture, _REACH, _KNOWN_TRIES, _KNOWN_SEED), posture)
+
+
+def _raising(free: Vector, candidates: Sequence[int], first: tuple[int, ...]) -> tuple[int, ...]:
+    """Of the candidates, in their order, those that are independent of what is there already."""
+    taken = list(first)
+    for k in candidates:
+        if k not in taken and _gain(free, tuple(taken), (k,)):
+            taken.append(k)
+    return tuple(taken[len(first) :])
+
+
+# The loops of a system solved where the pose of one frame is known.
+#
+# From the base through the tree to the frame, and back by its pose, leads one more loop.
+
+
+_POSE = 7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Posed:
+    """A plan that starts from the pose of a frame.
+
+    Attributes:
+        stages: in their order.
+        size: how many positions there are, seven of the pose at their end.
+        held: numbers in q of independent joints that the pose does not determine.
+    """
+
+    stages: tuple[Stage, ...]
+    size: int
+    held: tuple[int, ...]
+
+    def started(self, T: Vector, q: Vector) -> Vector:
+        """All positions, with those of the pose T (4, 4) and, as in q (nq,), those held."""
+        start = np.zeros(self.size)
+        start[list(self.held)] = q[list(self.held)]
+        start[-_POSE:-4] = T[:3, 3]
+        start[-4:] = _quaternion(T[:3, :3])
+        return start
+
+
+def plan_to(system: System, frame: str | int) -> Posed:
+    """The plan for a frame whose pose is known.
+
+    Args:
+        system: the assembled mechanism, with loops.
+        frame: a body, a named frame, or the number of a link.
+
+    Raises:
+        NoClosedForm: says which loop has none, and why.
+        ModelError: there is no such frame.
+    """
+    made: Posed = system.cached(("closed form to", frame), lambda: _plan_to(system, frame))
+    return made
+
+
+def _plan_to(system: System, frame: str | int) -> Posed:
+    number, pose = system.frame(frame)
+    welded = replace(system, cuts=(*system.cuts, _weld(number, pose, Pose.identity())), _cache={})
+    first = extent(welded)
+    q = SX.sym("q", first + _POSE)
+    goal = system.frame("base")[1] @ free_pose(q[first:])
+    cuts = (*system.cuts, _weld(number, pose, goal))
+    welded = replace(system, cuts=cuts, _cache={})
+    at = _pose_and_slope(system, frame)
+    p = closure_parameters(system)
+    held = _posed_locked(system, at, p)
+    known = {*held, *spin_places(welded).values(), *range(first, first + _POSE)}
+    plan = Posed(tuple(ordered(welded, known, q)), first + _POSE, held)
+
+    def started(posture: Vector) -> Vector:
+        return plan.started(np.array(at(posture, p)[0]), posture)
+
+    return replace(plan, stages=verified(system, plan.stages, started))
+
+
+def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
+    joint = Edge(Fixed("pose"), 0, 0, Pose.identity(), Pose.identity(), None)
+    return Cut(joint, -1, link, goal, pose, True)
+
+
+def _posed_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
+    """Independent joints that move while the frame stays."""
+    q = regular_posture(system)
+    rows = np.vstack([Closing(system, p).rows(q)[1], np.array(at(q, p)[1])])
+    return held_beside(system, null_space(rows), ())
+
+
+def _pose_and_slope(system: System, frame: str | int) -> Function:
+    q = SX.sym("q", system.nq)
+    T = relative_pose(system.tree, q, system.frame("base"), system.frame(frame)).matrix
+    slope = casadi.jacobian(casadi.vec(T), q)
+    return Function("pose", [q, system.p], [casadi.densify(T), casadi.densify(slope)])
+
+
+def _quaternion(R: Vector) -> Vector:
+    matrix = SX.sym("R", 3, 3)
+    return np.array(Function("quaternion", [matrix], [unit_quaternion(matrix)])(DM(R))).ravel()

@@ -1,0 +1,394 @@
+"""From postures to answers: distinct roots, self-motions, branches, limits, reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.closed_forms.arm import Arm, Array
+from mbs.models.inverse_geometry.chain import Chain
+from mbs.models.inverse_geometry.gathering import Gathered
+from mbs.models.inverse_geometry.search import Nearest, nearest
+from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
+from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes, unreachable
+from mbs.models.inverse_geometry.target import SINGULAR, Target, distinct, multiplicity, reduction
+from mbs.models.inverse_geometry.whole_robot import ClosedPosture, close, why_searched
+
+# Names of the branches of an arm with a spherical wrist: shoulder, elbow, wrist.
+#
+# Source: Lee & Ziegler 1984, definitions of the arm, elbow and wrist indicators.
+
+
+_PARALLEL = 1e-9
+_UNDECIDED = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Anatomy:
+    """Which branches of an arm have a name.
+
+    Attributes:
+        shoulder: axes 1 and 2 are at right angles, so that the wrist centre is before or behind
+            the shoulder.
+        elbow: axes 2 and 3 are parallel, so that the elbow is above or below the line from the
+            shoulder to the wrist centre.
+        wrist: axes 4, 5 and 6 meet.
+    """
+
+    shoulder: bool
+    elbow: bool
+    wrist: bool
+
+
+def anatomy(arm: Arm) -> Anatomy:
+    """What an arm has of shoulder, elbow and wrist."""
+    if arm.size != 6 or any(arm.prismatic[3:]) or not _wrist_meets(arm):
+        return Anatomy(False, False, False)
+    axes, origins = arm.lines(np.zeros(6))
+    shoulder = not any(arm.prismatic[:2]) and abs(axes[0] @ axes[1]) < _PARALLEL
+    parallel = np.linalg.norm(np.cross(axes[1], axes[2])) < _PARALLEL
+    apart = np.linalg.norm(np.cross(axes[1], origins[2] - origins[1])) > _PARALLEL * arm.length
+    elbow = shoulder and not arm.prismatic[2] and bool(parallel and apart)
+    return Anatomy(bool(shoulder), elbow, True)
+
+
+def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
+    """The names of postures' branches, such as "shoulder right, elbow up, no flip".
+
+    A name is left out where the posture stands between two branches; an arm without a spherical
+    wrist has none.
+
+    Args:
+        arm: its joints.
+        has: what it has of shoulder, elbow and wrist.
+        q: (m, n) postures [rad or m].
+    """
+    if not has.wrist:
+        return [""] * len(q)
+    axes, points = arm.lines(q)
+    a, p = np.moveaxis(axes, 1, 0), np.moveaxis(points, 1, 0)
+    reach = _meeting(a[4], p[4], a[5], p[5]) - p[1]
+    right = _dot(a[0], np.cross(a[1], reach)) / arm.length
+    bend = _dot(a[1], np.cross(reach, p[2] - p[1])) / arm.length**2
+    turn = _dot(np.cross(a[3], a[5]), a[4])
+    return [_label(has, *three) for three in zip(right, bend, turn, strict=True)]
+
+
+def _label(has: Anatomy, right: float, bend: float, turn: float) -> str:
+    names = []
+    if has.shoulder and abs(right) > _UNDECIDED:
+        names.append("shoulder right" if right > 0 else "shoulder left")
+    if has.elbow:
+        names.append(_elbow(bend, right))
+    if abs(turn) > _UNDECIDED:
+        names.append("no flip" if turn > 0 else "flip")
+    return ", ".join(name for name in names if name)
+
+
+def _elbow(bend: float, right: float) -> str:
+    if abs(bend) <= _UNDECIDED:
+        return "elbow straight"
+    if abs(right) <= _UNDECIDED:
+        return ""
+    return "elbow up" if bend * right > 0 else "elbow down"
+
+
+def _wrist_meets(arm: Arm) -> bool:
+    """Whether axes 4, 5, 6 meet in one point; they do so in every posture if in two."""
+    return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
+
+
+def _meet(arm: Arm, q: Array) -> bool:
+    axes, points = arm.lines(q)
+    if min(np.linalg.norm(np.cross(axes[k], axes[k + 1])) for k in (3, 4)) < _PARALLEL:
+        return False
+    centre = _meeting(axes[4], points[4], axes[5], points[5])
+    away = [np.linalg.norm(np.cross(axes[k], centre - points[k])) for k in (3, 4, 5)]
+    return bool(max(away) < _PARALLEL * arm.length)
+
+
+def _meeting(a: Array, p: Array, b: Array, r: Array) -> Array:
+    """The point of the line (p, a) nearest the line (r, b), (..., 3)."""
+    n = np.cross(a, b)
+    s = _dot(np.cross(r - p, b), n) / _dot(n, n)
+    return np.asarray(p + s[..., None] * a, dtype=float)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.sum(a * b, axis=-1), dtype=float)
+
+
+# The distinct solutions of a pose, how often each counts, and the self-motions among them.
+
+
+_REFINEMENTS, _SETTLED, _EXACT = 8, 1e-7, 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChainRoot:
+    """A solution of the chain.
+
+    Attributes:
+        q: (n,) posture [rad or m].
+        label: of the branch it comes from, "" where it comes from none.
+        multiplicity: how many roots meet in it, 0 on a self-motion.
+        family: the self-motion that it stands for.
+    """
+
+    q: Array
+    label: str
+    multiplicity: int
+    family: Family | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChainPlace:
+    """Where a chain stands in its system.
+
+    Attributes:
+        places: numbers of its joints in q.
+        whole: the posture (nq,) of the system for one of the chain, (n,); NaN where there is none.
+    """
+
+    places: tuple[int, ...]
+    whole: Callable[[Array], Array]
+
+
+def roots(target: Target, gathered: Gathered, place: ChainPlace) -> list[ChainRoot]:
+    """The distinct solutions, in the order in which they were gathered.
+
+    Args:
+        target: the pose that is wanted.
+        gathered: solutions, some of them more than once.
+        place: of the chain in the system.
+    """
+    found = _merged(target, gathered)
+    singular = [int(k) for k in np.flatnonzero(_singular(target, found))]
+    unsettled = list[int]()
+    dropped = set[int]()
+    for k in singular:
+        if k in dropped:
+            continue
+        found[k], settled = _examined(target, found[k], place)
+        if not settled:
+            unsettled.append(k)
+        dropped |= _on(target, found, k, [m for m in singular if m > k])
+    alone = [k for k in singular if k not in unsettled and found[k].family is None]
+    for k in unsettled:
+        if k in dropped:
+            continue
+        nearly = _nearly_moving(target, found[k], place)
+        if nearly is None:
+            continue
+        found[k] = nearly
+        if _on(target, found, k, [m for m in alone if m not in dropped]):
+            dropped.add(k)
+        dropped |= _on(target, found, k, [m for m in unsettled if m != k])
+    return _merged_again(target, [root for k, root in enumerate(found) if k not in dropped])
+
+
+def _merged(target: Target, gathered: Gathered) -> list[ChainRoot]:
+    residual = target.residual(gathered.q) if len(gathered.q) else np.zeros(0)
+    found = []
+    for group in distinct(target, gathered.q):
+        best = min(group, key=lambda k: float(residual[k]))
+        label = next((gathered.labels[k] for k in group if gathered.labels[k]), "")
+        found.append(ChainRoot(gathered.q[best], label, 1))
+    return found
+
+
+def _singular(target: Target, found: list[ChainRoot]) -> NDArray[np.bool_]:
+    """Whether the Jacobian of each loses rank."""
+    q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
+    return np.asarray(target.singular_values(q)[:, -1] < SINGULAR)
+
+
+def _examined(target: Target, root: ChainRoot, place: ChainPlace) -> tuple[ChainRoot, bool]:
+    """With its multiplicity or its self-motion, and whether that is certain."""
+    dimension, direction = freedoms(reduction(target, root.q))
+    found = curve(target, root.q, direction, dimension) if dimension else None
+    if found is None:
+        return _isolated(target, root)
+    of = family(target, found, dimension, place.places, place.whole)
+    return replace(root, multiplicity=0, family=of), True
+
+
+def _nearly_moving(target: Target, root: ChainRoot, place: ChainPlace) -> ChainRoot | None:
+    """With the self-motion along which the pose is held within the tolerance of solutions.
+
+    It is one of rounding: no posture on it can be told to be better than the others.
+    """
+    dimension, direction = freedoms(reduction(target, root.q))
+    found = curve(target, root.q, direction, dimension, 1.0) if dimension else None
+    if found is None:
+        return None
+    of = family(target, found, dimension, place.places, place.whole)
+    return replace(root, multiplicity=0, family=of)
+
+
+def _isolated(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
+    """With its multiplicity, moved to where its roots meet, and whether it stays there."""
+    q, count = root.q, 1
+    for _ in range(_REFINEMENTS):
+        count, better = multiplicity(reduction(target, q))
+        moved = float(np.max(np.abs(target.wrapped((better - q) / target.unit))))
+        q = better
+        if moved < _SETTLED:
+            exact = count > 1 or float(target.residual(q)) < _EXACT * target.tolerance
+            return replace(root, q=q, multiplicity=count), exact
+    return replace(root, q=q, multiplicity=count), False
+
+
+def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> set[int]:
+    """Which of the others are postures of the self-motion of root k, if it has one."""
+    of = found[k].family
+    if of is None or not others:
+        return set()
+    q = np.array([found[m].q for m in others])
+    meets = connected(target, q, found[k].q) if of.dimension > 1 else of.meets(q)
+    return {m for m, met in zip(others, meets, strict=True) if met}
+
+
+def _merged_again(target: Target, found: list[ChainRoot]) -> list[ChainRoot]:
+    """Without the copies of a multiple root that were moved to its middle."""
+    q = np.array([root.q for root in found]).reshape(len(found), target.arm.size)
+    return [found[group[0]] for group in distinct(target, q)]
+
+
+# From the solutions of a chain to those of the robot: names of branches, loops, reasons.
+
+
+_NO_LOOP = "the loops stay open: the joints on the way to the frame reach the pose, the others not"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """A pose of a frame at the end of a chain.
+
+    Attributes:
+        chain: that is solved for.
+        target: its wanted pose.
+        p: (np,) parameters.
+        wishes: what the user asks for beside the pose.
+    """
+
+    chain: Chain
+    target: Target
+    p: Array
+    wishes: Wishes
+
+    @property
+    def place(self) -> ChainPlace:
+        """Where the chain stands in the robot."""
+        return ChainPlace(self.chain.places, self.whole)
+
+    def whole(self, q: Array) -> Array:
+        """(nq,) the posture of the robot for that of its chain, (n,); NaN where loops stay open."""
+        postures = self.closed(q)
+        return postures[0].q if postures else np.full(self.chain.system.nq, np.nan)
+
+    def closed(self, q: Array) -> list[ClosedPosture]:
+        """The postures of the robot for that of its chain, (n,): several where loops allow."""
+        near = self.wishes.near
+        if self.chain.system.is_closed:
+            return close(self.chain.system, self.chain, q[None, :], self.p, near)
+        whole = near.copy()
+        whole[list(self.chain.places)] = q
+        return [ClosedPosture(whole, "", 0.0)]
+
+
+def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions:
+    """The solutions of the robot, or why there is none.
+
+    Args:
+        question: what was asked for.
+        found: the solutions of the chain.
+        method: that gave them.
+    """
+    if not found:
+        closest = nearest(question.target.arm, question.target.T)
+        reason = unreachable(question.target, closest)
+        return question.wishes.solutions([], method, reason, _whole(question, closest))
+    drafts = _drafts(question, _named(question, _shown(question, found)))
+    if why_searched(question.chain.system, question.chain) is not None:
+        method += ", loops by search"
+    return question.wishes.solutions(drafts, method, "" if drafts else _NO_LOOP)
+
+
+def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
+    """The solutions of the robot: several for one of the chain where its loops allow."""
+    target = question.target
+    q = np.array([root.q for root in found])
+    residual, sigma = target.residual(q), target.singular_values(q)[:, -1]
+    return [
+        RobotSolution(
+            posture.q,
+            "; ".join(label for label in (root.label, posture.label) if label),
+            max(float(residual[k]), posture.residual),
+            float(sigma[k]),
+            root.multiplicity,
+            root.family,
+        )
+        for k, root in enumerate(found)
+        for posture in question.closed(q[k])
+    ]
+
+
+def _named(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
+    """With the names of shoulder, elbow and wrist where the arm has them, else a number."""
+    way, arm = question.chain, question.target.arm
+    key = ("anatomy", *way.key, question.p.tobytes())
+    has: Anatomy = way.system.cached(key, lambda: anatomy(arm))
+    named = labels(arm, has, np.array([root.q for root in found]))
+    names = [name or root.label for name, root in zip(named, found, strict=True)]
+    seen = dict[str, int]()
+    result = []
+    for k, (root, name) in enumerate(zip(found, names, strict=True)):
+        seen[name] = seen.get(name, 0) + 1
+        again = f"{name} ({seen[name]})" if name and names.count(name) > 1 else name
+        result.append(replace(root, label=again or str(k + 1)))
+    return result
+
+
+def _shown(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
+    """With the postures that stand for self-motions; those that prove to be one are listed once."""
+    shown = list[ChainRoot]()
+    for root in found:
+        if root.family is None:
+            shown.append(root)
+            continue
+        q = _representative(question, root.family)
+        if not any(_is_same(question.target, other, root.family, q) for other in shown):
+            shown.append(replace(root, q=q))
+    return shown
+
+
+def _is_same(target: Target, other: ChainRoot, family: Family, q: Array) -> bool:
+    """Whether a root is a self-motion of the same joints through the same posture q, (n,)."""
+    if other.family is None or other.family.moving != family.moving:
+        return False
+    return len(distinct(target, np.array([other.q, q]))) == 1
+
+
+def _representative(question: Question, family: Family) -> Array:
+    """The posture of a self-motion that is within limits, its free joint near the seed's."""
+    places, near = list(question.chain.places), question.wishes.near
+    value = float(near[places[question.chain.names.index(family.free)]])
+    first = family.nearest(value)
+    for q in (first, *family.postures_from(value)):
+        whole = near.copy()
+        whole[places] = q
+        if not set(question.wishes.bounds.outside(whole)) & set(question.chain.names):
+            return np.asarray(q)
+    return first
+
+
+def _whole(question: Question, found: Nearest) -> Nearest:
+    """The nearest pose with the posture of the whole robot; NaN where its loops stay open."""
+    whole = question.whole(found.q)
+    if not np.all(np.isfinite(whole)):
+        return replace(found, q=whole)
+    return replace(found, q=question.wishes.bounds.wound(whole, question.wishes.near))

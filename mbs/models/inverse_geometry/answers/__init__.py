@@ -1,1 +1,0 @@
-"""From postures to answers: distinct roots, self-motions, branches, limits, reasons."""

@@ -1,0 +1,495 @@
+"""Which closed form solves a chain: Pieper's, Paul's, or the cheaper of both."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
+from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
+from mbs.errors import ModelError, NoClosedForm
+from mbs.models.inverse_geometry.chain import Chain, chain, wanted_pose
+from mbs.operations.counts import count
+from mbs.operations.graph import Graph, Node, function_of, graph_of
+from mbs.spatial import Pose, axis_turn, vector
+from mbs.text import did_you_mean, quoted
+
+if TYPE_CHECKING:
+    from mbs.closed_forms.raghavan_roth.expressions import Characteristic
+
+
+CLOSED_FORMS = ("pieper", "paul")
+"""The methods that give steps, the quicker one first."""
+
+Numbers: TypeAlias = NDArray[np.float64] | None
+"""(np,) values of the parameters; None where they stay symbols."""
+
+_FEW = 8
+
+
+def sequence_of(chain: Chain, method: str = "auto", p: Numbers = None) -> StepSequence:
+    """The steps that give the joints of a chain from the pose of its frame.
+
+    It is kept on the system: the next call with the same arguments is free.
+
+    Args:
+        chain: what is solved for.
+        method: "pieper", "paul", or "auto": Pieper's where it fits without a quartic, else the
+            one with the fewest branches, and of equals the one with the fewest operations.
+        p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
+
+    Returns:
+        StepSequence of the loop `chain.problem(p)`.
+
+    Raises:
+        NoClosedForm: the message says what stood in the way of each method.
+        ModelError: there is no such method.
+    """
+    require_method(chain.system, method, ("auto", *CLOSED_FORMS))
+    found, reasons = list[StepSequence](), list[str]()
+    for name in CLOSED_FORMS if method == "auto" else (method,):
+        steps = _kept(chain, name, p)
+        if isinstance(steps, str):
+            reasons.append(f"{name}: {steps}")
+            continue
+        found.append(steps)
+        if _is_short(steps):
+            break
+    if not found:
+        raise NoClosedForm(
+            f"{chain.system.name}: no closed form gives {', '.join(chain.names)} from the pose of"
+            f" frame {chain.frame!r} ({'; '.join(reasons)}); use"
+            " mbs.models.inverse_geometry.solve, which needs none"
+        )
+    return found[0] if len(found) == 1 else min(found, key=lambda steps: _price(chain, steps, p))
+
+
+def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
+    """Refuse a method that is not known.
+
+    Raises:
+        ModelError: the message names those that are.
+    """
+    if method not in known:
+        raise ModelError(
+            f"{system.name}: method is {quoted(method)}, which is not known here;"
+            f" {did_you_mean(method, known)}"
+        )
+
+
+def given_of(way: Chain, T: SX) -> SX:
+    """What a sequence of symbolic parameters takes for a pose T, (4, 4)."""
+    return SX(casadi.vertcat(way.system.p, casadi.vec(T[:3, :])))
+
+
+def _kept(chain: Chain, method: str, p: Numbers) -> StepSequence | str:
+    """The steps by one method, or why there are none; kept on the system."""
+
+    def solve() -> StepSequence | str:
+        try:
+            return _solver(method)(chain.problem(p))
+        except NoClosedForm as error:
+            return str(error)
+
+    steps: StepSequence | str = chain.system.cached(("steps", method, *_key(chain, p)), solve)
+    return steps
+
+
+def _key(chain: Chain, p: Numbers) -> tuple[object, ...]:
+    return *chain.key, None if p is None else np.asarray(p, dtype=float).tobytes()
+
+
+def _solver(method: str) -> Callable[[Problem], StepSequence]:
+    if method == "pieper":
+        from mbs.closed_forms.pieper import pieper
+
+        return pieper
+    from mbs.closed_forms.paul import paul
+
+    return paul
+
+
+def _is_short(sequence: StepSequence) -> bool:
+    """Whether no other sequence is worth looking for.
+
+    A wrist leaves no method fewer branches than Pieper's; Paul's, which takes longer to find its
+    steps, is asked where that one fails or solves quartics.
+    """
+    return sequence.branches <= _FEW and all(one.kind != "quartic" for one in sequence.steps)
+
+
+def _price(chain: Chain, sequence: StepSequence, p: Numbers) -> tuple[int, int]:
+    """Number of branches, then of operations for all of them; kept on the system."""
+
+    def counted() -> int:
+        given = chain.problem(p).given
+        every = casadi.horzcat(*(leaf.x for leaf in sequence.leaves(given)))
+        return count(Function("leaves", [given], [SX(every)])).total
+
+    operations: int = chain.system.cached(("operations", sequence), counted)
+    return sequence.branches, operations
+
+
+# The characteristic matrix of the general method as a Function of the pose.
+
+
+class CharacteristicFunction(ModelFunction):
+    """``igm_characteristic(T) -> M0, M1, M2``, and the joint whose positions it gives.
+
+    M0 + M1 cos q + M2 sin q of a joint that turns, M0 + M1 q + M2 q^2 of one that slides, is
+    singular at every solution for T.
+    """
+
+    def __init__(self, function: Function, system: System, found: Characteristic) -> None:
+        super().__init__(function, system)
+        self._found = found
+
+    @property
+    def joint(self) -> str:
+        """The name of the joint."""
+        return self._found.joint
+
+    @property
+    def slides(self) -> bool:
+        """Whether it slides."""
+        return self._found.slides
+
+
+def characteristic_function(way: Chain) -> Function:
+    """The matrices of a chain of six joints.
+
+    Source: Raghavan & Roth 1993; Manocha & Canny 1994.
+
+    Returns:
+        CharacteristicFunction of T (4, 4) [m]; M0, M1, M2 (n, n), M2 missing where the matrix is
+        linear in a joint that slides.
+
+    Raises:
+        NoClosedForm: the chain has not six joints, or the matrix is singular at every posture.
+    """
+    from mbs.closed_forms.raghavan_roth.expressions import characteristic
+
+    def make() -> Function:
+        problem = way.problem()
+        found = characteristic(problem)
+
+        def build() -> tuple[Named, Named]:
+            T = SX.sym("T", 4, 4)
+            parts = Function("parts", [problem.given], list(found.matrices))
+            every = parts.call([given_of(way, T)])
+            return [("T", T)], [(f"M{k}", part) for k, part in enumerate(every)]
+
+        plain = model_function(way.system, ("igm_characteristic", *way.key), build)
+        return CharacteristicFunction(Function(plain), way.system, found)
+
+    made: Function = way.system.cached(("characteristic matrix", *way.key), make)
+    return made
+
+
+# How far postures are from the wanted pose: the forward model of a chain on symbols.
+
+
+def forward(chain: Chain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
+    """The pose of the frame for positions x, (n, 1), of the free joints.
+
+    Args:
+        chain: from the base to the frame.
+        x: positions [rad or m].
+        p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
+    """
+    gaps = chain.ways(p)
+    pose = gaps[0]
+    for k, slides in enumerate(chain.prismatic):
+        turn = Pose.turned(axis_turn("z", SX(x[k])).matrix)
+        pose = pose @ (Pose.moved(vector([0, 0, x[k]])) if slides else turn) @ gaps[k + 1]
+    return pose
+
+
+def residual(pose: Pose, T: SX) -> SX:
+    """The largest difference of an element between a pose and T (4, 4), in m and 1."""
+    return relative_residual(pose, T, SX(1))
+
+
+def relative_residual(pose: Pose, T: SX, length: SX) -> SX:
+    """The same with positions in multiples of a length [m]."""
+    turned = casadi.vec(pose.R - T[:3, :3])
+    return SX(casadi.mmax(casadi.fabs(casadi.vertcat(turned, (pose.p - T[:3, 3]) / length))))
+
+
+def size(chain: Chain, p: NDArray[np.float64] | None = None) -> SX:
+    """A length of the chain's size [m], 1 where all its ways are turns alone."""
+    lengths = [casadi.norm_2(gap.p) for gap in chain.ways(p) if not gap.p.is_zero()]
+    return SX(sum(lengths, SX(0))) if lengths else SX(1)
+
+
+# The inverse geometric model as a Function of the pose and the number of a branch.
+
+
+METHODS = ("auto", *CLOSED_FORMS, "general")
+
+_ROUNDING = 1e-9
+"""Of radicands, free of units, and of the residual in sizes of the chain."""
+
+
+class InverseGeometry(ModelFunction):
+    """A closed form ``igm(T, branch) -> q, valid``, and how its branches and steps are called."""
+
+    def __init__(self, function: Function, system: System, sequence: StepSequence, annotate: Any):
+        super().__init__(function, system, annotate)
+        self._sequence = sequence
+
+    @property
+    def branches(self) -> int:
+        """How many branches there are: `branch` is 0 .. branches - 1."""
+        return self._sequence.branches
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The signs of every branch, such as "q3:+ q2:- q5:+"."""
+        return tuple(self._sequence.label(b) for b in range(self.branches))
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The equations in the order in which they are solved."""
+        return tuple(self._sequence.steps)
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Evaluate it as any model; a branch and a pose given in numbers must be such."""
+        T = kwargs.get("T", args[0] if args else None)
+        if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
+            wanted_pose(self.system, T)
+        branch = kwargs.get("branch", args[1] if len(args) > 1 else None)
+        if isinstance(branch, (int, float, np.ndarray, np.generic)):
+            self._require_branch(np.asarray(branch))
+        return super().__call__(*args, **kwargs)
+
+    def _require_branch(self, branch: Any) -> None:
+        known = (branch == np.floor(branch)) & (branch >= 0) & (branch < self.branches)
+        if not np.all(known):
+            raise ModelError(
+                f"{self._title}: branch {branch[~known][0]:g} does not exist; the branches are 0"
+                f" to {self.branches - 1}"
+            )
+
+
+def function(
+    system: System,
+    method: str = "auto",
+    frame: str | int | None = None,
+    locked: Mapping[str, float] | None = None,
+) -> Function:
+    """``igm(T, branch) -> q, valid``: the joint positions of one branch, without iteration.
+
+    One graph serves all branches. It can be differentiated with respect to T and to the
+    parameters wherever the posture is not singular.
+
+    Source: Pieper 1968; Paul 1981; Khalil & Creusot 1997, section 3.3.
+
+    Args:
+        system: open; a closed one is solved by `mbs.models.inverse_geometry.solve`.
+        method: "pieper", "paul", "auto" for the cheaper of them, or "general" for the matrices
+            ``igm_characteristic(T) -> M0, M1, M2`` of the method of Raghavan and Roth.
+        frame: a body, a named frame, the number of a link, or None for the terminal frame.
+        locked: positions of joints that stay where they are, by name [rad or m].
+
+    Returns:
+        InverseGeometry, a Function of T (4, 4) [m], the pose of the frame seen from the base, and
+        of the number of the branch; q (nq, 1) [rad or m], finite for every T, joints outside the
+        chain as in the assembled posture; valid, 1 where q gives T back within 1e-9 of the size
+        of the robot, else 0.
+
+    Raises:
+        NoClosedForm: no closed form is known; the message says what stood in the way.
+        ModelError: there is no such method, frame or joint, more than six joints are free, or
+            the system is closed.
+    """
+    require_system(system)
+    require_method(system, method, METHODS)
+    way = chain(system, frame, locked)
+    if method == "general":
+        return characteristic_function(way)
+    _require_open(system)
+    sequence = sequence_of(way, method)
+
+    def make() -> Function:
+        key = ("igm", method, *way.key)
+        plain: Any = model_function(system, key, lambda: _built(way, sequence))
+        return InverseGeometry(Function(plain), system, sequence, plain.annotated)
+
+    made: Function = system.cached(("inverse geometry", method, *way.key), make)
+    return made
+
+
+def _require_open(system: System) -> None:
+    if system.is_closed:
+        raise ModelError(
+            f"{system.name}: its loops must be closed too, and no Function does both; use"
+            " mbs.models.inverse_geometry.solve"
+        )
+
+
+def _built(way: Chain, sequence: StepSequence) -> tuple[Named, Named, Named]:
+    T, branch = SX.sym("T", 4, 4), SX.sym("branch")
+    leaf = sequence.leaf(given_of(way, T), signs_of(sequence, branch))
+    q = whole_posture(way, leaf.x)
+    outputs: Named = [("q", q), ("valid", _valid(way, sequence, leaf, T, branch))]
+    return [("T", T), ("branch", branch)], outputs, _names(way, sequence, leaf, branch)
+
+
+def signs_of(sequence: StepSequence, branch: SX) -> SX:
+    """(signs, 1) +1 or -1: the bits of the number of a branch, from the highest on."""
+    count = len(sequence.signs)
+    halves = [casadi.floor((branch + 0.5) / 2**k) for k in range(count + 1)]
+    bits = [halves[k] - 2 * halves[k + 1] for k in reversed(range(count))]
+    return SX(casadi.vertcat(*(1 - 2 * bit for bit in bits)))
+
+
+def whole_posture(way: Chain, x: SX) -> SX:
+    """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
+    q = SX(DM(way.system.position(way.locked)))
+    q[list(way.places)] = x
+    return q
+
+
+def _valid(way: Chain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) -> SX:
+    error = relative_residual(forward(way, leaf.x), T, size(way))
+    real = casadi.mmin(casadi.vertcat(leaf.real, SX(1)))
+    known = casadi.logic_and(branch >= 0, branch <= sequence.branches - 1)
+    good = casadi.logic_and(real >= -_ROUNDING, error <= _ROUNDING)
+    return SX(casadi.logic_and(known, good))
+
+
+def _names(way: Chain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
+    """The scalars that text names: signs, sines and cosines of the joints, coefficients."""
+    signs = casadi.vertsplit(signs_of(sequence, branch)) if sequence.signs else []
+    named = [(f"sign_{name}", sign) for name, sign in zip(sequence.signs, signs, strict=True)]
+    for k, name in enumerate(way.names):
+        if not way.prismatic[k]:
+            label = joint_label(name)
+            named += [(f"S{label}", casadi.sin(leaf.x[k])), (f"C{label}", casadi.cos(leaf.x[k]))]
+    named += leaf.coefficients.items()
+    changing = [(name, value) for name, value in named if not value.is_constant()]
+    opposite = [(f"minus_{name}", -value) for name, value in changing if _is_negative(value)]
+    return [*changing, *opposite]
+
+
+def _is_negative(value: SX) -> bool:
+    """Whether it is the opposite of an expression, which then stands in the equations alone."""
+    return bool(value.op() == casadi.OP_NEG)
+
+
+def joint_label(name: str) -> str:
+    """What stands for a coordinate in other names: 2 for q2, the name itself for others."""
+    return name[1:] if re.fullmatch(r"q\d+", name) else name
+
+
+# All branches of the inverse geometric model at once, in one graph without sines of angles.
+
+
+_TINY = 1e-300
+_SEED = 20260111
+_OUTPUTS = ("q", "residual", "real", "regular", "mark")
+
+
+def all_branches(
+    chain: Chain, sequence: StepSequence, p: NDArray[np.float64] | None = None
+) -> Function:
+    """``igm_all(T) -> q, residual, real, regular, mark``: a column for every branch.
+
+    Args:
+        chain: what is solved for.
+        sequence: its steps, for the same p.
+        p: (np,) numbers in the place of the parameters; else they are a second input p.
+
+    Returns:
+        Function of T (4, 4); q (n, branches) of the chain's joints [rad or m], finite; residual
+        (branches, 1), the largest difference of an element between the forward model and T, in m
+        and 1; real and regular (branches, 1), the smallest of each kind in `Leaf`; mark
+        (branches, 1), a number that is the same for equal postures, and hardly for others.
+    """
+    T = SX.sym("T", 4, 4)
+    given = given_of(chain, T) if p is None else SX(casadi.vec(T[:3, :]))
+    leaves = sequence.leaves(given)
+    columns = [_column(chain, leaf, T, p) for leaf in leaves]
+    values = [casadi.horzcat(*(leaf.x for leaf in leaves))]
+    values += [casadi.vertcat(*column) for column in zip(*columns, strict=True)]
+    inputs = {"T": T} | ({"p": chain.system.p} if p is None and chain.system.parameters else {})
+    outputs = {name: casadi.densify(v) for name, v in zip(_OUTPUTS, values, strict=True)}
+    every = [*inputs.values()], [*outputs.values()], [*inputs], [*outputs]
+    return function_of(without_sines(graph_of(Function("igm_all", *every, {"cse": True}))))
+
+
+def _column(chain: Chain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> list[SX]:
+    pose = forward(chain, leaf.x, p)
+    differences = casadi.vertcat(casadi.vec(pose.R - T[:3, :3]), pose.p - T[:3, 3])
+    largest = functools.reduce(_larger, casadi.vertsplit(casadi.fabs(differences)))
+    return [
+        largest,
+        _smallest(leaf.real),
+        _smallest(casadi.fabs(leaf.regular)),
+        _mark(chain, leaf.x),
+    ]
+
+
+def _mark(chain: Chain, x: SX) -> SX:
+    """A generic combination of slides and of sines and cosines of turns."""
+    weights = np.random.default_rng(_SEED).uniform(0.5, 1.0, (len(chain.names), 2))
+    mark = SX(0)
+    for k, (a, b) in enumerate(weights):
+        mark += a * x[k] if chain.prismatic[k] else a * casadi.sin(x[k]) + b * casadi.cos(x[k])
+    return mark
+
+
+def _larger(a: SX, b: SX) -> SX:
+    """The larger number, in operations that processors have in vectors."""
+    return SX(0.5 * (a + b + casadi.fabs(a - b)))
+
+
+def _smallest(values: SX) -> SX:
+    """The smallest of numbers, and 1."""
+    return functools.reduce(_smaller, casadi.vertsplit(values), SX(1))
+
+
+def _smaller(a: SX, b: SX) -> SX:
+    return SX(0.5 * (a + b - casadi.fabs(a - b)))
+
+
+def without_sines(graph: Graph) -> Graph:
+    """The same Function with y/hypot(x, y) and x/hypot(x, y) in the place of sin, cos of atan2.
+
+    Where x and y both vanish it has zeros.
+    """
+    nodes: list[Node] = []
+    new: list[int] = []
+    scales: dict[int, int] = {}
+
+    def add(op: int, *args: int, value: float = 0.0) -> int:
+        nodes.append(Node(op, args, value))
+        return len(nodes) - 1
+
+    for number, node in enumerate(graph.nodes):
+        operands = graph.operands(number)
+        angle = operands[0] if operands else -1
+        of = graph.nodes[angle]
+        if node.op not in (casadi.OP_SIN, casadi.OP_COS) or of.op != casadi.OP_ATAN2:
+            args = tuple(new[k] for k in operands) if operands else node.args
+            nodes.append(Node(node.op, args, node.value))
+            new.append(len(nodes) - 1)
+            continue
+        y, x = (new[k] for k in of.args)
+        if angle not in scales:
+            square = add(casadi.OP_ADD, add(casadi.OP_SQ, x), add(casadi.OP_SQ, y))
+            tiny = add(casadi.OP_CONST, value=_TINY)
+            scales[angle] = add(
+                casadi.OP_INV, add(casadi.OP_SQRT, add(casadi.OP_ADD, square, tiny))
+            )
+        new.append(add(casadi.OP_MUL, y if node.op == casadi.OP_SIN else x, scales[angle]))
+    return graph.with_nodes(nodes, [[new[k] for k in result] for result in graph.results])

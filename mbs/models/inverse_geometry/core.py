@@ -1,0 +1,253 @@
+"""The compiled core of the inverse geometric model, of `native/runtime`, on numpy arrays."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from importlib import resources
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.closed_forms.arm import Arm, Array
+from mbs.models.inverse_geometry.raghavan_roth import Prepared
+from mbs.native import cached_library, compiler_found
+
+Hits: TypeAlias = NDArray[np.int64]
+
+_PAIRS = ("rigid", "arm", "arm_search", "pair", "dense", "eigenvalues", "raghavan_roth")
+_SOURCES = (
+    "arm_descend.c",
+    "arm_nearest.c",
+    "arm_calls.c",
+    "raghavan_roth_roots.c",
+    "raghavan_roth_middle.c",
+    "raghavan_roth_rest.c",
+    "raghavan_roth_solve.c",
+)
+_FLAGS = ("-O3", "-ffp-contract=off", "-fPIC", "-shared")
+_JOINTS = 7  # for which the core has room
+
+_pointer, _real, _integer = ctypes.c_void_p, ctypes.c_double, ctypes.c_longlong
+_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "mbs_polish": (
+        None,
+        (_pointer, _pointer, _integer, _integer, _pointer, _pointer),
+    ),
+    "mbs_search": (
+        _integer,
+        (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer, _pointer, _pointer),
+    ),
+    "mbs_merge": (_integer, (_pointer, _pointer, _integer, _pointer, _pointer, _pointer)),
+    "mbs_general": (
+        _integer,
+        (_pointer, _pointer, _pointer, _integer, _integer, _pointer, _pointer, _pointer, _pointer),
+    ),
+    "mbs_nearest": (_real, (_pointer, _pointer, _integer, ctypes.c_ulonglong, _pointer)),
+}
+
+
+class _ArmStruct(ctypes.Structure):
+    _fields_ = (
+        ("n", ctypes.c_int),
+        ("gaps", ctypes.c_void_p),
+        ("slides", ctypes.c_void_p),
+        ("length", ctypes.c_double),
+    )
+
+
+def core() -> ctypes.CDLL | None:
+    """The compiled core; None where there is no C compiler.
+
+    Raises:
+        CompilerError: the compiler refused the code.
+    """
+    return _loaded() if compiler_found() else None
+
+
+def core_of(arm: Arm) -> ctypes.CDLL | None:
+    """The core for an arm; None where there is no C compiler, or it has more joints than seven.
+
+    Raises:
+        CompilerError: the compiler refused the code.
+    """
+    return core() if arm.size <= _JOINTS else None
+
+
+@functools.cache
+def _loaded() -> ctypes.CDLL:
+    folder = resources.files("mbs.native") / "runtime"
+    names = [*_SOURCES, *(name + end for name in _PAIRS for end in (".c", ".h"))]
+    files = {name: (folder / name).read_text(encoding="utf-8") for name in names}
+    library = ctypes.CDLL(str(cached_library(files, _FLAGS)))
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
+    """Polished postures, (m, n), and their residuals, (m,).
+
+    Args:
+        library: the core.
+        arm: whose postures.
+        T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
+        q: (m, n) postures [rad or m].
+    """
+    own, residual, _ = _rooms(len(q), arm.size)
+    own[:] = q
+    wanted = _wanted(T, *((4, 4) if np.ndim(T) == 2 else (len(q), 4, 4)))
+    stride, handed = 16 if wanted.ndim == 3 else 0, Handed(arm)
+    library.mbs_polish(handed.address, _at(wanted), stride, len(q), _at(own), _at(residual))
+    return own, residual
+
+
+def found_by(
+    library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
+) -> tuple[Array, Hits]:
+    """Postures (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
+    wanted = _wanted(T, 4, 4)
+    q, residual, hits = _rooms(starts, arm.size)
+    handed = Handed(arm)
+    count = library.mbs_search(
+        handed.address, _at(wanted), starts, seed, _at(q), _at(residual), hits.ctypes.data
+    )
+    return q[:count].copy(), hits[:count].copy()
+
+
+def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
+    """The distinct ones of postures q, (m, n), and how many are each of them."""
+    wanted = _wanted(T, 4, 4)
+    own, residual, hits = _rooms(len(q), arm.size)
+    own[:] = q
+    handed = Handed(arm)
+    count = library.mbs_merge(
+        handed.address, _at(wanted), len(q), _at(own), _at(residual), hits.ctypes.data
+    )
+    return own[:count].copy(), hits[:count].copy()
+
+
+def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
+    """The posture, (n,), whose pose is nearest to T."""
+    wanted, q = _wanted(T, 4, 4), np.empty(arm.size)
+    handed = Handed(arm)
+    library.mbs_nearest(handed.address, _at(wanted), starts, seed, _at(q))
+    return q
+
+
+class Handed:
+    """An arm as C sees it; keeps the arrays alive that it points to."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.gaps = np.ascontiguousarray(arm.gaps, dtype=float)
+        self.slides = np.ascontiguousarray(arm.prismatic, dtype=np.uint8)
+        self.arm = _ArmStruct(arm.size, self.gaps.ctypes.data, self.slides.ctypes.data, arm.length)
+        self.address = ctypes.addressof(self.arm)
+
+
+def _wanted(T: Array, *shape: int) -> Array:
+    """Poses as C reads them; a wrong shape is refused, for C would read beyond the array."""
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
+
+
+def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:
+    return np.empty((count, n)), np.empty(count), np.empty(count, dtype=np.int64)
+
+
+def _at(array: Array) -> int:
+    return int(array.ctypes.data)
+
+
+# What the compiled general method knows of an arm, and its calls.
+
+
+Numbers: TypeAlias = NDArray[np.int64]
+
+_ROOM = 4096  # postures of one call
+_CANDIDATES = 144  # ROTH_POSTURES: those of one pose, at most
+
+_int, _double = ctypes.c_int, ctypes.c_double
+
+
+class _LoopStruct(ctypes.Structure):
+    _fields_ = (
+        ("order", _int * 6),
+        ("sign", _int),
+        ("slides", _int * 6),
+        ("offsets", _double * 6),
+        ("ways", _double * 96),
+        ("place", _int),
+        ("after", _double * 16),
+        ("length", _double),
+        ("count", _int),
+        ("elements", _int * 15),
+        ("powers", _int * 5),
+        ("raised", _int),
+        ("rank", _int),
+        ("size", _int),
+        ("mix", ctypes.c_void_p),
+    )
+
+
+class HandedLoop:
+    """A prepared arm as C sees it; keeps the arrays alive that it points to."""
+
+    def __init__(self, arm: Arm, prepared: Prepared) -> None:
+        loop, pencil = prepared.arrangement, prepared.pencil
+        elimination = pencil.elimination
+        self.arm = Handed(arm)
+        self.mix = np.ascontiguousarray(pencil.mix, dtype=float)
+        square = self.mix.shape[0] == self.mix.shape[1]
+        parts = ("first", "second", "third", "fourth", "fifth")
+        elements = [*elimination.elements.tolist(), *[0] * 15][:15]
+        self.loop = _LoopStruct(
+            (_int * 6)(*loop.order.tolist()),
+            loop.sign,
+            (_int * 6)(*map(int, loop.prismatic)),
+            (_double * 6)(*loop.offsets.tolist()),
+            (_double * 96)(*loop.ways.ravel().tolist()),
+            loop.place,
+            (_double * 16)(*loop.after.ravel().tolist()),
+            loop.length,
+            len(elimination.elements),
+            (_int * 15)(*elements),
+            (_int * 5)(*(len(getattr(elimination, part)) for part in parts)),
+            elimination.raised,
+            pencil.rank,
+            elimination.size,
+            None if square else self.mix.ctypes.data,
+        )
+        self.address = ctypes.addressof(self.loop)
+
+
+def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbers, Array]:
+    """The solutions for poses T, (N, 4, 4).
+
+    Returns:
+        (m,) numbers of the poses, ascending, and (m, 6) postures for them.
+    """
+    wanted = np.ascontiguousarray(T, dtype=float)
+    room = min(_ROOM, _CANDIDATES * len(wanted))
+    q, start, done = np.empty((room, 6)), 0, ctypes.c_longlong(0)
+    number, hits = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+    found = list[tuple[Numbers, Array]]()
+    while start < len(wanted) or not found:
+        count = library.mbs_general(
+            handed.arm.address,
+            handed.address,
+            wanted[start:].ctypes.data,
+            len(wanted) - start,
+            room,
+            q.ctypes.data,
+            number.ctypes.data,
+            hits.ctypes.data,
+            ctypes.addressof(done),
+        )
+        found.append((number[:count] + start, q[:count].copy()))
+        start += done.value
+    if len(found) == 1:
+        return found[0]
+    numbers, postures = zip(*found, strict=True)
+    return np.concatenate(numbers), np.concatenate(postures)

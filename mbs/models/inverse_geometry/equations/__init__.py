@@ -1,1 +1,0 @@
-"""Closed forms: which one, as a Function, all branches at once, as text."""

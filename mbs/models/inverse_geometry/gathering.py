@@ -1,0 +1,166 @@
+"""Postures that may solve: the leaves of a closed form, the general method, the search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+
+from mbs.closed_forms.arm import Array
+from mbs.closed_forms.sequence import StepSequence
+from mbs.errors import ModelError, NoClosedForm
+from mbs.models.inverse_geometry.chain import Chain
+from mbs.models.inverse_geometry.closed_form import (
+    CLOSED_FORMS,
+    require_method,
+    sequence_of,
+)
+from mbs.models.inverse_geometry.search import General, general, general_of, polish, search
+from mbs.models.inverse_geometry.target import Target
+
+METHODS = ("auto", *CLOSED_FORMS, "general", "search")
+"""The methods that `solve` knows."""
+
+_BRANCH_NEAR = 1e-2
+_DEGENERATE = 1e-5
+_ILL_CONDITIONED = 1e-9
+_STARTS = 300
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gathered:
+    """Solutions as the methods give them, some of them more than once.
+
+    Attributes:
+        q: (m, n) postures [rad or m].
+        labels: of the branches they come from, "" where they come from none.
+        method: that gave them.
+        doubtful: whether further ones may be missing, because the pose is next to a degenerate
+            one of the method.
+    """
+
+    q: Array
+    labels: tuple[str, ...]
+    method: str
+    doubtful: bool
+
+
+def gather(chain: Chain, target: Target, method: str, p: Array) -> Gathered:
+    """The solutions by one method, or by the first that holds for the chain.
+
+    Args:
+        chain: what is solved for.
+        target: the pose that is wanted, of the chain in numbers.
+        method: "pieper", "paul", "general", "search"; "auto" for a closed form, else the general
+            method for six joints, else the search.
+        p: (np,) the parameters.
+
+    Raises:
+        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+        ModelError: there is no such method, or it does not hold for the chain.
+    """
+    require_method(chain.system, method, METHODS)
+    if method in (*CLOSED_FORMS, "auto"):
+        try:
+            return _by_closed_form(chain, target, sequence_of(chain, method, p), p)
+        except NoClosedForm:
+            if method != "auto":
+                raise
+    if method == "search":
+        return _by_search(target)
+    ready = general_ready(chain, p)
+    if ready is None and method == "general":
+        raise ModelError(
+            f"{chain.system.name}: the general method does not hold for the joints"
+            f" {', '.join(chain.names)}: it is for six joints, and not for all with slides; use"
+            " method='search'"
+        )
+    return _by_search(target) if ready is None else _by_general(target, ready)
+
+
+def further(chain: Chain, target: Target, gathered: Gathered, p: Array) -> Gathered:
+    """What was gathered, and what the general method and the search add to it."""
+    parts = [gathered]
+    ready = general_ready(chain, p)
+    if gathered.method != "general" and ready is not None:
+        parts.append(_by_general(target, ready))
+    if gathered.method != "search":
+        parts.append(_by_search(target))
+    return Gathered(
+        np.concatenate([part.q for part in parts]),
+        tuple(label for part in parts for label in part.labels),
+        gathered.method,
+        False,
+    )
+
+
+def _by_closed_form(chain: Chain, target: Target, sequence: StepSequence, p: Array) -> Gathered:
+    q, regular = (np.array(part).T for part in _leaves(chain, sequence, p)(DM(target.T)))
+    error = target.residual(q)
+    near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
+    doubtful = bool(np.min(regular) < _DEGENERATE)
+    labels = tuple(sequence.label(int(b)) for b in near)
+    return _polished(target, Gathered(q[near], labels, _name(chain, sequence, p), doubtful))
+
+
+def _leaves(chain: Chain, sequence: StepSequence, p: Array) -> Function:
+    """``leaves(T) -> q, regular``: a column for every branch, kept on the system.
+
+    q (n, branches) are postures [rad or m], regular (1, branches) the least of the quantities
+    that must not vanish, and 1.
+    """
+
+    def build() -> Function:
+        T = SX.sym("T", 4, 4)
+        every = sequence.leaves(SX(casadi.vec(T[:3, :])))
+        q = casadi.horzcat(*(leaf.x for leaf in every))
+        least = [casadi.mmin(casadi.vertcat(SX(1), casadi.fabs(leaf.regular))) for leaf in every]
+        outputs = [casadi.densify(q), casadi.densify(casadi.horzcat(*least))]
+        return Function("leaves", [T], outputs, {"cse": True})
+
+    function: Function = chain.system.cached(("leaves", sequence), build)
+    return function
+
+
+def _name(chain: Chain, sequence: StepSequence, p: Array) -> str:
+    """Which of the closed forms a sequence is."""
+    try:
+        return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"
+    except NoClosedForm:
+        return "paul"
+
+
+def _by_general(target: Target, ready: General) -> Gathered:
+    q = general(ready, target.T)
+    doubtful = ready.prepared.regularity < _ILL_CONDITIONED
+    return _polished(target, Gathered(q, ("",) * len(q), "general", doubtful))
+
+
+def _by_search(target: Target) -> Gathered:
+    q = search(target.arm, target.T, _STARTS)
+    return _polished(target, Gathered(q, ("",) * len(q), "search", False))
+
+
+def _polished(target: Target, gathered: Gathered) -> Gathered:
+    """The solutions beside what was gathered."""
+    if not len(gathered.q):
+        return gathered
+    better = polish(target.arm, target.T, gathered.q)
+    solved = np.flatnonzero(better.residual < target.tolerance)
+    labels = tuple(gathered.labels[k] for k in solved)
+    return Gathered(better.q[solved], labels, gathered.method, gathered.doubtful)
+
+
+def general_ready(chain: Chain, p: Array) -> General | None:
+    """The general method of a chain for parameters p, (np,); None where it does not hold."""
+
+    def build() -> General | None:
+        try:
+            return general_of(chain.arm(p))
+        except (ModelError, NoClosedForm):
+            return None
+
+    ready: General | None = chain.system.cached(("general", *chain.key, p.tobytes()), build)
+    return ready

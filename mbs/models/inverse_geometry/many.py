@@ -1,0 +1,453 @@
+"""Many poses at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from casadi import Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import require_system
+from mbs.closed_forms.arm import Arm, Array
+from mbs.closed_forms.sequence import StepSequence
+from mbs.errors import NoClosedForm
+from mbs.models.inverse_geometry.chain import Chain, chain, wanted_poses
+from mbs.models.inverse_geometry.closed_form import (
+    CLOSED_FORMS,
+    all_branches,
+    require_method,
+    sequence_of,
+)
+from mbs.models.inverse_geometry.gathering import METHODS, general_ready
+from mbs.models.inverse_geometry.search import General, general_many, polish
+from mbs.models.inverse_geometry.solutions import (
+    CoordinateLimits,
+    Given,
+    Solutions,
+    bounds,
+    leaves_out,
+)
+from mbs.models.inverse_geometry.solve import solve
+from mbs.models.inverse_geometry.target import SOLVED, Target
+from mbs.native import compiled
+
+# The closed form of a chain at many poses: in machine code, several poses in vector lanes.
+
+
+_COLUMNS = 32
+"""Poses in one call: more make the code longer, fewer the calls felt."""
+_MANY = 1000
+"""Poses from which machine code is worth the second that a compiler takes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseBatch:
+    """What `all_branches` gives for N poses.
+
+    Attributes:
+        q: (N, branches, n) positions of the chain's joints [rad or m].
+        residual, real, regular, mark: (N, branches).
+    """
+
+    q: Array
+    residual: Array
+    real: Array
+    regular: Array
+    mark: Array
+
+
+def batch(chain: Chain, sequence: StepSequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
+    """All branches at poses T, (N, 4, 4).
+
+    Args:
+        chain: what is solved for.
+        sequence: its steps, for the same p.
+        p: (np,) the parameters.
+        T: the poses [m].
+    """
+    plain = _plain(chain, sequence, p)
+    if len(T) < _MANY:
+        return _interpreted(plain, T)
+    key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
+    return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
+
+
+def _plain(chain: Chain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
+    key = ("igm_all", sequence, *chain.key, p.tobytes())
+    plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
+    return plain
+
+
+def _machine_code(plain: Function) -> Function:
+    return compiled(plain.map(_COLUMNS), derivatives=0, fast=True)
+
+
+def _interpreted(plain: Function, T: Array) -> PoseBatch:
+    """By the interpreter, which needs no compiler first."""
+    if not len(T):
+        return _by_machine(plain, plain, T)
+    columns = np.swapaxes(T, 1, 2).reshape(-1, 4).T
+    n, branches = plain.size_out(0)
+    q, *rows = (np.array(part) for part in plain.map(len(T))(columns))
+    return PoseBatch(q.T.reshape(-1, branches, n), *(row.T for row in rows))
+
+
+def _by_machine(call: Any, plain: Function, T: Array) -> PoseBatch:
+    """By machine code for so many columns at a time, straight into the arrays."""
+    n, branches = plain.size_out(0)
+    count = len(T)
+    padded = -(-count // _COLUMNS) * _COLUMNS
+    columns = np.empty((padded, 4, 4))
+    columns[:count], columns[count:] = np.swapaxes(T, 1, 2), np.eye(4)
+    q = np.empty((padded, branches, n))
+    rows = [np.empty((padded, branches)) for _ in range(4)]
+    for first in range(0, padded, _COLUMNS):
+        part = slice(first, first + _COLUMNS)
+        out = (q[part].reshape(-1, n).T, *(row[part].T for row in rows))
+        call(columns[part].reshape(-1, 4).T, out=out)
+    return PoseBatch(q[:count], *(row[:count] for row in rows))
+
+
+# What a compiled closed form gives for many poses, and which of them it leaves in doubt.
+
+
+Booleans = NDArray[np.bool_]
+
+_DOUBTFUL = 1e-6
+"""Residual, of max(1 m, the arm's length), below which a solution may stand beside a posture."""
+_DEGENERATE = 1e-12
+_FOLD = 1e-9
+_SAME, _MEETING = 1e-9, 1e-5
+_ALIKE = 12 * _MEETING
+"""Largest difference of the marks of two postures that differ by `_MEETING`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BranchSolutions:
+    """Solutions of N poses, a column for every branch.
+
+    Attributes:
+        q: (N, branches, n) positions of the chain's joints [rad or m].
+        valid: (N, branches) whether there is a solution.
+        residual: (N, branches) largest difference of an element from the wanted pose.
+        labels: of the branches.
+        searched: (N,) whether the solutions are to be looked for by other means: branches meet
+            there, or leave a joint undetermined.
+    """
+
+    q: Array
+    valid: Booleans
+    residual: Array
+    labels: tuple[str, ...]
+    searched: Booleans
+
+
+def nothing(arm: Arm, count: int) -> BranchSolutions:
+    """So many poses without a closed form."""
+    shape = count, 0
+    empty = np.empty((*shape, arm.size)), np.zeros(shape, dtype=bool), np.empty(shape)
+    return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
+
+
+def drafted(chain: Chain, sequence: StepSequence, p: Array, arm: Arm, T: Array) -> BranchSolutions:
+    """The solutions by a closed form.
+
+    Args:
+        chain: what is solved for.
+        sequence: its steps, for the same p.
+        p: (np,) the parameters.
+        arm: the chain in numbers.
+        T: (N, 4, 4) poses [m].
+    """
+    every = batch(chain, sequence, p, T)
+    scale = max(1.0, arm.length)
+    close = every.residual <= _DOUBTFUL * scale
+    doubtful = close & (every.residual > 0.1 * SOLVED * scale)
+    if np.any(doubtful):
+        doubtful[doubtful] = _polish(arm, T, every, doubtful)
+    valid = (every.residual <= SOLVED * scale) & (every.real >= -_FOLD) & ~doubtful
+    doubtful = close & ~valid
+    searched = np.any(doubtful | (every.regular < _DEGENERATE), axis=1)
+    searched |= _merge(arm, every, valid)
+    labels = tuple(sequence.label(b) for b in range(sequence.branches))
+    return BranchSolutions(every.q, valid, every.residual, labels, searched)
+
+
+def _polish(arm: Arm, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
+    """Improve some postures, (m,), and tell which of them moved far."""
+    before = every.q[which]
+    better = polish(arm, T[np.nonzero(which)[0]], before)
+    every.q[which], every.residual[which] = better.q, better.residual
+    far: Booleans = np.max(np.abs(arm.wrapped(better.q - before)), axis=-1) > _MEETING
+    return far
+
+
+def _merge(arm: Arm, every: PoseBatch, valid: Booleans) -> Booleans:
+    """Keep the first of equal solutions, and tell at which poses others are nearly equal."""
+    marks = np.sort(np.where(valid, every.mark, np.inf), axis=1)
+    with np.errstate(invalid="ignore"):
+        rows = np.flatnonzero(np.any(np.diff(marks, axis=1) < _ALIKE, axis=1))
+    some, q = valid[rows], every.q[rows]
+    meeting = np.zeros(len(valid), dtype=bool)
+    for b in range(1, valid.shape[1]):
+        apart = np.max(np.abs(arm.wrapped(q[:, :b] - q[:, b : b + 1])), axis=-1)
+        apart[~some[:, :b]] = np.inf
+        nearest = np.min(apart, axis=1)
+        meeting[rows] |= some[:, b] & (nearest >= _SAME) & (nearest < _MEETING)
+        some[:, b] &= nearest >= _SAME
+    valid[rows] = some
+    return meeting
+
+
+def with_postures(draft: BranchSolutions, k: int, arm: Arm, q: Array, T: Array) -> BranchSolutions:
+    """With other solutions of one pose, each in the column of the nearest branch.
+
+    Args:
+        draft: whose rows are written over.
+        k: number of the pose.
+        arm: the chain in numbers.
+        q: (m, n) its solutions [rad or m].
+        T: (4, 4) the pose.
+    """
+    draft = _widened(draft, len(q))
+    columns = _nearest_columns(arm, draft.q[k], q)
+    draft.valid[k] = False
+    draft.valid[k, columns], draft.q[k, columns] = True, q
+    draft.residual[k, columns] = arm.residual(q, T)
+    return draft
+
+
+def _widened(draft: BranchSolutions, columns: int) -> BranchSolutions:
+    """With so many columns at least."""
+    more = columns - draft.valid.shape[1]
+    if more <= 0:
+        return draft
+    rows = (0, 0), (0, more)
+    q, valid = np.pad(draft.q, (*rows, (0, 0))), np.pad(draft.valid, rows)
+    residual = np.pad(draft.residual, rows, constant_values=np.inf)
+    return BranchSolutions(q, valid, residual, draft.labels + ("",) * more, draft.searched)
+
+
+def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
+    """A column for every posture: the nearest pairs first."""
+    apart = np.sum(np.abs(arm.wrapped(q[:, None] - branches[None])), axis=-1)
+    columns = [-1] * len(q)
+    for _ in columns:
+        posture, column = np.unravel_index(int(np.argmin(apart)), apart.shape)
+        columns[int(posture)] = int(column)
+        apart[posture, :], apart[:, column] = np.inf, np.inf
+    return columns
+
+
+# What the general method gives for many poses, and which of them it leaves in doubt.
+
+
+_NEARLY_SINGULAR = 1e-4
+"""Smallest singular value below which a solution next to the one found may be missing."""
+_REGULAR = 1e-9
+
+
+def ready(chain: Chain, p: Array) -> General | None:
+    """The general method of a chain for parameters p, (np,); None where it hardly holds."""
+    found = general_ready(chain, p)
+    return found if found and found.prepared.regularity >= _REGULAR else None
+
+
+def general_draft(general: General, T: Array) -> BranchSolutions:
+    """The solutions by the general method, in no order.
+
+    Args:
+        general: the method, made ready for an arm.
+        T: (N, 4, 4) poses [m].
+    """
+    arm = general.arm
+    pose, q = general_many(general, T)
+    first = np.searchsorted(pose, np.arange(len(T)))
+    column = np.arange(len(q)) - first[pose]
+    shape = len(T), int(np.max(column, initial=-1)) + 1
+    every, valid = np.zeros((*shape, arm.size)), np.zeros(shape, dtype=bool)
+    residual, searched = np.full(shape, np.inf), np.zeros(len(T), dtype=bool)
+    target = Target(arm, T[pose])
+    reached, least = target.residual(q), target.singular_values(q)[:, -1]
+    every[pose, column], valid[pose, column], residual[pose, column] = q, True, reached
+    unsure = (least < _NEARLY_SINGULAR) | (reached > target.tolerance)
+    searched[pose[unsure]] = True
+    return BranchSolutions(every, valid, residual, ("",) * shape[1], searched)
+
+
+# Inverse geometric models of many poses at once.
+
+
+Repair = Callable[[Arm, Array], Array]
+"""All postures (m, n) of an arm that take its frame to a pose (4, 4)."""
+
+_WITHIN = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ManySolutions:
+    """The solutions of N poses: a row for every pose, in it a column for every branch.
+
+    Attributes:
+        q: (N, branches, nq) postures [rad or m]; where there is no solution any finite numbers.
+        valid: (N, branches) whether there is a solution.
+        residual: (N, branches) largest difference of an element between the pose of q and the
+            wanted one, in m and 1; infinite where a column is not used.
+        labels: of the branches; empty texts where no closed form tells them apart.
+        searched: (N,) whether the pose was solved by itself: its postures stand in the columns of
+            the nearest branches.
+    """
+
+    q: Array
+    valid: Booleans
+    residual: Array
+    labels: tuple[str, ...]
+    searched: Booleans
+
+    def __len__(self) -> int:
+        """The number of poses."""
+        return len(self.q)
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """(N,) how many solutions each pose has."""
+        count: NDArray[np.int64] = np.sum(self.valid, axis=1, dtype=np.int64)
+        return count
+
+    def of(self, k: int) -> Array:
+        """(m, nq) the solutions of pose number k, counted from 0 [rad or m]."""
+        postures: Array = self.q[k, self.valid[k]]
+        return postures
+
+
+def solve_many(
+    system: System,
+    T: Any,
+    frame: str | int | None = None,
+    method: str = "auto",
+    limits: bool | Given | None = None,
+    locked: Mapping[str, float] | None = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    repair: Repair | None = None,
+) -> ManySolutions:
+    """All solutions of many poses, by a compiled closed form, else by the general method.
+
+    Poses at which solutions meet or joints are left undetermined, and all poses of robots for which
+    neither method holds, are solved one by one. An angle is within half a turn of zero; limits
+    may move it by full turns.
+
+    Args:
+        system: a serial robot or a tree; of a robot with loops every pose is solved by itself.
+        T: (N, 4, 4) poses of the frame seen from the base [m].
+        frame: a body, a named frame, the number of a link, or None for the terminal frame.
+        method: "pieper", "paul", "auto" for the cheaper of them that fits, "general", "search".
+        limits: None leaves out no solution; True leaves out those beyond the limits of the
+            description; (lowest, highest) by name replaces these [rad or m].
+        locked: positions of joints that stay where they are, by name [rad or m].
+        parameters: values of symbols, the others at their defaults.
+        repair: what solves single poses of a serial robot, `solve` when left out.
+
+    Returns:
+        ManySolutions: the solutions that `solve` finds for each pose.
+
+    Raises:
+        NoClosedForm: "pieper" or "paul" was asked for and does not fit.
+        ModelError: a matrix is no rigid transform, a name is unknown, or more than six joints
+            are free.
+    """
+    require_system(system)
+    require_method(system, method, METHODS)
+    poses, p = wanted_poses(system, T), np.array(system.parameter_values(parameters))
+
+    def solved(pose: Array) -> Solutions:
+        return solve(system, pose, frame, method, given, locked=locked, parameters=parameters)
+
+    given = limits if system.is_closed else None
+    if system.is_closed:
+        return _stacked(system, [solved(pose) for pose in poses])
+    robot = _robot(chain(system, frame, locked), method, p)
+    draft = robot.draft(poses)
+    for k in np.flatnonzero(draft.searched):
+        pose = poses[k]
+        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.way.places)]
+        draft = with_postures(draft, int(k), robot.arm, q, pose)
+    q, valid = robot.whole(draft.q), draft.valid
+    if leaves_out(limits):
+        q, within = _wound(bounds(system, limits, robot.way.places), q)
+        valid = valid & within
+    return ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Robot:
+    """How a robot is solved; without both methods every pose is searched for by itself."""
+
+    way: Chain
+    p: Array
+    arm: Arm
+    sequence: StepSequence | None
+    general: General | None
+
+    def draft(self, T: Array) -> BranchSolutions:
+        """The solutions by a closed form, else by the general method."""
+        if self.sequence is not None:
+            return drafted(self.way, self.sequence, self.p, self.arm, T)
+        if self.general is not None:
+            return general_draft(self.general, T)
+        return nothing(self.arm, len(T))
+
+    def whole(self, q: Array) -> Array:
+        """(N, branches, nq) positions of all joints, those outside the chain as assembled."""
+        system = self.way.system
+        if self.way.places == tuple(range(system.nq)):
+            return q
+        every = np.empty((*q.shape[:2], system.nq))
+        every[...] = system.position(self.way.locked)
+        every[..., list(self.way.places)] = q
+        return every
+
+
+def _robot(way: Chain, method: str, p: Array) -> _Robot:
+    sequence, general = _sequence(way, method, p), None
+    if sequence is None and method in ("auto", "general"):
+        general = ready(way, p)
+    return _Robot(way, p, way.arm(p), sequence, general)
+
+
+def _sequence(way: Chain, method: str, p: Array) -> StepSequence | None:
+    """The closed form that was asked for, None for methods that are none."""
+    if method not in (*CLOSED_FORMS, "auto"):
+        return None
+    try:
+        return sequence_of(way, method, p)
+    except NoClosedForm:
+        if method != "auto":
+            raise
+        return None
+
+
+def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
+    """The solutions of every pose side by side."""
+    columns = max((len(answer) for answer in answers), default=0)
+    shape = len(answers), columns
+    q, valid = np.zeros((*shape, system.nq)), np.zeros(shape, dtype=bool)
+    residual = np.full(shape, np.inf)
+    for k, answer in enumerate(answers):
+        m = len(answer)
+        q[k, :m], valid[k, :m] = answer.q, True
+        residual[k, :m] = [solution.residual for solution in answer]
+    return ManySolutions(q, valid, residual, ("",) * columns, np.ones(len(answers), dtype=bool))
+
+
+def _wound(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
+    """Postures (N, branches, nq) changed by whole turns, and whether all is within limits."""
+    low, high = allowed.low - _WITHIN, allowed.high + _WITHIN
+    missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)
+    turns = np.copysign(np.ceil(np.abs(missing)), missing)
+    wound = np.where(allowed.turns & (missing != 0), q + 2 * np.pi * turns, q)
+    return wound, np.all((wound >= low) & (wound <= high), axis=-1)

@@ -1,1 +1,0 @@
-"""Postures in numbers, compiled: polished, searched, by the general method, nearest."""

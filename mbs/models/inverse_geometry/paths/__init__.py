@@ -1,1 +1,0 @@
-"""Paths followed on one branch."""

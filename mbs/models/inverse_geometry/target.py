@@ -1,0 +1,340 @@
+"""A pose that a serial arm is wanted to take: equations free of units, and what differs from it.
+
+Positions are counted in x = q / unit, where the unit is the arm's length for slides and one radian
+for turns, so that a number in x or in the equations means the same for every joint and every row.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mbs.closed_forms.arm import Arm, Array, gap_to
+
+SOLVED = 1e-12
+"""Largest residual of a solution, of max(1 m, the arm's length)."""
+
+_LONGEST_STEP, _TARGET_SETTLED = 0.3, 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """The equations of a wanted pose.
+
+    Attributes:
+        arm: that moves the frame.
+        T: (4, 4) the wanted pose; (m, 4, 4) of m postures, each its own.
+    """
+
+    arm: Arm
+    T: Array
+
+    @property
+    def unit(self) -> Array:
+        """(n,) the unit of every joint [m or rad]."""
+        return self.arm.units
+
+    @property
+    def tolerance(self) -> float:
+        """Largest residual of a solution."""
+        return SOLVED * max(1.0, self.arm.length)
+
+    def residual(self, q: Array) -> Array:
+        """(...) largest element of pose(q) - T at postures q, (..., n)."""
+        return self.arm.residual(q, self.T)
+
+    def excess(self, x: Array) -> tuple[Array, Array]:
+        """The equations e(x) = 0, (..., 6), and their derivative to first order, (..., 6, n)."""
+        unit, rows = self.unit, np.array([self.arm.length] * 3 + [1.0] * 3)
+        T, J = self.arm.pose_and_jacobian(x * unit)
+        return -gap_to(self.T, T) / rows, J * unit / rows[:, None]
+
+    def singular_values(self, q: Array) -> Array:
+        """(..., n) singular values of the Jacobian, lengths divided by the arm's length."""
+        J = self.excess(q / self.unit)[1]
+        return np.asarray(np.linalg.svd(J, compute_uv=False), dtype=float)
+
+    def wrapped(self, x: Array) -> Array:
+        """Differences x with those of turns brought into [-pi, pi)."""
+        return self.arm.wrapped(x)
+
+    def corrected(self, x: Array, held: Array, values: Array, iterations: int = 40) -> Array:
+        """Solutions near x, (..., n), at which held @ x = values, by Gauss-Newton.
+
+        Args:
+            x: (..., n) first guesses.
+            held: (..., k, n) further linear equations.
+            values: (..., k) their right sides.
+            iterations: at most.
+
+        Returns:
+            (..., n) the last iterates; whether they solve the equations is left to the residual.
+        """
+        for _ in range(iterations):
+            e, J = self.excess(x)
+            further = (held @ x[..., None])[..., 0] - values
+            inverse = np.linalg.pinv(np.concatenate([J, held], axis=-2), rcond=1e-12)
+            step = (inverse @ np.concatenate([e, further], axis=-1)[..., None])[..., 0]
+            size = np.linalg.norm(step, axis=-1, keepdims=True)
+            x = x - step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
+            if np.max(size) < _TARGET_SETTLED:
+                break
+        return x
+
+
+# Which of the postures that were found are one solution.
+
+
+_SAME, _CLOSE, _BETWEEN = 1e-9, 1e-2, 1e-13
+
+
+def distinct(target: Target, q: Array) -> list[list[int]]:
+    """The postures in groups of equal ones, the groups and their members in the given order.
+
+    Two are one solution when they are closer than 1e-9, or closer than 1e-2 and the posture half
+    way between solves too, as copies of a multiple root do. Whole turns do not count.
+
+    Args:
+        target: the pose they take.
+        q: (m, n) solutions [rad or m].
+    """
+    groups: list[list[int]] = []
+    x, scale = q / target.unit, max(1.0, target.arm.length)
+    apart = np.max(np.abs(target.wrapped(x[:, None] - x)), axis=2, initial=0.0)
+    if np.sum(apart < _CLOSE) == len(q):  # each is close to itself alone
+        return [[k] for k in range(len(q))]
+    for k in range(len(q)):
+        first = [group[0] for group in groups]
+        way = target.wrapped(x[k] - x[first])
+        far = np.max(np.abs(way), axis=1, initial=0.0)
+        near = np.flatnonzero(far < _CLOSE)
+        half = (x[[first[m] for m in near]] + 0.5 * way[near]) * target.unit
+        between = target.residual(half) < _BETWEEN * scale if len(near) else np.zeros(0, bool)
+        same = near[(far[near] < _SAME) | between]
+        if len(same):
+            groups[int(same[np.argmin(far[same])])].append(k)
+        else:
+            groups.append([k])
+    return groups
+
+
+# How many roots meet in a solution: the equations near it, reduced to the directions left free.
+#
+# Where the Jacobian has c singular values of zero, the implicit function theorem solves all
+# equations but those of the left null space for all unknowns but the c along the right null
+# space: g(h) = 0 remains, without linear terms (Lyapunov-Schmidt). With one unknown the
+# multiplicity is the order of the first derivative of g that does not vanish; with more, the
+# dimension of the dual space of the ideal of g, from the ranks of Macaulay matrices.
+#
+# Source: Golubitsky & Schaeffer 1985, chapter VII (reduction); Dayton & Zeng 2005, section 3
+# (dual space).
+
+
+SINGULAR = 2e-6
+"""Singular values below it count as zero: two roots that lie 1e-6 apart are one double root."""
+
+_MEETING = 1e-13
+_RADII = (0.05, 0.012, 3e-3, 7e-4, 1.5e-4, 3e-5, 6e-6)
+_ROUNDING = 3e-15
+_HIGHEST = 4
+_FARTHEST = 0.4
+_DEGREE = 8
+_SEED = 20260107
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TargetReduction:
+    """The equations of a target near a solution, split by the singular directions.
+
+    Attributes:
+        target: whose equations.
+        x: (n,) the solution.
+        left: (6, 6 - rank) directions of the equations that remain.
+        solved: (6, rank) those that are solved for the other unknowns.
+        null: (n, corank) directions of the unknowns h that remain.
+        next: smallest singular value that does not count as zero.
+    """
+
+    target: Target
+    x: Array
+    left: Array
+    solved: Array
+    null: Array
+    next: float
+
+    @property
+    def corank(self) -> int:
+        """The number of unknowns that remain."""
+        return int(self.null.shape[1])
+
+    def at(self, h: Array) -> tuple[Array, Array, bool]:
+        """X (k, n) and g (k, 6 - rank) for h, (k, corank), and whether all were found."""
+        x = self.x + h @ self.null.T
+        for _ in range(12):
+            e, J = self.target.excess(x)
+            off = (x - self.x) @ self.null - h
+            rows = np.concatenate(
+                [self.solved.T @ J, np.broadcast_to(self.null.T, (*h.shape, self.x.size))], axis=1
+            )
+            right = np.concatenate([e @ self.solved, off], axis=1)
+            step = _solved(rows, right)
+            x = x - step
+        found = bool(np.max(np.abs(step)) < 1e-11 and np.max(np.abs(right)) < 1e-11)
+        return x, self.target.excess(x)[0] @ self.left, found
+
+
+def _solved(rows: Array, right: Array) -> Array:
+    """The solutions of square systems, zero where a system is singular."""
+    try:
+        step = np.asarray(np.linalg.solve(rows, right[..., None])[..., 0], dtype=float)
+    except np.linalg.LinAlgError:
+        return np.zeros_like(right)
+    return np.clip(np.where(np.isfinite(step), step, 0.0), -0.5, 0.5)
+
+
+def reduction(target: Target, q: Array) -> TargetReduction:
+    """The equations near the solution q, (n,) [rad or m]."""
+    x = q / target.unit
+    J = target.excess(x)[1]
+    U, s, Vt = np.linalg.svd(J)
+    rank = int(np.sum(s > SINGULAR))
+    following = float(s[rank - 1]) if rank else 1.0
+    return TargetReduction(target, x, U[:, rank:], U[:, :rank], Vt[rank:].T, following)
+
+
+def multiplicity(reduced: TargetReduction) -> tuple[int, Array]:
+    """How many roots meet in an isolated solution, and where.
+
+    Args:
+        reduced: the equations near it.
+
+    Returns:
+        the number of roots, and the posture q (n,) [rad or m] in their middle.
+    """
+    if reduced.corank == 0:
+        return 1, reduced.x * reduced.target.unit
+    if reduced.corank == 1:
+        return _order(reduced)
+    return _dual_dimension(reduced), reduced.x * reduced.target.unit
+
+
+def _order(reduced: TargetReduction) -> tuple[int, Array]:
+    """The order of the root of g in one unknown, and the middle of the roots that meet.
+
+    It is the highest k for which, about the middle of k roots, all terms below the k-th are
+    negligible as far from it as the k-th is.
+    """
+    g = _coefficients(reduced)
+    order, middle = 1, 0.0
+    for k in range(2, _HIGHEST + 1):
+        size = max(float(g[k] @ g[k]), 1e-300)
+        radius, shift = (_MEETING / size**0.5) ** (1.0 / k), -float(g[k - 1] @ g[k]) / (k * size)
+        if max(radius, abs(shift)) > _RADII[0]:
+            continue
+        below = np.linalg.norm(_shifted(g, shift)[:k], axis=1) * radius ** np.arange(k)
+        if np.all(below < _MEETING):
+            order, middle = k, shift
+    target = reduced.target
+    if order == 1:
+        return 1, _best(reduced, _simple_roots(g))
+    q = reduced.at(np.array([[middle]]))[0][0] * target.unit
+    good = target.residual(q) <= 0.5 * target.tolerance
+    return order, q if good else reduced.x * target.unit
+
+
+def _best(reduced: TargetReduction, steps: list[float]) -> Array:
+    """The posture (n,) of least residual after one of several steps, or none."""
+    x, _, _ = reduced.at(np.clip(np.array(steps)[:, None], -_FARTHEST, _FARTHEST))
+    q = np.vstack([reduced.x, x]) * reduced.target.unit
+    best: Array = q[int(np.argmin(reduced.target.residual(q)))]
+    return best
+
+
+def _simple_roots(g: Array) -> list[float]:
+    """Where a simple root of g near h = 0 may be: by its first two, three and all terms."""
+    slope = float(np.linalg.norm(g[1]))
+    if slope == 0.0:
+        return [0.0]
+    along = g @ g[1] / slope
+    found = [-float(along[0]) / slope]
+    for terms in (along[:3], along):
+        every = np.roots(terms[::-1])
+        real = every.real[np.abs(every.imag) < 1e-6 * np.abs(every)]
+        found += [float(real[np.argmin(np.abs(real))])] if len(real) else []
+    return found
+
+
+def _shifted(g: Array, by: float) -> Array:
+    """Taylor coefficients about another point."""
+    orders = range(len(g))
+    return np.array(
+        [sum(math.comb(m, k) * by ** (m - k) * g[m] for m in orders[k:]) for k in orders]
+    )
+
+
+def _coefficients(reduced: TargetReduction) -> Array:
+    """(degree + 1, 6 - rank) Taylor coefficients of g in one unknown."""
+    nodes = np.cos(np.pi * (np.arange(2 * _DEGREE + 1) + 0.5) / (2 * _DEGREE + 1))
+    for radius in _RADII:
+        _, g, found = reduced.at(radius * nodes[:, None])
+        fit = np.polynomial.polynomial.polyfit(nodes, g, _DEGREE)
+        rest = np.polynomial.polynomial.polyval(nodes, fit).T - g
+        if found and np.max(np.abs(rest)) < _ROUNDING:
+            break
+    coefficients: Array = fit / radius ** np.arange(_DEGREE + 1)[:, None]
+    return coefficients
+
+
+def _dual_dimension(reduced: TargetReduction) -> int:
+    """The dimension of the dual space of g at h = 0, up to degree 5."""
+    powers, columns = _taylor(reduced)
+    before = 1
+    for degree in range(1, 6):
+        matrix = _macaulay(powers, columns, degree, reduced.corank)
+        s = np.linalg.svd(matrix, compute_uv=False)
+        nullity = int(matrix.shape[1]) - int(np.sum(s > 1e-4 * max(float(s[0]), 1e-300)))
+        if nullity == before:
+            return nullity
+        before = nullity
+    return before
+
+
+def _taylor(reduced: TargetReduction) -> tuple[list[tuple[int, ...]], Array]:
+    """Exponents of monomials, and their coefficients in g with h counted in units of the radius."""
+    c = reduced.corank
+    powers = _monomials(c, 6)
+    rng = np.random.default_rng(_SEED)
+    h = rng.uniform(-1.0, 1.0, (3 * len(powers), c))
+    for radius in _RADII:
+        _, g, found = reduced.at(radius * h)
+        if found:
+            break
+    values = np.stack([np.prod(h ** np.array(power), axis=1) for power in powers], axis=1)
+    fit: Array = np.linalg.lstsq(values, g, rcond=None)[0]
+    degree = np.array([sum(power) for power in powers])
+    fit[degree <= 1] = 0.0
+    return powers, fit / max(float(np.max(np.abs(fit))), 1e-300)
+
+
+def _monomials(c: int, degree: int) -> list[tuple[int, ...]]:
+    every = itertools.product(range(degree + 1), repeat=c)
+    return sorted((power for power in every if sum(power) <= degree), key=lambda m: (sum(m), m))
+
+
+def _macaulay(powers: list[tuple[int, ...]], columns: Array, degree: int, c: int) -> Array:
+    """Rows: the products of monomials and equations, cut off above the degree."""
+    kept = _monomials(c, degree)
+    place = {power: k for k, power in enumerate(kept)}
+    rows = []
+    for factor in _monomials(c, degree - 1):
+        for equation in columns.T:
+            row = np.zeros(len(kept))
+            for power, value in zip(powers, equation, strict=True):
+                product = tuple(a + b for a, b in zip(power, factor, strict=True))
+                if product in place:
+                    row[place[product]] += value
+            rows.append(row)
+    return np.array(rows)

@@ -1,0 +1,349 @@
+"""Rigid stops and dry friction in the state equation of the independent joints.
+
+Only what the elements need is a mode or an indicator: a stop has its place, friction its direction
+of sliding, and a limit that is not given is not watched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.tables import EFFORT_UNIT
+from mbs.assembly.tree import position_rate
+from mbs.models.contacts import KINDS, ContactEquations, Contacts, impact, jump
+from mbs.models.state.drive import TreeMotion
+from mbs.models.symbols import dense_function, outputs_of
+
+# What keeps dependent joints at rest that rigid stops or dry friction hold.
+#
+# A state equation of the independent joints is integrated without any projection. What it holds
+# of these stays where it is; a dependent joint would creep by the errors of the steps.
+
+
+RETURN_RATE = 20.0
+"""How fast what is held returns to where it should be [1/s]."""
+_SHARED = 1e-6
+"""Square that is added to rows: they may depend on others, or vanish."""
+
+
+def standstill(
+    system: System,
+    contacts: Contacts,
+    motion: TreeMotion,
+    wanted: tuple[SX, SX],
+    moved: Sequence[int],
+) -> SX:
+    """A small change of the independent coordinates that changes dependent ones as wanted.
+
+    Independent coordinates that are held do not change, nor do those whose motion is prescribed.
+
+    Args:
+        system: open or closed.
+        contacts: the k coordinates.
+        motion: of the tree.
+        wanted: (k, 1) 1 where a coordinate is held, 0 elsewhere; and (k, 1) the changes of what is
+            held.
+        moved: numbers of the velocities whose motion is prescribed.
+
+    Returns:
+        (m, 1) in the order of the independent velocities; changes of positions or of rates.
+    """
+    active = list(system.active)
+    rows = [j for j, number in enumerate(contacts.velocities) if number not in active]
+    if not rows or motion.G is None:
+        return SX.zeros(len(active))
+    held, change = wanted
+    may_move = SX.ones(len(active))
+    for k, number in enumerate(active):
+        if number in moved:
+            may_move[k] = 0
+        elif number in contacts.velocities:
+            may_move[k] = 1 - held[contacts.velocities.index(number)]
+    G = motion.G[[contacts.velocities[j] for j in rows], :]
+    R = casadi.mtimes(casadi.diag(held[rows]), casadi.mtimes(G, casadi.diag(may_move)))
+    S = casadi.mtimes(R, R.T) + casadi.diag(1 - held[rows]) + _SHARED * SX(DM.eye(len(rows)))
+    D, LT, order = casadi.ldl(casadi.densify(S))
+    shares = casadi.ldl_solve(held[rows] * change[rows], D, LT, order)
+    return casadi.densify(casadi.mtimes(R.T, shares))
+
+
+# What states and modes are after an event, where nothing projects the motion later.
+
+
+_SMALL = 1e-300
+
+States = tuple[Sequence[int], Sequence[int]]
+"""Numbers in q and in v of the positions and velocities that a state begins with."""
+
+
+def minimal_jump(
+    system: System,
+    contact: ContactEquations,
+    motion: TreeMotion,
+    before: tuple[SX, SX],
+    states: States,
+) -> tuple[SX, SX]:
+    """The state and the modes after an event.
+
+    What meets a limit is put there with the velocity that it had there, since an importer may
+    locate events coarsely: an impact neither drifts nor gains energy. What is held has no velocity.
+
+    Args:
+        system: open or closed.
+        contact: its equations of contact.
+        motion: of the tree.
+        before: the state x; and (5 k, 1) 1 for each indicator that is not positive.
+        states: what x begins with.
+
+    Returns:
+        x and (2 k, 1) modes.
+    """
+    contacts, (x, fired) = contact.contacts, before
+    lower, upper, *_ = casadi.vertsplit(fired, len(contacts))
+    wall = (upper - lower) * ((upper - lower) * contacts.velocity(motion.v) >= 0)
+    v, modes = _after(system, contact, motion, (_at_impact(contact, motion, wall), fired))
+    now = contacts.modes(modes)
+    at = casadi.if_else(now.place == 0, wall, now.place)
+    at = casadi.if_else(at == 0, contact.modes.place, at)
+    shift = to_limits(system, contact, motion, at)
+    x = _shifted(system, motion.q, x, shift, states[0])
+    return _written(contacts, (x, v), (at, now.held), states), modes
+
+
+def to_limits(system: System, contact: ContactEquations, motion: TreeMotion, place: SX) -> SX:
+    """(m, 1) changes of independent positions that bring dependent ones to their limits.
+
+    Args:
+        system: open or closed.
+        contact: its equations of contact.
+        motion: of the tree.
+        place: (k, 1) -1 for the lower limit, 1 for the upper one, 0 for none.
+    """
+    contacts = contact.contacts
+    wanted = place**2, -contacts.distance(motion.q, place)
+    return standstill(system, contacts, motion, wanted, contact.driven)
+
+
+def _at_impact(contact: ContactEquations, motion: TreeMotion, wall: SX) -> SX:
+    """(nv, 1) velocities when limits were reached, which may be a little while ago.
+
+    Args:
+        contact: the equations of contact.
+        motion: now.
+        wall: (k, 1) -1 where a lower limit is met, 1 where an upper one is, 0 elsewhere.
+    """
+    contacts = contact.contacts
+    depth = casadi.fmax(wall * contacts.distance(motion.q, wall), 0)
+    speed, rise = wall * contacts.velocity(motion.v), wall * contacts.velocity(contact.a)
+    square = speed**2 - 2 * rise * depth
+    since = casadi.if_else(
+        square > 0,
+        2 * depth / casadi.fmax(speed + casadi.sqrt(casadi.fmax(square, 0)), _SMALL),
+        speed / casadi.fmax(rise, _SMALL),
+    )
+    return motion.v - casadi.mmax(casadi.if_else(depth > 0, since, 0)) * contact.a
+
+
+def _after(
+    system: System, contact: ContactEquations, motion: TreeMotion, before: tuple[SX, SX]
+) -> tuple[SX, SX]:
+    """(nv, 1) velocities after an event, those of what is held zero, and the modes."""
+    contacts, (speed, fired) = contact.contacts, before
+    v, modes = jump(system, contacts, contact.modes, (motion.q, speed, fired), contact.driven)
+    held, m = contacts.modes(modes).held, len(contact.driven)
+    still = casadi.vertcat(SX.zeros(m), -held * contacts.velocity(v))
+    acting = casadi.vertcat(SX.ones(m), held)
+    numbers = (*contact.driven, *contacts.velocities)
+    dv = outputs_of(system, impact(system, numbers), motion.q, still, acting)[0]
+    return v + casadi.mmax(held) * dv, modes
+
+
+def _shifted(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) -> SX:
+    """The state with independent positions of a closed system, which are at q, shifted."""
+    after = SX(x)
+    if system.is_closed:
+        v = SX.zeros(system.nv)
+        v[list(system.active)] = shift
+        after[: len(positions)] += position_rate(system.tree, q, v)[list(positions)]
+    return after
+
+
+def _written(
+    contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], states: States
+) -> SX:
+    """The state x with velocities v: what is held stands still, what is at a limit is just there.
+
+    Args:
+        contacts: the k coordinates.
+        motion: x and v (nv, 1).
+        acting: (k, 1) the limits where coordinates are, as -1 and 1; (k, 1) 1 for what is held.
+        states: what x begins with.
+    """
+    (positions, velocities), (x, v), (at, held) = states, motion, acting
+    after = SX(x)
+    after[len(positions) : len(positions) + len(velocities)] = v[list(velocities)]
+    for j, (q, number) in enumerate(zip(contacts.positions, contacts.velocities, strict=True)):
+        if number in velocities:
+            row = len(positions) + list(velocities).index(number)
+            after[row] = casadi.if_else(held[j], 0, after[row])
+        if q is not None and q in positions:
+            row = list(positions).index(q)
+            limit = casadi.if_else(at[j] < 0, contacts.bounds[0][j], contacts.bounds[1][j])
+            after[row] = casadi.if_else(at[j] == 0, after[row], limit)
+    return after
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MinimalEvents:
+    """Where states and modes jump, and how; p = [parameters; modes] in all functions.
+
+    The state x is that of the independent joints, or of the tree, which has no z.
+
+    Attributes:
+        modes: name of every mode, such as `stop.mode`.
+        names: (k) what each indicator watches.
+        first: `first(t, x, z, u, p) -> (modes, beyond)` at a start, of the modes in p nothing;
+            beyond (k, 1) is positive where x is beyond the limit that the indicator watches.
+        indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events.
+        jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
+            indicator that is not positive, 0 for the others.
+    """
+
+    modes: tuple[str, ...]
+    names: tuple[str, ...]
+    first: Function
+    indicators: Function
+    jump: Function
+
+
+@dataclass(frozen=True, slots=True)
+class ContactEffort:
+    """What a rigid stop or dry friction exerts, as an output.
+
+    Attributes:
+        name: such as `stop.effort`.
+        unit: N.m or N.
+        row: its number among the 2 k efforts of k coordinates.
+    """
+
+    name: str
+    unit: str
+    row: int
+
+
+def used_modes(contacts: Contacts) -> list[int]:
+    """Numbers of the modes, among the 2 k of k coordinates, that elements have."""
+    elements = (*contacts.stops, *contacts.frictions)
+    return [number for number, element in enumerate(elements) if element is not None]
+
+
+def element_names(contacts: Contacts) -> list[str]:
+    """Names of the stops, then of the frictions."""
+    elements = (*contacts.stops, *contacts.frictions)
+    return [element.element.name for element in elements if element is not None]
+
+
+def contact_efforts(system: System, contacts: Contacts) -> tuple[ContactEffort, ...]:
+    """The outputs of the efforts of stops, then of friction."""
+    units = [EFFORT_UNIT[system.speeds[k].unit] for k in contacts.velocities] * 2
+    pairs = zip(element_names(contacts), used_modes(contacts), strict=True)
+    return tuple(ContactEffort(f"{name}.effort", units[k], k) for name, k in pairs)
+
+
+def few_modes(contact: ContactEquations | None, p: SX, values: Sequence[SX]) -> tuple[SX, list[SX]]:
+    """[p; modes] of the elements alone, and expressions of all 2 k modes with these in them.
+
+    Where there are no contacts, both as they are.
+    """
+    if contact is None:
+        return p, list(values)
+    modes, count = used_modes(contact.contacts), contact.values.numel()
+    few = SX.sym("modes", len(modes))
+    changed = casadi.substitute(list(values), [contact.values], [_spread(few, modes, count)])
+    return casadi.vertcat(p, few), [SX(value) for value in changed]
+
+
+def minimal_events(
+    contact: ContactEquations,
+    motion: TreeMotion,
+    point: Sequence[SX],
+    jump: Callable[[SX], tuple[SX, SX]],
+) -> MinimalEvents:
+    """The events of a state equation.
+
+    Args:
+        contact: its equations of contact.
+        motion: of the tree.
+        point: t, x, z, u and p, without modes.
+        jump: x and (2 k, 1) modes after an event, of (5 k, 1) 1 for each indicator that is not
+            positive.
+    """
+    contacts, modes = contact.contacts, used_modes(contact.contacts)
+    watched = _watched(contacts)
+    numbers = [number for number, _ in watched]
+    *others, p = point
+
+    def written(name: str, extra: list[SX], outputs: list[SX]) -> Function:
+        few, values = few_modes(contact, p, outputs)
+        return dense_function(name, [*others, few, *extra], values)
+
+    fired = SX.sym("fired", len(watched))
+    start, outside = contacts.first(motion.q, motion.v)
+    beyond = casadi.vertcat(outside, -SX.ones(3 * len(contacts)))
+    every = _spread(fired, numbers, 5 * len(contacts))
+    x, now = jump(every)
+    return MinimalEvents(
+        modes=tuple(f"{name}.mode" for name in element_names(contacts)),
+        names=tuple(name for _, name in watched),
+        first=written("first", [], [start[modes], beyond[numbers]]),
+        indicators=written("indicators", [], [contact.indicators[numbers]]),
+        jump=written("jump", [fired], [x, now[modes]]),
+    )
+
+
+def at_limits(system: System, contact: ContactEquations | None, motion: TreeMotion) -> SX:
+    """(m, 1) rates of independent positions that bring dependent ones at limits back to them."""
+    if contact is None:
+        return SX.zeros(len(system.active))
+    return RETURN_RATE * to_limits(system, contact, motion, contact.modes.place)
+
+
+def _watched(contacts: Contacts) -> list[tuple[int, str]]:
+    """Number among the 5 k indicators, and name, of those that can fall to zero."""
+    lower, upper, dry = (
+        np.array(flags)[:, 0] > 0
+        for flags in (contacts.has_lower, contacts.has_upper, contacts.has_friction)
+    )
+    acting = (lower, upper, lower | dry, upper | dry, dry)
+    return [
+        (kind * len(contacts) + j, _name(contacts, j, word))
+        for kind, word in enumerate(KINDS)
+        for j in range(len(contacts))
+        if acting[kind][j]
+    ]
+
+
+def _name(contacts: Contacts, j: int, word: str) -> str:
+    stop, friction = contacts.stops[j], contacts.frictions[j]
+    limit, way = {"pulled": ("lower", "up"), "pushed": ("upper", "down")}.get(word, ("", ""))
+    parts = []
+    if stop is not None and word in ("lower", "upper"):
+        parts.append(f"{stop.element.name} {word}")
+    if stop is not None and limit and getattr(stop.element, limit) is not None:
+        parts.append(f"{stop.element.name} leaves {limit}")
+    if friction is not None and word not in ("lower", "upper"):
+        parts.append(f"{friction.element.name} {f'slides {way}' if way else 'stops'}")
+    return " or ".join(parts)
+
+
+def _spread(values: SX, places: Sequence[int], size: int) -> SX:
+    """(size, 1) values at their places, zero elsewhere."""
+    every = SX.zeros(size)
+    every[list(places)] = values
+    return every

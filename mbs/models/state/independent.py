@@ -1,0 +1,758 @@
+"""The state equation of the independent joints, the others solved for.
+
+It is what an importer of an FMU expects: states that may be set freely, and no drift.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import accumulate
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import MX, SX, Function
+
+from mbs.assembly import System
+from mbs.assembly.tree import Frame, Link, position_rate, quaternion_slices
+from mbs.loops.closing import relative_rows
+from mbs.loops.closure import facing, square_closure
+from mbs.models.contacts import (
+    ContactEquations,
+    contact_equations,
+    contacts_of,
+    require_lasting_rows,
+)
+from mbs.models.direct_dynamics import hybrid_dynamics, independent_dynamics, inertia_matrix
+from mbs.models.geometry import terminal_frame
+from mbs.models.inverse_dynamics import bias
+from mbs.models.state.drive import (
+    DriveInputs,
+    InputMotion,
+    TreeMotion,
+    frames_of,
+    further_inputs,
+    input_motions,
+    load_of,
+    motions_of,
+    tree_motion,
+    wrenches_of,
+)
+from mbs.models.state.events import (
+    RETURN_RATE,
+    ContactEffort,
+    MinimalEvents,
+    at_limits,
+    contact_efforts,
+    few_modes,
+    minimal_events,
+    minimal_jump,
+    standstill,
+)
+from mbs.models.symbols import dense_function, device_equations, outputs_of, state_count
+from mbs.recursions.route import relative_pose
+from mbs.solvers.linear import newton_step
+from mbs.spatial import Wrench, quaternion_rate, quaternion_rotation
+
+# Quaternion joints in loops whose motion is independent, as a whole or in part.
+#
+# A rod between two ball joints spins about its own axis whatever the loops do, and no element of
+# the quaternion of a ball joint stands for that spin. The quaternion as a whole is then a state,
+# and a second one, on the loops, is solved for with the other dependent positions: of all
+# quaternions that close the loops the one that is not turned from the state about the independent
+# axes.
+#
+# The state turns with the same angular velocity in space as the solved quaternion, so that what
+# is solved moves with exactly the velocities of the joint, and decays to it.
+
+
+NORM_RATE = 10.0
+"""How fast a quaternion returns to unit length, and to the loops [1/s]: an error of the solver is
+gone within a second, and steps that a mechanism takes at 1 Hz or faster are not shortened by it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Orientation:
+    """A quaternion joint of which independent velocities are.
+
+    Attributes:
+        link: that it moves.
+        free: numbers in v of its velocities whose positions may be chosen.
+    """
+
+    link: Link
+    free: tuple[int, ...]
+
+    @property
+    def whole(self) -> bool:
+        """Whether all its velocities are: its positions are states then, and none is solved for."""
+        return len(self.free) == self.link.motion.nv
+
+    @property
+    def positions(self) -> tuple[int, ...]:
+        """Numbers in q."""
+        return tuple(range(self.link.q.start, self.link.q.stop))
+
+    @property
+    def quaternion(self) -> slice:
+        """Where its quaternion stands in q."""
+        return slice(self.link.q.stop - 4, self.link.q.stop)
+
+
+def orientations_of(system: System) -> tuple[Orientation, ...]:
+    """The quaternion joints of a closed system that are independent, in part at least."""
+    free = set(system.free)
+    found = (
+        Orientation(link, tuple(k for k in range(link.v.start, link.v.stop) if k in free))
+        for link in system.tree.links
+        if link.motion.nq > link.motion.nv
+    )
+    return tuple(joint for joint in found if joint.free)
+
+
+def with_unit_length(joints: Sequence[Orientation], q: SX) -> SX:
+    """The positions with the quaternions of joints that are states alone at unit length."""
+    result = SX(q)
+    for joint in joints:
+        if joint.whole:
+            part = joint.quaternion
+            result[part] = q[part] / casadi.norm_2(q[part])
+    return result
+
+
+def tied(system: System, joints: Sequence[Orientation], raw: SX, q: SX) -> SX:
+    """(k, 1) zero where q is moved from the state by none of the independent velocities.
+
+    Args:
+        system: with closed loops.
+        joints: its independent quaternion joints.
+        raw: (nq, 1) positions as in the state.
+        q: (nq, 1) positions that are solved for.
+    """
+    u = SX.sym("u", system.nv)
+    N = casadi.jacobian(position_rate(system.tree, raw, u), u)
+    rows = [SX(0, 1)]
+    for joint in joints:
+        if not joint.whole:
+            size = SX.ones(system.nq)
+            size[joint.quaternion] = 4  # of the columns of N, which are half unit vectors there
+            part = list(joint.positions)
+            along = N[part, list(joint.free)]
+            rows.append(casadi.mtimes(along.T, (size * (q - raw))[part]))
+    return casadi.vertcat(*rows)
+
+
+def state_rates(system: System, joints: Sequence[Orientation], motion: tuple[SX, SX, SX]) -> SX:
+    """(nq, 1) rates of the positions as in the state.
+
+    Args:
+        system: with closed loops.
+        joints: its independent quaternion joints.
+        motion: positions as in the state, positions on the loops, and velocities of the tree.
+    """
+    raw, q, v = motion
+    rate = position_rate(system.tree, q, v)
+    for joint in joints:
+        part = joint.quaternion
+        w = v[joint.link.v.stop - 3 : joint.link.v.stop]
+        if joint.whole:
+            left = (1 - casadi.sumsqr(raw[part])) * raw[part]
+            rate[part] = quaternion_rate(raw[part], w) + NORM_RATE * left
+            continue
+        every = list(joint.positions)
+        unit = raw[part] / casadi.norm_2(raw[part])
+        spin = casadi.mtimes(quaternion_rotation(q[part]), w)
+        left = q[every] - raw[every]
+        rate[part] = quaternion_rate(raw[part], casadi.mtimes(quaternion_rotation(unit).T, spin))
+        if len(every) > 4:
+            rate[every[:3]] -= casadi.cross(spin, left[:3])
+        rate[every] += NORM_RATE * left
+    return rate
+
+
+# What stands where in the state equation of the independent joints.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MinimalLayout:
+    """The elements of states x, dependent positions z, inputs u and outputs y.
+
+    x = [positions; velocities; states of devices]; u = [efforts of motors; inputs of devices;
+    wrenches; motions; w]; y = [accelerations; positions of z that are not in x, velocities and
+    accelerations of the dependent joints; origin (3) and orientation (9, by rows) of the terminal
+    frame; outputs of devices; efforts; efforts of contacts; what is observed].
+
+    Attributes:
+        positions: numbers in q of the first part of x.
+        orientations: quaternion joints of loops that are among them.
+        velocities: numbers in v of the second part of x.
+        dependents: numbers in q of z, some of them in x too: see `minimal_orientation`.
+        shown: those of them that are in y, which are not in x.
+        inputs: numbers in v of the efforts of motors.
+        devices: numbers of the devices whose inputs are in u.
+        wrenches: names of the frames on which wrenches act, six numbers each: force and moment
+            about the origin, in axes of the base.
+        frames: these frames.
+        motions: joints whose accelerations, or positions, velocities and accelerations, are in u.
+        extra: size of w.
+        accelerations: numbers in v of the first part of y.
+        passive: numbers in v of the velocities and accelerations of dependent joints in y.
+        efforts: numbers in v of the efforts in y, each all that drives the joint but contacts.
+        contacts: efforts of rigid stops and dry friction in y.
+    """
+
+    positions: tuple[int, ...]
+    orientations: tuple[Orientation, ...]
+    velocities: tuple[int, ...]
+    dependents: tuple[int, ...]
+    shown: tuple[int, ...]
+    inputs: tuple[int, ...]
+    devices: tuple[int, ...]
+    wrenches: tuple[str | int, ...]
+    frames: tuple[Frame, ...]
+    motions: tuple[InputMotion, ...]
+    extra: int
+    accelerations: tuple[int, ...]
+    passive: tuple[int, ...]
+    efforts: tuple[int, ...]
+    contacts: tuple[ContactEffort, ...]
+
+
+def motors_of(system: System, moved: Sequence[int] = ()) -> tuple[int, ...]:
+    """Numbers of the velocities that motors drive, the independent ones first.
+
+    Args:
+        system: open or closed.
+        moved: velocities whose motion is prescribed; they and those of devices are left out.
+    """
+    others = [k for k in range(system.nv) if k not in system.active]
+    taken = [*moved, *(device.velocity for device in system.devices)]
+    return tuple(
+        k for k in (*system.active, *others) if system.speeds[k].actuated and k not in taken
+    )
+
+
+def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
+    """The elements of the state equation of a system.
+
+    Args:
+        system: open or closed.
+        drive: what drives it.
+
+    Raises:
+        ModelError: a drive does not fit the system.
+    """
+    motions, extra = motions_of(system, drive), further_inputs(system, drive)
+    inputs_q = [motion.position for motion in motions]
+    moved = [motion.velocity for motion in motions]
+    without_states = [motion.velocity for motion in motions if motion.kind == "q"]
+    orientations = orientations_of(system) if system.is_closed else ()
+    solved = [k for joint in orientations if not joint.whole for k in joint.positions]
+    free = _free_positions(system, orientations)
+    motors = motors_of(system, moved)
+    return MinimalLayout(
+        positions=tuple(k for k in free if k not in inputs_q),
+        orientations=orientations,
+        velocities=tuple(k for k in system.active if k not in without_states),
+        dependents=tuple(k for k in range(system.nq) if k not in free or k in solved),
+        shown=tuple(k for k in range(system.nq) if k not in free),
+        inputs=() if drive.effort else motors,
+        devices=() if drive.device else tuple(range(len(system.devices))),
+        wrenches=drive.wrenches,
+        frames=frames_of(system, drive),
+        motions=motions,
+        extra=extra,
+        accelerations=tuple(k for k in system.active if k not in moved),
+        passive=system.closure.passive if system.closure else (),
+        efforts=(*(motors if drive.effort else ()), *moved),
+        contacts=contact_efforts(system, contacts_of(system)),
+    )
+
+
+def _free_positions(system: System, orientations: Sequence[Orientation]) -> tuple[int, ...]:
+    """Numbers in q of the positions that are independent, those of quaternion joints as a whole."""
+    if not system.is_closed:
+        return tuple(range(system.nq))
+    numbers = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
+    joints = {k: joint.positions for joint in orientations for k in joint.free}
+    found = (joints.get(k) or (numbers[system.speeds[k].name],) for k in system.free)
+    return tuple(dict.fromkeys(position for part in found for position in part))
+
+
+# Accelerations of the independent joints under contacts, prescribed motions and wrenches.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Accelerations:
+    """What a tree does under given efforts.
+
+    Attributes:
+        a_a: (m, 1) of the independent joints.
+        a: (nv, 1) of the tree.
+        tau: (nv, 1) joint efforts, those of prescribed motions included, those of contacts not.
+        contact: what contacts do, None where there are none.
+    """
+
+    a_a: SX
+    a: SX
+    tau: SX
+    contact: ContactEquations | None
+
+    @property
+    def every_effort(self) -> SX:
+        """(nv, 1) joint efforts, those of contacts included."""
+        total = SX(self.tau)
+        if self.contact is not None:
+            for row, number in enumerate(2 * self.contact.contacts.velocities):
+                total[number] += self.contact.efforts[row]
+        return total
+
+
+def minimal_accelerations(
+    system: System, motion: TreeMotion, tau: SX, load: SX, given: Mapping[int, SX]
+) -> Accelerations:
+    """Accelerations of a tree whose loops stay closed.
+
+    What is given, and what contacts hold, is exact in a_a, since nothing projects the motion later.
+
+    Args:
+        system: open or closed.
+        motion: of the tree.
+        tau: (nv, 1) joint efforts.
+        load: (nv, 1) what acts from outside, as joint efforts.
+        given: accelerations that are prescribed, by the numbers of their velocities.
+    """
+    contact = contact_equations(system, motion.q, motion.v, tau + load, given)
+    if contact is None and not given:
+        pushed = motion.reduced_effort(tau + load)
+        (a_a,) = outputs_of(system, independent_dynamics(system), motion.q, motion.v_a, pushed)
+        return Accelerations(a_a, motion.tree_acceleration(a_a), tau, None)
+    if contact is not None:
+        a, drives = _held(system, contact, motion), contact.drives
+    elif system.is_closed:
+        a, drives = _reduced_hybrid(system, motion, motion.reduced_effort(tau + load), given)
+    else:
+        hybrid = hybrid_dynamics(system, [system.speeds[k].name for k in given])
+        wanted = casadi.vertcat(*given.values())
+        a, drives = outputs_of(system, hybrid, motion.q, motion.v, tau + load, wanted)
+    every = SX(tau)
+    for row, (number, value) in enumerate(given.items()):
+        a[number] = value
+        every[number] += drives[row]
+    a_a = a[list(system.active)]
+    return Accelerations(a_a, motion.tree_acceleration(a_a), every, contact)
+
+
+def _held(system: System, contact: ContactEquations, motion: TreeMotion) -> SX:
+    """(nv, 1) accelerations under contacts, those of independent joints that are held exact."""
+    a, contacts, held = SX(contact.a), contact.contacts, contact.modes.held
+    back = -RETURN_RATE * contacts.velocity(motion.v)
+    a[list(system.active)] += standstill(system, contacts, motion, (held, back), contact.driven)
+    for j, number in enumerate(contacts.velocities):
+        a[number] = casadi.if_else(held[j], back[j], a[number])
+    return a
+
+
+def _reduced_hybrid(
+    system: System, motion: TreeMotion, tau: SX, given: Mapping[int, SX]
+) -> tuple[SX, SX]:
+    """Hybrid dynamics in the independent joints, (m, 1) efforts tau and prescribed accelerations.
+
+    Source: Featherstone 2008, section 9.2, for the inertia matrix G' A G.
+
+    Returns:
+        (nv, 1) accelerations, of the independent joints alone, and the efforts of drives.
+    """
+    (A,) = outputs_of(system, inertia_matrix(system), motion.q)
+    (H,) = outputs_of(system, bias(system), motion.q, motion.v_a)
+    driven = [system.active.index(k) for k in given]
+    free = [k for k in range(len(system.active)) if k not in driven]
+    a = SX.zeros(len(system.active))
+    a[driven] = casadi.vertcat(*given.values())
+    if free:
+        left = tau - H - casadi.mtimes(A, a)
+        D, LT, order = casadi.ldl(casadi.densify(A[free, free]))
+        a[free] = casadi.ldl_solve(left[free], D, LT, order)
+    needed = casadi.mtimes(A, a) + H - tau
+    every = SX.zeros(system.nv)
+    every[list(system.active)] = a
+    return every, needed[driven]
+
+
+# A state equation whose motors and devices follow laws instead of inputs.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StateEquations:
+    """The functions of a state equation.
+
+    Attributes:
+        rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
+        motion: `motion(t, x, z, u, p) -> (q, v)`, positions and velocities of the tree; p are the
+            parameters alone.
+        events: None where there are none.
+        sizes: of the parts of u: efforts, inputs of devices, the rest.
+    """
+
+    rhs: Function
+    motion: Function
+    events: MinimalEvents | None
+    sizes: tuple[int, int, int]
+
+
+def controlled(equations: StateEquations, drive: DriveInputs, extra: int) -> StateEquations:
+    """The same with inputs that the laws of a drive compute.
+
+    The functions are of scalars where the laws are. Else they hold calls of the laws, which may be
+    external functions.
+
+    Args:
+        equations: where u begins with what the laws give.
+        drive: with a law.
+        extra: number of the inputs w of the laws, which end u.
+    """
+    tau, u, rest = equations.sizes
+    wiring = _Wiring(
+        equations, drive, (0 if drive.effort else tau, 0 if drive.device else u, rest, extra)
+    )
+    return StateEquations(
+        rhs=_driven(wiring, equations.rhs),
+        motion=equations.motion,
+        events=_events(wiring, equations.events),
+        sizes=wiring.sizes[:3],
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wiring:
+    """What computes the inputs, and the sizes of the parts of u that are left."""
+
+    equations: StateEquations
+    drive: DriveInputs
+    sizes: tuple[int, int, int, int]
+
+
+def _events(wiring: _Wiring, events: MinimalEvents | None) -> MinimalEvents | None:
+    if events is None:
+        return None
+    return replace(
+        events,
+        first=_idle(wiring, events.first),
+        indicators=_driven(wiring, events.indicators),
+        jump=_driven(wiring, events.jump),
+    )
+
+
+def _driven(wiring: _Wiring, function: Function) -> Function:
+    """The function with what the laws give."""
+    drive, motion = wiring.drive, wiring.equations.motion
+    laws = [law for law in (drive.effort, drive.device) if law is not None]
+    kind: Any = SX if all(law.is_a("SXFunction") for law in laws) else MX
+    symbols = _symbols(wiring, function, kind)
+    t, x, z, u, p = symbols[:5]
+    pushes, inputs, others, w = _parts(u, wiring.sizes)
+    p = _parts(p, (motion.numel_in(4), p.numel() - motion.numel_in(4)))[0]
+    q, v = motion.call([t, x, z, _filled(wiring, kind, others), p])
+    if drive.effort is not None:
+        pushes = casadi.densify(casadi.vec(drive.effort.call([t, q, v, w, p])[0]))
+    if drive.device is not None:
+        inputs = casadi.densify(casadi.vec(drive.device.call([t, q, v, w, p])[0]))
+    given = casadi.vertcat(pushes, inputs, others)
+    return _written(function, symbols, given, kind)
+
+
+def _idle(wiring: _Wiring, function: Function) -> Function:
+    """The function, which depends on no effort, with other inputs."""
+    symbols = _symbols(wiring, function, SX)
+    others = _parts(symbols[3], wiring.sizes)[2]
+    return _written(function, symbols, _filled(wiring, SX, others), SX)
+
+
+def _symbols(wiring: _Wiring, function: Function, kind: Any) -> list[Any]:
+    sizes = [function.numel_in(k) for k in range(function.n_in())]
+    sizes[3] = sum(wiring.sizes)
+    names = ("t", "x", "z", "u", "p", "fired")
+    return [kind.sym(name, size) for name, size in zip(names, sizes, strict=False)]
+
+
+def _filled(wiring: _Wiring, kind: Any, others: Any) -> Any:
+    """The inputs that a function takes, zero where laws give them."""
+    tau, u, _ = wiring.equations.sizes
+    return casadi.vertcat(kind.zeros(tau), kind.zeros(u), others)
+
+
+def _parts(u: Any, sizes: tuple[int, ...]) -> list[Any]:
+    parts: list[Any] = casadi.vertsplit(u, [0, *accumulate(sizes)])
+    return parts
+
+
+def _written(function: Function, symbols: list[Any], u: Any, kind: Any) -> Function:
+    options = {"cse": True} if kind is SX else {}
+    values = function.call([*symbols[:3], u, *symbols[4:]])
+    return Function(function.name(), symbols, values, options)
+
+
+__all__ = ["DriveInputs", "MinimalState", "Observe", "Seen", "consistent_start", "minimal_state"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """A motion and what makes it, for outputs.
+
+    Attributes:
+        t: time [s].
+        p: (np, 1) parameters of the system.
+        q: (nq, 1) positions, quaternions of unit length.
+        v: (nv, 1) velocities of the tree.
+        a: (nv, 1) accelerations of the tree.
+        v_a: (m, 1) velocities of the independent joints.
+        a_a: (m, 1) accelerations of the independent joints.
+        tau: (nv, 1) joint efforts: motors, devices, prescribed motions and contacts.
+        external: for some links the wrench that they exert on what pushes them, about and in their
+            frames.
+    """
+
+    t: SX
+    p: SX
+    q: SX
+    v: SX
+    a: SX
+    v_a: SX
+    a_a: SX
+    tau: SX
+    external: dict[int, Wrench]
+
+
+Observe = Callable[[Seen], Sequence[SX]]
+"""What else is seen of a motion."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MinimalState(MinimalLayout):
+    """A state equation; what stands where in x, z, u and y tells `MinimalLayout`.
+
+    Attributes:
+        rhs: `rhs(t, x, z, u, p) -> (xdot, y)`; p are the parameters, here and in `events` with the
+            modes behind them.
+        closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step; None in open chains.
+        slopes: `slopes(x, z, p) -> J`, how the equations that the Newton step solves change with z,
+            (nz, nz); None in open chains, and where they are of least squares, whose determinant
+            has no sign.
+        events: of rigid stops and dry friction; None where there are none.
+    """
+
+    rhs: Function
+    closure: Function | None
+    slopes: Function | None
+    events: MinimalEvents | None
+
+
+def minimal_state(
+    system: System, observe: Observe | None = None, drive: DriveInputs | None = None
+) -> MinimalState:
+    """The state equation of the independent joints.
+
+    Args:
+        system: open or closed.
+        observe: what else the outputs end with.
+        drive: what drives it beside, or in place of, the efforts of motors and the inputs of
+            devices.
+
+    Raises:
+        ModelError: a drive does not fit the system, or the independent rows of the loops change
+            with the posture, which contacts do not follow.
+    """
+    require_lasting_rows(system, contacts_of(system))
+    drive = DriveInputs() if drive is None else drive
+    layout = minimal_layout(system, drive)
+    equations = _equations(system, observe, layout, drive)
+    if drive.effort is not None or drive.device is not None:
+        equations = controlled(equations, drive, layout.extra)
+    closure, slopes = _closure_step(system, layout) if layout.dependents else (None, None)
+    return MinimalState(
+        **{field.name: getattr(layout, field.name) for field in fields(layout)},
+        rhs=equations.rhs,
+        closure=closure,
+        slopes=slopes,
+        events=equations.events,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StatePoint:
+    """Symbols, and the parts of x and u."""
+
+    t: SX
+    x: SX
+    z: SX
+    u: SX
+    q: SX
+    v: SX
+    states: SX
+    efforts: SX
+    inputs: SX
+    wrenches: SX
+    motions: SX
+
+
+def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> StatePoint:
+    """Symbols of a state equation.
+
+    Args:
+        system: open or closed.
+        layout: what stands where.
+        motors: numbers in v of the efforts in u.
+    """
+    in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
+    in_u = [len(motors), len(system.devices), 6 * len(layout.frames)]
+    in_u.append(sum(motion.size for motion in layout.motions))
+    x, u = SX.sym("x", sum(in_x)), SX.sym("u", sum(in_u))
+    parts = (*_split(x, in_x), *_split(u, in_u))
+    return StatePoint(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
+
+
+def _split(values: SX, sizes: Sequence[int]) -> list[SX]:
+    return list(casadi.vertsplit(values, [0, *accumulate(sizes)]))
+
+
+def _equations(
+    system: System, observe: Observe | None, layout: MinimalLayout, drive: DriveInputs
+) -> StateEquations:
+    """The functions, where u has no w, and all efforts and inputs of devices that laws give."""
+    motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
+    s = point_of(system, layout, motors)
+    laws = input_motions(layout.motions, s.motions)
+    motion = motion_of(system, layout, s, laws)
+    tau, rates, shown = device_equations(system, motion.v, s.states, s.inputs)
+    for column, number in enumerate(motors):
+        tau[number] += s.efforts[column]
+    external = wrenches_of(system, motion.q, layout.frames, s.wrenches)
+    given = {m.velocity: law[2] for m, law in zip(layout.motions, laws, strict=True)}
+    load = load_of(system, motion.q, external)
+    moved = minimal_accelerations(system, motion, tau, load, given)
+    rate = _rate(system, layout, motion, moved, rates)
+    y = outputs_vector(system, layout, motion, moved, shown)
+    if observe is not None:
+        vectors = motion.q, motion.v, moved.a, motion.v_a, moved.a_a, moved.every_effort
+        y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *vectors, external)))
+    point = [s.t, s.x, s.z, s.u, system.p]
+    contact, states = moved.contact, (layout.positions, layout.velocities)
+    events = None
+    if contact:
+        events = minimal_events(
+            contact,
+            motion,
+            point,
+            lambda fired: minimal_jump(system, contact, motion, (s.x, fired), states),
+        )
+    point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
+    return StateEquations(
+        rhs=dense_function("rhs", point, [rate, y]),
+        motion=dense_function("motion", [s.t, s.x, s.z, s.u, system.p], [motion.q, motion.v]),
+        events=events,
+        sizes=(len(motors), len(system.devices), s.u.numel() - len(motors) - len(system.devices)),
+    )
+
+
+def motion_of(
+    system: System, layout: MinimalLayout, s: StatePoint, laws: Sequence[tuple[SX, SX, SX]]
+) -> TreeMotion:
+    """The motion of the tree, from states, dependent positions and prescribed motions."""
+    raw, q = positions_of(system, layout, s)
+    v = SX.zeros(system.nv)
+    v[list(layout.velocities)] = s.v
+    for motion, law in zip(layout.motions, laws, strict=True):
+        if motion.position is not None:
+            raw[motion.position], v[motion.velocity] = law[0], law[1]
+    return tree_motion(system, raw, q, v[list(system.active)])
+
+
+def positions_of(system: System, layout: MinimalLayout, s: StatePoint) -> tuple[SX, SX]:
+    """(nq, 1) positions as in the state, and on the loops."""
+    raw = SX.zeros(system.nq)
+    raw[list(layout.dependents)] = s.z
+    raw[list(layout.positions)] = s.q
+    q = with_unit_length(layout.orientations, raw)
+    q[list(layout.dependents)] = s.z
+    return raw, q
+
+
+def _rate(
+    system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, devices: SX
+) -> SX:
+    """The rate of x; quaternions are drawn back to unit length."""
+    if system.is_closed:
+        v = SX(motion.v)
+        v[list(system.active)] += at_limits(system, moved.contact, motion)
+        rate = state_rates(system, layout.orientations, (motion.raw, motion.q, v))
+    else:
+        rate = _steadied_rate(system, motion)
+    return casadi.vertcat(_rows(rate, layout.positions), _rows(moved.a, layout.velocities), devices)
+
+
+def _steadied_rate(system: System, motion: TreeMotion) -> SX:
+    raw = position_rate(system.tree, motion.raw, motion.v)
+    rate = position_rate(system.tree, motion.q, motion.v)
+    for part in quaternion_slices(system.tree):
+        q = motion.raw[part]
+        rate[part] = raw[part] + NORM_RATE * (1 - casadi.sumsqr(q)) * q
+    return rate
+
+
+def outputs_vector(
+    system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, shown: SX
+) -> SX:
+    """The outputs y that every state equation has."""
+    efforts = moved.contact.efforts if moved.contact else SX(0, 1)
+    return casadi.vertcat(
+        _rows(moved.a, layout.accelerations),
+        _rows(motion.q, layout.shown),
+        _rows(motion.v, layout.passive),
+        _rows(moved.a, layout.passive),
+        _terminal_pose(system, motion.q),
+        shown,
+        _rows(moved.tau, layout.efforts),
+        _rows(efforts, [effort.row for effort in layout.contacts]),
+    )
+
+
+def _rows(vector: SX, numbers: Sequence[int]) -> SX:
+    """Some elements of a vector; none of a vector (1, 1) are (1, 0), which would count as a row."""
+    return vector[list(numbers)] if numbers else SX(0, 1)
+
+
+def _terminal_pose(system: System, q: SX) -> SX:
+    """(12, 1) origin, and orientation by rows, of the terminal frame in the base."""
+    base, tool = system.frame("base"), system.frame(terminal_frame(system))
+    T = relative_pose(system.tree, q, base, tool)
+    return casadi.vertcat(T.p, casadi.reshape(T.R.T, 9, 1))
+
+
+def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Function | None]:
+    """`closure` and `slopes` of the state equation."""
+    dependents, s = list(layout.dependents), point_of(system, layout, ())
+    symbols, z = SX.sym("q", system.nq), s.z
+    raw, q = positions_of(system, layout, s)
+    ties = tied(system, layout.orientations, raw, symbols)
+    kept = square_closure(system, symbols, dependents, ties)
+    every = relative_rows(system, symbols)
+    kept, every = casadi.substitute([kept, every], [symbols], [q])
+    cosines = casadi.substitute(facing(system, symbols), symbols, q)
+    opposed = casadi.mmin(cosines) <= 0 if cosines.numel() else SX(0)
+    residual = casadi.mmax(casadi.fabs(casadi.vertcat(every, opposed)))
+    point = [s.x, z, system.p]
+    slopes = Function("slopes", point, [casadi.jacobian(kept, z)], {"cse": True})
+    step = newton_step(dense_function("rows", point, [kept, residual]), slopes)
+    varies = system.closure is not None and system.closure.varies
+    return step, None if varies else slopes
+
+
+def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float], list[float]]:
+    """State x and dependents z of the assembled posture at rest."""
+    posture = np.array(system.posture)
+    rest = [0.0] * (len(state.velocities) + state_count(system))
+    x = [*posture[list(state.positions)], *rest]
+    return [float(value) for value in x], [
+        float(value) for value in posture[list(state.dependents)]
+    ]

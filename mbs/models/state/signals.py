@@ -1,0 +1,239 @@
+"""Signals that drive a mechanism, written as functions of time, positions and velocities."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+
+from mbs.assembly import System
+from mbs.errors import ModelError
+from mbs.text import did_you_mean, quoted
+
+_LONGEST_REASON = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """What a user gives to drive a mechanism with.
+
+    Attributes:
+        name: of the argument.
+        noun: what its values are.
+        elements: the name of every value.
+    """
+
+    name: str
+    noun: str
+    elements: Sequence[str]
+
+
+def signal_function(
+    system: System,
+    signal: Signal,
+    given: SX | Function | Callable[[Any, Any, Any], Any],
+    driven: Collection[str] | None = None,
+) -> Function:
+    """`f(t, q, v, p)` -> the values of the signal, (n, 1).
+
+    Args:
+        system: open or closed.
+        signal: what it is, for messages.
+        given: the values, or a function of (t, q, v) that returns them: all of them in their order,
+            or a dict by name, where those that it does not name are zero.
+        driven: names of the elements that have a motor, outside of which a value is refused unless
+            a dict names it; every element may have one when left out.
+
+    Raises:
+        ModelError: the function cannot be traced, there are too few or too many values, a name is
+            unknown, or a value is given to what has no motor.
+    """
+    t, q, v = SX.sym("t"), SX.sym("q", system.nq), SX.sym("v", system.nv)
+    if isinstance(given, SX):
+        values, by_name = given, False
+    else:
+        values, by_name = _traced(system, signal, given, (t, q, v))
+    size = len(signal.elements)
+    if values.numel() != size:
+        raise ModelError(
+            f"{system.name}: {signal.name} has {values.numel()} values, the system has {size}:"
+            f" {', '.join(signal.elements)}"
+        )
+    if driven is not None and not by_name:
+        _require_driven(system, signal, values, driven)
+    inputs = [t, q, v, system.p]
+    result = Function(signal.name, inputs, [casadi.densify(values)], {"allow_free": True})
+    if result.has_free():
+        raise ModelError(
+            f"{system.name}: {signal.name}(t, q, v) holds the symbols"
+            f" {', '.join(result.get_free())}; make it of t, q, v and numbers"
+        )
+    return result
+
+
+def _traced(
+    system: System, signal: Signal, function: Callable[..., Any], point: tuple[SX, SX, SX]
+) -> tuple[SX, bool]:
+    """The values as an expression of t, q and v, and whether they were given by name."""
+    _check_inputs(system, signal, function, point)
+    try:
+        values = function(*point)
+    except Exception as error:
+        raise untraceable(system, f"{signal.name}(t, q, v)", error) from error
+    by_name = isinstance(values, Mapping)
+    if by_name:
+        values = _in_order(system, signal, values)
+    try:
+        result = _column(values)
+    except Exception:
+        result = None
+    if result is None or (not casadi.symvar(result) and not casadi.evalf(result).is_regular()):
+        raise ModelError(
+            f"{system.name}: {signal.name}(t, q, v) returns {quoted(values)}; return"
+            f" {len(signal.elements)} {signal.noun}, finite numbers or CasADi expressions of t, q"
+            " and v"
+        )
+    return result, by_name
+
+
+def _in_order(system: System, signal: Signal, values: Mapping[str, Any]) -> list[Any]:
+    """Every element, zero where it is not named."""
+    for name in values:
+        if name not in signal.elements:
+            known = did_you_mean(str(name), signal.elements)
+            raise ModelError(f"{system.name}: {signal.name}(t, q, v) names {quoted(name)}; {known}")
+    return [values.get(name, 0) for name in signal.elements]
+
+
+def _require_driven(system: System, signal: Signal, values: SX, driven: Collection[str]) -> None:
+    for name, value in zip(signal.elements, casadi.vertsplit(casadi.densify(values)), strict=True):
+        if name not in driven and not value.is_zero():
+            raise ModelError(
+                f"{system.name}: {signal.name} drives {name!r}, which has no motor; make that joint"
+                f" actuated=True, return zero for it, or return a dict that names it, as in"
+                f" {{{name!r}: value}}"
+            )
+
+
+def untraceable(system: System, what: str, error: Exception) -> ModelError:
+    """What a user's function says when it is called with CasADi symbols."""
+    return ModelError(
+        f"{system.name}: {what} could not be traced with CasADi symbols ({_reason(error)}); build"
+        " it from CasADi operations, such as casadi.sin and casadi.if_else"
+    )
+
+
+def _column(values: Any) -> SX:
+    if isinstance(values, np.ndarray):
+        values = list(values.ravel())
+    if isinstance(values, (list, tuple)):
+        return SX(casadi.vertcat(*values))
+    return casadi.vec(SX(values))
+
+
+def _check_inputs(
+    system: System, signal: Signal, function: Callable[..., Any], point: tuple[SX, SX, SX]
+) -> None:
+    if isinstance(function, Function):
+        sizes = [function.numel_in(k) for k in range(function.n_in())]
+        wanted = [symbol.numel() for symbol in point]
+        if sizes != wanted or function.n_out() != 1:
+            raise ModelError(
+                f"{system.name}: {signal.name} has inputs of sizes {sizes} and {function.n_out()}"
+                f" outputs; give a Function of (t, q, v), of sizes {wanted}, with one output"
+            )
+        return
+    try:
+        inspect.signature(function).bind(*point)
+    except TypeError:
+        raise ModelError(
+            f"{system.name}: {signal.name} does not take three arguments; give a function of"
+            " (t, q, v)"
+        ) from None
+    except ValueError:  # no signature is known: the call will tell
+        return
+
+
+def _reason(error: Exception) -> str:
+    """The first sentence of an error; CasADi adds lists of prototypes and places in its code."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    text = lines[0] if lines else type(error).__name__
+    if text.startswith("Wrong number or type of arguments"):
+        text = "an operation of CasADi was given what it does not take"
+    return text[:_LONGEST_REASON]
+
+
+# Joint efforts that drive a motion, in whatever form the user gives them.
+
+
+Effort = Mapping[str, float] | Sequence[float] | Function | Callable[[Any, Any, Any], Any] | None
+
+
+def effort_function(system: System, tau: Effort) -> Function | None:
+    """`tau(t, q, v, p) -> tau`, (nv, 1).
+
+    Args:
+        system: open or closed.
+        tau: constants of motors by name, or all of them, or a function of (t, q, v), or None. A
+            function that returns a dict names joints, also such as have no motor.
+
+    Returns:
+        the Function; None when there is no effort.
+
+    Raises:
+        ModelError: a name is unknown, an effort is of a joint that has no motor, or the efforts
+            are not (nv, 1) numbers.
+    """
+    if tau is None:
+        return None
+    signal = Signal("tau", "efforts", [speed.name for speed in system.speeds])
+    driven = [speed.name for speed in system.speeds if speed.actuated]
+    if callable(tau):
+        return signal_function(system, signal, tau, driven)
+    values = SX(DM(system.effort(tau)))
+    if isinstance(tau, Mapping):
+        _require_motors(system, tau, driven)
+    return signal_function(system, signal, values, driven)
+
+
+def _require_motors(system: System, tau: Mapping[str, float], driven: Sequence[str]) -> None:
+    for name in tau:
+        if name not in driven:
+            raise ModelError(
+                f"{system.name}: tau names {name!r}, which has no motor; make that joint"
+                f" actuated=True, or use one of {', '.join(driven) or '(none)'}"
+            )
+
+
+# Motions that are prescribed as functions of time.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prescribed:
+    """A coordinate that a drive moves along a law.
+
+    Attributes:
+        name: of the velocity.
+        velocity: its number in v.
+        position: number in q where the position is prescribed, None where it is free.
+        holds_speed: whether the velocity is prescribed; an acceleration alone leaves it free.
+        time: symbol of the time in the laws [s].
+        laws: position, velocity and acceleration as functions of it; what is free is zero.
+    """
+
+    name: str
+    velocity: int
+    position: int | None
+    holds_speed: bool
+    time: SX
+    laws: tuple[SX, SX, SX]
+
+    def law(self, t: SX) -> tuple[SX, SX, SX]:
+        """Position, velocity and acceleration at a time."""
+        values = casadi.substitute(list(self.laws), [self.time], [t])
+        return SX(values[0]), SX(values[1]), SX(values[2])

@@ -1,0 +1,528 @@
+"""The state equation of the whole tree with the inputs and outputs of the independent one.
+
+What integrates it passes configurations in which the independent joints determine nothing, and
+shows the same outputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.tree import norm_rows, normalised, position_rate, quaternion_slices
+from mbs.loops.closing import constraint_sizes, relative_rows
+from mbs.loops.closure import closure_rows, independent_closure
+from mbs.loops.velocity import (
+    acceleration_bias,
+    constraint_rows,
+    independent_constraint_rows,
+    kept_rows,
+    scales,
+)
+from mbs.models.contacts import ContactEquations, Contacts, Modes, contact_equations, tree_jump
+from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics, inertia_matrix
+from mbs.models.energy import energy
+from mbs.models.inverse_dynamics import bias
+from mbs.models.state.drive import DriveInputs, TreeMotion, load_of, wrenches_of
+from mbs.models.state.events import MinimalEvents, few_modes, minimal_events
+from mbs.models.state.independent import (
+    Accelerations,
+    Observe,
+    Seen,
+    StateEquations,
+    controlled,
+    minimal_layout,
+    motion_of,
+    outputs_vector,
+    point_of,
+)
+from mbs.models.state.signals import Prescribed
+from mbs.models.symbols import dense_function, device_equations, outputs_of, state_count
+from mbs.solvers.linear import partial_ldl
+from mbs.solvers.problem import Passage
+
+# One Newton step of a state of the whole tree onto all that constrains it.
+
+
+Array = NDArray[np.float64]
+
+_NEARLY_DEPENDENT = 1e-6
+"""Squared sine between a row and the rows before it below which it is left alone."""
+_ASLEEP = 1e-6
+"""What rows count in that case."""
+_SHARED = 1e-4
+"""Square that is added to rows of contacts, which may depend on others: they converge as fast."""
+_NEVER = 1e300
+
+
+def projected(
+    system: System,
+    q: SX,
+    v: SX,
+    motions: Sequence[Prescribed],
+    t: SX,
+    touch: tuple[Contacts, Modes] | None = None,
+) -> tuple[SX, SX, SX]:
+    """Positions and velocities one Newton step closer, and the largest row before the step.
+
+    The step is made on the independent rows of the loops: off the loops a dependent row is
+    almost, not exactly, dependent, and would turn rounding into motion. Close to a singular
+    posture the same holds for a row that the others nearly imply there: it is left alone, and
+    rows count little for as long. The largest row is that of all, dependent ones included.
+
+    Args:
+        system: open or closed.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities.
+        motions: what is prescribed.
+        t: time [s].
+        touch: contacts and what they do; none when left out.
+
+    Returns:
+        q (nq, 1), v (nv, 1), and the largest row, lengths as parts of the size of the mechanism.
+    """
+    if not system.is_closed and not motions and touch is None:
+        return normalised(system.tree, q), v, SX(0)
+    symbols = SX.sym("q", system.nq)
+    norms = norm_rows(system.tree, symbols)
+    laws = [motion.law(t) for motion in motions]
+    places = [
+        symbols[motion.position] - law[0]
+        for motion, law in zip(motions, laws, strict=True)
+        if motion.position is not None
+    ]
+    loops, measures = SX(0, 1), SX(0, 1)
+    J = SX(0, system.nv)
+    if system.is_closed:
+        loops = independent_closure(system, symbols)
+        measures = constraint_sizes(system)[kept_rows(system)]
+        J = independent_constraint_rows(system, symbols)
+    distance, place_off, still, slide_off = _touched(system, symbols, v, touch)
+    r = casadi.vertcat(loops, norms, *places, distance)
+    J_q = casadi.jacobian(r, symbols)
+    held = [(m.velocity, law[1]) for m, law in zip(motions, laws, strict=True) if m.holds_speed]
+    E = SX(DM.eye(system.nv))[[k for k, _ in held], :]
+    J = casadi.vertcat(J, E)
+    wanted = casadi.vertcat(SX(J.shape[0] - len(held), 1), *(speed for _, speed in held))
+    J = casadi.vertcat(J, casadi.jacobian(still, v))
+    speed = casadi.vertcat(casadi.mtimes(J[: wanted.numel(), :], v) - wanted, still)
+    found = scales(system)
+    first = found.rows[kept_rows(system)]
+    places_of, speeds_of = (
+        found.columns([row.unit for row in table]) for table in (system.coordinates, system.speeds)
+    )
+    step_q, _ = _shortest(J_q, r, place_off, first[: loops.numel()], places_of)
+    step_v, awake = _shortest(J, speed, slide_off, first, speeds_of)
+    relative = casadi.vertcat(speed[: measures.numel(), 0] / measures, speed[measures.numel() :, 0])
+    rows = casadi.vertcat(relative_rows(system, symbols), *places, distance, relative)
+    residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
+    values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])
+    return q - values[0], v - values[1], values[2]
+
+
+def _touched(
+    system: System, q: SX, v: SX, touch: tuple[Contacts, Modes] | None
+) -> tuple[SX, SX, SX, SX]:
+    """Rows of positions at stops, then of velocities that are held; each with its `_switched`."""
+    if touch is None:
+        return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
+    contacts, modes = touch
+    return (
+        contacts.distance(q, modes.place),
+        _switched(modes.place**2),
+        modes.held * contacts.velocity(v),
+        _switched(modes.held),
+    )
+
+
+def _switched(acting: SX) -> SX:
+    """What stands in for the squares of rows that vanish when they do not act."""
+    return casadi.if_else(acting, _SHARED, 1)
+
+
+def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, SX]:
+    """A short step x with J x = r, by rows that are not nearly dependent, and whether all are.
+
+    Args:
+        J: rows of loops, then rows on one coordinate each; the last ones are switched.
+        r: what the rows are to become.
+        off: what is added to the squares of the switched rows.
+        first: scales of the rows of the loops; other rows are of unit length.
+        columns: scales of the columns.
+    """
+    if J.shape[0] == 0:
+        return SX.zeros(J.shape[1]), SX(1)
+    rows = DM([*first, *(_unit(J[k, :], columns) for k in range(len(first), J.shape[0]))])
+    B = rows * casadi.mtimes(J, casadi.diag(DM(columns)))
+    every = casadi.vertcat(SX(J.shape[0] - off.numel(), 1), off)
+    S = casadi.sparsify(casadi.mtimes(B, B.T)) + casadi.diag(every)
+    squares = casadi.fmax(casadi.densify(casadi.diag(S)), 1)
+    D, LT, order, independent = partial_ldl(S, _NEARLY_DEPENDENT * squares)
+    x = casadi.ldl_solve(rows * r, casadi.if_else(independent, D, _NEVER), LT, order)
+    return DM(columns) * casadi.mtimes(B.T, casadi.densify(x)), casadi.mmin(independent)
+
+
+def _unit(row: SX, columns: Array) -> float:
+    """The scale of a row on one coordinate, or on a quaternion."""
+    places = casadi.sparsify(row).sparsity().get_triplet()[1]
+    return 1 / float(columns[places[0]]) if places else 1.0
+
+
+# What steps in local tangent coordinates need of a system: all its rows, inertia and forces.
+#
+# All rows of the loops, dependent ones included, since those that assembling keeps may become
+# dependent where the others do not; the rank is what assembling found, never a threshold.
+
+
+def passage(
+    system: System,
+    point: tuple[SX, SX, SX],
+    tau: SX,
+    rates: SX,
+    motions: Sequence[Prescribed] = (),
+    contact: ContactEquations | None = None,
+    inputs: SX | None = None,
+) -> Passage | None:
+    """The functions of passages; None where nothing is lost, or rows bind velocities alone.
+
+    Args:
+        system: open or closed.
+        point: t, x = [q; v; z] and p, without modes.
+        tau: (nv, 1) joint efforts, those of drives and contacts left out.
+        rates: (nz, 1) of z.
+        motions: coordinates that drives move along laws.
+        contact: what rigid stops and dry friction do.
+        inputs: u, where the functions are to take (t, x, z, u, p), z empty.
+    """
+    closure = system.closure
+    if closure is None or closure.slips:
+        return None
+    driven = [motion.position for motion in motions if motion.position is not None]
+    if len(driven) < len(motions):
+        return None
+    t, x, p = point
+    nq, nv = system.nq, system.nv
+    q, v = SX.sym("q", nq), SX.sym("v", nv)
+    J = casadi.sparsify(constraint_rows(system, q))
+    moving = sorted(set(J.sparsity().row()))  # a row that nothing moves says nothing
+    J = J[moving, :]
+    scale = DM(scales(system).rows[moving])
+    bend = acceleration_bias(system, q, v, J)
+    loops = (
+        scale * closure_rows(system, q)[moving],
+        casadi.mtimes(casadi.diag(scale), J),
+        -scale * bend,
+    )
+    count, held = loops[0].numel(), SX(0, 1)
+    laws = [motion.law(t) for motion in motions]
+    unit = SX(DM.eye(nv))
+    drives = [m.velocity for m in motions]
+    place = [q[number] - law[0] for number, law in zip(driven, laws, strict=True)]
+    braked = SX(tau)
+    anchors: list[SX] = []
+    E = SX(0, nv)
+    if contact is not None:
+        modes, contacts = contact.modes, contact.contacts
+        held = modes.held
+        p = casadi.vertcat(p, contact.values)
+        for j, number in enumerate(contacts.velocities):
+            braked[number] -= modes.slide[j] * contacts.sliding[j]
+            anchors.append(held[j] * q[_position(system, number)])
+        E = casadi.mtimes(casadi.diag(held), unit[list(contacts.velocities), :])
+    norms = norm_rows(system.tree, q)
+    places = casadi.vertcat(loops[0], *place, *anchors, norms)
+    speeds = casadi.vertcat(loops[1], unit[drives, :], E)
+    still = SX.zeros(len(anchors))
+    b = casadi.vertcat(SX.zeros(count), *(law[1] for law in laws), still)
+    c = casadi.vertcat(loops[2], *(law[2] for law in laws), still)
+    turns = nq > nv  # else N is the unit matrix, and J are the slopes of the places
+    rate = position_rate(system.tree, q, v)
+    rank = len(closure.rows) + len(motions) + (casadi.sum1(held) if anchors else 0)
+    rows = [
+        places,
+        casadi.jacobian(places, q),
+        speeds if turns else SX(0, nv),
+        b,
+        c,
+        casadi.jacobian(rate, v) if turns else SX(0, nv),
+        casadi.jtimes(rate, q, rate) if turns else SX(0, 1),
+        SX(rank),
+    ]
+    at = [x[:nq], x[nq : nq + nv]]
+    rows = casadi.substitute([casadi.densify(row) for row in rows], [q, v], at)
+    (M,) = outputs_of(system, inertia_matrix(system, "tree"), at[0])
+    (H,) = outputs_of(system, bias(system, "tree"), *at)
+    measure = _regularity(system, q, unit[drives, :])
+    regularity = casadi.substitute(measure, q, at[0])
+    txp = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
+    sizes = (nq, nv, rates.numel(), places.numel(), len(anchors))
+    return Passage(
+        rows=dense_function("rows", txp, rows),
+        forces=dense_function("forces", txp, [M, braked - H, rates]),
+        regularity=dense_function("regularity", txp, [regularity]),
+        size=(*sizes, speeds.shape[0], int(bool(laws))),
+        typical=_typical(system, q, measure),
+    )
+
+
+def _position(system: System, number: int) -> int:
+    """The number in q of a velocity of a joint with one degree of freedom."""
+    link = next(link for link in system.tree.links if link.v.start <= number < link.v.stop)
+    return int(link.q.start + number - link.v.start)
+
+
+def _regularity(system: System, q: SX, drives: SX) -> SX:
+    """The smallest sine between a kept row and those before it: near zero, linear in the way."""
+    found = scales(system)
+    columns = DM(found.columns([speed.unit for speed in system.speeds]))
+    J = casadi.vertcat(
+        DM(found.rows[kept_rows(system)]) * independent_constraint_rows(system, q), drives
+    )
+    if J.shape[0] == 0:  # the loops hold nothing
+        return SX(1)
+    B = casadi.mtimes(J, casadi.diag(columns))
+    squares = casadi.fmax(casadi.sum2(B * B), 1)  # a row may also vanish by itself
+    D, _, order = casadi.ldl(casadi.sparsify(casadi.mtimes(B, B.T)))
+    return casadi.sqrt(casadi.fmax(casadi.mmin(D / squares[order]), 0))
+
+
+def _typical(system: System, q: SX, measure: SX) -> float:
+    """The regularity at the assembled configuration; zero where symbols have no value."""
+    found = Function("typical", [q, system.p], [measure])
+    value = float(found(np.array(system.posture), system.p_default))
+    return value if np.isfinite(value) else 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TreeState:
+    """A state equation of X = [q; v; states of devices]; functions take (t, X, z, u, p), z empty.
+
+    Where rigid stops or dry friction act, p has their modes behind the parameters.
+
+    Attributes:
+        rhs: `rhs(t, X, z, u, p) -> (Xdot, y)`, y the outputs of the independent state equation.
+        project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
+        start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
+        passage: of rows, forces and regularity.
+        events: of rigid stops and dry friction; None where there are none.
+        rate: `rate(X) -> q'`, the rates of the positions in X.
+        states: numbers in X of the states x.
+        dependents: numbers in X of the dependents z.
+        passive: numbers in X of the velocities of the dependent joints.
+        held: numbers in v of the independent velocities.
+        units: (nv,) typical velocities, of one size for all joints.
+    """
+
+    rhs: Function
+    project: Function
+    start: Function
+    passage: Passage
+    events: MinimalEvents | None
+    rate: Function
+    states: tuple[int, ...]
+    dependents: tuple[int, ...]
+    passive: tuple[int, ...]
+    held: tuple[int, ...]
+    units: tuple[float, ...]
+
+
+def tree_state(
+    system: System, observe: Observe | None = None, drive: DriveInputs | None = None
+) -> TreeState | None:
+    """The state equation of the tree; None where it has no advantage, or is not known.
+
+    Args:
+        system: open or closed.
+        observe: as of `minimal_state`, likewise the next one.
+        drive: motions that are inputs are left to the independent state equation.
+    """
+    drive = DriveInputs() if drive is None else drive
+    layout = minimal_layout(system, drive)
+    if not layout.dependents or layout.motions:
+        return None
+    motors = layout.inputs if drive.effort is None else tuple(range(system.nv))
+    s = point_of(system, layout, motors)
+    nq, nv = system.nq, system.nv
+    n = nq + nv
+    X, none = SX.sym("X", n + state_count(system)), SX.sym("z", 0)
+    q, v = X[:nq], X[nq:n]
+    tau, rates, shown = device_equations(system, v, X[n:], s.inputs)
+    for column, number in enumerate(motors):
+        tau[number] += s.efforts[column]
+    external = wrenches_of(system, q, layout.frames, s.wrenches)
+    load = load_of(system, q, external)
+    contact = contact_equations(system, q, v, tau + load, {})
+    point = [s.t, X, none, s.u, system.p]
+    through = passage(
+        system, (s.t, X, system.p), SX(tau + load), rates, contact=contact, inputs=s.u
+    )
+    if through is None:
+        return None
+    if contact is None:
+        (a, _) = outputs_of(system, direct_dynamics(system, coordinates="tree"), q, v, tau + load)
+    else:
+        a = contact.a
+    active = list(system.active)
+    moved = Accelerations(a[active], a, tau, contact)
+    motion = TreeMotion(q, q, v[active], v, None, SX.zeros(nv))
+    y = outputs_vector(system, layout, motion, moved, shown)
+    if observe is not None:
+        seen = (q, v, a, v[active], a[active], moved.every_effort)
+        y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *seen, external)))
+    rate = casadi.vertcat(position_rate(system.tree, q, v), a, rates)
+    touch = (contact.contacts, contact.modes) if contact else None
+    *kept, residual = projected(system, q, v, (), s.t, touch)
+
+    def written(name: str, at: Sequence[SX], outputs: Sequence[SX]) -> Function:
+        few, values = few_modes(contact, system.p, outputs)
+        return dense_function(name, [*at, few], values)
+
+    whole = [*point[:4], casadi.vertcat(system.p, contact.values) if contact else system.p]
+    rhs = written("tree_rhs", point[:4], [rate, y])
+    forces = written("forces", point[:4], through.forces.call(whole))
+    events = None
+    if contact:
+        events = minimal_events(
+            contact, motion, point, lambda fired: tree_jump(system, contact, X, fired)
+        )
+    if drive.effort is not None or drive.device is not None:
+        at = dense_function("motion", point, [q, v])
+        sizes = (len(motors), len(system.devices))
+        sizes3 = (*sizes, s.u.numel() - sum(sizes))
+        pushed = controlled(StateEquations(forces, at, None, sizes3), drive, layout.extra)
+        moving = controlled(StateEquations(rhs, at, events, sizes3), drive, layout.extra)
+        rhs, forces, events = moving.rhs, pushed.rhs, moving.events
+    inputs = SX.sym("u", rhs.numel_in(3))
+    free = [s.t, X, none, inputs]
+    first = motion_of(system, layout, s, [])
+    start = casadi.vertcat(first.q, first.v, s.states)
+    rows, regularity = (
+        written(function.name(), free, function.call(whole))
+        for function in (through.rows, through.regularity)
+    )
+    return TreeState(
+        rhs=rhs,
+        project=written("tree_project", free, [casadi.vertcat(*kept, X[n:]), residual]),
+        start=written("tree_start", [s.t, s.x, s.z, inputs], [start]),
+        passage=replace(through, rows=rows, forces=forces, regularity=regularity),
+        events=events,
+        states=(
+            *layout.positions,
+            *(nq + k for k in layout.velocities),
+            *range(n, n + state_count(system)),
+        ),
+        rate=Function("tree_rate", [X], [casadi.densify(position_rate(system.tree, q, v))]),
+        dependents=layout.dependents,
+        passive=tuple(nq + k for k in layout.passive),
+        held=layout.velocities,
+        units=tuple(scales(system).columns([speed.unit for speed in system.speeds])),
+    )
+
+
+# The state equation of the whole tree, with a projection that keeps its loops closed.
+#
+# Every position and velocity of the tree is a state: the motion runs through postures where no
+# choice of independent joints would hold.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FullState:
+    """State x = [q; v; z] of the whole tree and of the devices that drive its shafts.
+
+    Attributes:
+        rhs: `rhs(t, x, p) -> xdot`.
+        project: `project(t, x, p) -> (x, residual)`, one Newton step onto loops, unit quaternions
+            and prescribed motions, None where there is nothing to keep.
+        observe: `observe(t, x, p) -> a, tau, u, y, held, E, U, openness`, what a result shows
+            beside x: u and y are inputs and outputs of the devices, `held` the efforts of rigid
+            stops and of dry friction, the last is the largest closure row.
+        events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
+            and dry friction, whose modes are then the last of p; None where there are none.
+        passage: for steps through singular configurations of the loops; None where there are none.
+    """
+
+    rhs: Function
+    project: Function | None
+    observe: Function
+    events: tuple[Function, Function] | None = None
+    passage: Passage | None = None
+
+
+def full_state(
+    system: System,
+    effort: Function | None = None,
+    inputs: Function | None = None,
+    motions: Sequence[Prescribed] = (),
+) -> FullState:
+    """The state equation of the whole tree under given joint efforts and inputs of devices.
+
+    Args:
+        system: open or closed.
+        effort: `effort(t, q, v, p) -> tau`, (nv, 1), beside what devices deliver; no effort when
+            left out.
+        inputs: `inputs(t, q, v, p) -> u`, (nu, 1), one for each device; zeros when left out.
+        motions: coordinates that drives move along laws; their efforts are added to tau.
+    """
+    nq, n = system.nq, system.nq + system.nv
+    t, x = SX.sym("t"), SX.sym("x", n + state_count(system))
+    q, v, z, p = x[:nq], x[nq:n], x[n:], system.p
+    tau = SX.zeros(system.nv) if effort is None else casadi.densify(effort(t, q, v, p))
+    u = SX.zeros(len(system.devices)) if inputs is None else SX(inputs(t, q, v, p))
+    delivered, z_rate, y = device_equations(system, v, z, u)
+    tau += delivered
+    given = SX(tau)
+    contact = contact_equations(
+        system, q, v, tau, {motion.velocity: motion.law(t)[2] for motion in motions}
+    )
+    a, tau = (contact.a, contact.tau) if contact else _accelerations(system, q, v, tau, motions, t)
+    rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
+    through = passage(system, (t, x, p), given, z_rate, motions, contact)
+    touch = (contact.contacts, contact.modes) if contact else None
+    *kept, residual = projected(system, q, v, motions, t, touch)
+    rows = closure_rows(system, q)
+    openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
+    E, U = outputs_of(system, energy(system, "tree"), q, v)
+    held = contact.efforts if contact else SX(0, 1)
+    observed = [a, tau, u, y, held, E, U, openness]
+    keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
+    moved = [casadi.vertcat(*kept, z), residual]
+    p = casadi.vertcat(p, contact.values) if contact else p
+    return FullState(
+        rhs=dense_function("rhs", [t, x, p], [rate]),
+        project=dense_function("project", [t, x, p], moved) if keeps else None,
+        observe=dense_function("observe", [t, x, p], observed),
+        events=_events(system, contact, [t, x, p]) if contact else None,
+        passage=through,
+    )
+
+
+def _events(system: System, contact: ContactEquations, txp: list[SX]) -> tuple[Function, Function]:
+    """The functions of `FullState.events`."""
+    fired = SX.sym("fired", contact.indicators.numel())
+    after, modes = tree_jump(system, contact, txp[1], fired)
+    return (
+        dense_function("indicators", txp, [contact.indicators]),
+        dense_function("jump", [*txp, fired], [after, modes]),
+    )
+
+
+def _accelerations(
+    system: System, q: SX, v: SX, tau: SX, motions: Sequence[Prescribed], t: SX
+) -> tuple[SX, SX]:
+    """Accelerations of the tree, and its efforts, those of drives included."""
+    if not motions:
+        ddm = direct_dynamics(system, coordinates="tree")
+        return outputs_of(system, ddm, q, v, tau)[0], tau
+    hybrid = hybrid_dynamics(system, [motion.name for motion in motions])
+    given = casadi.vertcat(*(motion.law(t)[2] for motion in motions))
+    a, drives, *_ = outputs_of(system, hybrid, q, v, tau, given)
+    every = SX(tau)
+    for row, motion in enumerate(motions):
+        every[motion.velocity] += drives[row]
+    return a, every

@@ -1,0 +1,594 @@
+"""Blocks of a graph as C functions: straight lines of scalars."""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate, groupby, pairwise
+from typing import ClassVar, TypeAlias
+
+import casadi
+from casadi import Function
+
+from mbs.errors import ModelError
+from mbs.operations.graph import Graph, Node
+from mbs.operations.text import CODES, NAMES
+
+# One operation of a graph as a C expression, of numbers and of vectors.
+
+
+_OF_TWO = ("fmod", "remainder", "copysign", "fmin", "fmax", "atan2", "hypot")
+_OF_ONE = (
+    *("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil"),
+    *("fabs", "erf", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "log1p", "expm1"),
+)
+BINARY: Mapping[int, str] = {
+    casadi.OP_ADD: "{} + {}",
+    casadi.OP_SUB: "{} - {}",
+    casadi.OP_MUL: "{} * {}",
+    casadi.OP_DIV: "{} / {}",
+    casadi.OP_LT: "{} < {}",
+    casadi.OP_LE: "{} <= {}",
+    casadi.OP_EQ: "{} == {}",
+    casadi.OP_NE: "{} != {}",
+    casadi.OP_AND: "{} && {}",
+    casadi.OP_OR: "{} || {}",
+    casadi.OP_IF_ELSE_ZERO: "{} ? {} : 0.0",
+    casadi.OP_POW: "pow({}, {})",
+    casadi.OP_CONSTPOW: "pow({}, {})",
+    **{CODES[name]: f"{name}({{}}, {{}})" for name in _OF_TWO},
+}
+"""C text of the operations of two numbers, by CasADi's codes."""
+
+_UNARY: Mapping[int, str] = {
+    casadi.OP_ASSIGN: "{0}",
+    casadi.OP_NEG: "-{0}",
+    casadi.OP_SQ: "{0} * {0}",
+    casadi.OP_TWICE: "{0} + {0}",
+    casadi.OP_INV: "1.0 / {0}",
+    casadi.OP_NOT: "!{0}",
+    casadi.OP_SIGN: "({0} > 0.0 ? 1.0 : {0} < 0.0 ? -1.0 : {0})",
+    **{CODES[name]: f"{name}({{0}})" for name in _OF_ONE},
+}
+
+
+ELEMENTWISE = frozenset((*BINARY, *_UNARY))
+"""CasADi's codes of the operations that C has."""
+
+_SIGNS_OF_VECTORS = ("add", "sub", "mul", "div", "assign", "neg", "sq", "twice", "inv")
+_IN_EACH_LANE = ("erf", "asinh", "acosh", "atanh", "log1p")
+VECTORS: Mapping[int, str] = {
+    **{
+        op: f"mbs_each_{NAMES[op]}" if NAMES[op] in _IN_EACH_LANE else f"mbs_{NAMES[op]}"
+        for op in ELEMENTWISE - {CODES[name] for name in (*_SIGNS_OF_VECTORS, "sin", "cos")}
+    },
+    casadi.OP_CONSTPOW: "mbs_pow",
+}
+"""Of every operation on vectors that has no sign in C, the function in elementary.h; sines and
+cosines of one angle are made together."""
+
+
+def expression(
+    graph: Graph, number: int, written: Callable[[Graph, int], str] | None = None
+) -> str:
+    """The C expression of a node.
+
+    Args:
+        graph: has it.
+        number: of the node.
+        written: gives the text of an operand; `operand` unless told.
+
+    Raises:
+        ModelError: the operation has no equivalent in C's library.
+    """
+    write = written or operand
+    return form_of(graph, number).format(*(write(graph, n) for n in graph.operands(number)))
+
+
+def form_of(graph: Graph, number: int) -> str:
+    """The C expression of a node with places for its operands, as `str.format` takes it.
+
+    Args:
+        graph: has it.
+        number: of the node.
+
+    Raises:
+        ModelError: the operation has no equivalent in C's library.
+    """
+    op = graph.nodes[number].op
+    form = BINARY.get(op) or _UNARY.get(op)
+    if form is None:
+        raise ModelError(
+            f"{graph.name}: operation {op} of CasADi has no C equivalent; compile without fast"
+        )
+    return form
+
+
+def operand(graph: Graph, number: int) -> str:
+    """A node as it is written inside an expression: input, constant or name of its value."""
+    node = graph.nodes[number]
+    if node.op == casadi.OP_INPUT:
+        return f"i{node.args[0]}[{node.args[1]}]"
+    return constant(node) if node.op == casadi.OP_CONST else f"t{number}"
+
+
+def constant(node: Node) -> str:
+    """A constant that C reads back to the last bit."""
+    if math.isnan(node.value):
+        return "NAN"
+    if math.isinf(node.value):
+        return "INFINITY" if node.value > 0 else "(-INFINITY)"
+    text = repr(node.value)
+    return f"({text})" if text.startswith("-") else text
+
+
+# The order in which machine code computes a graph: its angles first, then block after block.
+
+
+LANES = 8
+"""Angles whose sines and cosines are computed at once."""
+
+_ONE_PIECE = 4000  # operations that compilers digest at once, and better so
+_BATCH_SIZE = 50  # as many operations take a compiler as long
+
+_FREE = (casadi.OP_INPUT, casadi.OP_CONST)
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Sines and cosines computed at once.
+
+    Attributes:
+        angles: the nodes they are of, at most LANES.
+        results: for each node that is a sine (lane) or cosine (LANES + lane) of them its place.
+    """
+
+    angles: tuple[int, ...]
+    results: tuple[tuple[int, int], ...]
+
+
+Step: TypeAlias = int | Batch
+"""A node to compute by its own operation, or a batch."""
+
+
+def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
+    """Every step that the outputs need, each after what it needs.
+
+    Angles made of inputs alone come first, all their sines and cosines at once; angles made of
+    those next, and so on; then all that remains, in the order of the graph.
+
+    Args:
+        graph: what to compute.
+        phase: of each node, as `phases` tells; nodes of different phases share no batch.
+    """
+    phase = phase or [0] * len(graph.nodes)
+    pending = graph.live()
+    for number, node in enumerate(graph.nodes):
+        pending[number] = pending[number] and node.op not in _FREE
+    steps: list[Step] = []
+    for batches in _batches(graph, pending, phase):
+        angles = [angle for batch in batches for angle in batch.angles]
+        steps += _take(_ancestors(graph, angles, pending), pending)
+        for batch in batches:
+            steps.append(batch)
+            for number, _ in batch.results:
+                pending[number] = False
+    return [*steps, *_take(range(len(graph.nodes)), pending)]
+
+
+def plain_order(graph: Graph) -> list[Step]:
+    """Every node that the outputs need and that is computed, in the order of the graph."""
+    live = graph.live()
+    return [k for k, node in enumerate(graph.nodes) if live[k] and node.op not in _FREE]
+
+
+def phases(graph: Graph, late: Mapping[int, int]) -> list[int]:
+    """For each node the phase in which it can be computed.
+
+    Args:
+        graph: has the nodes.
+        late: of inputs that are not known from the beginning, the phase from which they are.
+    """
+    phase: list[int] = []
+    for number, node in enumerate(graph.nodes):
+        if node.op == casadi.OP_INPUT:
+            phase.append(late.get(node.args[0], 0))
+        else:
+            phase.append(max((phase[k] for k in graph.operands(number)), default=0))
+    return phase
+
+
+def blocks(graph: Graph, steps: Sequence[Step], size: int) -> list[list[Step]]:
+    """Steps in pieces of about `size` operations, or in one if they are few enough for that."""
+    leaves = Counter(number for result in graph.results for number in result)
+    ends = list(accumulate(_weight(step) + sum(leaves[n] for n in gives(step)) for step in steps))
+    total = ends[-1] if ends else 0
+    one = total <= _ONE_PIECE and leaves.total() <= size
+    pieces = 1 if one else round(total / size) or 1
+    cuts = [bisect_right(ends, total * k // pieces) for k in range(pieces)]
+    return [list(steps[a:b]) for a, b in pairwise([*cuts, len(steps)])]
+
+
+def _weight(step: Step) -> int:
+    return _BATCH_SIZE if isinstance(step, Batch) else 1
+
+
+def needs(graph: Graph, step: Step) -> tuple[int, ...]:
+    """The nodes that must be known before a step."""
+    return step.angles if isinstance(step, Batch) else graph.operands(step)
+
+
+def gives(step: Step) -> tuple[int, ...]:
+    """The nodes that are known after a step."""
+    return tuple(n for n, _ in step.results) if isinstance(step, Batch) else (step,)
+
+
+def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
+    """Those of the numbers that are pending, which they are no longer."""
+    taken = [number for number in numbers if pending[number]]
+    for number in taken:
+        pending[number] = False
+    return taken
+
+
+def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) -> list[int]:
+    """These nodes and those they are made of, as far as they are not computed yet."""
+    wanted: set[int] = set()
+    stack = list(numbers)
+    while stack:
+        number = stack.pop()
+        if pending[number] and number not in wanted:
+            wanted.add(number)
+            stack += graph.operands(number)
+    return sorted(wanted)
+
+
+def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[list[Batch]]:
+    """The batches, those first that need no others."""
+    depth = [0] * len(graph.nodes)
+    levels: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
+    for number, node in enumerate(graph.nodes):
+        operands = graph.operands(number)
+        depth[number] = max((depth[k] for k in operands), default=0)
+        if node.op in (casadi.OP_SIN, casadi.OP_COS) and alive[number]:
+            part = 0 if node.op == casadi.OP_SIN else LANES
+            angles = levels.setdefault((phase[number], depth[number]), {})
+            angles.setdefault(operands[0], []).append((number, part))
+            depth[number] += 1
+    return [_split(levels[level]) for level in sorted(levels)]
+
+
+def _split(angles: dict[int, list[tuple[int, int]]]) -> list[Batch]:
+    result = []
+    every = list(angles.items())
+    for k in range(0, len(every), LANES):
+        some = every[k : k + LANES]
+        places = [
+            (number, part + lane) for lane, (_, uses) in enumerate(some) for number, part in uses
+        ]
+        result.append(Batch(tuple(angle for angle, _ in some), tuple(places)))
+    return result
+
+
+# Where values wait that one block of code computes and later ones need.
+
+
+Leaving: TypeAlias = tuple[int, int, int]
+"""An element of an output: number of the output, of the element in it, and of the node."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slots:
+    """Places in a work array.
+
+    Attributes:
+        of: place of each node that more than one block uses.
+        outputs: for each computed node where it leaves: number of the output, of the element in
+            it, and the node.
+        moved: for each block the same of the inputs and constants that it copies.
+        count: length of the array.
+        blocks: number of blocks.
+    """
+
+    of: Mapping[int, int]
+    outputs: Mapping[int, Sequence[Leaving]]
+    moved: Mapping[int, Sequence[Leaving]]
+    count: int
+    blocks: int
+
+
+def slots(
+    graph: Graph,
+    blocks: Sequence[Sequence[Step]],
+    begins: Mapping[int, int] | None = None,
+    elsewhere: Container[int] = (),
+) -> Slots:
+    """A place for each value that outlives its block, free again after its last use.
+
+    Args:
+        graph: what is computed.
+        blocks: the steps.
+        begins: of inputs that are not known from the beginning, the first block that has them.
+        elsewhere: inputs, as nodes, that reach their outputs without a copy.
+    """
+    home = {n: k for k, steps in enumerate(blocks) for step in steps for n in gives(step)}
+    of, count = _places(graph, blocks, home)
+    outputs: dict[int, list[Leaving]] = {}
+    moved: dict[int, list[Leaving]] = {}
+    for k, nodes in enumerate(graph.results):
+        for element, n in enumerate(nodes):
+            if n in home:
+                outputs.setdefault(n, []).append((k, element, n))
+            elif n not in elsewhere:
+                moved.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
+    return Slots(of, outputs, moved, count, len(blocks))
+
+
+def _places(
+    graph: Graph, blocks: Sequence[Sequence[Step]], home: Mapping[int, int]
+) -> tuple[dict[int, int], int]:
+    """The place of each node that a later block than its own uses, and how many there are."""
+    last: dict[int, int] = {}
+    for k, steps in enumerate(blocks):
+        for step in steps:
+            last.update({n: k for n in needs(graph, step) if home.get(n, k) < k})
+    starts: list[list[int]] = [[] for _ in blocks]
+    ends: list[list[int]] = [[] for _ in blocks]
+    for n in sorted(last):
+        starts[home[n]].append(n)
+        ends[last[n]].append(n)
+    of: dict[int, int] = {}
+    free: list[int] = []
+    count = 0
+    for k, entering in enumerate(starts):
+        for n in entering:
+            of[n] = free.pop() if free else count
+            count += of[n] == count
+        free += [of[n] for n in ends[k]]
+    return of, count
+
+
+def _first(graph: Graph, number: int, begins: Mapping[int, int]) -> int:
+    """The first block that knows an input or constant."""
+    node = graph.nodes[number]
+    return begins.get(node.args[0], 0) if node.op == casadi.OP_INPUT else 0
+
+
+_POINTERS = re.compile(r"\b[io]\d+\b")  # of inputs and outputs
+
+_MANY_ZEROS = 4  # in a row, from which they are stored at once
+
+
+@dataclass(frozen=True, slots=True)
+class BlockCode:
+    """The C functions of one graph: its blocks.
+
+    Attributes:
+        graph: what is computed.
+        where: what its blocks leave for each other.
+        sincos: the C function for a batch of angles.
+    """
+
+    graph: Graph
+    where: Slots
+    sincos: str
+
+    kind: ClassVar[str] = "double"
+    scalar: ClassVar[str] = "double"
+    zero: ClassVar[str] = "0.0"
+
+    def block(self, name: str, number: int, steps: Sequence[Step]) -> str:
+        """A C function: loads what earlier ones left, computes, stores what later ones need."""
+        lines = self._body(number, steps)
+        used = set(_POINTERS.findall("\n".join(lines)))
+        inputs = (k for k in range(len(self.graph.inputs)) if f"i{k}" in used)
+        outputs = (k for k in range(len(self.graph.outputs)) if f"o{k}" in used)
+        head = [
+            f"static {'NOINLINE ' if self.where.blocks > 1 else ''}void {name}"
+            f"(const {self.scalar} *const *in, {self.kind} *const *out, {self.kind} *restrict w)",
+            "{",
+            "  (void)in, (void)out, (void)w;",
+            *(f"  {self.input(k)};" for k in inputs),
+            *(f"  {self.kind} *restrict o{k} = out[{k}];" for k in outputs),
+        ]
+        return "\n".join([*head, *lines, "}"])
+
+    def _body(self, number: int, steps: Sequence[Step]) -> list[str]:
+        lines = self._stores(self.where.moved.get(number, ()))
+        known: set[int] = set()
+        of = self.where.of
+        for step in steps:
+            lines += self._loads(step, known)
+            lines += self.values(step)
+            known.update(gives(step))
+            for n in gives(step):
+                lines += [f"  w[{of[n]}] = t{n};"] if n in of else []
+                lines += self._stores(self.where.outputs.get(n, ()))
+        return lines
+
+    def _loads(self, step: Step, known: set[int]) -> list[str]:
+        of = self.where.of
+        wanted = [n for n in dict.fromkeys(needs(self.graph, step)) if n not in known and n in of]
+        known.update(wanted)
+        return [f"  const {self.kind} t{n} = w[{of[n]}];" for n in wanted]
+
+    def input(self, number: int) -> str:
+        """The declaration of an input."""
+        return f"const {self.scalar} *restrict i{number} = in[{number}]"
+
+    def stored(self, number: int) -> str:
+        """A node as an output takes it."""
+        return operand(self.graph, number)
+
+    def values(self, step: Step) -> list[str]:
+        """Lines that declare what a step gives."""
+        if not isinstance(step, Batch):
+            return [f"  const double t{step} = {expression(self.graph, step)};"]
+        angles = [operand(self.graph, n) for n in step.angles]
+        angles += ["0.0"] * (LANES - len(angles))
+        array = f"sc{step.angles[0]}"
+        return [
+            f"  double {array}[{2 * LANES}] ALIGNED;",
+            f"  {self.sincos}({', '.join(angles)}, {array});",
+            *(f"  const double t{n} = {array}[{place}];" for n, place in step.results),
+        ]
+
+    def _stores(self, leaving: Sequence[Leaving]) -> list[str]:
+        """The elements of outputs that are known now."""
+        rows = [(k, element, self.stored(node)) for k, element, node in leaving]
+        lines: list[str] = []
+        for (k, text), elements in groupby(rows, lambda row: (row[0], row[2])):
+            places = [element for _, element, _ in elements]
+            for first, last in _runs(places):
+                target, length = f"o{k}[{first}]", last - first + 1
+                if text == self.zero and length >= _MANY_ZEROS:
+                    size = f"{length} * sizeof({self.scalar})"
+                    lines.append(f"  memset(&{target}, 0, {size});")
+                else:
+                    lines += [f"  o{k}[{place}] = {text};" for place in range(first, last + 1)]
+        return lines
+
+
+def _runs(places: Sequence[int]) -> list[tuple[int, int]]:
+    """First and last of each run of consecutive numbers."""
+    runs: list[tuple[int, int]] = []
+    for place in places:
+        if runs and place == runs[-1][1] + 1:
+            runs[-1] = (runs[-1][0], place)
+        else:
+            runs.append((place, place))
+    return runs
+
+
+# Blocks of a graph as C functions that compute several columns at once, one in each lane.
+
+
+@dataclass(frozen=True, slots=True)
+class LaneCode(BlockCode):
+    """The C functions of one graph, its values vectors.
+
+    Attributes:
+        shared: for each input, whether all columns have the same.
+    """
+
+    shared: Sequence[bool]
+
+    kind: ClassVar[str] = "mbs_lanes"
+
+    def input(self, number: int) -> str:
+        """See BlockCode."""
+        if self.shared[number]:
+            return f"const double *restrict i{number} = in[{number}]"
+        return f"const mbs_lanes *restrict i{number} = (const mbs_lanes *)in[{number}]"
+
+    def stored(self, number: int) -> str:
+        """See BlockCode."""
+        return self._vector(number)
+
+    def values(self, step: Step) -> list[str]:
+        """See BlockCode."""
+        if isinstance(step, Batch):
+            return [line for k in range(len(step.angles)) for line in self._sincos(step, k)]
+        operands = self.graph.operands(step)
+        vectors = any(not self._is_scalar(n) for n in operands)
+        if not vectors:
+            return [f"  const mbs_lanes t{step} = mbs_all({expression(self.graph, step)});"]
+        op = self.graph.nodes[step].op
+        if op in VECTORS:
+            text = f"{VECTORS[op]}({', '.join(map(self._vector, operands))})"
+        else:
+            text = expression(self.graph, step, self._written)
+        return [f"  const mbs_lanes t{step} = {text};"]
+
+    def _sincos(self, batch: Batch, lane: int) -> list[str]:
+        angle = batch.angles[lane]
+        own = [(n, place) for n, place in batch.results if place % LANES == lane]
+        names = f"s{angle}", f"c{angle}"
+        return [
+            f"  mbs_lanes {names[0]}, {names[1]};",
+            f"  {self.sincos}({self._vector(angle)}, &{names[0]}, &{names[1]});",
+            *(f"  const mbs_lanes t{n} = {names[place // LANES]};" for n, place in own),
+        ]
+
+    def _is_scalar(self, number: int) -> bool:
+        node = self.graph.nodes[number]
+        shared = node.op == casadi.OP_INPUT and self.shared[node.args[0]]
+        return shared or node.op == casadi.OP_CONST
+
+    def _vector(self, number: int) -> str:
+        text = self._written(self.graph, number)
+        return f"mbs_all({text})" if self._is_scalar(number) else text
+
+    def _written(self, graph: Graph, number: int) -> str:
+        node = graph.nodes[number]
+        if node.op == casadi.OP_INPUT and not self.shared[node.args[0]]:
+            return f"i{node.args[0]}[{node.args[1]} * MBS_ROW]"
+        return operand(graph, number)
+
+
+# Where the C code of a Function has its inputs, outputs and work space.
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """The work space: slots, what callers do not want, then what maps take and give.
+
+    Attributes:
+        function: the whole Function.
+        graph: the scalar operations of it; it has more inputs and outputs where there are maps.
+        slots: doubles that its blocks leave for each other.
+    """
+
+    function: Function
+    graph: Graph
+    slots: int
+
+    @property
+    def size(self) -> int:
+        """Doubles in all."""
+        return self.slots + self._lost + (self._starts[-1] + LANES if self._sizes else 0)
+
+    def buffer(self, number: int) -> int:
+        """The number in `out` of an input of the graph that a map gives."""
+        return len(self.graph.outputs) + number - self.function.n_in()
+
+    def pointers(self) -> list[str]:
+        """Lines that declare `in` and `out`.
+
+        What a caller left out is replaced: inputs are zero, outputs are lost. `out` has the
+        outputs of the graph, then those of the maps, which are also the last of `in`.
+        """
+        n_in, n_out = self.function.n_in(), self.function.n_out()
+        most = max((port.sparsity.nnz() for port in self.graph.inputs[:n_in]), default=0)
+        places = [f"base + {start}" for start in self._starts[:-1]]
+        taken = len(self.graph.outputs) - n_out
+        inputs = [f"arg[{k}] ? arg[{k}] : zeros" for k in range(n_in)] + places[taken:]
+        outputs = [f"res[{k}] ? res[{k}] : w + {self.slots}" for k in range(n_out)] + places
+        base = f"  double *const base = mbs_aligned(w + {self.slots + self._lost});"
+        lanes = f"  mbs_lanes *const lanes = (mbs_lanes *)(base + {self._starts[-1]});"
+        return [
+            f"  static const double zeros[{most or 1}];",
+            *([base, lanes] if self._sizes else []),
+            f"  const double *const in[] = {{{', '.join(inputs) or '0'}}};",
+            f"  double *const out[] = {{{', '.join(outputs) or '0'}}};",
+        ]
+
+    @property
+    def _lost(self) -> int:
+        return max((self.function.nnz_out(k) for k in range(self.function.n_out())), default=0)
+
+    @property
+    def _sizes(self) -> list[int]:
+        """Of what maps take, then of what they give."""
+        taken = self.graph.outputs[self.function.n_out() :]
+        given = self.graph.inputs[self.function.n_in() :]
+        return [port.sparsity.nnz() for port in (*taken, *given)]
+
+    @property
+    def _starts(self) -> list[int]:
+        rounded = ((size + LANES - 1) // LANES * LANES for size in self._sizes)
+        return list(accumulate(rounded, initial=0))

@@ -1,0 +1,532 @@
+"""Passes: each makes an equal graph, cheaper in one respect."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import NamedTuple
+
+import casadi
+
+from mbs.operations.counts import count_graph
+from mbs.operations.graph import COMMUTATIVE, Builder, Graph, Node, drop, rebuilt
+from mbs.operations.polynomials import (
+    Algebra,
+    Group,
+    Monomial,
+    Pair,
+    Polynomial,
+    angle,
+    extract_pairs,
+    improved,
+    multiplied_out,
+    rewritten,
+    without,
+)
+
+# Sums of angles in place of products of sines and cosines.
+
+
+class _Meeting(NamedTuple):
+    """A term with a sine or cosine, `first`, of one angle and one, `second`, of the other."""
+
+    monomial: Monomial
+    coefficient: int
+    first: int
+    second: int
+
+
+def angles(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """Rotations about parallel axes joined: c2 c3 - s2 s3 is cos(q2 + q3).
+
+    Rotations of vectors, one after the other, are joined too. Each pair of angles is tried by
+    itself and stays joined if the graph got cheaper.
+    """
+    return improved(graph, parameters, _joined, lambda pair: pair[0] != pair[1])
+
+
+def _joined(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+    """Two angles joined wherever both of their terms are there; itself if they never are."""
+    opened = multiplied_out(algebra, polynomial, pair)
+    meetings: dict[Monomial, dict[tuple[int, int], _Meeting]] = {}
+    nodes = algebra.builder.nodes
+    for monomial, coefficient in opened.items():
+        for first, second in _of_both(algebra, monomial, pair):
+            ops = nodes[first].op, nodes[second].op
+            meeting = _Meeting(monomial, coefficient, first, second)
+            meetings.setdefault(without(monomial, first, second), {})[ops] = meeting
+    result = dict(opened)
+    for rest, found in meetings.items():
+        for op in (casadi.OP_COS, casadi.OP_SIN):
+            one = found.get((op, casadi.OP_COS))
+            other = found.get((casadi.OP_COS + casadi.OP_SIN - op, casadi.OP_SIN))
+            if one and other:
+                _join(algebra, result, rest, one, other)
+    return polynomial if result == opened else result
+
+
+def _of_both(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple[int, int]]:
+    """Two factors, one of each angle."""
+    known = {n: name for n in monomial if (name := angle(algebra, n)) in pair}
+    for first, a in known.items():
+        for second, b in known.items():
+            if (a, b) == pair:
+                yield first, second
+
+
+def _join(
+    algebra: Algebra, result: Polynomial, rest: Monomial, one: _Meeting, other: _Meeting
+) -> None:
+    """Two terms as one in place, if their coefficients agree: cos cos - sin sin and the like."""
+    builder = algebra.builder
+    if any(result.get(m.monomial) != m.coefficient for m in (one, other)):
+        return
+    same = one.coefficient == other.coefficient
+    if not same and other.coefficient != builder.negative(one.coefficient):
+        return
+    op = builder.nodes[one.first].op
+    a, b = (builder.nodes[number].args[0] for number in (one.first, one.second))
+    plus = same == (op == casadi.OP_SIN)
+    joined = builder.sum(a, b) if plus else builder.difference(a, b)
+    del result[one.monomial], result[other.monomial]
+    for monomial, sign in algebra.indeterminate(builder.apply(op, joined)).items():
+        product = builder.product(sign, one.coefficient)
+        algebra.accumulate(result, [(tuple(sorted(rest + monomial)), product)])
+
+
+# Factor sums of products.
+
+
+_LONGEST_MONOMIAL = 12
+_MOST_WORK = 20_000
+
+
+def factor(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """Sums of products with common factors put outside: a b + a c is a (b + c).
+
+    The factor that saves most products is taken first. Products that are used elsewhere are
+    opened too where that is no dearer, as the bracket may be there already.
+    """
+    names = tuple(parameters)
+    trials = (rewritten(graph, names, write) for write in (_opened_first, _opened_last))
+    return min(trials, key=lambda trial: count_graph(trial, names).total)
+
+
+def _opened_first(algebra: Algebra, polynomial: Polynomial) -> int:
+    """The cheapest way to write a polynomial; of equals the one with its products opened."""
+    return algebra.cheapest(reversed(_ways(algebra, polynomial)))
+
+
+def _opened_last(algebra: Algebra, polynomial: Polynomial) -> int:
+    return algebra.cheapest(_ways(algebra, polynomial))
+
+
+def _ways(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
+    ways = [partial(_factored, algebra, polynomial)]
+    opened = _opened(algebra, polynomial)
+    if opened != polynomial:
+        ways.append(partial(_factored, algebra, opened))
+    return ways
+
+
+def _opened(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+    """The same polynomial, no factor of which is a product."""
+    total: Polynomial = {}
+    for monomial, coefficient in polynomial.items():
+        factors: Monomial = ()
+        waiting = list(monomial)
+        while waiting:
+            number = waiting.pop()
+            inside = algebra.written.get(number, {})
+            if len(inside) == 1 and len(factors) + len(waiting) < _LONGEST_MONOMIAL:
+                ((inner, c),) = inside.items()
+                coefficient = algebra.builder.product(coefficient, c)
+                waiting += inner
+            else:
+                factors = (*factors, number)
+        algebra.accumulate(total, [(tuple(sorted(factors)), coefficient)])
+    return total
+
+
+def _factored(algebra: Algebra, polynomial: Polynomial) -> int:
+    rest = dict(polynomial)
+    for _ in range(_MOST_WORK // max(1, len(polynomial))):
+        savings = _savings(algebra, rest)
+        best = max(savings, key=lambda number: savings[number], default=None)
+        if best is None:
+            break
+        rest = _with_factor(algebra, rest, best)
+    return algebra.plain(rest)
+
+
+def _savings(algebra: Algebra, polynomial: Polynomial) -> Counter[int]:
+    """How many products are saved when a node is put outside, of nodes that save any."""
+    savings: Counter[int] = Counter()
+    for monomial, coefficient in polynomial.items():
+        unit = algebra.is_unit(coefficient)
+        saved = int(len(monomial) > 1 or not unit)
+        for number in set(monomial):
+            savings[number] += saved
+        if monomial and not unit:
+            savings[algebra.builder.unsigned(coefficient)[1]] += 1
+    return Counter({number: saved - 1 for number, saved in savings.items() if saved > 1})
+
+
+def _with_factor(algebra: Algebra, polynomial: Polynomial, number: int) -> Polynomial:
+    """The polynomial with all multiples of a node written as one product."""
+    builder, rest = algebra.builder, dict(polynomial)
+    bracket: Polynomial = {}
+    for monomial, coefficient in polynomial.items():
+        quotient = _quotient(algebra, monomial, coefficient, number)
+        if quotient:
+            del rest[monomial]
+            algebra.accumulate(bracket, algebra.opened(quotient).items())
+    if bracket:
+        product = builder.product(number, _factored(algebra, bracket))
+        algebra.accumulate(rest, algebra.indeterminate(product).items())
+    return rest
+
+
+def _quotient(
+    algebra: Algebra, monomial: Monomial, coefficient: int, number: int
+) -> Polynomial | None:
+    """A term divided by a node; None when that is no factor of it."""
+    if number in monomial:
+        return {without(monomial, number): coefficient}
+    sign, unsigned = algebra.builder.unsigned(coefficient)
+    if unsigned == number and not algebra.is_unit(coefficient):
+        return {monomial: algebra.builder.constant(sign)}
+    return None
+
+
+# Fold constants and move signs to where they are free.
+
+
+def fold(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """Constants computed, 0 and 1 removed, signs moved outwards, one node for equal nodes.
+
+    A sign that is left goes into a difference that nothing else uses: -(x - y) is y - x.
+    """
+    return drop(_turned(drop(rebuilt(graph, Builder(graph, parameters)))))
+
+
+def _turned(graph: Graph) -> Graph:
+    """Differences of which the negatives alone are used, turned round."""
+    negated = {n.args[0] for n in graph.nodes if n.op == casadi.OP_NEG}
+    plain = {number for result in graph.results for number in result}
+    for number, node in enumerate(graph.nodes):
+        if node.op != casadi.OP_NEG:
+            plain.update(graph.operands(number))
+    turned = {number for number in negated - plain if graph.nodes[number].op == casadi.OP_SUB}
+    nodes = list(graph.nodes)
+    for number in turned:
+        a, b = nodes[number].args
+        nodes[number] = Node(casadi.OP_SUB, (b, a))
+    for number, node in enumerate(nodes):
+        if node.op == casadi.OP_NEG and node.args[0] in turned:
+            nodes[number] = Node(casadi.OP_ASSIGN, node.args)
+    return _without_assignments(graph.with_nodes(nodes, graph.results))
+
+
+def _without_assignments(graph: Graph) -> Graph:
+    """Whatever uses an assignment uses what is assigned."""
+    target = list(range(len(graph.nodes)))
+    nodes = list(graph.nodes)
+    for number, node in enumerate(nodes):
+        if node.op == casadi.OP_ASSIGN:
+            target[number] = target[node.args[0]]
+        elif node.op not in (casadi.OP_INPUT, casadi.OP_CONST):
+            nodes[number] = node._replace(args=tuple(target[a] for a in node.args))
+    return graph.with_nodes(nodes, [[target[n] for n in result] for result in graph.results])
+
+
+# Order the operations so that few values wait at a time.
+
+
+_LEAVES = (casadi.OP_INPUT, casadi.OP_CONST)
+
+_Rank = Callable[[int], tuple[int, ...]]
+
+
+def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """The same nodes, outputs one after the other and operands in the order that needs less room.
+
+    Where an operation is commutative its operands change places, so that a walk from the outputs
+    to the inputs, as CasADi makes it, finds this order.
+    Source: Sethi & Ullman 1970, with shared nodes counted where they are met first.
+    """
+    graph = drop(graph)
+    room = _room(graph)
+    deep = _depth(graph)
+    ranks: list[_Rank] = [
+        lambda number: (-room[number], number),
+        lambda number: (-deep[number], number),
+        lambda number: (room[number], number),
+        lambda number: (number,),
+    ]
+    trials = [_walked(graph, rank) for rank in ranks]
+    return min([*trials, graph], key=waiting)
+
+
+def waiting(graph: Graph) -> int:
+    """The largest number of values that are kept at a time, inputs and constants apart."""
+    last = list(range(len(graph.nodes)))
+    for number in range(len(graph.nodes)):
+        for operand in graph.operands(number):
+            last[operand] = number
+    kept = most = 0
+    for number, node in enumerate(graph.nodes):
+        if node.op not in _LEAVES:
+            ended = {a for a in graph.operands(number) if last[a] == number}
+            kept -= sum(1 for a in ended if graph.nodes[a].op not in _LEAVES)
+            kept += last[number] > number
+            most = max(most, kept)
+    return most
+
+
+def _room(graph: Graph) -> list[int]:
+    """Sethi and Ullman's number of values that a node needs, as if nothing were shared."""
+    room: list[int] = []
+    for number, node in enumerate(graph.nodes):
+        needs = sorted((room[a] for a in graph.operands(number)), reverse=True)
+        own = 0 if node.op in _LEAVES else 1
+        room.append(max([own, *(need + k for k, need in enumerate(needs))]))
+    return room
+
+
+def _depth(graph: Graph) -> list[int]:
+    depth: list[int] = []
+    for number in range(len(graph.nodes)):
+        depth.append(max((depth[a] + 1 for a in graph.operands(number)), default=0))
+    return depth
+
+
+def _walked(graph: Graph, rank: _Rank) -> Graph:
+    """The graph in the order of a walk from the outputs, operands of lower rank first."""
+    operands = [graph.operands(number) for number in range(len(graph.nodes))]
+    for number, node in enumerate(graph.nodes):
+        if node.op in COMMUTATIVE:
+            operands[number] = tuple(sorted(operands[number], key=rank))
+    numbers: dict[int, int] = {}
+    nodes: list[Node] = []
+    stack = [number for result in reversed(graph.results) for number in reversed(result)]
+    while stack:
+        number = stack[-1]
+        missing = [a for a in operands[number] if a not in numbers]
+        if missing and number not in numbers:
+            stack.append(missing[0])
+            continue
+        stack.pop()
+        if number not in numbers:
+            node = graph.nodes[number]
+            if node.op not in _LEAVES:
+                node = node._replace(args=tuple(numbers[a] for a in operands[number]))
+            numbers[number] = len(nodes)
+            nodes.append(node)
+    return graph.with_nodes(nodes, [[numbers[n] for n in result] for result in graph.results])
+
+
+# Gather parameters: what depends on them alone is done once.
+
+
+def parameters(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """Products and sums associated so that parameter-only factors and terms meet.
+
+    c1 (x c2) is (c1 c2) x, c1 x + c2 x is (c1 + c2) x, and c1 (c2 x + c3 y) is
+    (c1 c2) x + (c1 c3) y. What is used elsewhere is never computed a second time.
+    """
+    return rewritten(graph, parameters, _gathered)
+
+
+def _gathered(algebra: Algebra, polynomial: Polynomial) -> int:
+    opened = _opened_parameters(algebra, polynomial)
+    ways = [polynomial] if opened == polynomial else [polynomial, opened]
+    return algebra.cheapest([partial(algebra.plain, way) for way in ways])
+
+
+def _opened_parameters(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+    """A polynomial, sums among its terms opened that have a term in common with it."""
+    total = dict(polynomial)
+    for monomial, coefficient in polynomial.items():
+        inside = algebra.written.get(monomial[0], {}) if len(monomial) == 1 else {}
+        if any(inner in total for inner in inside):
+            algebra.accumulate(total, [(monomial, algebra.builder.negative(coefficient))])
+            algebra.accumulate(total, algebra.scaled(inside, coefficient).items())
+    return total
+
+
+# The sum of the squares of a sine and a cosine is 1.
+
+
+def pythagoras(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """Squares of sines and cosines reduced: s s x + c c x is x, x - s s x is c c x.
+
+    With other coefficients p1 s s x + p2 c c x is p1 x + (p2 - p1) c c x.
+    A vector turned to and fro is itself again. Each angle is tried by itself and stays so if the
+    graph got cheaper.
+    """
+    return improved(graph, parameters, _reduced, lambda pair: pair[0] == pair[1])
+
+
+def _reduced(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+    """The squares of an angle's sine and cosine reduced where that saves a term or product."""
+    opened = multiplied_out(algebra, polynomial, pair)
+    result = dict(opened)
+    for monomial in opened:
+        for number in set(monomial):
+            if monomial.count(number) > 1 and angle(algebra, number) == pair[0]:
+                result = _reduced_rest(algebra, result, number, without(monomial, number, number))
+    return polynomial if result == opened else result
+
+
+def _reduced_rest(
+    algebra: Algebra, polynomial: Polynomial, number: int, rest: Monomial
+) -> Polynomial:
+    """The cheapest of the ways to write the terms with rest, c c rest and s s rest."""
+    builder = algebra.builder
+    argument = builder.nodes[number].args[0]
+    squares = [
+        tuple(sorted((*rest, *[builder.apply(op, argument)] * 2)))
+        for op in (casadi.OP_COS, casadi.OP_SIN)
+    ]
+    minus = builder.constant(-1.0)
+    ways = [polynomial]
+    for gone, other in (squares, squares[::-1]):
+        if gone in polynomial:
+            way = dict(polynomial)
+            coefficient = way.pop(gone)
+            opposite = builder.product(minus, coefficient)
+            algebra.accumulate(way, [(rest, coefficient), (other, opposite)])
+            ways.append(way)
+    return min(ways, key=algebra.cost)
+
+
+# Share common parts of sums and products.
+
+
+_SUMS = {casadi.OP_ADD, casadi.OP_SUB}
+_PRODUCTS = {casadi.OP_MUL}
+_LONGEST_OPENED = (1, 8)
+
+
+def share(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
+    """Sums and products associated so that parts of several of them are computed once.
+
+    Sums and products are opened to sets of signed terms and of factors; the pair that most sets
+    hold becomes a node, until no pair is held twice.
+    Source: Breuer 1969, generation of optimal code for expressions via factorization.
+    """
+    names = tuple(parameters)
+    graph = fold(graph, names)
+    for ops in (_PRODUCTS, _SUMS):
+        trials = (fold(_associated(graph, names, ops, n), names) for n in _LONGEST_OPENED)
+        graph = min([graph, *trials], key=lambda trial: count_graph(trial, names).total)
+    return graph
+
+
+def _associated(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest: int) -> Graph:
+    """The graph with its sums or products associated anew.
+
+    Args:
+        graph: folded.
+        parameters: names of inputs.
+        ops: either.
+        longest: so many elements a group may have that is used elsewhere and opened even so.
+    """
+    fixed = graph.fixed_by(parameters)
+    groups = _opened_groups(graph, ops, fixed, longest)
+    known: dict[int, Group] = {}
+    for group in groups.values():
+        _gather_fixed(group, fixed, known, len(graph.nodes))
+    taken = len(graph.nodes) + len(known)
+    extract_pairs(groups, taken)
+    return _written(graph, {**groups, **known}, Builder(graph, parameters), ops)
+
+
+def _opened_groups(
+    graph: Graph, ops: set[int], fixed: list[bool], longest: int
+) -> dict[int, Group]:
+    """The terms of every sum, or factors of every product, that is more than part of another."""
+    uses = graph.uses()
+    groups: dict[int, Group] = {}
+    part_of_another: set[int] = set()
+    for number, node in enumerate(graph.nodes):
+        if node.op not in ops or fixed[number]:
+            continue
+        signs = (1, -1 if node.op == casadi.OP_SUB else 1)
+        for opened in ((0, 1), (0,), (1,), ()):
+            parts = [
+                _part(groups, operand, position in opened, uses[operand] == 1, longest)
+                for position, operand in enumerate(node.args)
+            ]
+            if not set(parts[0]) & set(parts[1]):
+                break
+        first, second = (
+            part if sign > 0 else {e: -s for e, s in part.items()}
+            for part, sign in zip(parts, signs, strict=True)
+        )
+        groups[number] = {**first, **second}
+        part_of_another.update(
+            a for k, a in enumerate(node.args) if k in opened and a in groups and uses[a] == 1
+        )
+    return {number: group for number, group in groups.items() if number not in part_of_another}
+
+
+def _part(groups: dict[int, Group], number: int, opened: bool, alone: bool, longest: int) -> Group:
+    group = groups.get(number)
+    if not opened or group is None or (not alone and len(group) > longest):
+        return {number: 1}
+    return group
+
+
+def _gather_fixed(group: Group, fixed: list[bool], known: dict[int, Group], first: int) -> None:
+    """Replace the parameter-only elements of a group by one, in place."""
+    together = {e: s for e, s in group.items() if fixed[e]}
+    if len(together) < 2:
+        return
+    for element in together:
+        del group[element]
+    name = first + len(known)
+    known[name] = together
+    group[name] = 1
+
+
+def _written(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[int]) -> Graph:
+    """The graph in which groups are computed element by element."""
+    numbers: dict[int, int] = {}
+
+    def write(name: int) -> None:
+        group = groups.get(name)
+        if group is None:
+            operands = [numbers[a] for a in graph.operands(name)]
+            numbers[name] = builder.add(graph.nodes[name], operands)
+            return
+        combine = builder.sum if ops is _SUMS else builder.product
+        total = builder.constant(0.0 if ops is _SUMS else 1.0)
+        for element, sign in group.items():
+            value = numbers[element]
+            total = combine(total, value if sign > 0 else builder.negative(value))
+        numbers[name] = total
+
+    for name in _in_order(graph, groups):
+        write(name)
+    results = [[numbers[n] for n in result] for result in graph.results]
+    return graph.with_nodes(builder.nodes, results)
+
+
+def _in_order(graph: Graph, groups: dict[int, Group]) -> Iterator[int]:
+    """Nodes and groups that the outputs need, operands first."""
+    done: set[int] = set()
+    stack = [number for result in reversed(graph.results) for number in reversed(result)]
+    while stack:
+        name = stack[-1]
+        operands = groups[name] if name in groups else graph.operands(name)
+        waiting = [operand for operand in operands if operand not in done]
+        if name in done or not waiting:
+            stack.pop()
+            if name not in done:
+                done.add(name)
+                yield name
+        else:
+            stack.extend(reversed(waiting))

@@ -1,1 +1,0 @@
-"""Passes: each makes an equal graph, cheaper in one respect."""

@@ -1,0 +1,449 @@
+"""A, B and Q of Lagrange's form, without differentiation, from augmented bodies.
+
+Every particle of the system moves at r_dot = J v, so that A is the integral of J' J over the mass
+and B that of J' dJ/dt: dA/dt = B + B', and B v are the Coriolis and centrifugal efforts. For
+revolute and prismatic joints B is made of the Christoffel symbols; for quaternion joints, whose
+velocities are no rates of positions, it is their extension. Column j of B needs the moments of the
+mass behind joint j and how they change: the augmented body of link j.
+
+Source: Renaud 1986; Khalil & Creusot 1997, section 5.5; Echeandia & Wensing 2021.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi
+from casadi import DM, SX
+
+from mbs.assembly.tree import Link, Tree, position_rate
+from mbs.components.joints import Motion
+from mbs.recursions.newton_euler import momentum_on, spin_momenta
+from mbs.recursions.poses import LinkPose
+from mbs.recursions.regrouping import regrouped, slid
+from mbs.recursions.route import parameters_of, price
+from mbs.recursions.velocities import (
+    effort,
+    link_accelerations,
+    motion_behind,
+    resting_base,
+    unit_motions,
+)
+from mbs.spatial import (
+    Displacement,
+    FreeDisplacement,
+    MatrixTurn,
+    PseudoInertia,
+    Screw,
+    cross,
+    skew,
+    zeros,
+)
+from mbs.spatial.rotation import Turn
+
+# The augmented body of a link: everything behind its joint, and how it changes.
+#
+# Source: Renaud 1986 (augmented bodies); Echeandia & Wensing 2021.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VelocityField:
+    """What the velocity field u of a unit joint velocity does, about an origin and in its axes.
+
+    With r a particle seen from the origin and u its velocity:
+
+    Attributes:
+        f, m: (3, 1) integrals of u and r x u over the mass, the momenta.
+        f_rate, m_rate: (3, 1) of du/dt and r x du/dt.
+        drag: (3, 1) of dr/dt x u.
+    """
+
+    f: SX
+    m: SX
+    f_rate: SX
+    m_rate: SX
+    drag: SX
+
+    @staticmethod
+    def nothing() -> VelocityField:
+        """The column of no mass."""
+        return VelocityField(zeros(), zeros(), zeros(), zeros(), zeros())
+
+    def __add__(self, other: VelocityField) -> VelocityField:
+        """The column of two masses that move with the same velocity."""
+        return VelocityField(
+            self.f + other.f,
+            self.m + other.m,
+            self.f_rate + other.f_rate,
+            self.m_rate + other.m_rate,
+            self.drag + other.drag,
+        )
+
+    def through(self, step: Displacement, velocity: SX) -> VelocityField:
+        """The column in the frame before a displacement whose translation has this velocity."""
+        f, m = step.wrench(self.f, self.m)
+        f_rate, m_rate = step.wrench(self.f_rate, self.m_rate)
+        drag = step.turn.apply(self.drag) + cross(velocity, f)
+        return VelocityField(f, m, f_rate, m_rate, drag)
+
+    def row(self, motion: Motion, w: SX) -> SX:
+        """Entries of B in the row of u for the velocities of a link that turns at w."""
+        return effort(motion, cross(self.f, w), cross(self.m, w) + self.drag)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Augmented:
+    """The mass behind a joint, about the origin of a frame and in its axes.
+
+    Attributes:
+        mass: its moments.
+        rate: half the rate of these moments, seen from the frame.
+        spin: (3, 1) half the angular momentum about the origin, seen from the frame.
+    """
+
+    mass: PseudoInertia
+    rate: PseudoInertia
+    spin: SX
+
+    @staticmethod
+    def of(body: PseudoInertia, spin: SX) -> Augmented:
+        """A body at rest in the frame, with half the angular momentum of rotors in it."""
+        return Augmented(body, PseudoInertia(zeros(3, 3), zeros(), SX(0)), spin)
+
+    @staticmethod
+    def nothing() -> Augmented:
+        """No mass at all."""
+        return Augmented.of(PseudoInertia(zeros(3, 3), zeros(), SX(0)), zeros())
+
+    def __add__(self, other: Augmented) -> Augmented:
+        """Two bodies in one frame."""
+        return Augmented(self.mass + other.mass, self.rate + other.rate, self.spin + other.spin)
+
+    def through(self, step: Displacement) -> Augmented:
+        """The same mass about and in the frame before a displacement, which stands still."""
+        _, spin = step.wrench(self.rate.ms, self.spin)
+        return Augmented(step.body(self.mass), step.body(self.rate), spin)
+
+    def moved(self, linear: SX, angular: SX) -> Augmented:
+        """Seen from a frame in which this one moves, at twice these velocities (3, 1)."""
+        S, ms, m = self.mass.S, self.mass.ms, self.mass.m
+        flow = casadi.mtimes(linear, ms.T) + casadi.mtimes(skew(angular), S)
+        rate = PseudoInertia(
+            self.rate.S + flow + flow.T,
+            self.rate.ms + m * linear + cross(angular, ms),
+            SX(0),
+        )
+        spin = self.spin + cross(ms, linear) + _inertia_times(S, angular)
+        return Augmented(self.mass, rate, spin)
+
+    def column(self, w: SX, linear: SX, angular: SX) -> VelocityField:
+        """The column of the velocity field linear + angular x r.
+
+        Args:
+            w: (3, 1) angular velocity of the frame.
+            linear: (3, 1) velocity at the origin, fixed in the frame.
+            angular: (3, 1) likewise.
+        """
+        S, ms = self.mass.S, self.mass.ms
+        f = self.mass.m * linear + cross(angular, ms)
+        change, twist = _inertia_times(self.rate.S, angular), cross(angular, self.spin)
+        flow = cross(w, ms) + 2 * self.rate.ms
+        return VelocityField(
+            f=f,
+            m=cross(ms, linear) + _inertia_times(S, angular),
+            f_rate=cross(w, f) + 2 * cross(angular, self.rate.ms),
+            m_rate=cross(ms, cross(w, linear))
+            - cross(angular, casadi.mtimes(S, w))
+            + change
+            + twist,
+            drag=cross(flow, linear) + casadi.mtimes(S, cross(w, angular)) + change - twist,
+        )
+
+
+def rotor_column(link: Link, carrier: int, w: SX) -> VelocityField:
+    """The column of the joint's velocity in the rotor that it spins on a carrier.
+
+    Args:
+        link: of the joint.
+        carrier: number of the link; the column is zero where the rotor is on another one.
+        w: (3, 1) angular velocity of the carrier.
+    """
+    momentum = momentum_on(link, carrier)
+    half_turn = 0.5 * cross(w, momentum)
+    return VelocityField(zeros(), momentum, zeros(), half_turn, half_turn)
+
+
+def _inertia_times(S: SX, a: SX) -> SX:
+    """J a of the inertia tensor J = tr(S) - S, without the squares that cancel."""
+    rows = []
+    for k in range(3):
+        m, n = (k + 1) % 3, (k + 2) % 3
+        rows.append(S[m, m] * a[k] + S[n, n] * a[k] - S[k, m] * a[m] - S[k, n] * a[n])
+    return casadi.vertcat(*rows)
+
+
+Step = tuple[Displacement, SX]
+"""A displacement, and the velocity (3, 1) of its translation, both in the axes before it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LagrangeForm:
+    """tau = A a + B v + Q.
+
+    Attributes:
+        A: (nv, nv) symmetric inertia matrix [kg m^2, kg m, kg].
+        B: (nv, nv) Coriolis matrix; dA/dt - 2 B is skew-symmetric.
+        Q: (nv, 1) gravity efforts [N m or N].
+    """
+
+    A: SX
+    B: SX
+    Q: SX
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _FormPlace:
+    """Where the columns of a joint are written: its seat, or the frame of its link.
+
+    Joints with parallel axes, one after the other, may have parallel places: what comes from
+    behind them is then turned once, by the sum of their angles.
+
+    Attributes:
+        w: (3, 1) angular velocity of link j.
+        g: (3, 1) gravity acceleration.
+        inner: from the place to frame j; empty when it is frame j.
+        outer: to the place from frame i, or from the place of joint i when that is parallel.
+        parallel: whether it is.
+    """
+
+    w: SX
+    g: SX
+    inner: list[Step]
+    outer: list[Step]
+    parallel: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _FormWork:
+    """The form being filled, and what its entries are read with.
+
+    Attributes:
+        form: so far.
+        tree: the links.
+        places: of the joints.
+        w: (3, 1) angular velocities of the links, each in its frame.
+    """
+
+    form: LagrangeForm
+    tree: Tree
+    places: list[_FormPlace]
+    w: list[SX]
+
+
+_COMPARED = 12
+"""Links up to which frames slid and not slid are both tried: a second for both. The gain beyond is
+below one operation in a hundred."""
+
+
+def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
+    """The three matrices of the dynamic model.
+
+    Args:
+        tree: the links.
+        poses: each with respect to its antecedent.
+        v: (nv, 1) joint velocities.
+    """
+    bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
+    moved = slid(tree, poses, bodies)
+    form = _form(tree, *moved, v)
+    if moved[0] is poses or len(tree.links) > _COMPARED:
+        return form
+    fixed = parameters_of(tree, poses)
+    return min(
+        (form, _form(tree, poses, bodies, v)),
+        key=lambda form: price(casadi.horzcat(form.A, form.B, form.Q), fixed),
+    )
+
+
+def _form(tree: Tree, poses: list[LinkPose], bodies: list[PseudoInertia], v: SX) -> LagrangeForm:
+    bodies = regrouped(tree, poses, bodies)
+    rest, base = zeros(tree.nv), resting_base(zeros())
+    w = [motion.w for motion in link_accelerations(tree, poses, v, rest, base)]
+    places = _places(tree, poses, v, w)
+    spins = spin_momenta(tree, 0.5 * v)
+    framed = [Augmented.of(body, spins.get(j, zeros())) for j, body in enumerate(bodies)]
+    placed = [Augmented.nothing()] * len(bodies)
+    form = LagrangeForm(zeros(tree.nv, tree.nv), zeros(tree.nv, tree.nv), zeros(tree.nv))
+    work = _FormWork(form, tree, places, w)
+    for j in reversed(range(len(tree.links))):
+        link, place = tree.links[j], places[j]
+        body = framed[j]
+        for step, _ in reversed(place.inner):
+            body = body.through(step)
+        body = body + placed[j]
+        _fill_columns(work, j, body)
+        if link.antecedent >= 0:
+            body = body.moved(*motion_behind(link.motion, 0.5 * v[link.v]))
+            for step, _ in reversed(place.outer):
+                body = body.through(step)
+            (placed if place.parallel else framed)[link.antecedent] += body
+    _add_drives(form, tree, v)
+    return form
+
+
+def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_FormPlace]:
+    """Where the columns of every joint are written.
+
+    Nothing is read before a joint on the base, so that it needs no seat.
+    """
+    result: list[_FormPlace] = []
+    gravity: list[SX] = []
+    for j, link in enumerate(tree.links):
+        pose, i = poses[j], link.antecedent
+        linear, angular = motion_behind(link.motion, v[link.v])
+        w_i, g_i = (w[i], gravity[i]) if i >= 0 else (zeros(), tree.gravity)
+        gravity.append(pose.apply_inverse(g_i))
+        if link.motion is Motion.REVOLUTE and _follows(tree, poses, j, w):
+            result.append(_parallel(pose, result[i], angular))
+            continue
+        steps = _moving_steps(pose, w_i, linear)
+        if i < 0 or link.motion.nv > 1:
+            result.append(_FormPlace(w[j], gravity[j], [], steps))
+        else:
+            seat = len(pose.seat)
+            seat_w, seat_g = pose.at_seat(w_i) + angular, pose.at_seat(g_i)
+            result.append(_FormPlace(seat_w, seat_g, steps[seat:], steps[:seat]))
+    return result
+
+
+def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
+    """Whether the axis is parallel to that of the joint before, and turns across itself.
+
+    Where it does not, links move in a plane, and turning them one by one leaves more zeros.
+    """
+    run = poses[j].run
+    root = tree.links[run[0]].antecedent
+    if len(run) == 1 or root < 0:
+        return False
+    turning = poses[run[0]].at_seat(w[root])
+    return not (turning[0].is_zero() and turning[1].is_zero())
+
+
+def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
+    """The place of a joint that is parallel to that of the joint before it."""
+    inner, _ = before.inner[0]
+    p = inner.point(pose.foot)
+    outer = FreeDisplacement(MatrixTurn(SX(DM.eye(3))), p)
+    motion = pose.motion[0]
+    assert isinstance(motion, Screw)
+    assert isinstance(pose.spin, Turn)
+    w = before.w + angular
+    screw = Screw(pose.spin, motion.t)
+    return _FormPlace(
+        w,
+        before.g,
+        [(screw, cross(w, screw.point(zeros())))],
+        [(outer, cross(before.w, p))],
+        parallel=True,
+    )
+
+
+def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
+    """The displacements from frame i, which turns at w, to frame j; the last slides at `linear`."""
+    steps: list[Step] = []
+    for number, step in enumerate(pose.steps, 1):
+        velocity = cross(w, step.point(zeros()))
+        if number == len(pose.steps):
+            velocity = velocity + step.turn.apply(linear)
+        steps.append((step, velocity))
+        w = step.turn.apply_inverse(w)
+    return steps
+
+
+def _fill_columns(work: _FormWork, j: int, body: Augmented) -> None:
+    """Columns and rows of the velocities of joint j, its own block and those of its ancestors."""
+    form, link, place = work.form, work.tree.links[j], work.places[j]
+    spin = _at(place.inner, rotor_column(link, j, work.w[j]))
+    for number, (linear, angular) in enumerate(unit_motions(link.motion)):
+        k = link.v.start + number
+        column = body.column(place.w, linear, angular)
+        form.Q[k] = -casadi.dot(place.g, column.f)
+        column = column + spin
+        form.A[link.v, k] = effort(link.motion, column.f, column.m)
+        form.B[link.v, k] = effort(link.motion, column.f_rate, column.m_rate)
+        if link.rotor is not None:
+            form.A[k, k] += link.rotor.seen_at_joint + effort(link.motion, spin.f, spin.m)
+            form.B[k, k] += spin.row(link.motion, place.w)
+        _fill_ancestors(work, j, k, column)
+
+
+def _add_drives(form: LagrangeForm, tree: Tree, v: SX) -> None:
+    """What Ia adds; on a Free joint it is a mass too, whose velocity turns with the link."""
+    for link in tree.links:
+        for k in range(link.v.start, link.v.stop):
+            form.A[k, k] += link.Ia
+        if link.motion is Motion.FREE and not link.Ia.is_zero():
+            linear, angular = slice(link.v.start, link.v.start + 3), v[link.v][3:6]
+            form.B[linear, linear] += link.Ia * skew(angular)
+
+
+def _fill_ancestors(work: _FormWork, j: int, k: int, column: VelocityField) -> None:
+    """Entries of velocity k of joint j, at whose place the column is, with its ancestors."""
+    form, tree, places, w = work.form, work.tree, work.places, work.w
+    driven = tree.links[j]
+    while (i := tree.links[j].antecedent) >= 0:
+        link, parallel = tree.links[i], places[j].parallel
+        column = _at(places[j].outer, column)
+        if tree.links[j] is driven:
+            carried = rotor_column(driven, i, w[i])
+            column = column + (_at(places[i].inner, carried) if parallel else carried)
+        entries = effort(link.motion, column.f, column.m)
+        form.A[link.v, k], form.A[k, link.v] = entries, entries.T
+        form.B[link.v, k] = effort(link.motion, column.f_rate, column.m_rate)
+        form.B[k, link.v] = column.row(link.motion, places[i].w if parallel else w[i]).T
+        column = column if parallel else _at(places[i].inner, column)
+        j = i
+
+
+def _at(steps: list[Step], column: VelocityField) -> VelocityField:
+    """A column in the frame before these displacements."""
+    for step, velocity in reversed(steps):
+        column = column.through(step, velocity)
+    return column
+
+
+# B of Lagrange's form by differentiating the inertia matrix: Christoffel's symbols.
+#
+# For quaternion joints, whose velocities are not rates of positions, Hamel's terms are added as a
+# skew-symmetric block.
+#
+# Source: Khalil & Creusot 1997, section 5.5; Hamel 1904 for quasi-velocities.
+
+
+def christoffel(tree: Tree, q: SX, v: SX, A: SX) -> SX:
+    """B (nv, nv) = (dA/dt + D - D') / 2 with D = d(A v)/dq N(q), plus Hamel's block.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) symbols.
+        v: (nv, 1) symbols.
+        A: (nv, nv) inertia matrix at q.
+    """
+    momentum = casadi.mtimes(A, v)
+    direction = SX.sym("u", tree.nv)
+    rate = position_rate(tree, q, direction)
+    D = casadi.jacobian(casadi.jtimes(momentum, q, rate), direction)
+    A_rate = casadi.jtimes(A, q, position_rate(tree, q, v))
+    B = 0.5 * (A_rate + D - D.T)
+    for link in tree.links:
+        if link.motion in (Motion.SPHERICAL, Motion.FREE):
+            B[link.v, link.v] += _hamel(link.motion, momentum[link.v])
+    return B
+
+
+def _hamel(motion: Motion, momentum: SX) -> SX:
+    """The matrix that times the joint's own velocity is w x p (and V x p) of its momentum p."""
+    if motion is Motion.SPHERICAL:
+        return -skew(momentum)
+    linear, angular = skew(momentum[0:3]), skew(momentum[3:6])
+    return -casadi.vertcat(casadi.horzcat(SX.zeros(3, 3), linear), casadi.horzcat(linear, angular))

@@ -1,0 +1,206 @@
+"""Symbolic solution of small linear systems, the operations counted in mind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+from casadi import MX, SX, Function, Sparsity
+
+
+def solve_square(A: SX, B: SX) -> SX:
+    """The solution X of A X = B for a regular (n, n) matrix A of scalars.
+
+    Up to three equations by the adjugate (one division), beyond by QR on the blocks that the
+    sparsity leaves coupled.
+    """
+    n = A.shape[0]
+    if n == 0:
+        return SX(0, B.shape[1])
+    if n > 3:
+        return casadi.densify(casadi.solve(casadi.sparsify(A), B))
+    adjugate = _adjugate(casadi.densify(A))
+    determinant = casadi.mtimes(A[0, :], adjugate[:, 0])
+    return casadi.mtimes(adjugate, B) / determinant
+
+
+def _adjugate(A: SX) -> SX:
+    match A.shape[0]:
+        case 1:
+            return SX(1)
+        case 2:
+            return casadi.vertcat(
+                casadi.horzcat(A[1, 1], -A[0, 1]), casadi.horzcat(-A[1, 0], A[0, 0])
+            )
+    rows = [A[k, :].T for k in range(3)]
+    return casadi.horzcat(
+        casadi.cross(rows[1], rows[2]),
+        casadi.cross(rows[2], rows[0]),
+        casadi.cross(rows[0], rows[1]),
+    )
+
+
+# L D L' of symmetric matrices some of whose rows nearly depend on the rows before them.
+
+
+def partial_ldl(S: SX, least: SX) -> tuple[SX, SX, list[int], SX]:
+    """L D L' of the rows whose pivot is large enough, as `casadi.ldl` gives it for all rows.
+
+    What is left of a row that the others nearly imply is rounding. If it were divided by its pivot,
+    which is rounding too, numbers of the size of one would pass into every row after it, and these
+    would be solved wrongly. Such a row has no part in L, as if S were without it.
+
+    Source: Davis 2006, section 4.8, for the order of the sums.
+
+    Args:
+        S: (n, n) symmetric, positive semidefinite.
+        least: (n, 1) what a pivot must be above, row by row of S.
+
+    Returns:
+        D (n, 1), L' without its diagonal (n, n), the order p of the rows, so that
+        S[p, p] = L D L', all as `casadi.ldl_solve` takes them; and, in this order, whether the
+        pivot is large enough (n, 1). The D of a row that is left out is what is left of it.
+    """
+    pattern, order = S.sparsity().ldl()
+    W, least = S[order, order], casadi.densify(least)[order]
+    n = S.shape[0]
+    columns = [pattern.row()[pattern.colind()[k] : pattern.colind()[k + 1]] for k in range(n)]
+    LT = SX(pattern)
+    D, good, inverse = list[SX](), list[SX](), list[SX]()
+    for j, above in enumerate(columns):
+        # row j of L D, then of L, from the columns before; U_ij = L_ji D_i
+        U = dict[int, SX]()
+        pivot = W[j, j]
+        for i in above:
+            both = [k for k in columns[i] if k in U]
+            U[i] = W[i, j] - sum((LT[k, i] * U[k] for k in both), SX(0))
+            LT[i, j] = U[i] * inverse[i]
+            pivot -= LT[i, j] * U[i]
+        D.append(pivot)
+        good.append(least[j] < pivot)
+        inverse.append(casadi.if_else(good[j], 1 / pivot, 0))
+    return casadi.vertcat(*D), LT, order, casadi.vertcat(*good)
+
+
+# Symbolic solution of constrained equations: A x - J' y = b, J x + C y = d.
+#
+# The matrix of both is factorised as L D L' in an order that is fixed once: a row of J comes
+# after the columns that it acts on, so that no pivot vanishes where A is positive definite and
+# the rows are independent; within this rule the element with the fewest neighbours is next, so
+# that what is sparse stays sparse.
+#
+# Source: Tinney and Walker 1967 for the order; Benzi, Golub and Liesen 2005 for the equations.
+
+
+_SINGULAR = 1e-12
+"""What is added to J A^-1 J', relative to 1 / scale: finite where rows become dependent."""
+_SHARED = 1e-8
+"""Likewise for rows that are switched, which are dependent as a rule."""
+
+
+def solve_saddle(
+    A: SX,
+    J: SX,
+    b: SX,
+    d: SX,
+    scale: float,
+    corner: SX | None = None,
+    penalty: float | None = None,
+) -> tuple[SX, SX]:
+    """The x and y of A x - J' y = b, J x + C y = d, with a diagonal C that is zero as a rule.
+
+    A multiple of J'J is added to A, which changes no solution and is regular where A alone is
+    not, as massless links make it. One refinement restores the digits that nearly dependent rows
+    cost.
+    A row with a structural element in C is a switch: it acts where that is zero, and does not where
+    that is positive and the row of J and d are zero. Switched rows that depend on others share
+    their y.
+
+    Args:
+        A: (n, n) symmetric, positive definite where J x = 0, everywhere if the penalty is zero.
+        J: (m, n) independent rows.
+        b: (n, 1).
+        d: (m, 1).
+        scale: makes scale * J'J as large as A.
+        corner: (m, 1) the diagonal of C, sparse; the unit of its elements is that of 1 / scale.
+        penalty: how many times J'J is added to A; the scale when left out.
+
+    Returns:
+        x (n, 1) and y (m, 1).
+    """
+    n, m = J.shape[1], J.shape[0]
+    J = casadi.sparsify(J)
+    weighted = (scale if penalty is None else penalty) * J.T
+    K = casadi.sparsify(A) + casadi.sparsify(casadi.mtimes(weighted, J))
+    C = SX(m, 1) if corner is None else corner
+    last = SX(m, m)
+    for row in range(m):
+        last[row, row] = -C[row] - (_SHARED if C.sparsity().has_nz(row, 0) else _SINGULAR) / scale
+    whole = casadi.vertcat(casadi.horzcat(K, J.T), casadi.horzcat(J, last))
+    order = elimination_order(whole.sparsity(), n)
+    D, LT, _ = casadi.ldl(whole[order, order], False)
+    places = [order.index(k) for k in range(n + m)]
+
+    def solve(right: SX) -> SX:
+        ordered = casadi.ldl_solve(casadi.densify(right)[order], D, LT, list(range(n + m)))
+        return casadi.densify(ordered)[places]
+
+    first = solve(casadi.vertcat(b + casadi.mtimes(weighted, d), d))
+    missing = d - casadi.mtimes(J, first[:n])
+    if corner is not None:
+        missing += corner * first[n:]
+    second = solve(casadi.vertcat(SX.zeros(n), missing))
+    found = first + second
+    return found[:n], -found[n:]
+
+
+def elimination_order(pattern: Sparsity, n: int) -> list[int]:
+    """An order of elimination: fewest neighbours first, a row of J after its columns.
+
+    Args:
+        pattern: of the symmetric matrix [A J'; J C].
+        n: size of A.
+    """
+    columns, rows = pattern.get_triplet()[1], pattern.get_triplet()[0]
+    neighbours: list[set[int]] = [set() for _ in range(pattern.size1())]
+    for row, column in zip(rows, columns, strict=True):
+        if row != column:
+            neighbours[column].add(row)
+    waits = [
+        {k for k in near if k < n} if own >= n else set() for own, near in enumerate(neighbours)
+    ]
+    left = set(range(len(neighbours)))
+    order = []
+    while left:
+        pivot = min((k for k in left if not waits[k]), key=lambda k: (len(neighbours[k]), k))
+        order.append(pivot)
+        left.remove(pivot)
+        near = neighbours[pivot]
+        for k in near:
+            neighbours[k] = (neighbours[k] | near) - {k, pivot}
+        for k in left:
+            waits[k].discard(pivot)
+    return order
+
+
+# One step of Newton's method as a Function whose derivatives are those of the solution.
+
+
+def newton_step(rows: Function, slopes: Function) -> Function:
+    """``closure(x, z, p) -> (z_next, residual)``, z_next = z - J^-1 r.
+
+    Its derivatives hold J: where r is zero, those of z_next by x and p are the derivatives of the
+    solution, -J^-1 dr, and nothing is spent on how J changes. Elsewhere they are approximate.
+
+    Args:
+        rows: `rows(x, z, p) -> (r, residual)`, as many equations r (n, 1) as unknowns z, and how
+            far from a solution z is.
+        slopes: `slopes(x, z, p) -> J`, how r changes with z, (n, n).
+    """
+    A, b = SX.sym("A", slopes.sparsity_out(0)), SX.sym("b", rows.numel_out(0))
+    held: dict[str, Any] = {"cse": True, "is_diff_in": [False, True]}
+    step = Function("step", [A, b], [casadi.densify(solve_square(A, b))], held)
+    point = [MX.sym(name, slopes.size_in(k)) for k, name in enumerate(("x", "z", "p"))]
+    r, residual = rows.call(point)
+    z_next = point[1] - step(slopes.call(point)[0], r)
+    return Function("closure", point, [z_next, residual])

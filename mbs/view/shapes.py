@@ -1,0 +1,328 @@
+"""What joints, constraints and force elements look like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi
+import numpy as np
+
+from mbs.assembly.khalil_frames import Cut
+from mbs.components import Box, Cylinder, RollingDisc
+from mbs.components.joints import Motion
+from mbs.expressions import Scalar, to_float
+from mbs.models.skeleton import SkeletonForce, SkeletonJoint, SkeletonLink, link_outline
+from mbs.view.mesh import turned_to
+from mbs.view.posed import Array, Measures, PosedLinks, rows, three
+from mbs.view.primitives import (
+    AxisShape,
+    BallShape,
+    BarShape,
+    BoxShape,
+    CylinderShape,
+    FrameShape,
+    LabelShape,
+    PlateShape,
+    Primitive,
+    RingShape,
+    SpanShape,
+    SpringShape,
+    Vector,
+    link_colour,
+)
+
+_COILED = ("spring", "bushing")
+
+
+def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
+    """Every joint: cylinders about axes, boxes along them, balls; and their names."""
+    for joint in _shown(scene):
+        if joint.kind == "rollingdisc":
+            yield from _wheel(scene, joint, sizes)
+            continue
+        yield from _joined(scene, joint, sizes)
+        yield from _axes(scene, joint, sizes)
+    yield from _labels(scene, sizes)
+
+
+def _shown(scene: PosedLinks) -> Iterator[SkeletonJoint]:
+    """All but those that leave a body free, or weld it without closing a loop."""
+    for joint in scene.parts.joints:
+        if joint.kind != "free" and (joint.kind != "fixed" or joint.cut):
+            yield joint
+
+
+def _labels(scene: PosedLinks, sizes: Measures) -> Iterator[LabelShape]:
+    """The names of joints, one above the other where they are at one place."""
+    taken: list[Array] = []
+    for joint in _shown(scene):
+        side = 1 if joint.kind == "rollingdisc" else 0
+        point = scene.points[joint.points[side]]
+        row = sum(bool(np.linalg.norm(point - other) < sizes.joint) for other in taken)
+        taken.append(point)
+        at = scene.local(joint.links[side], point)
+        yield LabelShape("label", joint.links[side], at, joint.name, row)
+
+
+def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
+    """Role and colour."""
+    if joint.cut:
+        return "loop", "loop"
+    driven = any(c.actuated for c in scene.system.speeds if c.joint == joint.name)
+    return "joint", "active" if driven else "joint"
+
+
+def _joined(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+    """A bar between frames that are not one place, balls where a joint has no axes."""
+    role, colour = _look(scene, joint)
+    a, b = (scene.points[k] for k in joint.points)
+    ends = scene.local(joint.links[0], a), scene.local(joint.links[1], b)
+    slides = any(axis.motion == "prismatic" for axis in joint.axes)
+    if slides or np.linalg.norm(a - b) > 1e-6 * sizes.size or joint.cut:
+        paint = colour if joint.cut or not slides else "joint"
+        yield SpanShape(role, joint.links, paint, ends, 0.45 * sizes.bar)
+    if not joint.axes:
+        for link, end in dict(zip(joint.links, ends, strict=True)).items():
+            yield BallShape(role, link, colour, end, 1.15 * sizes.joint)
+
+
+def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+    role, colour = _look(scene, joint)
+    carriers = _carriers(scene, joint)
+    shrink = 1.0 if len(joint.axes) == 1 else 0.8
+    for (link, column), axis in zip(carriers, joint.axes, strict=True):
+        direction, center = scene.directions[axis.direction], scene.points[column]
+        radius = shrink * sizes.joint
+        if axis.motion == "revolute":
+            a, b = _around(scene, link, center, 1.35 * radius * direction)
+            yield CylinderShape(role, link, colour, a, b, radius)
+        else:
+            side = 1.9 * radius
+            seat = _seat(scene, joint, direction, 1.5 * side)
+            pose = scene.local_pose(link, turned_to(direction), center + seat)
+            yield BoxShape(role, link, colour, pose, (side, side, 1.5 * side))
+        a, b = _around(scene, link, center, 4.5 * sizes.joint * direction)
+        yield AxisShape("axis", link, a, b)
+
+
+def _carriers(scene: PosedLinks, joint: SkeletonJoint) -> list[tuple[int, int]]:
+    """For each axis the link that it is fixed on, and the point that it goes through."""
+    if joint.cut:
+        return [(joint.links[min(k, 1)], joint.points[min(k, 1)]) for k in range(len(joint.axes))]
+    system = scene.system
+    return [
+        (number, joint.points[1])
+        for number, link in enumerate(system.tree.links, start=1)
+        if system.coordinates[link.q.start].joint == joint.name
+        and link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
+    ]
+
+
+def _around(scene: PosedLinks, link: int, center: Array, half: Array) -> tuple[Vector, Vector]:
+    return scene.local(link, center - half), scene.local(link, center + half)
+
+
+def _seat(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: float) -> Array:
+    """Where a slide sits, seen from frame_b: beside a ball that is there too."""
+    a, b = (scene.points[k] for k in joint.points)
+    back = float((a - b) @ direction)
+    if abs(back) > 2.5 * length:
+        return np.array(np.sign(back) * 1.1 * length * direction)
+    crowded = any(
+        np.linalg.norm(scene.points[k] - b) < 0.25 * length
+        for other in scene.parts.joints
+        if not other.axes and other.kind not in ("free", "fixed")
+        for k in other.points
+    )
+    return np.array(-1.1 * length * direction if crowded else 0.0 * direction)
+
+
+def _wheel(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+    cut = next(cut for cut in scene.system.cuts if cut.edge.joint.name == joint.name)
+    disc = cut.edge.joint
+    radius = to_float(disc.radius, scene.parameters) if isinstance(disc, RollingDisc) else None
+    if radius is None or not isinstance(disc, RollingDisc):
+        return
+    link, center = joint.links[1], scene.points[joint.points[1]]
+    axis = scene.poses[link, :, :3] @ _rotation(scene, cut) @ np.array(disc.axis, dtype=float)
+    tube = min(0.06 * radius, 0.7 * sizes.joint)
+    direction, at = scene.local_direction(link, axis), scene.local(link, center)
+    yield RingShape("loop", link, "loop", at, direction, radius - tube, tube)
+
+
+def _rotation(scene: PosedLinks, cut: Cut) -> Array:
+    """Frame_b of a cut joint in its link's frame."""
+    system = scene.system
+    R = casadi.Function("R", [system.p], [casadi.densify(cut.pose_b.R)])
+    return np.array(R([scene.parameters[p.name] for p in system.parameters]))
+
+
+def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
+    """Springs as coils, other elements between two points as bars."""
+    for force in scene.parts.forces:
+        a, b = (scene.points[k] for k in force.points)
+        ends = scene.local(force.links[0], a), scene.local(force.links[1], b)
+        yield _element(force, ends, float(np.linalg.norm(a - b)), sizes)
+
+
+def _element(
+    force: SkeletonForce, ends: tuple[Vector, Vector], length: float, sizes: Measures
+) -> SpringShape | SpanShape:
+    if force.kind in _COILED:
+        nominal = max(length, 4 * sizes.joint)
+        return SpringShape("force", force.links, "force", ends, 0.8 * sizes.joint, nominal)
+    return SpanShape("force", force.links, "force", ends, 0.35 * sizes.bar)
+
+
+# What links, the base and frames look like.
+
+
+_THIN = 0.35
+
+
+def solid_shapes(scene: PosedLinks) -> Iterator[BoxShape | CylinderShape]:
+    """The bodies that were described by their dimensions, as they are."""
+    for body in scene.system.bodies:
+        if body.solid is not None:
+            pose = _body_pose(scene, body.name)
+            shape = _solid(scene, body.link, pose, body.solid)
+            if shape is not None:
+                yield shape
+
+
+def _body_pose(scene: PosedLinks, name: str) -> Array:
+    """(3, 4) pose of the reference frame of a body in its link's frame."""
+    system = scene.system
+    _, place = system.frames[name]
+    both = casadi.densify(casadi.horzcat(place.R, place.p))
+    pose_of = casadi.Function("pose", [system.p], [both])
+    pose: Array = np.array(pose_of(list(scene.parameters.values())))
+    return pose
+
+
+def _solid(
+    scene: PosedLinks, link: int, pose: Array, body: Box | Cylinder
+) -> BoxShape | CylinderShape | None:
+    def number(scalar: Scalar | None) -> float:
+        value = None if scalar is None else to_float(scalar, scene.parameters)
+        return float("nan") if value is None else value
+
+    length, colour = number(body.length), link_colour(link)
+    R, left = pose[:, :3], pose[:, 3]
+    right = left + length * R[:, 0]
+    if isinstance(body, Cylinder):
+        radius, bore = number(body.radius), number(body.inner_radius)
+        shape = CylinderShape("link", link, colour, three(left), three(right), radius, bore)
+        return shape if np.isfinite([length, radius, bore]).all() else None
+    size = length, number(body.width), number(body.height)
+    middle = np.column_stack([R, (left + right) / 2])
+    return BoxShape("link", link, colour, rows(middle), size) if np.isfinite(size).all() else None
+
+
+def corners(scene: PosedLinks, solid: BoxShape | CylinderShape) -> Array:
+    """(k, 3) points of the base frame that span a solid."""
+    R, p = scene.poses[solid.link, :, :3], scene.poses[solid.link, :, 3]
+    if isinstance(solid, CylinderShape):
+        return np.array([solid.a, solid.b]) @ R.T + p
+    pose = np.array(solid.pose).reshape(3, 4)
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    ends: Array = (signs * np.array(solid.size) / 2 @ pose[:, :3].T + pose[:, 3]) @ R.T + p
+    return ends
+
+
+def link_shapes(
+    scene: PosedLinks, sizes: Measures, solids: list[BoxShape | CylinderShape]
+) -> Iterator[Primitive]:
+    """Bars from joint to joint, polygons filled, balls where a link is nothing but a point."""
+    for link in scene.parts.links[1:]:
+        own = [solid for solid in solids if solid.link == link.number]
+        colour = link_colour(link.number)
+        for a, b in link.segments:
+            ends = [scene.local(link.number, scene.points[k]) for k in (a, b)]
+            if not any(all(_holds(solid, end, sizes) for end in ends) for solid in own):
+                yield BarShape("link", link.number, colour, ends[0], ends[1], sizes.bar)
+        yield from _plate(scene, link)
+        if not link.segments and not own:
+            yield from _point_link(scene, link, sizes)
+
+
+def _holds(solid: BoxShape | CylinderShape, point: tuple[float, ...], sizes: Measures) -> bool:
+    """Whether a point of the link lies in a solid."""
+    slack, at = 1e-6 * sizes.size, np.array(point)
+    if isinstance(solid, BoxShape):
+        pose = np.array(solid.pose).reshape(3, 4)
+        inside = np.abs(pose[:, :3].T @ (at - pose[:, 3])) <= np.array(solid.size) / 2 + slack
+        return bool(inside.all())
+    a, b = np.array(solid.a), np.array(solid.b)
+    length = float(np.linalg.norm(b - a))
+    along = float((at - a) @ (b - a)) / length
+    away = float(np.linalg.norm(at - a - along * (b - a) / length))
+    return -slack <= along <= length + slack and away <= solid.radius + slack
+
+
+def _plate(scene: PosedLinks, link: SkeletonLink) -> Iterator[PlateShape]:
+    segments = link.segments
+    ends = [k for k, (_, b) in enumerate(segments) if b == segments[0][0]]
+    if len(segments) > 2 and ends and ends[0] > 1:
+        ring = segments[: ends[0] + 1]
+        points = tuple(scene.local(link.number, scene.points[a]) for a, _ in ring)
+        yield PlateShape("link", link.number, link_colour(link.number), points, _THIN)
+
+
+def _point_link(
+    scene: PosedLinks, link: SkeletonLink, sizes: Measures
+) -> Iterator[BallShape | BarShape]:
+    """A link without extent: a ball where only a mass is, a flange where a joint carries it."""
+    number, colour = link.number, link_colour(link.number)
+    held = [
+        scene.points[point]
+        for joint in scene.parts.joints
+        for side, point in zip(joint.links, joint.points, strict=True)
+        if side == number and joint.kind != "free"
+    ]
+    frames = [f for f in scene.parts.frames if f.link == number]
+    if link.mass_centre is not None and not held:
+        at = scene.local(number, scene.points[link.mass_centre])
+        yield BallShape("link", number, colour, at, 2.5 * sizes.bar)
+    elif held and (frames or len(held) == 1):
+        a = scene.local(number, held[0])
+        yield BarShape("link", number, colour, a, (a[0], a[1], a[2] + 2.2 * sizes.joint), sizes.bar)
+
+
+def base_shapes(scene: PosedLinks, sizes: Measures, floor: float) -> Iterator[Primitive]:
+    """The base: bars between its joints, a column below the only one."""
+    points = [
+        scene.points[point]
+        for joint in scene.parts.joints
+        for link, point in zip(joint.links, joint.points, strict=True)
+        if link == 0 and joint.kind not in ("free", "rollingdisc")
+    ]
+    if not points:
+        return
+    held = np.array(points)
+    for a, b in link_outline(held, len(held)):
+        yield BarShape("base", 0, "base", three(held[a]), three(held[b]), 1.1 * sizes.bar)
+    if np.ptp(held, axis=0).max() <= 1e-9 * sizes.size:
+        yield from _column(scene, sizes, held[0], floor)
+
+
+def _column(
+    scene: PosedLinks, sizes: Measures, top: Array, floor: float
+) -> Iterator[CylinderShape]:
+    foot = top + (floor - float(top @ scene.up)) * scene.up
+    pad = foot + 0.5 * sizes.joint * scene.up
+    if np.linalg.norm(top - foot) > 1e-9 * sizes.size:
+        yield CylinderShape("base", 0, "base", three(foot), three(top), 0.8 * sizes.joint)
+        yield CylinderShape("base", 0, "base", three(foot), three(pad), 2.4 * sizes.joint)
+
+
+def frame_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[FrameShape]:
+    """The base frame and those that have a name; then the frame of every link."""
+    identity = tuple(float(x) for x in np.eye(3, 4).ravel())
+    yield FrameShape("frame", 0, identity, sizes.frame)
+    for frame in scene.parts.frames:
+        R = scene.directions[list(frame.directions)].T
+        pose = scene.local_pose(frame.link, R, scene.points[frame.origin])
+        yield FrameShape("frame", frame.link, pose, sizes.frame)
+    for number in range(1, len(scene.poses)):
+        yield FrameShape("link frame", number, identity, 0.75 * sizes.frame)

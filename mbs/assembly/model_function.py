@@ -331,7 +331,8 @@ class ModelFunction(Function):
             raise ModelError(
                 f"{self._title}: {name} has the shape {shape}, it needs {(wanted, width)}"
             )
-        if shape == (wanted, wanted) and wanted > 1 and not isinstance(value, (SX, MX, DM)):
+        square = shape == (wanted, wanted) and wanted > 1 and width != wanted
+        if square and not isinstance(value, (SX, MX, DM)):
             raise ModelError(
                 f"{self._title}: {name} is an array of shape {shape}, whose states may be rows or"
                 " columns; give casadi.DM(array), whose columns are states, or take"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from casadi import SX, Function
+from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
@@ -112,8 +112,9 @@ def pose_rows(system: System, q: Array, p: Sequence[float]) -> Array:
     """
     function = _pose_function(system)
     if not system.parameters:
-        return np.array(function(q))
-    return np.array(function(q, np.repeat(np.array(p).reshape(-1, 1), q.shape[1], axis=1)))
+        return np.array(function(DM(q)))
+    every = np.repeat(np.array(p).reshape(-1, 1), q.shape[1], axis=1)
+    return np.array(function(DM(q), DM(every)))
 
 
 def _pose_function(system: System) -> Function:

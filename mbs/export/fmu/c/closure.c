@@ -122,7 +122,9 @@ static int follow(const loops *l, const real *x, real *z) {
         for (i = 0; i < NZ && status == CLOSURE_OK && known; i++) {
             real off = real_abs(trial[i] - z[i] - (to - done) * slope[i]);
             real most = real_max(length * size[DEPENDENTS + i], real_abs(slope[i]));
-            if (off > BENT * (to - done) * most) status = CLOSURE_OPEN;
+            /* what Newton steps leave open may be more than a short move bends */
+            if (off > BENT * (to - done) * most + MOVE * size[DEPENDENTS + i])
+                status = CLOSURE_OPEN;
         }
         if (status != CLOSURE_OK) {
             part /= REAL(2.0);

@@ -18,6 +18,7 @@ from casadi import SX
 
 from mbs.assembly import System
 from mbs.assembly.rates import norm_rows, position_rate
+from mbs.assembly.validity import plain_rows
 from mbs.loops.closure import independent_closure
 from mbs.loops.function import function
 from mbs.loops.reduction import reduction_matrix
@@ -47,6 +48,8 @@ class DaeEquations:
         invariants: of x and p; zero along every motion, so zero at every start.
         q: (nq, 1) positions of the tree that belong to x.
         v: (nv, 1) velocities of the tree that belong to x.
+        excess: of p; by how much parameters are out of their bounds, not above zero where they are
+            within.
     """
 
     x: SX
@@ -58,6 +61,7 @@ class DaeEquations:
     invariants: SX
     q: SX
     v: SX
+    excess: SX
 
 
 def motors(system: System) -> list[int]:
@@ -185,5 +189,7 @@ def equations(
     motion: tuple[SX, SX],
 ) -> DaeEquations:
     """The expressions with their common parts shared."""
-    shared = casadi.cse([casadi.densify(e) for e in (ode, alg, invariants, *motion)])
+    rules = [row for row in plain_rows(system, motion[0]) if row.kind == "parameter"]
+    excess = casadi.vertcat(SX(0, 1), *(row.residual - row.bound for row in rules))
+    shared = casadi.cse([casadi.densify(e) for e in (ode, alg, invariants, *motion, excess)])
     return DaeEquations(*states, system.p, *(SX(e) for e in shared))

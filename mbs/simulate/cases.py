@@ -12,6 +12,7 @@ from pathlib import Path
 from mbs.errors import ExportError, ModelError
 from mbs.files import path_of, write_text
 from mbs.messages import quoted
+from mbs.numbers import doubles
 from mbs.result import Result
 
 _INDEX = "study.json"
@@ -44,10 +45,12 @@ def _combinations(grid: Mapping[str, Iterable[float]]) -> Iterable[Case]:
 
 
 def _number(name: str, value: object) -> float:
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise ModelError(f"sweep: {name} is {quoted(value)}; give numbers") from None
+    array = doubles(value)
+    if isinstance(array, str):
+        raise ModelError(f"sweep: {name} {array}")
+    if array.size != 1:
+        raise ModelError(f"sweep: {name} is {quoted(value)}; give one number for each case")
+    return float(array.item())
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)

@@ -529,3 +529,25 @@ def test_row(row, subjects):
     }
     assert found == wanted
     assert "number" not in wanted.values()
+
+
+def test_a_start_of_all_positions_is_not_a_guess(subjects):
+    """Where `closes` does not hold, as the page says."""
+    system = subjects["loop"].system
+    q = np.array(system.posture)
+    mbs.simulate.run(system, 0.01, q0=q, quiet=True)
+    for away in (0.1, 1e-4):
+        wrong = q + away * np.eye(3)[0]
+        assert (
+            refusal(lambda q0=wrong: mbs.simulate.run(system, 0.01, q0=q0, quiet=True)) == "error"
+        )
+
+
+def test_columns_are_states(subjects):
+    """Of a model, where rows are those of a batch."""
+    arm = subjects["arm"]
+    one = arm.model(*arm.good.values()).full()
+    rows = [np.column_stack([x] * 3) for x in arm.good.values()]
+    assert arm.model(*rows).full() == pytest.approx(np.tile(one, 3), rel=1e-12)
+    many = mbs.native.batch(arm.model)(*(x.T for x in rows))
+    assert many == pytest.approx(np.tile(one, 3).T, rel=1e-9)

@@ -34,6 +34,7 @@ from mbs.components import Component
 from mbs.errors import MbsError, ModelError
 from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
+from mbs.numbers import doubles
 from mbs.spatial import Pose
 from mbs.text import did_you_mean, quoted
 
@@ -403,16 +404,17 @@ class System:
         return start
 
     def _numbers(self, values: Any, what: str) -> list[float]:
-        try:
-            numbers = [float(x) for x in DM(values).full().ravel()]
-        except (NotImplementedError, TypeError, ValueError):
-            numbers = [math.nan]
-        if not all(math.isfinite(number) for number in numbers):
+        if isinstance(values, (list, tuple)):  # numpy makes no array of several (1, 1) of CasADi
+            values = [float(x) if isinstance(x, DM) and x.numel() == 1 else x for x in values]
+        array = doubles(values)
+        if isinstance(array, str):
+            raise ModelError(f"{self.name}: the {what} {array}")
+        if not np.isfinite(array).all():
             raise ModelError(
                 f"{self.name}: the {what} is {quoted(values)}; give a finite number for each"
                 " coordinate"
             )
-        return numbers
+        return [float(x) for x in array.ravel()]
 
     def _number(self, value: Any, what: str) -> float:
         numbers = self._numbers(value, what)

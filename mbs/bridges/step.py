@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import casadi
@@ -27,6 +28,9 @@ of the largest: what a step resolves stays far below, a change of branch is far 
 _NO_MOTION = 1e-9
 """Kinks that move nothing further than this [rad or m] are rounding."""
 
+_LARGEST = sys.float_info.max
+"""What is not above it is a number."""
+
 
 def step(model: Model, substeps: int = 1, *, checked: bool = True) -> Function:
     """``step(x, u, p, dt) -> x_next``: the classical fourth-order method, u constant.
@@ -38,7 +42,9 @@ def step(model: Model, substeps: int = 1, *, checked: bool = True) -> Function:
     every substep: x is moved onto them, as little as possible, by two steps of Newton's method.
     Where that fails, and where velocities of a closed mechanism have a kink within the substep,
     x_next is NaN: the loops do not close any more, the step is too long, or it passed a singular
-    configuration, through which `mbs.simulate.run` goes.
+    configuration, through which `mbs.simulate.run` goes. Of a Dae the whole of x_next is NaN also
+    where an input or an element of it is no finite number, and where parameters are out of their
+    bounds.
 
     Source: Kutta 1901; projection as in Hairer and Wanner 1996, section VII.2.
 
@@ -63,8 +69,23 @@ def step(model: Model, substeps: int = 1, *, checked: bool = True) -> Function:
     settle = _settled(model, checked) if isinstance(model, Dae) else None
     after = None if settle is None else lambda x, middle, end, h: settle(x, middle, end, p, h)
     x = advanced(lambda at: ode(at, u, p), start, dt, substeps, after)
+    if checked and isinstance(model, Dae):
+        x = _flagged(model, x, [start, u, p, dt])
     inputs = ["x", "u", "p", "dt"]
     return Function("step", [start, u, p, dt], [x], inputs, ["x_next"], {"cse": True})
+
+
+def _flagged(dae: Dae, x: Any, inputs: Sequence[Any]) -> Any:
+    """The states x, all of them NaN where an input or one of them has no meaning."""
+    # a sum is finite where everything is, and one comparison
+    given, reached = (
+        sum((casadi.sum1(value) for value in values), 0.0) for values in (inputs, [x])
+    )
+    holds = casadi.logic_and(casadi.fabs(given) <= _LARGEST, casadi.fabs(reached) <= _LARGEST)
+    excess = Function("excess", [dae.p], [dae.excess])(inputs[2])
+    for row in casadi.vertsplit(excess):
+        holds = casadi.logic_and(holds, row <= 0)
+    return casadi.if_else(holds, x, math.nan)
 
 
 def _settled(dae: Dae, checked: bool) -> Function | None:

@@ -16,6 +16,7 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.system import packed, unpacked
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT
 from mbs.assembly.tree import norm_rows, position_rate, quaternion_slices
+from mbs.assembly.validity import plain_rows
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closure import SLIPS, independent_closure
 from mbs.loops.configuration import Values, start
@@ -122,6 +123,8 @@ class DaeEquations:
         invariants: of x and p; zero along every motion, so zero at every start.
         q: (nq, 1) positions of the tree that belong to x.
         v: (nv, 1) velocities of the tree that belong to x.
+        excess: of p; by how much parameters are out of their bounds, not above zero where they are
+            within.
     """
 
     x: SX
@@ -133,6 +136,7 @@ class DaeEquations:
     invariants: SX
     q: SX
     v: SX
+    excess: SX
 
 
 def motors(system: System) -> list[int]:
@@ -260,7 +264,9 @@ def equations(
     motion: tuple[SX, SX],
 ) -> DaeEquations:
     """The expressions with their common parts shared."""
-    shared = casadi.cse([casadi.densify(e) for e in (ode, alg, invariants, *motion)])
+    rules = [row for row in plain_rows(system, motion[0]) if row.kind == "parameter"]
+    excess = casadi.vertcat(SX(0, 1), *(row.residual - row.bound for row in rules))
+    shared = casadi.cse([casadi.densify(e) for e in (ode, alg, invariants, *motion, excess)])
     return DaeEquations(*states, system.p, *(SX(e) for e in shared))
 
 

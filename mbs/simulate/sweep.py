@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.errors import ExportError, Interrupted, MbsError, ModelError, SolverError
 from mbs.files import check_archive, path_of, write_text
+from mbs.numbers import doubles
 from mbs.progress import progress
 from mbs.result import Result, optional_module
 from mbs.simulate.fmu import fmu
@@ -65,10 +66,12 @@ def _combinations(grid: Mapping[str, Iterable[float]]) -> Iterable[Case]:
 
 
 def _number(name: str, value: object) -> float:
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise ModelError(f"sweep: {name} is {quoted(value)}; give numbers") from None
+    array = doubles(value)
+    if isinstance(array, str):
+        raise ModelError(f"sweep: {name} {array}")
+    if array.size != 1:
+        raise ModelError(f"sweep: {name} is {quoted(value)}; give one number for each case")
+    return float(array.item())
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)

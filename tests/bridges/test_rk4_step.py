@@ -7,7 +7,7 @@ from support.linkages import linkage
 
 import mbs
 from mbs.bridges import step
-from mbs.components import Body, Spherical
+from mbs.components import Body, Revolute, Spherical
 
 QUIET = {"quiet": True}
 
@@ -85,3 +85,31 @@ def test_quaternions_stay_of_unit_length():
     assert abs(float(casadi.norm_2(x[:4])) - 1) < 1e-15
     fine = step(dae, 200)(dae.x0, [], [], 1.0)
     assert float(casadi.norm_inf(x - fine)) < 1e-2
+
+
+def test_rows_are_flagged_as_a_whole():
+    """Also where a bad number has no effect on other states."""
+    m = mbs.Mechanism("two")
+    for name in ("a", "b"):
+        mass = mbs.Parameter(f"M_{name}", 1.0)
+        body = m.add(Body(name, mass=mass, com=(0, 0, 0.1), inertia=(0.02, 0.02, 0.01)))
+        m.connect(m.world, Revolute(f"j_{name}", axis="y", actuated=True), body)
+    dae = mbs.models.dae(m.assemble())
+    u, p, dt = np.tile(dae.u0, (4, 1)), np.tile(dae.p0, (4, 1)), np.array([0.01])
+    u[1, 0], p[2, 1] = np.nan, -0.5
+    checked, free = (
+        mbs.native.batch(step(dae, checked=checked))(np.tile(dae.x0, (4, 1)), u, p, dt)
+        for checked in (True, False)
+    )
+    assert np.isnan(checked[1:3]).all()
+    assert np.array_equal(checked[[0, 3]], free[[0, 3]])
+    assert np.isfinite(free[2]).all()
+    assert np.isfinite(free[1]).any()
+
+
+def test_checks_are_not_in_the_derivatives():
+    """J of a step is that of the step without checks."""
+    dae = mbs.models.dae(mbs.load("cart_pole").assemble())
+    point = [dae.x0 + 0.1, [0.3], dae.p0, 0.01, 0]
+    one, other = (step(dae, checked=checked).jacobian()(*point)[0] for checked in (True, False))
+    np.testing.assert_allclose(one.full(), other.full(), rtol=1e-12, atol=1e-15)

@@ -119,6 +119,8 @@ def test_a_failed_case_does_not_stop_the_others(system):
         ({"L": []}, "no case"),
         ([], "no case"),
         ({"L": ["long"]}, "L is 'long'; give numbers"),
+        ({"L": ["1.5"]}, "L is '1.5'; give numbers"),
+        ({"L": [[0.5, 0.6]]}, "give one number for each case"),
     ],
 )
 def test_grids(system, grid, message):

@@ -141,7 +141,7 @@ def test_out_of_reach_offers_the_nearest_posture(monkeypatch, rx90):
         await until(lambda: element(user, "x").value)
         choose(user, "x", "oops")
         user.find(marker="solve").click()
-        await user.should_see("'oops' in a pose has no value", retries=PATIENT)
+        await user.should_see("'oops' is not a number", retries=PATIENT)
         choose(user, "pose form", "matrix")
         choose(user, "matrix", "1 0 0 3  0 1 0 0  0 0 1 1/2")
         user.find(marker="solve").click()

@@ -1,4 +1,4 @@
-"""Parts of messages: values as Python writes them, the nearest known name, how to install."""
+"""Parts of messages, and texts of others inside of comments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The connection graph: bodies welded together are one node, joints are the edges."""
+"""The connection graph: welded bodies are one node; which joints carry the tree, which are cut."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables of a system: what a script reads to know its coordinates, bodies and loops."""
+"""The tables of a system: coordinates, joints, bodies, loops, force elements, sensors."""
 
 from __future__ import annotations
 

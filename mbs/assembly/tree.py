@@ -1,4 +1,4 @@
-"""The tree of links that every recursion runs over."""
+"""The tree of links that every recursion runs over, and dq/dt = N(q) v along it."""
 
 from __future__ import annotations
 

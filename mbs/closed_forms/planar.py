@@ -1,4 +1,4 @@
-"""Plane loops of three unknown joints: which of the kernels for them fits."""
+"""Plane loops of three unknown joints: turns and slides, parallelograms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A loop as its unknown joints in cyclic order, and the known poses between them.
+"""A loop as its unknown joints in cyclic order: known poses between them, geometry, samples.
 
 Walking once around the loop leads back to the start: X_1 J_1 X_2 J_2 .. X_n J_n = 1. Each J_k
 turns about or slides along its own z axis; each X_k is made of links, and of joints whose positions

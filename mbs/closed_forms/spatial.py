@@ -1,4 +1,4 @@
-"""Points of a loop that its unknown joints turn about: balls, and turns whose axes meet.
+"""Loops in space: joints from centres they turn about, distances, orientations and slides.
 
 What lies beyond such a centre only sees a point, whatever the joints in it do.
 """

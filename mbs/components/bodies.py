@@ -1,4 +1,4 @@
-"""Bodies by their numbers: mass and inertia, the ten parameters, or a point mass."""
+"""Bodies: by their numbers, as homogeneous solids, the world; which inertias they may have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What bodies, joints and the world have in common: a name, and points to connect."""
+"""What all components have in common: a name, points to connect, placements, axes."""
 
 from __future__ import annotations
 

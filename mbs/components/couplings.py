@@ -1,4 +1,4 @@
-"""Relations between the coordinates of joints."""
+"""Couplings of coordinates: polynomials, gears, racks and screws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Flanges: where the parts of a drive line are connected.
+"""Drive lines: flanges, shafts and gears, what drives them, elastic parts between them.
 
 A flange has an angle, which is the same for all flanges that are connected, and a torque, and the
 torques of connected flanges add up to zero.

@@ -1,4 +1,4 @@
-"""What force elements have in common: they act on points or on a joint and constrain nothing.
+"""Force elements: they act on points or on a joint and constrain nothing.
 
 A force element is a component that knows where it acts: `m.add(Spring("s", a.right, b, ...))`. Its
 law is written once, on CasADi scalars; the recursions know where its points are.

@@ -1,4 +1,4 @@
-"""Joints: how frame_b may move with respect to frame_a.
+"""Joints: how frame_b may move with respect to frame_a; their motions, rotors and limits.
 
 A joint is described by its freedoms, elementary motions one after the other from frame_a to
 frame_b. The rows that close a loop through a cut joint follow from the same description

@@ -1,4 +1,4 @@
-"""What sensors have in common, and sensors on points: positions, velocities, accelerations.
+"""Sensors on points and on joints: motions, wrenches, power.
 
 A sensor is a component that knows where it is: `m.add(AbsoluteSensor("tip", arm.right))`. It takes
 no part in the motion; `mbs.models.measurements` says what it reads.

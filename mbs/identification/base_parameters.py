@@ -1,4 +1,4 @@
-"""How base inertial parameters are found: rules of trees and of loops, and the rank of samples."""
+"""Base inertial parameters: the fewest that give the same equations of motion."""
 
 from __future__ import annotations
 

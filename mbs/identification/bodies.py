@@ -1,4 +1,4 @@
-"""Full sets of parameters that bodies can have."""
+"""Bodies that explain identified parameters, and what is known of them before."""
 
 from __future__ import annotations
 

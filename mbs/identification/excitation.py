@@ -1,4 +1,4 @@
-"""Motions that show the parameters as well as the limits of a robot allow."""
+"""Motions that show the parameters of a robot, found by a nonlinear programme."""
 
 from __future__ import annotations
 

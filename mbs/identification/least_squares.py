@@ -1,4 +1,4 @@
-"""Ordinary least squares."""
+"""Least squares: ordinary, effort by effort, weighted, robust, with instruments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Methods that find parameters from equations, how sure these are, and what they leave."""
+"""Every method of estimation by its name, and the parameters that a record really shows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The equations that a record gives, and how well they show the parameters."""
+"""The equations that a record gives: dynamic, filtered, energy; how well they show what."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measured motions, what they may not be, and their filters."""
+"""A measured motion: its columns, what it may not be, and its filter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Models that are linear in the dynamic parameters, and the parameters as named columns."""
+"""The identification models: efforts, momenta and energy as matrices times parameters."""
 
 from __future__ import annotations
 

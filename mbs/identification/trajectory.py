@@ -1,4 +1,4 @@
-"""An exciting motion: positions, rates, how near it comes to its limits, and a table of it."""
+"""An exciting motion: Fourier series of joints within limits of ranges, rates and efforts."""
 
 from __future__ import annotations
 

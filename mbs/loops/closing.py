@@ -1,4 +1,4 @@
-"""The numbers of a closure: its residual at a posture, and the nearest posture that closes it."""
+"""The numbers of a closure: its residual, the nearest configuration that closes, and sizes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Postures that close the loops: followed from the assembled one, or searched for near a guess."""
+"""Configurations that close the loops, and the start of a motion."""
 
 from __future__ import annotations
 

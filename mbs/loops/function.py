@@ -1,4 +1,4 @@
-"""Positions of the whole tree as an explicit Function of the independent ones, on one branch."""
+"""Positions of the whole tree from the independent ones, on one branch: in closed form, or not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every posture that closes the loops for given positions of the independent joints."""
+"""Every configuration that closes the loops, and every one that brings a frame to a pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Velocities and accelerations that loops allow: J(q) v = 0 and J a + psi = 0.
+"""Velocities and accelerations that loops allow: J(q) v = 0 and J a + psi = 0; their wrenches.
 
 The rows of J are those of the closure, then those of rolling discs, which bind velocities alone.
 

@@ -1,4 +1,4 @@
-"""Coordinates that rigid stops and dry friction may hold, and the modes that say what they do.
+"""Coordinates that rigid stops and dry friction may hold: modes, accelerations, impacts.
 
 A mode is constant between events. Every such coordinate has two: its place, -1 at the lower limit,
 1 at the upper one, 0 between them; and the direction in which it slides, 0 where friction holds it.

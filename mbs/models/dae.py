@@ -1,4 +1,4 @@
-"""Differential-algebraic equations of a mechanism, for optimal control and for DAE solvers."""
+"""Differential-algebraic equations of a mechanism, in the forms that solvers take."""
 
 from __future__ import annotations
 

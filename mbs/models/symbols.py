@@ -1,4 +1,4 @@
-"""The symbols of a model: positions, and velocities in tree or independent coordinates."""
+"""The symbols of a model, what acts from outside, and the devices that drive shafts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blocks of a graph as C functions: straight lines of scalars."""
+"""C text of a graph: operators, the order of operations, slots, blocks of scalars and lanes."""
 
 from __future__ import annotations
 

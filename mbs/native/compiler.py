@@ -1,4 +1,4 @@
-"""The C compiler of this computer: which one there is, and shared libraries made with it."""
+"""The C compiler: which one there is, libraries for here and elsewhere, and their cache."""
 
 import atexit
 import functools

@@ -1,4 +1,4 @@
-"""Jacobian of a frame: its velocity as a linear function of the joint velocities.
+"""Jacobian of a frame, where its entries are zero or constant, and Renaud's factors of it.
 
 Every joint gives the velocity z x L along its own axis, L being the way from the joint to the
 point whose velocity is asked for; the axes in which the result is wanted may be those of any

@@ -1,4 +1,4 @@
-"""Axes in which a joint is simple, and the way from them to those of the joint before.
+"""Axes in which a joint is simple: its unit motions and their rates there.
 
 They stand at the origin of link j and do not turn with joint j: what is computed there for the
 joint needs no turn about its own axis. Joints with parallel axes, one after the other, have the

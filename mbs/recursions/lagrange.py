@@ -1,4 +1,4 @@
-"""A, B and Q of Lagrange's form, without differentiation, from augmented bodies.
+"""Lagrange's form: A, B and Q without differentiation, from augmented bodies.
 
 Every particle of the system moves at r_dot = J v, so that A is the integral of J' J over the mass
 and B that of J' dJ/dt: dA/dt = B + B', and B v are the Coriolis and centrifugal efforts. For

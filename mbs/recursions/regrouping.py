@@ -1,4 +1,4 @@
-"""Inertial parameters moved towards the base, where fewer of them take part in the motion.
+"""Inertial parameters moved towards the base, and frames slid to where distances vanish.
 
 What joint j cannot tell from a part of link i belongs to link i: mass on the axis of a revolute
 joint, the whole rotational inertia behind a prismatic joint, the mass at the centre of a

@@ -1,4 +1,4 @@
-"""The way from one frame of a tree to another one, as shifts and turns with the joints on it.
+"""The way from one frame of a tree to another one, its price, and how frames move on it.
 
 Turns about parallel axes that follow each other are joined into one turn by the sum of their
 angles; what lies between them is seen from before the first.

@@ -1,4 +1,4 @@
-"""Velocities of the links, each in its own frame.
+"""Velocities and accelerations of the links, each in its own frame.
 
 Source: Khalil & Creusot 1997, eq. 6.
 """

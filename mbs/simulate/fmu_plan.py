@@ -1,4 +1,4 @@
-"""What is asked of a run of an FMU: interface, times, inputs, start values."""
+"""What is asked of a run of an FMU, its inputs over time, and what is kept of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The smallest least-squares solution in plain arithmetic, the same digits on every processor."""
+"""Least squares: smallest solutions, Gauss-Newton and Levenberg-Marquardt iterations."""
 
 from __future__ import annotations
 

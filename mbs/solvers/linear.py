@@ -1,4 +1,4 @@
-"""Symbolic solution of small linear systems, the operations counted in mind."""
+"""Symbolic solution of linear systems: small ones, constrained ones, Newton steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""3-vectors of SX scalars, and constants made exact."""
+"""3-vectors of SX scalars, constants made exact, sines and cosines of quarter turns."""
 
 import math
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""A mechanism at one posture: where its links are, and its skeleton seen from them."""
+"""A mechanism at one configuration: where its links are, and how large the picture is."""
 
 from __future__ import annotations
 

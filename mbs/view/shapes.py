@@ -1,4 +1,4 @@
-"""What joints, constraints and force elements look like."""
+"""What links, joints and force elements look like."""
 
 from __future__ import annotations
 

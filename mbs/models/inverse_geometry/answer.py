@@ -1,4 +1,4 @@
-"""From postures to answers: distinct roots, self-motions, branches, limits, reasons."""
+"""From the roots of a chain to the solutions of a robot: branches, loops, reasons."""
 
 from __future__ import annotations
 

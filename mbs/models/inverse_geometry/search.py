@@ -1,4 +1,4 @@
-"""Postures in numbers, compiled: polished, searched, by the general method, nearest."""
+"""Solutions by many descents, polished and merged; the general method; the nearest pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A pose that a serial arm is wanted to take: equations free of units, and what differs from it.
+"""A pose that a serial arm is wanted to take, and how many roots meet in a solution.
 
 Positions are counted in x = q / unit, where the unit is the arm's length for slides and one radian
 for turns, so that a number in x or in the equations means the same for every joint and every row.

@@ -15,7 +15,7 @@ from mbs.identification.estimate import (
     held_out,
     plot_residuals,
 )
-from mbs.identification.excitation import Series, excitation
+from mbs.identification.exciting import Series, excitation
 from mbs.identification.identify import Identification, identify, report
 from mbs.identification.least_squares import (
     instrumental,

@@ -14,7 +14,7 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.errors import ModelError, SolverError
 from mbs.identification.estimate import Estimate, NamedValues, repetition
-from mbs.identification.excitation import SolverFollower, Watch
+from mbs.identification.exciting import SolverFollower, Watch
 from mbs.identification.observations import Observations, excitation_quality
 from mbs.identification.regressors import INERTIAL, Column
 from mbs.identification.triangle import compressed

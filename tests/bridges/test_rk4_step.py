@@ -3,7 +3,7 @@
 import casadi
 import numpy as np
 import pytest
-from support.linkages import linkage
+from support.change_points import linkage
 
 import mbs
 from mbs.bridges import step

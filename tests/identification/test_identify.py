@@ -7,7 +7,7 @@ import mbs
 import mbs.identification.bodies as physical_set
 from mbs.errors import ModelError, SolverError
 from mbs.identification.base_parameters import base_parameters
-from mbs.identification.excitation import Series, excitation
+from mbs.identification.exciting import Series, excitation
 from mbs.identification.identify import identify
 from mbs.identification.leading import active_places
 from mbs.identification.least_squares import least_squares

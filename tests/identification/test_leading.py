@@ -7,7 +7,7 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError
-from mbs.identification.excitation import Series, excitation
+from mbs.identification.exciting import Series, excitation
 from mbs.identification.identify import identify
 from mbs.identification.leading import LED, active_places, leads_of, led, positions, signed_leads
 from mbs.identification.record import Record

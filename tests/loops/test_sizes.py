@@ -10,6 +10,7 @@ from mbs.components import Body, Prismatic, Revolute, Spherical
 from mbs.errors import LoopError, ModelError
 from mbs.loops import examine, modes, solve
 from mbs.loops.closing import Closing, closure_parameters, mechanism_size, row_sizes
+from mbs.loops.function import follow_active
 from mbs.models.state.tree import full_state
 from mbs.robots import four_bar as catalogue_four_bar
 
@@ -68,7 +69,7 @@ def test_all_sizes_close_alike(scaled):
     np.testing.assert_allclose(solve(system, [0.7]), solve(like, [0.7]), atol=1e-11)
     found, wanted = modes(system, [0.7]), modes(like, [0.7])
     assert [mode.branch for mode in found] == [mode.branch for mode in wanted]
-    followed = mbs.loops.function.follow_active(system)
+    followed = follow_active(system)
     np.testing.assert_allclose(np.array(followed(0.7, [])).ravel(), solve(like, [0.7]), atol=1e-9)
 
 

@@ -1,5 +1,6 @@
 """Constants of steps through singular configurations: what each tells apart, moved tenfold."""
 
+import importlib
 import re
 
 import numpy as np
@@ -7,9 +8,9 @@ import pytest
 from support.change_points import linkage
 
 import mbs
-import mbs.solvers.integrate as compiled_run
 from mbs.errors import SolverError
 
+INTEGRATE = importlib.import_module("mbs.solvers.integrate")
 PARALLELOGRAM, MEETS, ANTI = "parallelogram", "a+g=b+c", "antiparallelogram"
 SYSTEMS = {
     PARALLELOGRAM: lambda: mbs.robots.n_four_bar().assemble(active=["a0"]),
@@ -52,7 +53,7 @@ def systems():
 
 def scale(monkeypatch, constant, factor):
     """Compile the steps with another value of a constant."""
-    given = compiled_run._runtime
+    given = INTEGRATE._runtime
 
     def changed(names):
         files, found = dict(given(names)), 0
@@ -66,7 +67,7 @@ def scale(monkeypatch, constant, factor):
         assert found == 1
         return files
 
-    monkeypatch.setattr(compiled_run, "_runtime", changed)
+    monkeypatch.setattr(INTEGRATE, "_runtime", changed)
 
 
 def outcome(systems, run):

@@ -1,5 +1,6 @@
 """The numeric method on systems with symbols: what was found at one length is used at no other."""
 
+import importlib
 import pickle
 
 import numpy as np
@@ -194,8 +195,7 @@ def test_everything_that_a_system_holds_knows_the_constants():
 
 def test_rules_that_are_not_exact_leave_no_parameter_that_they_ignore(monkeypatch):
     """The rank then decides, at the defaults: lengths are constants as in the numeric method."""
-    from mbs.identification.base_parameters import base_parameters as module
-
+    module = importlib.import_module("mbs.identification.base_parameters")
     rules = module.grouped_by_rules
 
     def bent(system, *arguments):

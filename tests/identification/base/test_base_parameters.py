@@ -1,5 +1,7 @@
 """The result: names, equations, function, the system in base parameters, errors."""
 
+import importlib
+
 import numpy as np
 import pytest
 from support.base_counts import TX40
@@ -9,7 +11,6 @@ import mbs
 from mbs.errors import ModelError
 from mbs.formats import read_par, write_toml
 from mbs.identification.base_parameters import base_parameters
-from mbs.identification.base_parameters import base_parameters as module
 from mbs.identification.grouping.grouping import Grouping
 from mbs.identification.regressors import columns_of, numbers_of
 from mbs.operations import count
@@ -148,6 +149,7 @@ def test_errors(puma, arguments, told):
 
 
 def test_a_grouping_that_holds_at_the_defaults_alone_is_told(symbolic, monkeypatch):
+    module = importlib.import_module("mbs.identification.base_parameters")
     rules = module.grouped_by_rules
 
     def bent(system, *arguments):

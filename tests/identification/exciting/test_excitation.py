@@ -13,7 +13,7 @@ from mbs.components import Body, Revolute
 from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
 from mbs.identification.base_parameters import base_parameters
-from mbs.identification.excitation import Plane, Series, Trajectory, excitation
+from mbs.identification.exciting import Plane, Series, Trajectory, excitation
 from mbs.identification.leading import active_places
 from mbs.identification.trajectory import Margin, MotionLimit, limits_of
 from mbs.loops.closing import Closing

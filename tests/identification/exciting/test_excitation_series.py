@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mbs.errors import ModelError
-from mbs.identification.excitation import CRITERIA, CriterionFunction
+from mbs.identification.exciting import CRITERIA, CriterionFunction
 from mbs.identification.trajectory import (
     FourierSeries,
     between_samples,

@@ -15,7 +15,7 @@ CROSS := ,cross
 endif
 
 OTHER_KERNELS := tests/solvers/test_shortest_steps.py tests/solvers/test_partial_ldl.py \
-    tests/loops/test_posture.py tests/robots/test_benchmarks_pendulum.py \
+    tests/loops/test_configuration.py tests/robots/test_benchmarks_pendulum.py \
     tests/simulate/test_over_constrained.py \
     tests/bridges/test_opti.py::test_four_bar_finds_its_optimum \
     tests/identification/exciting/test_excitation.py::test_a_platform_that_follows_keeps_its_height

@@ -84,7 +84,7 @@ def fingerprint(name: str, base: bool = False) -> dict[str, Any]:
         "tree": [[link.name, link.antecedent] for link in system.tree.links],
         "cuts": [loop.name for loop in system.loops],
         "rows": [[list(loop.rows), list(loop.dropped)] for loop in system.loops],
-        "configuration": [float(x).hex() for x in system.posture],
+        "configuration": [float(x).hex() for x in system.configuration],
         **_closure(system),
     }
     if system.nv > MANY:

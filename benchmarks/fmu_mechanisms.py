@@ -35,7 +35,7 @@ class Case:
 
     Attributes:
         system: makes it.
-        seconds: how long it moves; where it falls freely it ends before a singular posture.
+        seconds: how long it moves; where it falls freely it ends before a singular configuration.
         effort: of the first motor at the end; the others have less [N m or N].
     """
 
@@ -53,7 +53,7 @@ def floating_body() -> mbs.System:
 
 
 def rubbing_pendulum() -> mbs.System:
-    """A pendulum with motor, hard stops and dry friction."""
+    """A pendulum with motor, hard stops and Coulomb friction."""
     m = mbs.Mechanism("rubbing_pendulum", gravity=(0, -9.81, 0))
     rod = m.add(Box("rod", length=0.5, width=0.05, density=2700))
     m.connect(m.world, Revolute("j1", axis="z", actuated=True), rod.left)

@@ -4,7 +4,8 @@
     python benchmarks/inverse_geometry.py --speed [--robots puma560,ur5] [--rounds 15]
     python benchmarks/inverse_geometry.py --build [--robots puma560]
 
-Completeness: expected of a pose are the postures that it was made from, those that a multi-start
+Completeness: expected of a pose are the configurations that it was made from, those that a
+    multi-start
 search of its own finds (not next to two singularities), and whatever else a solver returns that
 the forward model confirms. Peers count as having found what is anywhere in their answer; a wrong
 row is one that is not marked as approximate and misses the pose by more than 1e-6; "twice" are

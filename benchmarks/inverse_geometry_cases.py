@@ -25,7 +25,7 @@ Pose = Callable[[System, PlainArm, np.random.Generator], tuple[Array, Array]]
 
 
 def anywhere(_: System, arm: PlainArm, rng: np.random.Generator) -> tuple[Array, Array]:
-    """The pose (4, 4) of a random posture, and that posture (1, n)."""
+    """The pose (4, 4) of a random configuration, and that configuration (1, n)."""
     q = arm.random(rng, 1)
     return arm.pose(q[0]), q
 
@@ -35,9 +35,9 @@ class Case:
     """A class of arms: how many of them, how many poses of each, and number k of them.
 
     Attributes:
-        pose: a pose (4, 4) to be reached, and some of its postures (m, n).
-        least: smallest singular value of the postures that must be found; those of a self-motion
-            are not counted.
+        pose: a pose (4, 4) to be reached, and some of its configurations (m, n).
+        least: smallest singular value of the configurations that must be found; those of a
+            self-motion are not counted.
         search: whether a search tells what must be found.
     """
 
@@ -144,7 +144,7 @@ CASES = {
         Case("panda with a lock", 14, 10, _locked),
         Case("general 7R with a lock", 14, 10, _locked_at_random),
         Case("q5 = 1e-5", 5, 4, _with_a_wrist, _wrist_at(1e-5)),
-        Case("q5 = 0 (isolated postures)", 5, 4, _with_a_wrist, _wrist_at(0.0), least=1e-6),
+        Case("q5 = 0 (isolated configurations)", 5, 4, _with_a_wrist, _wrist_at(0.0), least=1e-6),
         Case("elbow straight", 5, 4, _with_a_wrist, _elbow_straight, search=False),
         Case(
             "folded 2 mm from axis 2",

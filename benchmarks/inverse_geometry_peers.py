@@ -1,4 +1,4 @@
-"""Other inverse geometric solvers behind one call: all postures of an arm for a pose.
+"""Other inverse geometric solvers behind one call: all configurations of an arm for a pose.
 
 An adapter is made of an arm in plain numbers (`support.arm_search.PlainArm`) and raises `Refused`
 where the solver does not take such an arm. Its answer is compared with the forward model by
@@ -35,7 +35,7 @@ class Peer(Protocol):
     """A solver made for one arm."""
 
     def solve(self, T: Array) -> tuple[Array, Array]:
-        """(m, n) postures for a pose (4, 4), and (m,) which are not marked as approximate."""
+        """(m, n) configurations for a pose (4, 4), and (m,) which are not marked as approximate."""
 
     def many(self, T: Array) -> Callable[[], Any]:
         """What to time: all poses (N, 4, 4), in the form in which the solver likes them."""
@@ -131,7 +131,7 @@ class SsikPrebuilt:
         if robot not in _PREBUILT:
             raise Refused("not shipped")
         self._code = importlib.import_module(f"ssik.prebuilt.{_PREBUILT[robot]}")
-        self._postures = np.random.default_rng(0).uniform(-np.pi, np.pi, (64, 6))
+        self._configurations = np.random.default_rng(0).uniform(-np.pi, np.pi, (64, 6))
 
     def worst(self) -> float:
         """The largest element of its own pose of its answers less the wanted pose."""
@@ -146,7 +146,7 @@ class SsikPrebuilt:
         return lambda: [self._answer(pose) for pose in poses]
 
     def _poses(self, count: int) -> list[Array]:
-        return [self._code.fk(q) for q in np.resize(self._postures, (count, 6))]
+        return [self._code.fk(q) for q in np.resize(self._configurations, (count, 6))]
 
     def _answer(self, T: Array) -> Any:
         return self._code.solve(T, respect_limits=False, enumerate_windings=False)

@@ -191,7 +191,7 @@ def build_table() -> str:
 
 
 def long_run(seconds: float = 1000.0, tolerance: float = 1e-9) -> str:
-    """A four-bar for a long time, through the singular postures: what drifts, in a table."""
+    """A four-bar for a long time, through the singular configurations: what drifts, in a table."""
     case = CASES["n1"]
     own = made(case)
     times = np.linspace(0.0, seconds, round(10 * seconds) + 1)

@@ -39,7 +39,8 @@ class Solved:
 
 
 def panda_point_to_point(idm: Function, longest: int = 1000) -> Solved:
-    """The least integral of the squared efforts from posture to posture, at rest at both ends.
+    """The least integral of the squared efforts from configuration to configuration, at rest at
+    both ends.
 
     States q and v, accelerations constant on each stage; the efforts are those at its begin and
     are limited. The inverse dynamic model is mapped over the stages.
@@ -157,7 +158,8 @@ def _by_stages(values: Any, N: int) -> Any:
 
 
 def _panda_ends(N: int) -> dict[str, Any]:
-    """Bounds of the first and the last posture, and a smooth motion between them as a guess."""
+    """Bounds of the first and the last configuration, and a smooth motion between them as a
+    guess."""
     s, way = np.linspace(0, 1, N + 1), (PANDA_END - PANDA_START)[:, None]
     guess = [PANDA_START[:, None] + way * (3 * s**2 - 2 * s**3), way * (6 * s - 6 * s**2)]
     guess.append(way * (6 - 12 * s[:-1]))

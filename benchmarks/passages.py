@@ -83,8 +83,10 @@ def starts(
             10 ** rng.uniform(-10, -3) if tolerances is None else tolerances[k % len(tolerances)]
         )
         names = [system.speeds[j].name for j in system.active]
-        posture = dict(zip((c.name for c in system.coordinates), system.posture, strict=True))
-        q0 = {name: posture[name] + rng.uniform(-0.3, 0.3) for name in names}
+        configuration = dict(
+            zip((c.name for c in system.coordinates), system.configuration, strict=True)
+        )
+        q0 = {name: configuration[name] + rng.uniform(-0.3, 0.3) for name in names}
         v0 = {name: rng.uniform(-6, 6) for name in names}
         try:
             mbs.simulate.run(system, 1e-6, q0=q0, v0=v0, step=1e-6, quiet=True)

@@ -27,7 +27,7 @@ def main() -> None:
         model = mbs.models.direct_dynamics(system)
         plain = casadi.Function(model)
         point = [np.full(model.size1_in(k), 0.3) for k in range(model.n_in())]
-        point[0] = np.array(system.posture) if system.is_closed else point[0]
+        point[0] = np.array(system.configuration) if system.is_closed else point[0]
         pairs = {
             "interpreted": (model, plain),
             "compiled": (mbs.native.compiled(model), mbs.native.compiled(plain)),

@@ -37,7 +37,7 @@ lagrange = mbs.models.lagrange(system)
 energy = mbs.models.energy(system)
 print(f"\nModels\n  {idm!r}\n  {ddm!r}\n  {lagrange!r}\n  {energy!r}")
 
-# %% Check them against each other at a posture that closes the loop
+# %% Check them against each other at a configuration that closes the loop
 q = mbs.loops.solve(system, {"j1": 0.3})
 speed, torque = 2.0, 5.0
 acceleration = ddm(q, speed, torque)
@@ -62,14 +62,15 @@ print(f"\nSimulated {DURATION:g} s, {len(motion)} rows")
 print(f"  largest closure residual: {motion['closure_residual'].max():.1e}")
 print(f"  energy gained - work done: {np.abs(total - total[0] - work).max():.1e} J")
 
-# %% Draw: postures of one turn of the crank, the path of the middle of the coupler, the motion
+# %% Draw: configurations of one turn of the crank, the path of the middle of the coupler, the
+# motion
 poses = {name: mbs.models.transform(system, name) for name in LENGTHS}
 
 
-def bar(name: str, posture: np.ndarray, *along: float) -> np.ndarray:
+def bar(name: str, configuration: np.ndarray, *along: float) -> np.ndarray:
     """Points (2, n) of a body in the base frame, given their distances [m] from its left end."""
     points = np.array([[x, 0.0, 0.0, 1.0] for x in along]).T
-    return (np.array(poses[name](posture)) @ points)[:2]
+    return (np.array(poses[name](configuration)) @ points)[:2]
 
 
 turn, near = [], {}
@@ -88,7 +89,7 @@ for k in range(0, 90, 10):
         strong = {"linewidth": 4.0} if k == 20 else {"linewidth": 1.3, "alpha": 0.3}
         label = f"{name}, {length:g} m" if k == 20 else None
         drawing.plot(*bar(name, turn[k], 0, length), color=COLOURS[name], label=label, **strong)
-middle = np.hstack([bar("b", posture, LENGTHS["b"] / 2) for posture in turn])
+middle = np.hstack([bar("b", configuration, LENGTHS["b"] / 2) for configuration in turn])
 drawing.plot(*middle, "k--", linewidth=1, label="middle of b")
 drawing.plot([0, 0.8], [0, 0], "k^", markersize=9)
 drawing.set(title="one turn of the crank", xlabel="x [m]", ylabel="y [m]", aspect="equal")

@@ -50,7 +50,7 @@ print(f"  A a + B v + Q - tau: {np.abs(np.array(A @ a + B @ v + Q).ravel() - tau
 print(f"  bias(q, 0) - gravity(q): {np.abs(np.array(bias(q, v * 0) - gravity(q))).max():.1e} N.m")
 print(f"  J v - d(dgm)/dt: {np.abs(velocity - (ahead - behind) / 2e-6).max():.1e} m/s")
 
-# %% Let it fall from the stretched posture: nothing brakes it, so its energy does not change
+# %% Let it fall from the stretched configuration: nothing brakes it, so its energy does not change
 DURATION, TOLERANCE = 2.0, 1e-11
 start = {"q2": -np.pi / 4, "q3": np.pi / 2}
 motion = mbs.simulate.run(system, DURATION, q0=start, tolerance=TOLERANCE, quiet=True)
@@ -69,8 +69,8 @@ arm = figure.add_subplot(grid[:, 0])
 angles, energies = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
 for instant in (0.0, 0.3, 0.5, 0.7, 0.9):
     row = int(np.argmin(np.abs(motion.time - instant)))
-    posture = [motion[f"{name}.q"][row] for name in names]
-    origins = np.array([np.array(pose(posture))[:3, 3] for pose in poses]).T
+    configuration = [motion[f"{name}.q"][row] for name in names]
+    origins = np.array([np.array(pose(configuration))[:3, 3] for pose in poses]).T
     arm.plot(origins[0], origins[2], "o-", linewidth=2, markersize=4, label=f"{instant:g} s")
 arm.set(title="falling arm, seen along y", xlabel="x [m]", ylabel="z [m]", aspect="equal")
 arm.grid(alpha=0.3)

@@ -1,11 +1,11 @@
-"""Every posture of a PUMA 560 for one pose, the path of a straight line, and the equations.
+"""Every configuration of a PUMA 560 for one pose, the path of a straight line, and the equations.
 
 Run it with `python examples/03_inverse_geometry.py [folder]`; files go to
 `build/inverse_geometry` if no folder is named. It needs matplotlib
 (`pip install "casadi-mbs[plot]"`).
 """
 
-# %% A pose, and every posture that takes it
+# %% A pose, and every configuration that takes it
 import sys
 from pathlib import Path
 
@@ -48,7 +48,7 @@ path = igm.follow(system, line, q, samples=41)
 print(f"Line of 0.2 m: {path.reached + 1} of 41 poses; {path.reason or 'followed to its end'}")
 print(f"Largest residual on the line: {path.residual.max():.1e}")
 
-# %% Draw the postures and the line
+# %% Draw the configurations and the line
 frames = [mbs.models.transform(system, number) for number in range(len(system.tree.links) + 1)]
 figure = Figure(figsize=(10.5, 7.2))
 grid = figure.add_gridspec(3, 4, height_ratios=(1, 1, 0.8), hspace=0.25, wspace=0.05)
@@ -74,5 +74,5 @@ for k, name in enumerate(coordinate.name for coordinate in system.coordinates):
 joints.set(xlabel="way of the hand along -y [m]", ylabel="joint [rad]", title="straight line")
 joints.grid(alpha=0.3)
 joints.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize="small")
-figure.savefig(folder / "postures.png", dpi=90)
+figure.savefig(folder / "configurations.png", dpi=90)
 print(f"\nFiles in {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")

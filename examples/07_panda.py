@@ -48,8 +48,8 @@ def motion(duration=None, stages=STAGES):
     for k in range(7):
         opti.subject_to(opti.bounded(LOWER[k], q[k, 1:-1], UPPER[k]))
         opti.subject_to(opti.bounded(-SPEED[k], v[k, 1:-1], SPEED[k]))
-    for knot, posture in ((0, FROM), (-1, TO)):
-        opti.subject_to(q[:, knot] == posture)
+    for knot, configuration in ((0, FROM), (-1, TO)):
+        opti.subject_to(q[:, knot] == configuration)
         opti.subject_to(v[:, knot] == 0)
     opti.set_initial(q, np.linspace(FROM, TO, stages + 1).T)
     effort = h * casadi.sumsqr(load)
@@ -95,8 +95,10 @@ for (seconds, q, load, *_), row, title in ((calm, 0, "least effort"), (fast, 1, 
         torque.stairs(load[k], knots, baseline=None, label=name)
     torque.set(title="torque / limit", ylim=(-1.1, 1.1), xlabel="time [s]")
     torque.legend(ncols=2, fontsize="x-small") if row == 0 else None
-for posture, shade in ((FROM, "0.7"), (TO, "0.2")):
-    hand.plot(*np.array([np.array(frame(posture))[:3, 3] for frame in frames]).T, "o-", color=shade)
+for configuration, shade in ((FROM, "0.7"), (TO, "0.2")):
+    hand.plot(
+        *np.array([np.array(frame(configuration))[:3, 3] for frame in frames]).T, "o-", color=shade
+    )
 hand.set(title="paths of the flange", xlim=(-0.2, 0.8), ylim=(-0.3, 0.7), zlim=(0, 1))
 hand.set_box_aspect((1, 1, 1))
 hand.legend(fontsize="small")

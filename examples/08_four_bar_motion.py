@@ -57,8 +57,8 @@ def least_effort(form):
     way.guess(np.transpose([start.x0 for start in starts]))
     opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
     found = opti.solve()
-    posture = casadi.Function("posture", [dae.x, dae.p], [dae.q, dae.v])
-    q, _ = posture.map(STAGES + 1)(found.value(way.x), casadi.repmat(dae.p0, 1, STAGES + 1))
+    configuration = casadi.Function("configuration", [dae.x, dae.p], [dae.q, dae.v])
+    q, _ = configuration.map(STAGES + 1)(found.value(way.x), casadi.repmat(dae.p0, 1, STAGES + 1))
     return found.value(opti.f), found.stats()["iter_count"], np.array(q), found.value(way.u)
 
 

@@ -21,7 +21,7 @@ folder.mkdir(parents=True, exist_ok=True)
 system = mbs.load("sr400").assemble()
 
 
-# %% Postures with the hand downwards, on the left and on the right of a wall
+# %% Configurations with the hand downwards, on the left and on the right of a wall
 def reached(x, y, z):
     """Positions of all joints, on one branch of the arm and of its loop."""
     T = [[1, 0, 0, x], [0, -1, 0, y], [0, 0, -1, z], [0, 0, 0, 1]]
@@ -36,7 +36,7 @@ dae = mbs.models.dae(system, q0=dict(zip(names, PICK, strict=True)))
 print(f"States: {', '.join(name for name, _ in dae.elements['x'])}")
 
 # %% Everything else is a Function of the six motors' angles, the loop solved inside
-posture = casadi.Function("posture", [dae.x], [dae.q], {"cse": True})
+configuration = casadi.Function("configuration", [dae.x], [dae.q], {"cse": True})
 place = casadi.Function("place", [dae.x], [mbs.models.transform(system, 6)(dae.q)], {"cse": True})
 
 
@@ -76,7 +76,7 @@ again = np.array(fine(x[:, 0], u * TORQUE[:, None], [], DURATION / STAGES))
 print(f"Least effort: {cost:.5f} s")
 beside = np.abs(again - x[:, 1:])[:6].max()
 print(f"Simulated with these torques, largest error of a motor: {beside:.1e} rad")
-q = np.array(posture.map(STAGES + 1)(x))
+q = np.array(configuration.map(STAGES + 1)(x))
 gap = max(np.abs(np.subtract(*pins(q[:, k]))).max() for k in range(STAGES + 1))
 print(f"Largest gap of the loop: {gap:.1e} m")
 print(f"Largest torque / limit: {np.abs(u).max():.3f}")

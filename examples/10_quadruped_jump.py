@@ -66,7 +66,7 @@ standing[names.index("z")] = 2 * LEG * np.cos(BENT["hip"])
 landed = standing.copy()
 landed[[names.index("x"), names.index("yaw")]] = WAY, TURN
 rest = np.zeros(size)
-before, after = (np.array(points(posture, rest)[0]) for posture in (standing, landed))
+before, after = (np.array(points(configuration, rest)[0]) for configuration in (standing, landed))
 
 
 def guess(number, count):
@@ -175,8 +175,8 @@ joints = {
     for part in (f"{leg}_bracket", f"{leg}_lower", f"{leg}_foot")
 }
 shown = (q[0][:, 0], "0.75"), (q[1][:, 3], "tab:blue"), (q[2][:, -1], "0.0")
-for posture, shade in shown:
-    where = {part: np.array(frame(posture))[:3, 3] for part, frame in joints.items()}
+for configuration, shade in shown:
+    where = {part: np.array(frame(configuration))[:3, 3] for part, frame in joints.items()}
     for leg in HIPS:
         bones = [where[f"{leg}_{part}"] for part in ("bracket", "lower", "foot")]
         drawing.plot(*np.transpose(bones), color=shade, linewidth=1.2)

@@ -4,10 +4,10 @@
     ├── DescriptionError      a component or a file says something impossible
     │   └── ExpressionError   a text is not a number or an expression of symbols
     ├── AssemblyError         the components do not form a mechanism
-    ├── LoopError             a closed loop has no usable posture
+    ├── LoopError             a closed loop has no usable configuration
     │   ├── NoClosedForm      a loop is solved by iteration only
     │   ├── SingularPosture   the independent joints cannot lead the others there
-    │   └── Unclosable        no posture closes the loop
+    │   └── Unclosable        no configuration closes the loop
     ├── ModelError            a model was asked for that the system does not have
     ├── SolverError           a numerical method could not go on
     ├── CompilerError         no compiler, or the compiler refused the code
@@ -39,11 +39,11 @@ class AssemblyError(MbsError, ValueError):
 
 
 class LoopError(MbsError):
-    """A closed loop has no usable posture."""
+    """A closed loop has no usable configuration."""
 
 
 class SingularPosture(LoopError):
-    """A posture at which the independent joints do not determine how the others move."""
+    """A configuration at which the independent joints do not determine how the others move."""
 
 
 class NoClosedForm(LoopError):
@@ -51,7 +51,7 @@ class NoClosedForm(LoopError):
 
 
 class Unclosable(LoopError):
-    """No posture closes the loops of the mechanism."""
+    """No configuration closes the loops of the mechanism."""
 
 
 class ModelError(MbsError, ValueError):

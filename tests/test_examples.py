@@ -87,7 +87,7 @@ SMALL = {
 FILES = {
     "01_four_bar": ["four_bar.png", "four_bar.fmu", "motion.csv", "models/models.c", "example"],
     "02_puma560": ["puma560.png", "puma560.fmu", "fall.csv", "models/models.h"],
-    "03_inverse_geometry": ["postures.png", "igm.c", "equations.txt"],
+    "03_inverse_geometry": ["configurations.png", "igm.c", "equations.txt"],
     "04_identification": ["identification.png", "motion.csv"],
     "05_co_simulation": ["co_simulation.png", "hatch3.fmu", "cell.ssp", "study/case_000014.npz"],
     "06_acrobot": ["acrobot.png"],

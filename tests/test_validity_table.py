@@ -101,7 +101,7 @@ def subjects(tmp_path_factory):
         model = mbs.models.direct_dynamics(system)
         sizes = {name: model.size1_in(name) for name in model.name_in()}
         good = {name: np.full(n, 0.2) for name, n in sizes.items()}
-        good["q"] = np.array(system.posture)
+        good["q"] = np.array(system.configuration)
         if not system.is_closed:
             good["q"][:2] = 0.3, 0.4
         good["p"] = np.array(system.p_default)
@@ -199,15 +199,15 @@ def moved(bad: Bad, subject: Subject) -> dict[str, Any]:
     if bad.of != "loop" or bad.dt != STEP:
         return bad.values
     names = [c.name for c in subject.system.coordinates]
-    posture = dict(zip(names, subject.system.posture, strict=True))
+    configuration = dict(zip(names, subject.system.configuration, strict=True))
     if bad.values is DEAD:
-        guess = {"j1": 0.5, "j4": posture["j4"]}
+        guess = {"j1": 0.5, "j4": configuration["j4"]}
         dead = subject.once(
             "dead", lambda: mbs.loops.solve(subject.system, {"j2": 0.0}, guess=guess)
         )
         return {f"{name}.q": float(x) for name, x in zip(names, dead, strict=True)}
     if "j1.q" in bad.values:
-        return {"j1.q": posture["j1"] + bad.values["j1.q"]}
+        return {"j1.q": configuration["j1"] + bad.values["j1.q"]}
     return bad.values
 
 
@@ -534,7 +534,7 @@ def test_row(row, subjects):
 def test_a_start_of_all_positions_is_not_a_guess(subjects):
     """Where `closes` does not hold, as the page says."""
     system = subjects["loop"].system
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     mbs.simulate.run(system, 0.01, q0=q, quiet=True)
     for away in (0.1, 1e-4):
         wrong = q + away * np.eye(3)[0]

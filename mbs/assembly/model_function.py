@@ -99,7 +99,7 @@ Named = Sequence[tuple[str, SX]]
 
 
 @dataclass(frozen=True, slots=True)
-class PostureCheck:
+class ConfigurationCheck:
     """Which positions and parameters a model takes.
 
     Attributes:
@@ -131,7 +131,7 @@ def _refuses(system: System, q: Any, p: Any) -> None:
     raise ModelError(f"{system.name}: {row.sentence}")
 
 
-_PLAIN = PostureCheck(_plainly_valid, _refuses)
+_PLAIN = ConfigurationCheck(_plainly_valid, _refuses)
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
 
@@ -149,12 +149,12 @@ class ModelFunction(Function):
         function: Function,
         system: System,
         annotate: Callable[[], Function] | None = None,
-        check: PostureCheck | None = None,
+        check: ConfigurationCheck | None = None,
     ) -> None:
         Function.__init__(self, function)
         self._system = system
         self._annotate = annotate
-        self._check_posture = check
+        self._check_configuration = check
         self._sizes = {name: self.size_in(name) for name in self.name_in()}
         self._valid: Function | None = None
         self._asks = bool(check or system.bounds or quaternion_slices(system.tree))
@@ -193,7 +193,7 @@ class ModelFunction(Function):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds the System too, so that names, defaults and checks go with it."""
-        return _unpickled, (self.serialize(), self._system, self._check_posture)
+        return _unpickled, (self.serialize(), self._system, self._check_configuration)
 
     def __deepcopy__(self, dummy: Any = None) -> ModelFunction:
         """Itself: a Function never changes."""
@@ -201,7 +201,7 @@ class ModelFunction(Function):
 
     def like(self, function: Function) -> ModelFunction:
         """Another Function with the inputs of this one, checked and completed in the same way."""
-        return ModelFunction(function, self._system, check=self._check_posture)
+        return ModelFunction(function, self._system, check=self._check_configuration)
 
     def valid(self) -> Function | None:
         """``valid(q)``, or ``valid(q, p)``: 1 at positions and parameters that the model takes.
@@ -210,7 +210,7 @@ class ModelFunction(Function):
             None where it asks for nothing but numbers, or has no such input.
         """
         system = self._system
-        asked = plain_rows(system, SX.sym("q", system.nq)) or self._check_posture
+        asked = plain_rows(system, SX.sym("q", system.nq)) or self._check_configuration
         names = self.name_in()
         if not asked or "q" not in names or self.size_in("q") != (system.nq, 1):
             return None
@@ -370,7 +370,9 @@ class ModelFunction(Function):
             if fault := plain_fault(system, q_k, p_k):
                 raise ModelError(f"{self._title}: {fault}")
             if whole:
-                (self._check_posture or _PLAIN).refuse(system, q_k, DM() if p_k is None else p_k)
+                (self._check_configuration or _PLAIN).refuse(
+                    system, q_k, DM() if p_k is None else p_k
+                )
 
     def _holds(self, point: Sequence[Any]) -> bool:
         return bool(self._validity().call([*point])[0] == 1)
@@ -378,17 +380,17 @@ class ModelFunction(Function):
     def _validity(self) -> Function:
         """``valid(q)``, or ``valid(q, p)``, made once."""
         if self._valid is None:
-            self._valid = (self._check_posture or _PLAIN).valid(self._system)
+            self._valid = (self._check_configuration or _PLAIN).valid(self._system)
         return self._valid
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)
         if all(isinstance(o, (SX, MX)) or o.is_regular() for o in every):
             return
-        loops = ", no posture closes the loops there" if self._system.is_closed else ""
+        loops = ", no configuration closes the loops there" if self._system.is_closed else ""
         raise ModelError(
             f"{self._title}: the result is not a number; an input is not finite{loops}, a parameter"
-            " takes a value that has no sense, or the posture is singular"
+            " takes a value that has no sense, or the configuration is singular"
         )
 
     def _shapes(self) -> str:
@@ -414,7 +416,7 @@ def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | Non
     return full if full.shape[0] == rows else None
 
 
-def _unpickled(data: str, system: System, check: PostureCheck | None) -> ModelFunction:
+def _unpickled(data: str, system: System, check: ConfigurationCheck | None) -> ModelFunction:
     return ModelFunction(Function.deserialize(data), system, check=check)
 
 
@@ -422,7 +424,7 @@ def model_function(
     system: System,
     key: tuple[Any, ...],
     build: Callable[[], tuple[Named, Named] | tuple[Named, Named, Named]],
-    check: PostureCheck | None = None,
+    check: ConfigurationCheck | None = None,
 ) -> Function:
     """The model of a system under this key, built the first time it is asked for.
 

@@ -47,7 +47,7 @@ _TEXTS = {
     "Ia": "rotor inertia seen at joint {link}",
     "Jm": "inertia of the rotor that spins with joint {link}",
     "Fv": "viscous friction of joint {link}",
-    "Fs": "dry friction of joint {link}",
+    "Fs": "Coulomb friction of joint {link}",
     **{kind: f"first moment {kind} of link {{link}}" for kind in GROUPS["first_moments"]},
     **{kind: f"inertia {kind} of link {{link}}" for kind in GROUPS["inertias"]},
     **{kind: f"Khalil parameter {kind} of link {{link}}" for kind in PLACEMENT},
@@ -146,8 +146,8 @@ def symbolic(system: System, what: Sequence[str]) -> System:
     names them: M3 alone changes the mass and leaves first moments and inertia where they are, so
     that the centre of mass moves. Where Fixed joints divide a link, the change is one of the body
     that none of them holds. Lengths are the Khalil parameters of the frames and the places of
-    joints that were cut; what is fixed on a link stays where it is on the link. The posture stays
-    too.
+    joints that were cut; what is fixed on a link stays where it is on the link. The configuration
+    stays too.
 
     Args:
         system: open or closed.

@@ -145,7 +145,7 @@ def _loops(system: System) -> list[str]:
         lines.append(f"Driven by {_count(len(closure.motors), 'effort')}: {motors}.")
     if len(closure.motors) > closure.mobility:
         lines.append("  They are more than the mobility: which of them carries a load is a choice.")
-    lines.append(f"The loops close to {closure.residual:.1e} at the assembled posture.")
+    lines.append(f"The loops close to {closure.residual:.1e} at the assembled configuration.")
     return lines
 
 
@@ -198,7 +198,7 @@ class System:
         frames: named frames: link (-1 for the base) and pose in the link's frame.
         named_frames: those of them that the description named by `add_frame`.
         loops: one row for each loop or coupling.
-        posture: a position q that closes the loops, or all zero.
+        configuration: a position q that closes the loops, or all zero.
         closure: how the loops constrain velocities; None for an open chain.
         forces: springs, dampers and other force elements.
         joints: every joint and constraint, those of the tree and those that were cut.
@@ -224,7 +224,7 @@ class System:
     frames: Mapping[str, tuple[int, Pose]]
     named_frames: tuple[str, ...]
     loops: tuple[LoopRow, ...]
-    posture: tuple[float, ...]
+    configuration: tuple[float, ...]
     closure: Closure | None = None
     forces: tuple[AttachedForce, ...] = ()
     joints: tuple[JointRow, ...] = ()
@@ -357,12 +357,12 @@ class System:
         )
 
     def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
-        """Positions q from values by coordinate name, the others as in the assembled posture.
+        """Positions q from values by coordinate name, the others as in the assembled configuration.
 
         Raises:
             ModelError: a name is unknown, or a sequence has the wrong length.
         """
-        return self._filled(values, self.coordinates, list(self.posture), "position")
+        return self._filled(values, self.coordinates, list(self.configuration), "position")
 
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Velocities v from values by name, the others zero; errors as for `position`."""

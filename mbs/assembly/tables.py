@@ -171,9 +171,9 @@ class Closure:
         free: numbers of the velocities whose positions may be chosen: the active ones, and what
             rolling discs alone hold.
         varies: whether the dropped rows follow from the kept ones in a way that changes with the
-            posture, so that other rows may be independent elsewhere.
+            configuration, so that other rows may be independent elsewhere.
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
-        residual: largest closure residual at the assembled posture.
+        residual: largest closure residual at the assembled configuration.
     """
 
     rows: tuple[int, ...]

@@ -56,7 +56,7 @@ class Link:
         inertia: of everything fixed on the link, about the origin of frame j and in its axes.
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
         Fv: viscous friction [N m s/rad or N s/m].
-        Fs: dry friction [N m or N].
+        Fs: Coulomb friction [N m or N].
         Fs_width: velocity over which it changes sign [rad/s or m/s], zero for a step.
         stiffness: of the spring of a joint of one degree of freedom [N m/rad or N/m].
         rest: position at which the spring is at rest [rad or m].
@@ -173,7 +173,7 @@ def normalised(tree: Tree, q: SX) -> SX:
 
 
 def zero_position(tree: Tree) -> list[float]:
-    """Positions of the posture in which every joint is at zero, quaternions at the identity."""
+    """Positions with every joint at zero, quaternions at the identity."""
     q = [0.0] * tree.nq
     for part in quaternion_slices(tree):
         q[part.start] = 1.0

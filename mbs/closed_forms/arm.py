@@ -1,4 +1,4 @@
-"""A serial arm in numbers: its pose, its Jacobian, for one posture or many at once."""
+"""A serial arm in numbers: its pose, its Jacobian, for one configuration or many at once."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ class Arm:
         return len(self.prismatic)
 
     def wrapped(self, way: Array) -> Array:
-        """Differences (..., n) of postures, those of turns brought into [-pi, pi)."""
+        """Differences (..., n) of configurations, those of turns brought into [-pi, pi)."""
         return np.where(self.prismatic, way, np.mod(way + np.pi, 2 * np.pi) - np.pi)
 
     def residual(self, q: Array, T: Array) -> Array:
-        """(...) largest element of pose(q) - T [m or 1], at postures q, (..., n)."""
+        """(...) largest element of pose(q) - T [m or 1], at configurations q, (..., n)."""
         error: Array = np.max(np.abs(self.pose(q) - T), axis=(-2, -1))
         return error
 
     def pose(self, q: Array) -> Array:
-        """(..., 4, 4) pose of the frame at postures q, (..., n) [rad or m]."""
+        """(..., 4, 4) pose of the frame at configurations q, (..., n) [rad or m]."""
         return self._walked(q)[0]
 
     def pose_and_jacobian(self, q: Array) -> tuple[Array, Array]:

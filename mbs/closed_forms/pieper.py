@@ -585,7 +585,7 @@ def pieper(problem: Problem) -> StepSequence:
 
     Raises:
         NoClosedForm: no three neighbouring axes meet and no three joints slide, or the arm is
-            singular in every posture.
+            singular in every configuration.
     """
     names = [joint.name for joint in problem.ring.joints]
     if problem.size != _JOINTS:
@@ -653,7 +653,7 @@ def _pose_comes_first(scene: PieperLoop) -> bool:
 
 
 def _regular(problem: Problem, steps: list[Step]) -> bool:
-    """Whether the steps determine every joint of a generic posture."""
+    """Whether the steps determine every joint of a generic configuration."""
     x, given = problem.x, problem.given
     return not any(
         problem.always_zero(quantity)
@@ -709,5 +709,5 @@ def _degenerate(scenes: list[PieperLoop]) -> str:
     first, last = (", ".join(joint.name for joint in part) for part in (joints[:3], joints[3:]))
     return (
         f"the axes of {last} meet in a point, but the positions of {first} do not follow from"
-        " where it is wanted: the arm is singular in every posture"
+        " where it is wanted: the arm is singular in every configuration"
     )

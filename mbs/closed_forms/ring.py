@@ -34,7 +34,7 @@ from mbs.spatial import Pose, align_z, axis_turn, quaternion_rotation, vector
 # A rod between two balls may spin about its own line, which no closure row sees: one velocity of
 # a quaternion is independent then, and no element of q belongs to it. Its position here is the
 # angle by which the rod is turned about its line [rad], from where the shortest way leads from
-# its orientation in the assembled posture.
+# its orientation in the assembled configuration.
 
 
 def cut_places(system: System) -> tuple[int, ...]:
@@ -89,7 +89,7 @@ class Spin:
 
     Attributes:
         place: number of the angle among the positions.
-        rest: quaternion of the ball in the assembled posture.
+        rest: quaternion of the ball in the assembled configuration.
     """
 
     place: int
@@ -248,7 +248,7 @@ def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
 def _unknown(system: System, k: int, sign: int) -> Unknown:
     link = system.tree.links[k]
     place = spin_places(system).get(link.q.start)
-    spin = None if place is None else Spin(place, system.posture[link.q])
+    spin = None if place is None else Spin(place, system.configuration[link.q])
     return Unknown(link.name, link.motion, link.q.start, sign, spin=spin)
 
 
@@ -307,7 +307,7 @@ def _pass_cut(walk: _Walk, system: System, number: int, known: Container[int], q
 # The geometry of a loop, read from its gaps at random positions and parameters.
 #
 # What holds at every one of them holds by structure: lengths and angles given as numbers, or by
-# the same symbol, not by accident of one posture.
+# the same symbol, not by accident of one configuration.
 
 
 Matrix = NDArray[np.float64]
@@ -452,7 +452,7 @@ _LOOSE = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """A posture that closes a loop.
+    """A configuration that closes a loop.
 
     Attributes:
         x: (n,) positions of its joints, in their order.
@@ -476,7 +476,7 @@ def closure_of(ring: Ring, x: SX) -> SX:
 
 
 def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
-    """Some closed postures: four, or fewer where random starts lead to no more.
+    """Some closed configurations: four, or fewer where random starts lead to no more.
 
     It ends early where joints move at two of them while the given stay.
 

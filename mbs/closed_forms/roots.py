@@ -17,7 +17,7 @@ Positions = Mapping[int, SX]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spun:
-    """The spin of a rod at a posture whose quaternion is known.
+    """The spin of a rod at a configuration whose quaternion is known.
 
     Attributes:
         place: number of the spin among the positions.

@@ -130,12 +130,12 @@ def _name(problem: Problem, place: int) -> str:
     return names.get(place, str(problem.x[place]))
 
 
-# Steps one after the other: a posture for every choice of their signs.
+# Steps one after the other: a configuration for every choice of their signs.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf:
-    """A posture for one choice of all signs.
+    """A configuration for one choice of all signs.
 
     Attributes:
         x: (n, 1) positions of the joints.
@@ -186,7 +186,7 @@ class StepSequence:
         return " ".join(f"{name}:{'+' if sign > 0 else '-'}" for name, sign in signs)
 
     def leaf(self, given: SX, s: SX) -> Leaf:
-        """The posture of one branch whose signs, (number of signs, 1), are expressions."""
+        """The configuration of one branch whose signs, (number of signs, 1), are expressions."""
         leaf, first = self._start(), 0
         for step in self.steps:
             chosen = s[first : first + len(step.signs)]
@@ -194,7 +194,7 @@ class StepSequence:
         return self._cropped(leaf)
 
     def leaves(self, given: SX) -> list[Leaf]:
-        """The postures of all branches, in their order; what branches share is computed once."""
+        """The configurations of all branches in order; what they share is computed once."""
         leaves = [self._start()]
         for step in self.steps:
             choices = list(itertools.product((1, -1), repeat=len(step.signs)))
@@ -213,7 +213,7 @@ class StepSequence:
 
 
 def _taken(leaf: Leaf, step: Step, given: SX, s: SX) -> Leaf:
-    """The posture with one more step."""
+    """The configuration with one more step."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
     x[list(step.places)] = values

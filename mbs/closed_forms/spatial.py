@@ -523,7 +523,8 @@ def _solved(u: Sequence[SX], e: SX) -> list[SX]:
 # A rod between two balls as all that is unknown: aimed the shortest way, and turned about itself.
 #
 # The ball turns the vector u of the rod onto the known vector w. From the orientation R_0 of the
-# assembled posture the shortest turn M leads R_0 u onto w; before both the rod may spin about u.
+# assembled configuration the shortest turn M leads R_0 u onto w; before both the rod may spin
+# about u.
 
 
 def spin(ring: Ring, q: SX, p: SX) -> Root | None:

@@ -74,7 +74,7 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
     if max((sample.rank for sample in samples), default=n) < n:
         return "they can move while all that is known stays"
     if len(samples) < _ENOUGH:
-        return "no posture that closes it was found"
+        return "no configuration that closes it was found"
     joints = tuple(replace(joint, place=k) for k, joint in enumerate(ring.joints))
     names = [joint.name for joint in joints] + [f"x{k + 1}" for k in range(n)]
     x = casadi.vertcat(*map(SX.sym, names))

@@ -475,7 +475,7 @@ def _half_turn(R: SX) -> tuple[SX, SX]:
     return axis / (4 * cosine), cosine
 
 
-# The sign of a velocity, smoothed: the one law of dry friction without events.
+# The sign of a velocity, smoothed: the one law of Coulomb friction without events.
 
 
 def smooth_sign(v: SX, width: SX) -> SX:
@@ -578,11 +578,11 @@ class JointFriction(JointForce):
     Effort (coulomb + stribeck exp(-(v / velocity)^2)) tanh(v / width) + viscous v.
 
     Attributes:
-        coulomb: dry friction while it slides [N m or N].
-        stribeck: what dry friction has more than that at rest [N m or N].
+        coulomb: Coulomb friction while it slides [N m or N].
+        stribeck: what Coulomb friction has more than that at rest [N m or N].
         velocity: over which this falls to 1/e [rad/s or m/s].
         viscous: [N m s/rad or N s/m].
-        width: velocity over which dry friction changes sign [rad/s or m/s].
+        width: velocity over which Coulomb friction changes sign [rad/s or m/s].
     """
 
     coulomb: Scalar = 0.0
@@ -599,7 +599,7 @@ class JointFriction(JointForce):
         self._require_effect("coulomb", "stribeck", "viscous")
 
     def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
-        """Dry friction that falls from rest to sliding, and viscous friction."""
+        """Coulomb friction that falls from rest to sliding, and viscous friction."""
         dry = to_sx(self.coulomb, symbols)
         if self.stribeck != Number(0.0):
             falling = casadi.exp(-((v / to_sx(self.velocity, symbols)) ** 2))
@@ -612,7 +612,7 @@ class JointFriction(JointForce):
         return SX(0)
 
 
-# Contacts along a coordinate of a joint: rigid stops and dry friction that really sticks.
+# Contacts along a coordinate of a joint: rigid stops and Coulomb friction that really sticks.
 #
 # They hold the coordinate at times and let it go at others. Simulations change between the two at
 # events; smooth models, such as the inverse dynamic one, leave contacts out.
@@ -676,7 +676,7 @@ class RigidStop(JointContact):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoulombFriction(JointContact):
-    """Dry friction that holds a coordinate at rest up to an effort and brakes it when it slides.
+    """Coulomb friction: it holds a coordinate at rest up to an effort, and brakes it beyond.
 
     Attributes:
         sliding: friction while it slides [N m or N].
@@ -697,7 +697,8 @@ class CoulombFriction(JointContact):
         low, high = to_float(self.sliding), to_float(self.sticking)
         if low is not None and high is not None and high < low:
             raise DescriptionError(
-                f"{self.name}: sticking is {high:g} and sliding is {low:g}; at rest dry friction"
+                f"{self.name}: sticking is {high:g} and sliding is {low:g}; at rest Coulomb"
+                " friction"
                 " holds at least as much, so give sticking >= sliding"
             )
         if self.sticking == Number(0.0):

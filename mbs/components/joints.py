@@ -49,7 +49,8 @@ class Freedom:
 
     Attributes:
         motion: what moves.
-        axis: unit vector of the axis in frame_a at the zero posture (z where none is special).
+        axis: unit vector of the axis in frame_a at the zero configuration (z where none is
+            special).
         suffix: what distinguishes its coordinates from the others of the same joint.
     """
 
@@ -187,8 +188,8 @@ class Joint(Component):
             degree of freedom [rad/s or m/s]; kept as the pair.
         effort: likewise of its motor [N m or N].
         Fv: viscous friction [N m s/rad or N s/m].
-        Fs: dry friction [N m or N], which acts as Fs tanh(v / Fs_width).
-        Fs_width: velocity over which dry friction changes sign [rad/s or m/s]; zero for the
+        Fs: Coulomb friction [N m or N], which acts as Fs tanh(v / Fs_width).
+        Fs_width: velocity over which Coulomb friction changes sign [rad/s or m/s]; zero for the
             step Fs sign(v), which identification wants and integrators do not.
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg], for what its spin does to the
             link that carries it see `rotor`.
@@ -361,7 +362,7 @@ class Universal(Joint):
     """Two rotations about orthogonal axes that meet, `phi_a` then `phi_b`; 4 rows.
 
     Attributes:
-        axes: the two axes in frame_a at the zero posture.
+        axes: the two axes in frame_a at the zero configuration.
     """
 
     axes: tuple[Any, Any] = ("x", "y")

@@ -265,7 +265,7 @@ class Mechanism:
 
         Raises:
             AssemblyError: the components do not form a mechanism, or nothing in it can move.
-            Unclosable: no posture closes the loops.
+            Unclosable: no configuration closes the loops.
         """
         from mbs.loops.assemble import assemble  # the one call upwards, see docs/decisions.md
 

@@ -427,7 +427,7 @@ def _entry(name: str, model: Function, library: _Library) -> _Entry:
 def _code(name: str, model: Function, check: StatusCheck | None) -> Function:
     """The function under a name, every input and output dense, and the check as its last output.
 
-    They share what they have in common, such as the sines and cosines of a posture.
+    They share what they have in common, such as the sines and cosines of a configuration.
     """
     patterns = [model.sparsity_in(k) for k in range(model.n_in())]
     patterns += [model.sparsity_out(k) for k in range(model.n_out())]
@@ -644,7 +644,7 @@ def example_input(model: Function, k: int) -> np.ndarray[tuple[int, ...], np.dty
     if name == "p":
         own = model.default_of_p()
     elif system.is_closed or system.parameters or system.nq != system.nv:
-        named = {c.name: x for c, x in zip(system.coordinates, system.posture, strict=True)}
+        named = {c.name: x for c, x in zip(system.coordinates, system.configuration, strict=True)}
         if name in ("q", "q_a"):
             own = [named.get(element) for element, _ in model.elements(name)]
     if own is None or len(own) != rows or None in list(own):

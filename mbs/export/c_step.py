@@ -174,7 +174,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
     """The C of the motion of a system.
 
     Args:
-        system: open or closed, without rigid stops and dry friction.
+        system: open or closed, without rigid stops and Coulomb friction.
         name: of it in C.
         library: name of the library.
         real: type of numbers.

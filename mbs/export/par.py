@@ -105,7 +105,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
         CutRow((first + k, first + count + k), _kind(cut)) for k, cut in enumerate(system.cuts)
     ]
     names = [f"q{number[j]}" for j in range(len(system.tree.links))]
-    posture = dict(zip(names, system.posture, strict=True)) if system.cuts else {}
+    configuration = dict(zip(names, system.configuration, strict=True)) if system.cuts else {}
     table = RobotTable(
         name=system.name,
         frames=(*frames, *moving, *fixed),
@@ -113,7 +113,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
         loops=tuple(loops),
         gravity=tuple(text(system.tree.gravity[k]) for k in range(3)),
         source=system.source,
-        guess={name: value for name, value in posture.items() if value},
+        guess={name: value for name, value in configuration.items() if value},
     )
     # symbols may have cancelled, such as a length along the axis of the last link
     defaults = {p.name: p.default for p in system.parameters if p.name in table.symbols}

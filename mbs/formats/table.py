@@ -98,8 +98,8 @@ class InertiaRow:
         MX, MY, MZ: first moments [kg m].
         M: mass [kg].
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg].
-        Fv, Fs: viscous [N m s/rad or N s/m] and dry friction [N m or N].
-        Fs_width: velocity over which dry friction changes sign [rad/s or m/s], 0 for a step.
+        Fv, Fs: viscous [N m s/rad or N s/m] and Coulomb friction [N m or N].
+        Fs_width: velocity over which Coulomb friction changes sign [rad/s or m/s], 0 for a step.
         stiffness: of the spring of the joint [N m/rad or N/m].
         rest: position at which the spring is at rest [rad or m].
         rotor: that spins with the joint, on the antecedent of the frame; its axis, where given,

@@ -32,10 +32,10 @@ from mbs.identification.grouping.grouping import (
     without_zeros,
 )
 from mbs.identification.grouping.loops import (
-    ClosedPostures,
+    ClosedConfigurations,
+    configurations_needed,
     cut_relations,
     pair_relations,
-    postures_needed,
     turning_relations,
 )
 from mbs.identification.grouping.numeric import (
@@ -260,7 +260,7 @@ def checked_elsewhere(
 def grouped_by_rules(
     system: System,
     columns: Sequence[Column],
-    postures: Sequence[ClosedPostures],
+    configurations: Sequence[ClosedConfigurations],
     structure: Structure,
 ) -> Grouping:
     """What the rules find.
@@ -268,7 +268,7 @@ def grouped_by_rules(
     Args:
         system: open or closed.
         columns: the parameters.
-        postures: that close the loops; none for an open system.
+        configurations: that close the loops; none for an open system.
         structure: of its tree.
     """
     places = _places(columns)
@@ -278,8 +278,8 @@ def grouped_by_rules(
         return without_zeros(grouping, sampled)
     relations = [
         *cut_relations(system),
-        *pair_relations(system, postures, base_moves=structure.base_moves),
-        *turning_relations(system, postures, base_moves=structure.base_moves),
+        *pair_relations(system, configurations, base_moves=structure.base_moves),
+        *turning_relations(system, configurations, base_moves=structure.base_moves),
     ]
     for relation in relations:
         terms = _terms(relation, places)
@@ -436,7 +436,7 @@ def base_parameters(
     rank.
 
     Args:
-        system: open or closed; of a closed one the branch of its assembled posture.
+        system: open or closed; of a closed one the branch of its assembled configuration.
         method: "symbolic" or "numeric".
         order: for the numeric method, names of parameters to keep before all others.
         columns: parameters to look at; `columns_of(system)` when left out.
@@ -497,8 +497,8 @@ def _by_rules(
 
     None where the rules are not exact and the rank has to decide.
     """
-    postures = _postures(system, seed, symbolic=symbolic)
-    grouping = grouped_by_rules(system, sample.columns, postures, structure)
+    configurations = _configurations(system, seed, symbolic=symbolic)
+    grouping = grouped_by_rules(system, sample.columns, configurations, structure)
     beta = numbers_at(system, sample.columns, grouping, default_parameters(system))
     check = checked(sample, grouping, beta, order)
     if check.agrees and symbolic and not system.is_closed:
@@ -528,16 +528,16 @@ def _completed(
     return found, replace(check, applied=True, text=told)
 
 
-def _postures(system: System, seed: int, *, symbolic: bool) -> list[ClosedPostures]:
-    """Closed postures at the defaults of the symbols, and at other values where there are any.
+def _configurations(system: System, seed: int, *, symbolic: bool) -> list[ClosedConfigurations]:
+    """Closed configurations at the defaults of the symbols, and at other values of them.
 
     They are others than those of the check.
     """
     if not system.is_closed:
         return []
     values = parameter_samples(system, system.p)[:2] if symbolic else [default_parameters(system)]
-    count = postures_needed(system)
-    return [ClosedPostures(closed_positions(system, p, count, seed + 1), p) for p in values]
+    count = configurations_needed(system)
+    return [ClosedConfigurations(closed_positions(system, p, count, seed + 1), p) for p in values]
 
 
 def _result(

@@ -486,7 +486,7 @@ def excitation(
     regressor at all samples, by IPOPT with exact gradients. Efforts are those of the parameters
     that the system has. Ranges of positions, velocities and accelerations hold at every instant;
     those of efforts and planes, at instants eight times as dense as the samples. Closed systems
-    keep clear of postures at which the independent joints do not lead the others.
+    keep clear of configurations at which the independent joints do not lead the others.
 
     The sign of velocities is smoothed over a fiftieth of the largest velocity while the motion is
     sought; the condition numbers of the answer are of the regressor as it is.
@@ -642,7 +642,7 @@ def _columns(
 
 
 def _smoothed(system: System, limits: MotionLimits, form: Series) -> System:
-    """The system with dry friction that changes sign over a part of the largest velocity."""
+    """The system with Coulomb friction that changes sign over a part of the largest velocity."""
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)
     for k, position, velocity in rows:

@@ -147,7 +147,7 @@ def _dropped(observations: Observations) -> list[str]:
     rows = len(observations.time)
     return [
         f"Loops: {observations.dropped} of {rows + observations.dropped} instants are left out,"
-        " where the motion is next to a singular posture or passes it"
+        " where the motion is next to a singular configuration or passes it"
     ]
 
 

@@ -9,7 +9,7 @@ from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
 from mbs.errors import ModelError, NoClosedForm
-from mbs.loops.examine import posture_health
+from mbs.loops.examine import configuration_health
 from mbs.loops.function import follow_active
 from mbs.loops.function import function as closed_form
 from mbs.loops.velocity import determining_rows
@@ -17,8 +17,8 @@ from mbs.loops.velocity import determining_rows
 Array = npt.NDArray[np.float64]
 
 LED = 2.5e-3
-"""Squared sine between rows of the passive joints, that of 3 degrees, below which postures are
-taken as next to a singular one: the joints that follow magnify errors by 20 and more."""
+"""Squared sine between rows of the passive joints, that of 3 degrees, below which configurations
+are taken as next to a singular one: the joints that follow magnify errors by 20 and more."""
 
 CLEAR = 0.01
 """The same that exciting motions keep."""
@@ -27,17 +27,17 @@ _LARGEST = 8
 
 
 def leads_of(system: System, q: Array) -> Array:
-    """(n,) `leads` of `mbs.loops.examine` at postures q (n, nq), negative beyond a singular one.
+    """(n,) `leads` of `mbs.loops.examine` at q (n, nq), negative beyond a singularity.
 
     The sign is that of the determinant of the passive joints' rows by that of the assembled
-    posture; it does not change where the rows are more than these joints.
+    configuration; it does not change where the rows are more than these joints.
 
     Args:
         system: with loops, at the defaults of its parameters.
         q: (n, nq) positions [rad or m].
     """
     n, p = len(q), DM(system.parameter_values())
-    leads = np.asarray(posture_health(system).map(n)(DM(q.T), p)[1]).ravel()
+    leads = np.asarray(configuration_health(system).map(n)(DM(q.T), p)[1]).ravel()
     assert system.closure is not None
     if system.closure.varies:
         return leads
@@ -51,7 +51,7 @@ def signed_leads(system: System) -> Function:
 
     def build() -> Function:
         q, p = SX.sym("q", system.nq), DM(system.parameter_values())
-        value = posture_health(system)(q, p)[1]
+        value = configuration_health(system)(q, p)[1]
         assert system.closure is not None
         size = len(system.closure.passive)
         if not system.closure.varies and size <= _LARGEST:
@@ -64,7 +64,7 @@ def signed_leads(system: System) -> Function:
 
 
 def led(system: System, q: Array) -> npt.NDArray[np.bool_]:
-    """(n,) whether a posture, and the step from and to it, keeps clear of singular ones."""
+    """(n,) whether a configuration, and the step from and to it, keeps clear of singular ones."""
     leads = leads_of(system, q)
     good = np.abs(leads) > LED
     crossed = np.sign(leads[1:]) != np.sign(leads[:-1])
@@ -74,8 +74,10 @@ def led(system: System, q: Array) -> npt.NDArray[np.bool_]:
 
 
 def _usual_sign(system: System) -> float:
-    """Of the determinant at the assembled posture."""
-    rows = np.asarray(_passive_rows(system)(DM(system.posture), DM(system.parameter_values())))
+    """Of the determinant at the assembled configuration."""
+    rows = np.asarray(
+        _passive_rows(system)(DM(system.configuration), DM(system.parameter_values()))
+    )
     size = round(rows.size**0.5)
     return float(np.linalg.slogdet(rows.reshape(size, size))[0]) or 1.0
 
@@ -104,7 +106,7 @@ def _determinant(A: SX) -> SX:
     return SX((-1) ** n * c)
 
 
-# Postures of all joints from the positions of the independent ones.
+# Configurations of all joints from the positions of the independent ones.
 
 
 def active_places(system: System) -> list[int]:
@@ -126,7 +128,7 @@ def active_places(system: System) -> list[int]:
     return places
 
 
-def posture_of(system: System, q_a: MX) -> MX:
+def configuration_of(system: System, q_a: MX) -> MX:
     """(nq, 1) positions that close the loops, by closed form or else by continuation.
 
     Args:
@@ -138,20 +140,20 @@ def posture_of(system: System, q_a: MX) -> MX:
     p = DM(system.parameter_values())
     if is_explicit(system):
         inputs = [q_a, p] if system.parameters else [q_a]
-        return _near_posture(system, MX(Function.__call__(closed_form(system), *inputs)))
+        return _near_configuration(system, MX(Function.__call__(closed_form(system), *inputs)))
     return MX(follow_active(system)(q_a, p))
 
 
-def _near_posture(system: System, q: MX) -> MX:
-    """The same posture, angles that follow less than half a turn from the assembled ones.
+def _near_configuration(system: System, q: MX) -> MX:
+    """The same configuration, angles that follow less than half a turn from the assembled ones.
 
     Closed forms give angles between -pi and pi, which would jump within a motion.
     """
     places, rows = active_places(system), casadi.vertsplit(q)
     for k, coordinate in enumerate(system.coordinates):
         if coordinate.unit == "rad" and k not in places:
-            turned = rows[k] - system.posture[k]
-            rows[k] = system.posture[k] + casadi.atan2(casadi.sin(turned), casadi.cos(turned))
+            turned = rows[k] - system.configuration[k]
+            rows[k] = system.configuration[k] + casadi.atan2(casadi.sin(turned), casadi.cos(turned))
     return MX(casadi.vertcat(*rows))
 
 
@@ -171,5 +173,5 @@ def positions(system: System, q_a: Array) -> Array:
     if not system.is_closed:
         return q_a
     x = MX.sym("q_a", len(system.active))
-    follow = Function("positions", [x], [posture_of(system, x)])
+    follow = Function("positions", [x], [configuration_of(system, x)])
     return np.asarray(DM(follow.map(len(q_a))(q_a.T))).T

@@ -12,7 +12,7 @@ from casadi import DM, MX, SX, Function
 
 from mbs.errors import ModelError, SolverError
 from mbs.identification.estimate import Estimate, repetition
-from mbs.identification.leading import active_places, is_explicit, posture_of
+from mbs.identification.leading import active_places, configuration_of, is_explicit
 from mbs.identification.observations import Observations, known_of, motion_of, require_visible
 from mbs.identification.record import Samples
 from mbs.identification.triangle import triangle, triangle_solved
@@ -435,7 +435,7 @@ def _efforts(regressor: Any, K: Array) -> Function:
     """(q_a, v_a, a_a) -> D K of the independent joints."""
     m = int(regressor.size1_in(1))
     q, v, a = (MX.sym(name, m) for name in "qva")
-    tau = casadi.mtimes(regressor(posture_of(regressor.system, q), v, a), DM(K))
+    tau = casadi.mtimes(regressor(configuration_of(regressor.system, q), v, a), DM(K))
     function = Function("efforts", [q, v, a], [tau])
     return function.expand() if is_explicit(regressor.system) else function
 

@@ -28,7 +28,7 @@ from mbs.identification.triangle import triangle
 from mbs.result import optional_module
 from mbs.text import did_you_mean
 
-# Rows of a record of a closed system that are next to singular postures.
+# Rows of a record of a closed system that are next to singular configurations.
 
 
 Array = npt.NDArray[np.float64]
@@ -39,7 +39,7 @@ _ROUNDING = 1e-9
 
 
 def led_rows(system: System, q: Array) -> Chosen:
-    """(n,) which postures q (n, nq) of a closed system are not next to singular ones.
+    """(n,) which configurations q (n, nq) of a closed system are not next to singular ones.
 
     Raises:
         ModelError: they are less than half of all.
@@ -49,7 +49,8 @@ def led_rows(system: System, q: Array) -> Chosen:
         names = ", ".join(system.speeds[k].name for k in system.active)
         raise ModelError(
             f"{system.name}: {100 * (1 - good.mean()):.0f} % of the record is next to singular"
-            f" postures, where {names} do not lead the other joints; record a motion that keeps"
+            f" configurations, where {names} do not lead the other joints; record a motion that"
+            " keeps"
             " away from them, or assemble with other independent joints"
         )
     return good
@@ -150,7 +151,7 @@ def _has_elements(system: System) -> bool:
 def evaluated(model: Any, samples: Samples) -> list[Array]:
     """(n, rows, columns) every output of a model of (q, v) or (q, v, a) at every sample.
 
-    Next to singular postures of closed systems, straight lines take the place of the model.
+    Next to singular configurations of closed systems, straight lines take the place of the model.
 
     Args:
         model: of the independent or tree coordinates of `model.system`.
@@ -200,7 +201,7 @@ class Observations:
         columns: the k parameters.
         efforts: names of the m efforts.
         effort_units: their units.
-        dropped: instants that were left out, the posture of a closed system being next to a
+        dropped: instants that were left out, the configuration of a closed system being next to a
             singular one.
     """
 
@@ -294,7 +295,7 @@ def observe(regressor: Any, samples: Samples) -> Observations:
     """The equations of the samples, none filtered.
 
     What springs and force elements of the system take is subtracted from the efforts. Instants of
-    a closed system next to singular postures are left out.
+    a closed system next to singular configurations are left out.
 
     Args:
         regressor: Function D(q, v, a) with `.columns` and `.system`, such as `regressor` gives.
@@ -302,7 +303,7 @@ def observe(regressor: Any, samples: Samples) -> Observations:
 
     Raises:
         ModelError: the samples have not the coordinates of the regressor, or most are next to
-            singular postures.
+            singular configurations.
     """
     keep = led_samples(regressor, samples)
     full = replace(_observed(regressor, samples), dropped=int(np.sum(~keep)))
@@ -310,7 +311,7 @@ def observe(regressor: Any, samples: Samples) -> Observations:
 
 
 def _observed(regressor: Any, samples: Samples) -> Observations:
-    """Every instant; next to singular postures the regressor is on straight lines."""
+    """Every instant; next to singular configurations the regressor is on straight lines."""
     return Observations(
         samples.time,
         evaluated(regressor, samples)[0],
@@ -327,9 +328,9 @@ def observe_filtered(
     """The equations of the samples with the same filter on every column as on the efforts.
 
     The columns pass the filter that the efforts of the samples have passed already: a filtered
-    product is not the product of filtered motions, least of all in dry friction. A further filter
-    may be put on both sides. Rows that then say nothing new are dropped, so that the noise of
-    those that stay is nearly independent.
+    product is not the product of filtered motions, least of all in Coulomb friction. A further
+    filter may be put on both sides. Rows that then say nothing new are dropped, so that the noise
+    of those that stay is nearly independent.
 
     Source: Gautier 1997 (parallel filtering and decimation).
 
@@ -369,7 +370,7 @@ def observe_filtered(
 def clear_of_singular(
     found: Observations, model: Any, samples: Samples, before: float, after: float | None = None
 ) -> Observations:
-    """The equations without those that a filter or an interval mixes with singular postures.
+    """The equations without those that a filter or an interval mixes with singular configurations.
 
     Args:
         found: from the samples.
@@ -626,7 +627,7 @@ def require_visible(observations: Observations) -> ExcitationQuality:
     count, rows = len(observations.columns), len(observations)
     if rows < count:
         dropped = observations.dropped
-        left_out = f", {dropped} next to singular postures being left out" if dropped else ""
+        left_out = f", {dropped} next to singular configurations being left out" if dropped else ""
         raise ModelError(
             f"observations: {rows} equations are too few for {count} parameters{left_out}; give a"
             " longer record"

@@ -616,8 +616,8 @@ class Samples:
         efforts: names of the efforts.
         effort_units: their units.
         bandwidth: of what was left by the filter [Hz], or None where nothing was filtered.
-        led: (n,) whether a posture of a closed system keeps clear of singular ones; None where
-            that is still to be found.
+        led: (n,) whether a configuration of a closed system keeps clear of singular ones; None
+            where that is still to be found.
     """
 
     time: Array

@@ -19,7 +19,7 @@ from mbs.errors import ModelError
 from mbs.models.symbols import (
     ModelSymbols,
     check_coordinates,
-    posture_check,
+    configuration_check,
     surroundings,
     symbols_of,
 )
@@ -454,7 +454,9 @@ class Regressor(ModelFunction):
     """
 
     def __init__(self, model: ModelFunction, columns: tuple[Column, ...]) -> None:
-        ModelFunction.__init__(self, model, model.system, model._annotate, model._check_posture)
+        ModelFunction.__init__(
+            self, model, model.system, model._annotate, model._check_configuration
+        )
         self.columns = columns
 
     @property
@@ -480,7 +482,7 @@ class Regressor(ModelFunction):
     def like(self, function: Function) -> ModelFunction:
         """Another Function with the inputs of this one and, where they are as many, its columns."""
         same = function.size_out(0) == self.size_out(0)
-        plain = ModelFunction(function, self.system, None, self._check_posture)
+        plain = ModelFunction(function, self.system, None, self._check_configuration)
         return Regressor(plain, self.columns) if same else ModelFunction.like(self, function)
 
     def _outputs(self) -> list[SX]:
@@ -556,7 +558,7 @@ def known_efforts(system: System, coordinates: str = "independent") -> Function:
         tau = s.reduced_effort(acting + spring_effort(system.tree, s.q))
         return [("q", s.q), ("v" + s.suffix, s.v)], [("tau" + s.suffix, tau)]
 
-    check = posture_check(system, coordinates)
+    check = configuration_check(system, coordinates)
     return model_function(system, ("known_efforts", coordinates), build, check)
 
 
@@ -584,7 +586,7 @@ def regressor_function(
         return [("q", s.q), ("v" + s.suffix, s.v), *inputs], outputs
 
     def make() -> Regressor:
-        check = posture_check(system, coordinates)
+        check = configuration_check(system, coordinates)
         model: Any = model_function(system, (*key, columns), both, check)
         return Regressor(model, columns)
 

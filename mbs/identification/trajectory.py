@@ -17,10 +17,10 @@ from mbs.errors import ModelError
 from mbs.identification.leading import (
     CLEAR,
     active_places,
+    configuration_of,
     is_explicit,
     leads_of,
     positions,
-    posture_of,
     signed_leads,
 )
 from mbs.identification.record import FARTHEST_TURN
@@ -157,7 +157,7 @@ def between_samples(samples: int, harmonics: int) -> float:
 
 
 _SHARE = 0.2
-"""Part of `leads` of the assembled posture that motions keep at least."""
+"""Part of `leads` of the assembled configuration that motions keep at least."""
 
 Range = float | tuple[float, float] | None
 """A number +-, (lower, upper), or None for no limit."""
@@ -355,10 +355,10 @@ def _known(described: tuple[float, float] | None) -> Range:
 
 
 def _leading(system: System) -> tuple[MotionLimit, ...]:
-    """The distance from singular postures; a robot that is assembled near one may come as near."""
+    """The distance from singular configurations; a robot assembled near one may come as near."""
     if not system.is_closed:
         return ()
-    least = min(CLEAR, _SHARE * float(leads_of(system, np.array([system.posture]))[0]))
+    least = min(CLEAR, _SHARE * float(leads_of(system, np.array([system.configuration]))[0]))
     return (MotionLimit("leading", system.name, "1", least, np.inf),)
 
 
@@ -486,7 +486,7 @@ class Trajectory:
         """(m, 1) positions of the independent joints as an expression; see `FourierSeries.law`."""
         return self.series.law(t, order)
 
-    def posture(self, t: npt.ArrayLike) -> Array:
+    def configuration(self, t: npt.ArrayLike) -> Array:
         """(n, nq) positions of all joints of the tree, which close the loops, or (nq,)."""
         instants = np.asarray(t, dtype=float)
         q = positions(self.system, self.series.q(instants.ravel()))
@@ -567,7 +567,7 @@ def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> 
     """``instant(q_a, v_a, a_a) -> D, bounded``: what one instant adds to the observations.
 
     Positions of the other joints of a closed system follow by its closed form, or by continuation
-    from the assembled posture where it has none.
+    from the assembled configuration where it has none.
 
     Args:
         system: open or closed, at the defaults of its parameters.
@@ -583,7 +583,7 @@ def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> 
     """
     m = len(system.active)
     q_a, v_a, a_a = (MX.sym(name, m) for name in ("q_a", "v_a", "a_a"))
-    q = posture_of(system, q_a)
+    q = configuration_of(system, q_a)
     D = regressor(system, columns)(q, v_a, a_a)
     bounded = [*_efforts(system, limits, q, v_a, a_a), *(q[k] for k, _ in limits.passive)]
     for plane in limits.planes:

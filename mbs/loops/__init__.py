@@ -1,8 +1,8 @@
-"""Closed loops: closure equations, their independent rows, postures, reduction."""
+"""Closed loops: closure equations, their independent rows, configurations, reduction."""
 
 from mbs.loops.closure import closure
 from mbs.loops.configuration import solve
-from mbs.loops.examine import PostureState, examine
+from mbs.loops.examine import ConfigurationState, examine
 from mbs.loops.function import function
 from mbs.loops.modes import Mode, WorkingMode, modes, working_modes
 from mbs.loops.pose import solve_pose
@@ -10,8 +10,8 @@ from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import closure_jacobian
 
 __all__ = [
+    "ConfigurationState",
     "Mode",
-    "PostureState",
     "WorkingMode",
     "closure",
     "closure_jacobian",

@@ -1,7 +1,7 @@
 """What the loops of a system leave free: mobility, independent rows, independent joints.
 
-Ranks are taken at several assembled postures, never at one, since a loop may pass through a
-posture where rows that are independent elsewhere coincide.
+Ranks are taken at several assembled configurations, never at one, since a loop may pass through a
+configuration where rows that are independent elsewhere coincide.
 """
 
 from __future__ import annotations
@@ -18,47 +18,48 @@ from mbs.assembly import Closure, Coordinate, LoopRow, System
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
 from mbs.loops.closure import SLIPS, rolling_discs, row_labels
-from mbs.loops.configuration import closed_posture
+from mbs.loops.configuration import closed_configuration
 from mbs.loops.velocity import constraint_jacobian
 from mbs.solvers.rank import independent_rows, null_space_of, rank
 
 Matrix = NDArray[np.float64]
 
-_POSTURES = 5
+_CONFIGURATIONS = 5
 _TRIES = 25
 _SEED = 20260102
 _REACH = 0.5
 _GAP = 1e-5
 """Singular values below this part of the largest count as zero: Gauss-Newton ends about the square
-root of its tolerance, 1e-6, away from a singular posture, where they are not smaller. At regular
-postures of the catalogue those that count are above 1e-2 and the others below 1e-13, in lengths of
-the size of the mechanism. A loop that holds a motion by less than 1e-5 of it counts as free."""
+root of its tolerance, 1e-6, away from a singular configuration, where they are not smaller. At
+regular configurations of the catalogue those that count are above 1e-2 and the others below 1e-13,
+in lengths of the size of the mechanism. A loop that holds a motion by less than 1e-5 of it counts
+as free."""
 _SAME_SHARE = 1e-6
 
 
 def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
-    """The system with its loops closed at a posture, and what they constrain.
+    """The system with its loops closed at a configuration, and what they constrain.
 
     Args:
         system: with open loops.
-        guess: approximate positions by coordinate name; where the posture next to them is
+        guess: approximate positions by coordinate name; where the configuration next to them is
             singular, a regular one nearby is taken.
         chosen: numbers of velocities that the user wants independent, beside those of motors.
 
     Raises:
-        Unclosable: no posture closes the loops.
+        Unclosable: no configuration closes the loops.
         AssemblyError: the loops leave no motion.
     """
     p = closure_parameters(system)
-    posture = _assembled(system, guess, p)
-    nearby = Closing(system, p).nearby(posture, _REACH, _TRIES, _SEED)
-    postures = [posture, *islice(nearby, _POSTURES)]
+    configuration = _assembled(system, guess, p)
+    nearby = Closing(system, p).nearby(configuration, _REACH, _TRIES, _SEED)
+    configurations = [configuration, *islice(nearby, _CONFIGURATIONS)]
     J = constraint_jacobian(system)
     rows, columns = _measures(system, p)
-    jacobians = [np.array(J(q, p)) for q in postures]
+    jacobians = [np.array(J(q, p)) for q in configurations]
     ranks = _ranks([m / rows * columns for m in jacobians])
     generic = max(ranks)
-    posture = postures[ranks.index(generic)]
+    configuration = configurations[ranks.index(generic)]
     regular = [m for m, found in zip(jacobians, ranks, strict=True) if found == generic]
     labels = _labels(system)
     positions = sum(len(rows) for rows, _ in labels)
@@ -75,13 +76,13 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
         free=_free_positions(regular, kept, active),
         varies=_varies(regular, positions, kept),
         gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
-        residual=float(np.max(np.abs(Closing(system, p).rows(posture)[0]))),
+        residual=float(np.max(np.abs(Closing(system, p).rows(configuration)[0]))),
     )
     return replace(
         system,
         coordinates=_with_motors(system.coordinates, drive.named),
         speeds=_with_motors(system.speeds, drive.named),
-        posture=tuple(float(x) for x in posture),
+        configuration=tuple(float(x) for x in configuration),
         closure=closure,
         loops=_with_rows(system.loops, labels, kept),
         _cache={},
@@ -89,14 +90,14 @@ def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...]
 
 
 def _assembled(system: System, guess: Mapping[str, float], p: Matrix) -> Matrix:
-    """A closed posture near the guess: first with the motors held, then with everything free."""
+    """A closed configuration near the guess: motors held first, then everything free."""
     known = {name: value for name, value in guess.items() if name in _names(system)}
     start = np.array(system.position(known))
     motors = tuple(k for k, c in enumerate(system.coordinates) if c.actuated)
     try:
-        return closed_posture(Closing(system, p, motors), start, restarts=10)
+        return closed_configuration(Closing(system, p, motors), start, restarts=10)
     except Unclosable:
-        return closed_posture(Closing(system, p), start)
+        return closed_configuration(Closing(system, p), start)
 
 
 def _names(system: System) -> list[str]:
@@ -127,7 +128,7 @@ class _Kept:
 
 
 def _kept_rows(jacobians: Sequence[Matrix], positions: int, held: int, slips: int) -> _Kept:
-    """The independent rows at regular postures, rows of positions before those of velocities.
+    """The independent rows at regular configurations, rows of positions before those of velocities.
 
     Args:
         jacobians: (m, nv) each, the first rows those of positions.
@@ -141,7 +142,7 @@ def _kept_rows(jacobians: Sequence[Matrix], positions: int, held: int, slips: in
 
 
 def _varies(jacobians: Sequence[Matrix], positions: int, kept: _Kept) -> bool:
-    """Whether dropped rows are other combinations of the kept ones at other postures."""
+    """Whether dropped rows are other combinations of the kept ones at other configurations."""
     rows = [*kept.positions, *(positions + k for k in kept.slips)]
     dropped = [k for k in range(len(jacobians[0])) if k not in rows]
     if not dropped:
@@ -153,7 +154,7 @@ def _varies(jacobians: Sequence[Matrix], positions: int, kept: _Kept) -> bool:
 
 
 def rows_at(system: System, q: Matrix, p: Matrix) -> System:
-    """The same system with the rows that are most independent at one posture.
+    """The same system with the rows that are most independent at one configuration.
 
     Args:
         system: with closed loops.

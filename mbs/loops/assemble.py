@@ -25,7 +25,7 @@ def assemble(
 
     Raises:
         AssemblyError: the components do not form a mechanism, or a guess names no coordinate.
-        Unclosable: no posture closes the loops.
+        Unclosable: no configuration closes the loops.
     """
     system = open_system(mechanism, (*guess, *active))
     _check_guess(system, guess)
@@ -34,7 +34,7 @@ def assemble(
         return analysed(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}
-    return replace(system, posture=tuple(system.position(start)), _cache={})
+    return replace(system, configuration=tuple(system.position(start)), _cache={})
 
 
 def _chosen(system: System, active: Sequence[str]) -> tuple[int, ...]:

@@ -25,14 +25,14 @@ from mbs.solvers.least_squares import gauss_newton
 _ROUNDING = 1e-9
 """Length [m] below which levers are rounding, which is 1e-13 of a mechanism of 1 km."""
 _SAMPLES, _SEED = 3, 20260201
-"""Postures at which levers are measured, the zero posture among them."""
+"""Configurations at which levers are measured, the zero configuration among them."""
 
 
 def mechanism_size(system: System) -> SX:
     """The longest lever by which an angle moves the ends of a loop, or their largest distance [m].
 
-    It is taken at some postures, always the same and open as a rule, so that it is known before a
-    loop is closed; 1 m where nothing tells a small mechanism from a large one.
+    It is taken at some configurations, always the same and open as a rule, so that it is known
+    before a loop is closed; 1 m where nothing tells a small mechanism from a large one.
 
     Returns:
         (1, 1) expression of the parameters p.
@@ -48,7 +48,9 @@ def mechanism_size(system: System) -> SX:
         levers = casadi.jacobian(rows, q)[:, turns]
         lengths = casadi.vertcat(rows, casadi.vec(levers.nz[:])) if levers.nnz() else rows
         found = Function("lengths", [q, system.p], [lengths])
-        every = casadi.vertcat(*(found(posture, system.p) for posture in _postures(system)))
+        every = casadi.vertcat(
+            *(found(configuration, system.p) for configuration in _configurations(system))
+        )
         size = SX(casadi.mmax(casadi.fabs(every)))
         # around the centre of a sphere levers are rounding
         return SX(casadi.if_else(size > _ROUNDING, size, 1))
@@ -84,9 +86,9 @@ def _lengths(system: System) -> list[bool]:
     ]
 
 
-def _postures(system: System) -> list[list[float]]:
-    """The zero posture and random ones; displacements are zero, quaternions of unit length."""
-    rng, postures = np.random.default_rng(_SEED), list[list[float]]()
+def _configurations(system: System) -> list[list[float]]:
+    """The zero configuration and random ones; displacements zero, quaternions of unit length."""
+    rng, configurations = np.random.default_rng(_SEED), list[list[float]]()
     for number in range(_SAMPLES):
         reach = np.pi if number else 0.0
         q = [
@@ -95,8 +97,8 @@ def _postures(system: System) -> list[list[float]]:
         ]
         for part in quaternion_slices(system.tree):
             q[part] = [1.0, 0.0, 0.0, 0.0]
-        postures.append(q)
-    return postures
+        configurations.append(q)
+    return configurations
 
 
 Vector = NDArray[np.float64]
@@ -107,10 +109,12 @@ sums of some tens of terms of size one stays below it, what Newton's method leav
 step, 1e-8 or more, does not."""
 
 CLOSED = 1e-10
-"""The same of postures that formulas or others give: hundreds of roundings, no missing step."""
+"""The same of configurations that formulas or others give: hundreds of roundings, no missing
+step."""
 
 OPEN = 1e-6
-"""The same of postures that a user gives, with seven digits; forces are wrong by as little."""
+"""The same of configurations that a user gives, with seven digits; forces are wrong by as
+little."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,7 +171,7 @@ class Closing:
         return float(np.max(np.abs(self.rows(q)[0]) / self.sizes, initial=0.0))
 
     def nearest(self, q: Vector) -> Closed:
-        """The posture that Gauss-Newton reaches from q (nq,)."""
+        """The configuration that Gauss-Newton reaches from q (nq,)."""
         start = np.array(q, dtype=float)
 
         def residual(x: Vector) -> tuple[Vector, Vector]:
@@ -178,7 +182,7 @@ class Closing:
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
-        """Closed postures that Gauss-Newton reaches from random ones around q (nq,).
+        """Closed configurations that Gauss-Newton reaches from random ones around q (nq,).
 
         Args:
             q: around which they are taken.
@@ -255,11 +259,11 @@ def _replaced(q: Vector, places: Sequence[int], values: Vector) -> Vector:
     return result
 
 
-# When two postures are the same: up to whole turns, and to the sign of quaternions.
+# When two configurations are the same: up to whole turns, and to the sign of quaternions.
 
 
 def difference(system: System, q: Vector, other: Vector) -> Vector:
-    """(nq,) difference of two postures: angles to the nearest whole turn, quaternions to a sign."""
+    """(nq,) difference of two configurations: angles up to whole turns, quaternions up to sign."""
     gap = within_half_turn(system, q - other)
     for part in quaternion_slices(system.tree):
         opposite = q[part] + other[part]
@@ -275,7 +279,7 @@ def within_half_turn(system: System, q: Vector) -> Vector:
     return turned
 
 
-# Moving a closed posture along a line in small steps, so that it stays on its branch.
+# Moving a closed configuration along a line in small steps, so that it stays on its branch.
 
 
 _LARGEST_STEP = 0.2
@@ -288,11 +292,13 @@ _SMALLEST_PART = 1e-4
 """Of the whole line, below which it is said to end."""
 
 
-def followed_posture(system: System, target: Vector, held: tuple[int, ...], p: Vector) -> Vector:
-    """The posture reached from the assembled one as its held positions, and p, move to theirs.
+def followed_configuration(
+    system: System, target: Vector, held: tuple[int, ...], p: Vector
+) -> Vector:
+    """The configuration reached from the assembled one while held positions, and p, move.
 
     Args:
-        system: with loops; its posture is where the line starts.
+        system: with loops; its configuration is where the line starts.
         target: (nq,) of which the held positions count.
         held: numbers in q.
         p: (np,) values of the parameters at the end of the line.
@@ -303,13 +309,14 @@ def followed_posture(system: System, target: Vector, held: tuple[int, ...], p: V
     Raises:
         Unclosable: the line leaves what this branch can reach; the message says where.
     """
-    start, p_start = np.array(system.posture), closure_parameters(system)
+    start, p_start = np.array(system.configuration), closure_parameters(system)
     places, free = list(held), [k for k in range(system.nq) if k not in held]
     way = target[places] - start[places]
     length = float(np.max(np.abs(way), initial=0.0))
     if length > _LONGEST_LINE:
         raise Unclosable(
-            f"{system.name}: a position is {length:.3g} rad or m away from the assembled posture;"
+            f"{system.name}: a position is {length:.3g} rad or m away from the assembled"
+            " configuration;"
             f" give one less than {_LONGEST_LINE:g} away"
         )
     largest = min(1.0, _LARGEST_STEP / max(length, 1e-12))
@@ -328,8 +335,9 @@ def followed_posture(system: System, target: Vector, held: tuple[int, ...], p: V
             part, slope = part / 2, slope if part > 8 * _SMALLEST_PART else np.zeros(len(free))
             if part < _SMALLEST_PART:
                 raise Unclosable(
-                    f"{system.name}: {closing.held_positions(target) or 'the posture'} cannot be"
-                    " reached from the assembled posture, whose branch ends near"
+                    f"{system.name}: {closing.held_positions(target) or 'the configuration'}"
+                    " cannot be"
+                    " reached from the assembled configuration, whose branch ends near"
                     f" {closing.held_positions(q) or 'it'}; give a guess of other joints to choose"
                     " another branch, or other positions"
                 )

@@ -244,8 +244,8 @@ def _equations(system: System) -> _Equations:
 def facing(system: System, q: SX) -> SX:
     """(k, 1) cosines that must be positive: axes that are aligned and not opposed.
 
-    The rows of a joint with an axis are zero for opposed axes as well; a posture is only right
-    when these are positive.
+    The rows of a joint with an axis are zero for opposed axes as well; a configuration is only
+    right when these are positive.
     """
     found = _equations(system)
     return casadi.substitute(found.cosines, found.q, q)

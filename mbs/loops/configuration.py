@@ -19,9 +19,9 @@ from mbs.loops.closing import (
     Vector,
     closure_parameters,
     difference,
-    followed_posture,
+    followed_configuration,
 )
-from mbs.loops.function import fixed_positions, independent_names, posture_on
+from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.velocity import closure_jacobian
 from mbs.solvers.least_squares import smallest_solution
 from mbs.solvers.rank import RELATIVE_GAP, null_space
@@ -32,7 +32,7 @@ _SEED = 20260101
 _LARGEST_ANGLE = np.pi
 _GUESSES = 16
 _NEAR = 0.3
-"""Distance from a guess [rad or m] within which the first posture found is taken."""
+"""Distance from a guess [rad or m] within which the first configuration found is taken."""
 
 
 def solve(
@@ -43,16 +43,16 @@ def solve(
     branch: str | Sequence[str] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
-    """A posture with the given positions that closes the loops.
+    """A configuration with the given positions that closes the loops.
 
-    Without a guess the assembled posture is moved along a straight line to the given positions,
-    in steps small enough to keep its branch. With a guess the posture next to it is looked for.
-    With a branch the loops are closed by closed forms (`mbs.loops.function`).
+    Without a guess the assembled configuration is moved along a straight line to the given
+    positions, in steps small enough to keep its branch. With a guess the configuration next to it
+    is looked for. With a branch the loops are closed by closed forms (`mbs.loops.function`).
 
     Args:
         system: the assembled mechanism.
         q_active: positions of the independent joints in the order of `system.free`, those left
-            out staying as in the assembled posture; or positions of any joints by name.
+            out staying as in the assembled configuration; or positions of any joints by name.
         guess: approximate positions of other joints, which choose the branch.
         branch: labels of `mbs.loops.modes` instead, such as "j3:+"; a loop that no label names
             stays as it was assembled. Positions are then those of independent joints.
@@ -62,7 +62,7 @@ def solve(
         q (nq,) [rad or m].
 
     Raises:
-        Unclosable: no posture was found; the message says by how much the loops stay open, or
+        Unclosable: no configuration was found; the message says by how much the loops stay open, or
             what can be reached on the branch.
         NoClosedForm: a branch was named, but a loop is solved by iteration only.
         ModelError: a name is unknown, or a value is not finite; or guess and branch are given.
@@ -75,7 +75,7 @@ def solve(
     if branch is not None:
         if guess:
             raise ModelError(f"{system.name}: guess and branch both choose the branch; give one")
-        return posture_on(system, q_active, branch, parameters)
+        return configuration_on(system, q_active, branch, parameters)
     names = independent_names(system)
     fixed = fixed_positions(system, q_active)
     p = closure_parameters(system, parameters)
@@ -87,12 +87,12 @@ def solve(
         return target
     if guess:
         named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
-        return _guessed_posture(Closing(system, p, held), target, named)
-    return followed_posture(system, target, held, p)
+        return _guessed_configuration(Closing(system, p, held), target, named)
+    return followed_configuration(system, target, held, p)
 
 
-def _guessed_posture(closing: Closing, start: Vector, named: list[int]) -> Vector:
-    """The posture whose named positions are nearest to those of `start`, (nq,).
+def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) -> Vector:
+    """The configuration whose named positions are nearest to those of `start`, (nq,).
 
     Newton's method may land far from its start: unless it stays near, starts that differ in the
     positions that nobody named are tried as well, and the nearest answer is taken.
@@ -108,7 +108,7 @@ def _guessed_posture(closing: Closing, start: Vector, named: list[int]) -> Vecto
         if not closed.is_closed and found:
             continue
         q = _unwound(closing, closed.q, start) if closed.is_closed else None
-        q = closed_posture(closing, start) if q is None else q
+        q = closed_configuration(closing, start) if q is None else q
         far = float(np.max(np.abs(q[named] - start[named]), initial=0.0))
         found.append((far, q))
         if far < _NEAR:
@@ -117,7 +117,7 @@ def _guessed_posture(closing: Closing, start: Vector, named: list[int]) -> Vecto
 
 
 def _unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
-    """The posture with angles within half a turn of the start, where that closes the loops too."""
+    """The configuration with angles within half a turn of the start, if that closes the loops."""
     near: Vector = start + difference(closing.system, q, start)
     for part in quaternion_slices(closing.system.tree):
         near[part] = q[part]
@@ -125,8 +125,8 @@ def _unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
     return near if closing.openness(near) < CLOSED else q
 
 
-def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:
-    """The posture nearest to `start`, (nq,), that Gauss-Newton finds, with restarts further away.
+def closed_configuration(closing: Closing, start: Vector, restarts: int = _RESTARTS) -> Vector:
+    """The configuration near `start`, (nq,), that Gauss-Newton finds, with restarts.
 
     Args:
         closing: the rows, and the positions that must not change.
@@ -147,7 +147,7 @@ def closed_posture(closing: Closing, start: Vector, restarts: int = _RESTARTS) -
     at = closing.held_positions(start)
     raise Unclosable(
         f"{closing.system.name}: the loop cannot be closed{' with ' + at if at else ''}; the best"
-        f" posture found leaves {closing.gap(best.q)}; change lengths or guesses"
+        f" configuration found leaves {closing.gap(best.q)}; change lengths or guesses"
     )
 
 
@@ -165,7 +165,7 @@ def starts(first: Vector, free: list[int], restarts: int = _RESTARTS) -> Iterato
 def require_closed(
     system: System, q: Vector, parameters: Mapping[str, float] | None = None
 ) -> None:
-    """Refuse a posture that does not close the loops.
+    """Refuse a configuration that does not close the loops.
 
     Raises:
         LoopError: says how far it is open.
@@ -174,7 +174,7 @@ def require_closed(
     if closing.openness(q) > OPEN:
         worst = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
         raise LoopError(
-            f"{system.name}: the posture leaves the loops open by {worst:.3g};"
+            f"{system.name}: the configuration leaves the loops open by {worst:.3g};"
             " use mbs.loops.solve to get one that closes them"
         )
 
@@ -195,8 +195,8 @@ def start(
 
     Args:
         system: open or closed.
-        q0: positions by coordinate name [rad or m], the others as in the assembled posture; in a
-            closed system the loops are closed with the independent ones as given.
+        q0: positions by coordinate name [rad or m], the others as in the assembled configuration;
+            in a closed system the loops are closed with the independent ones as given.
         v0: velocities by name [rad/s or m/s], the others zero; in a closed system they may be of
             any joints, and the others follow.
         parameters: values of symbols, the others at their defaults.

@@ -1,4 +1,4 @@
-"""What a posture is worth: whether it closes the loops, and how freely it moves there."""
+"""What a configuration is worth: whether it closes the loops, and how freely it moves there."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.model_function import PostureCheck, require_system
+from mbs.assembly.model_function import ConfigurationCheck, require_system
 from mbs.assembly.validity import Row, all_hold, plain_rows
 from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters, row_sizes
@@ -32,14 +32,14 @@ _LED = 1e-14
 
 
 @dataclass(frozen=True, slots=True)
-class PostureState:
-    """A posture of a system with loops.
+class ConfigurationState:
+    """A configuration of a system with loops.
 
     Attributes:
         residual: largest closure row [m or 1].
         opening: the same with lengths as parts of the size of the mechanism.
-        mobility: number of independent velocities at this posture.
-        generic: the same at postures that are not singular.
+        mobility: number of independent velocities at this configuration.
+        generic: the same at configurations that are not singular.
         leads: 1 where the independent joints lead the others well, 0 where they cannot: the
             smallest squared sine between a row of the passive joints and the rows before it.
     """
@@ -68,8 +68,8 @@ class PostureState:
 
 def examine(
     system: System, q: Sequence[float], *, parameters: Mapping[str, float] | None = None
-) -> PostureState:
-    """How a posture closes the loops of a system, and whether it is singular.
+) -> ConfigurationState:
+    """How a configuration closes the loops of a system, and whether it is singular.
 
     Args:
         system: with closed loops.
@@ -84,15 +84,17 @@ def examine(
         raise ModelError(f"{system.name}: an open chain has no loops that could be examined")
     position = np.array(system.position(q))
     p = closure_parameters(system, parameters)
-    residual, leads, opening = (float(x) for x in posture_health(system)(position, p))
+    residual, leads, opening = (float(x) for x in configuration_health(system)(position, p))
     found = scales(system)
     J = np.array(constraint_jacobian(system)(position, p)) * found.rows.reshape(-1, 1)
     J *= found.columns([speed.unit for speed in system.speeds])
-    return PostureState(residual, opening, system.nv - rank(J), system.closure.mobility, leads)
+    return ConfigurationState(
+        residual, opening, system.nv - rank(J), system.closure.mobility, leads
+    )
 
 
 def require_led(system: System, q: Vector, p: Vector) -> None:
-    """Refuse a posture at which models in the independent joints have no sense.
+    """Refuse a configuration at which models in the independent joints have no sense.
 
     Args:
         system: with closed loops.
@@ -100,32 +102,33 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
         p: (np,) parameters.
 
     Raises:
-        Unclosable: the posture leaves the loops open.
+        Unclosable: the configuration leaves the loops open.
         SingularPosture: the independent joints do not determine how the others move.
     """
-    residual, leads, opening = (float(x) for x in posture_health(system)(q, p))
+    residual, leads, opening = (float(x) for x in configuration_health(system)(q, p))
     if opening > OPEN:
         raise Unclosable(
-            f"{system.name}: q leaves the loops open by {residual:.3g}; take a posture of"
+            f"{system.name}: q leaves the loops open by {residual:.3g}; take a configuration of"
             " mbs.loops.solve"
         )
     if leads <= _LED:
         names = ", ".join(system.speeds[k].name for k in system.active)
         raise SingularPosture(
-            f"{system.name}: the posture is singular, {names} cannot lead the other joints there;"
-            " take another posture, other independent joints (assemble(active=...)), or"
+            f"{system.name}: the configuration is singular, {names} cannot lead the other joints"
+            " there;"
+            " take another configuration, other independent joints (assemble(active=...)), or"
             ' coordinates="tree"'
         )
 
 
 def loop_rows(system: System, q: SX) -> list[Row]:
-    """What a posture of closed loops must fulfil for models in the independent joints.
+    """What a configuration of closed loops must fulfil for models in the independent joints.
 
     Args:
         system: with closed loops.
         q: (nq, 1) positions.
     """
-    _, leads, opening = posture_health(system)(q, system.p)
+    _, leads, opening = configuration_health(system)(q, system.p)
     return [
         Row("open", "opening of the loops", opening, OPEN, "the loops are open"),
         Row(
@@ -143,12 +146,12 @@ def _valid(system: System) -> Function:
     return all_hold(system, "led", q, [*plain_rows(system, q), *loop_rows(system, q)])
 
 
-LED = PostureCheck(_valid, require_led)
+LED = ConfigurationCheck(_valid, require_led)
 """Closed loops whose independent joints lead the others."""
 
 
-def posture_health(system: System) -> Function:
-    """``health(q, p) -> residual, leads, opening``; see `PostureState`."""
+def configuration_health(system: System) -> Function:
+    """``health(q, p) -> residual, leads, opening``; see `ConfigurationState`."""
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -163,7 +166,7 @@ def posture_health(system: System) -> Function:
         leads = _independence(J_p.T if varies else J_p)
         return Function("health", [q, system.p], [residual, leads, opening], {"cse": True})
 
-    function: Function = system.cached("posture health", build)
+    function: Function = system.cached("configuration health", build)
     return function
 
 

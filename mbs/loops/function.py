@@ -53,7 +53,7 @@ def fixed_positions(system: System, values: Given) -> dict[str, float]:
 
 
 def independent_positions(system: System, values: Given) -> list[float]:
-    """The positions of the independent joints, those left out as in the assembled posture.
+    """The positions of the independent joints, those left out as in the assembled configuration.
 
     Raises:
         ModelError: another joint is named, or a value is not finite.
@@ -124,7 +124,7 @@ def _span(
     """Where to look: a whole turn, or a stroke about the assembled position that ends outside."""
     if system.coordinates[k].unit == "rad":
         return -np.pi, np.pi
-    middle = system.posture[k]
+    middle = system.configuration[k]
     stroke = max(_LEAST_STROKE, abs(value - middle))
     for _ in range(_DOUBLINGS):
         if not is_reached(middle - stroke) and not is_reached(middle + stroke):
@@ -162,13 +162,13 @@ Branch = str | Sequence[str] | None
 
 
 class LoopFunction(ModelFunction):
-    """A closed form; where it gives no posture a call says what the joints can reach."""
+    """A closed form; where it gives no configuration a call says what the joints can reach."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate it as any model.
 
         Raises:
-            Unclosable: no posture has these positions on this branch.
+            Unclosable: no configuration has these positions on this branch.
             ModelError: an argument does not fit.
         """
         try:
@@ -196,13 +196,13 @@ class LoopFunction(ModelFunction):
     def _refusal(self, q_a: Vector, p: Vector) -> str:
         names = independent_names(self.system)
         at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(names, q_a, strict=True))
-        return f"{self.system.name}: no posture on this branch has {at}; " + reachable(
+        return f"{self.system.name}: no configuration on this branch has {at}; " + reachable(
             self.system, self, q_a, p
         )
 
 
 def function(system: System, branch: Branch = None) -> Function:
-    """``loops(q_a) -> q``: the posture for positions of the independent joints, without iteration.
+    """``loops(q_a) -> q``: the configuration for independent positions, without iteration.
 
     It can be differentiated as often as one likes. Angles that a loop gives are
     within half a turn of zero.
@@ -214,8 +214,8 @@ def function(system: System, branch: Branch = None) -> Function:
 
     Returns:
         Function of q_a (m, 1) and the parameters p where there are any; q (nq, 1) [rad or m].
-        Called with numbers that no posture of the branch has, it raises Unclosable and says what
-        can be reached; within symbols and maps q is NaN there.
+        Called with numbers that no configuration of the branch has, it raises Unclosable and says
+        what can be reached; within symbols and maps q is NaN there.
 
     Raises:
         NoClosedForm: a loop is solved by iteration only.
@@ -226,7 +226,7 @@ def function(system: System, branch: Branch = None) -> Function:
 
     def build() -> tuple[Named, Named]:
         q_a = SX.sym("q_a", len(system.free))
-        return [("q_a", q_a)], [("q", _posture(system, stages, ways, q_a))]
+        return [("q_a", q_a)], [("q", _configuration(system, stages, ways, q_a))]
 
     def make() -> Function:
         return LoopFunction(model_function(system, ("loops", ways), build), system)
@@ -235,13 +235,13 @@ def function(system: System, branch: Branch = None) -> Function:
     return made
 
 
-def posture_on(
+def configuration_on(
     system: System, q_active: Given, branch: Branch, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """The posture (nq,) of a branch, from positions as a user gives them.
+    """The configuration (nq,) of a branch, from positions as a user gives them.
 
     Raises:
-        Unclosable: no posture of the branch has these positions.
+        Unclosable: no configuration of the branch has these positions.
         NoClosedForm: a loop is solved by iteration only.
         ModelError: a name is unknown, or a value is not finite.
     """
@@ -252,7 +252,7 @@ def posture_on(
     return np.array(q).ravel()
 
 
-def _posture(system: System, stages: Sequence[Stage], ways: Sequence[int], q_a: SX) -> SX:
+def _configuration(system: System, stages: Sequence[Stage], ways: Sequence[int], q_a: SX) -> SX:
     q = SX.zeros(extent(system))
     q[independent_places(system)] = q_a
     for stage, way in zip(stages, ways, strict=True):
@@ -305,11 +305,11 @@ _OPEN = 1e-9
 
 
 def follow_active(system: System) -> Function:
-    """``follow(q_a, p) -> q``: the posture reached from the assembled one along a straight line.
+    """``follow(q_a, p) -> q``: the configuration reached along a straight line of q_a.
 
     The independent positions, and the parameters from their defaults, are moved in small equal
     stages, each closed by Newton's method from where the slope led: the branch of the assembled
-    posture is kept, and the Function is differentiable (implicit function theorem). Where the
+    configuration is kept, and the Function is differentiable (implicit function theorem). Where the
     line leaves what the mechanism can reach, q is NaN.
 
     Returns:
@@ -325,14 +325,14 @@ def follow_active(system: System) -> Function:
         if any(place >= system.nq for place in active):
             raise NoClosedForm(
                 f"{system.name}: a rod spins about its line, which no position of q follows; use a"
-                " posture of mbs.loops.solve"
+                " configuration of mbs.loops.solve"
             )
         passive = [k for k in range(system.nq) if k not in active]
         q_a, p = MX.sym("q_a", len(active)), MX.sym("p", system.p.numel())
-        q_start = DM([system.posture[k] for k in active])
+        q_start = DM([system.configuration[k] for k in active])
         p_start = DM(closure_parameters(system))
         stage = _stage(system, active, passive)
-        z = before = MX(DM([system.posture[k] for k in passive]))
+        z = before = MX(DM([system.configuration[k] for k in passive]))
         good: MX = MX(1)
         for number in range(1, _STAGES + 1):
             part = number / _STAGES

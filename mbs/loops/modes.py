@@ -23,7 +23,7 @@ from mbs.loops.closing import (
     within_half_turn,
 )
 from mbs.loops.function import Given, independent_positions
-from mbs.loops.plan import every_posture, plan
+from mbs.loops.plan import every_configuration, plan
 from mbs.loops.pose import Goal, goal
 from mbs.solvers.rank import rank
 from mbs.text import quoted
@@ -37,7 +37,7 @@ class Mode:
     """One way to assemble a mechanism.
 
     Attributes:
-        q: (nq) the posture [rad or m], angles that a loop gives are within half a turn
+        q: (nq) the configuration [rad or m], angles that a loop gives are within half a turn
             of zero.
         branch: what tells it from the others, such as ("j3:+",); one label for each loop that
             closes in two ways.
@@ -55,7 +55,7 @@ def modes(
     *,
     parameters: Mapping[str, float] | None = None,
 ) -> list[Mode]:
-    """All postures with these positions of the independent joints, by closed forms.
+    """All configurations with these positions of the independent joints, by closed forms.
 
     Each is checked with every closure row and for joints that face the right way. The list is
     empty where the mechanism cannot be assembled; two modes that meet are listed once.
@@ -63,7 +63,7 @@ def modes(
     Args:
         system: the assembled mechanism.
         q_active: positions of the independent joints, by name or in the order of
-            `system.free`; those left out stay as in the assembled posture.
+            `system.free`; those left out stay as in the assembled configuration.
         parameters: values of symbols, the others at their defaults.
 
     Raises:
@@ -81,7 +81,7 @@ def modes(
     start = np.zeros(extent(system))
     start[independent_places(system)] = independent_positions(system, q_active)
     found: list[Mode] = []
-    for q, branch in every_posture(stages, start, p):
+    for q, branch in every_configuration(stages, start, p):
         mode = _checked(system, q[: system.nq], branch, p)
         if mode is not None and not any(_same(mode, other) for other in found):
             found.append(mode)
@@ -102,7 +102,7 @@ def _same(mode: Mode, other: Mode) -> bool:
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
 
 
-# The postures that bring a frame to one pose, as far as random starts lead to them.
+# The configurations that bring a frame to one pose, as far as random starts lead to them.
 
 
 _TRIES, _LEAST, _SEED = 500, 60, 20260103
@@ -112,11 +112,11 @@ _LOOSE = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class WorkingMode:
-    """A posture that closes the loops and brings a frame to a pose.
+    """A configuration that closes the loops and brings a frame to a pose.
 
     Attributes:
-        q: (nq) the posture [rad or m], angles within half a turn of zero, the first element of a
-            quaternion not negative.
+        q: (nq) the configuration [rad or m], angles within half a turn of zero, the first element
+            of a quaternion not negative.
         residual: largest row of the loops and of the pose there.
         hits: how many starts led to it; where some mode has one alone, others are likely missing.
     """
@@ -137,7 +137,7 @@ def working_modes(
     tries: int = _TRIES,
     parameters: Mapping[str, float] | None = None,
 ) -> list[WorkingMode]:
-    """The postures with closed loops and this pose of a frame to which random starts lead.
+    """The configurations with closed loops and this pose of a frame to which random starts lead.
 
     Nothing proves that the list is complete; `hits` tells how well it was searched. The starts are
     the same at every call. The search ends early after at least 60 of them, once the last three
@@ -148,18 +148,18 @@ def working_modes(
         frame: likewise.
         T: likewise.
         rows: likewise.
-        guess: about which posture the starts are taken, the assembled one when left out.
+        guess: about which configuration the starts are taken, the assembled one when left out.
         reach: largest difference of a position between a start and the guess [rad or m]; smaller
-            than half a turn, postures near the guess are looked for.
+            than half a turn, configurations near the guess are looked for.
         tries: largest number of starts.
         parameters: likewise.
 
     Returns:
-        The postures found, those near the guess first; empty when none was found.
+        The configurations found, those near the guess first; empty when none was found.
 
     Raises:
-        LoopError: in a posture found the joints can move while the frame stays, so that there may
-            be postures without number.
+        LoopError: in a configuration found the joints can move while the frame stays, so that
+            there may be configurations without number.
         ModelError: as for `solve_pose`; or reach or tries is not above zero.
     """
     wanted = goal(system, frame, T, rows, parameters)
@@ -172,9 +172,9 @@ def working_modes(
     found: list[WorkingMode] = []
     newest = 0
     for number, start in enumerate(_starts(system, middle, reach, tries), start=1):
-        posture, known = wanted.nearest(start), len(found)
-        if posture.is_closed:
-            _add(wanted, found, _tidy(wanted, posture.q))
+        configuration, known = wanted.nearest(start), len(found)
+        if configuration.is_closed:
+            _add(wanted, found, _tidy(wanted, configuration.q))
         newest = number if len(found) > known else newest
         if number >= max(_LEAST, 4 * newest) and all(mode.hits > 1 for mode in found):
             break
@@ -206,7 +206,7 @@ def _distance(system: System, q: Vector, other: Vector) -> float:
 
 
 def _tidy(wanted: Goal, q: Vector) -> Vector:
-    """The posture with small angles where that is the same one: not so across a gear."""
+    """The configuration with small angles where that is the same one: not so across a gear."""
     system = wanted.closing.system
     tidy = within_half_turn(system, q)
     for part in quaternion_slices(system.tree):
@@ -215,7 +215,7 @@ def _tidy(wanted: Goal, q: Vector) -> Vector:
 
 
 def _require_isolated(wanted: Goal, q: Vector) -> None:
-    """Refuse a posture that can move, at least to first order, while the frame stays.
+    """Refuse a configuration that can move, at least to first order, while the frame stays.
 
     Raises:
         LoopError: names the joints that move most.
@@ -228,12 +228,12 @@ def _require_isolated(wanted: Goal, q: Vector) -> None:
     names = [c.name for k, c in enumerate(system.coordinates) if motion[k] > motion.max() / 10]
     raise LoopError(
         f"{system.name}: {', '.join(names)} can move while frame {quoted(wanted.frame)} stays at"
-        " this pose, so postures cannot be counted; take another pose, name more rows, or use"
-        " mbs.loops.solve_pose for one posture"
+        " this pose, so configurations cannot be counted; take another pose, name more rows, or use"
+        " mbs.loops.solve_pose for one configuration"
     )
 
 
-# Postures that close the loops with some positions held, as far as random starts lead there.
+# Configurations that close the loops with some positions held, as far as random starts lead there.
 
 
 _START_TRIES, _LEAST_STARTS, _START_SEED = 300, 40, 20260107
@@ -241,18 +241,19 @@ _REACH = np.pi
 _SAME_START = 1e-6
 
 
-def closed_postures(closing: Closing, start: Vector) -> list[Vector]:
-    """Postures found by Gauss-Newton from random starts, always the same ones.
+def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:
+    """Configurations found by Gauss-Newton from random starts, always the same ones.
 
     The search ends early after at least 40 starts, once the last three quarters led to nothing new
-    and every posture was met twice.
+    and every configuration was met twice.
 
     Args:
         closing: the rows, and the positions that are held.
         start: (nq,) of which the held positions count; the starts are taken about the others.
 
     Returns:
-        Postures (nq,) with angles within half a turn of zero; nothing proves that these are all.
+        Configurations (nq,) with angles within half a turn of zero; nothing proves that these are
+        all.
     """
     rng = np.random.default_rng(_START_SEED)
     found, hits, newest = list[Vector](), list[int](), 0
@@ -283,7 +284,7 @@ def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
 
 
 def _tidy_start(closing: Closing, q: Vector) -> Vector:
-    """The posture with small angles where that is the same one: not so across a gear."""
+    """The configuration with small angles where that is the same one: not so across a gear."""
     tidy = within_half_turn(closing.system, q)
     tidy[list(closing.held)] = q[list(closing.held)]
     return tidy if closing.openness(tidy) < OPEN else q

@@ -13,9 +13,9 @@ bennett, trilateration, coupling                        special measures, shared
 split, closed_samples    whatever is left, by Paul's method, and numbers at which a loop closes
 free_body       a body whose pose is known
 dispatch        the kernel for a loop
-stage           one step of a plan, and which of its ways lead to a posture
+stage           one step of a plan, and which of its ways lead to a configuration
 plan            the loops of a system in the order in which they can be solved
-verified        a plan held against postures
+verified        a plan held against configurations
 known           joints that may be known together
 posed           the plan for a frame whose pose is known
 """
@@ -64,7 +64,7 @@ from mbs.recursions.route import relative_pose
 from mbs.solvers.rank import null_space, rank
 from mbs.spatial import Pose
 
-# One step of a plan, and which of its ways lead to a posture.
+# One step of a plan, and which of its ways lead to a configuration.
 
 
 _NEAR = 1e-5
@@ -94,7 +94,7 @@ class Stage:
 
 
 def ways_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tuple[int, ...]:
-    """The ways of all stages that lead to the closed posture q; as far as they do.
+    """The ways of all stages that lead to the closed configuration q; as far as they do.
 
     What a stage gives of cut joints is not in q: whether it fits is seen in later stages.
     """
@@ -102,11 +102,11 @@ def ways_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tu
 
 
 def started_at(system: System, q: Vector, known: Collection[int] | None = None) -> Vector:
-    """All positions, the known ones as in the posture q and the others zero.
+    """All positions, the known ones as in the configuration q and the others zero.
 
     Args:
         system: whose positions they are.
-        q: (nq,) the posture.
+        q: (nq,) the configuration.
         known: their places, those of the independent joints when left out.
     """
     start = np.zeros(extent(system))
@@ -119,13 +119,13 @@ def started_at(system: System, q: Vector, known: Collection[int] | None = None) 
 def ways_from(
     system: System, stages: Sequence[Stage], start: Vector, q: Vector, p: Vector
 ) -> tuple[int, ...]:
-    """The ways of all stages that lead to the closed posture q; as far as they do.
+    """The ways of all stages that lead to the closed configuration q; as far as they do.
 
     Args:
         system: whose loops they are.
         stages: in their order.
         start: all positions, the known ones as in q; spins are written into it.
-        q: (nq,) the posture.
+        q: (nq,) the configuration.
         p: (np,) parameters.
     """
     if not stages:
@@ -146,7 +146,7 @@ def ways_from(
     return longest
 
 
-def every_posture(
+def every_configuration(
     stages: Sequence[Stage], q: Vector, p: Vector, branch: tuple[str, ...] = ()
 ) -> Iterator[tuple[Vector, tuple[str, ...]]]:
     """All positions and the labels of the branch, one loop after the other; NaN ends a branch.
@@ -166,7 +166,7 @@ def every_posture(
         if np.all(np.isfinite(values[:, way])):
             longer = q.copy()
             longer[list(stage.places)] = values[:, way]
-            yield from every_posture(rest, longer, p, branch + ((label,) if label else ()))
+            yield from every_configuration(rest, longer, p, branch + ((label,) if label else ()))
 
 
 def _agree(system: System, places: Sequence[int], reached: Vector, q: Vector) -> bool:
@@ -175,7 +175,8 @@ def _agree(system: System, places: Sequence[int], reached: Vector, q: Vector) ->
     return bool(np.all(np.abs(gap[[k for k in places if k < system.nq]]) < _NEAR))
 
 
-# A plan held against postures: it must give them back, and none of its ways may leave loops open.
+# A plan held against configurations: it must give them back, and none of its ways may leave loops
+# open.
 #
 # Kernels use what must hold where a loop closes. In loops that move by their special measures
 # alone that may not be enough: such a plan is refused, and a way that never closes is left out.
@@ -188,13 +189,13 @@ _CHECKS = 3
 
 
 Start = Callable[[Vector], Vector]
-"""All positions from a posture (nq,), of which the known ones count."""
+"""All positions from a configuration (nq,), of which the known ones count."""
 
 
 def verified(
     system: System, stages: Sequence[Stage], started: Start | None = None
 ) -> tuple[Stage, ...]:
-    """The stages with the ways of the assembled posture, seen to hold at others as well.
+    """The stages with the ways of the assembled configuration, seen to hold at others as well.
 
     Args:
         system: whose loops they are.
@@ -204,12 +205,12 @@ def verified(
     Raises:
         NoClosedForm: a loop does not close so.
     """
-    start = started or (lambda posture: started_at(system, posture))
+    start = started or (lambda configuration: started_at(system, configuration))
     p = closure_parameters(system)
-    posture = np.array(system.posture)
-    nearby = Closing(system, p).nearby(posture, _MOVE, _TRIES, _SEED)
-    postures = [posture, *islice(nearby, _CHECKS)]
-    ways = [ways_from(system, stages, start(q), q, p) for q in postures]
+    configuration = np.array(system.configuration)
+    nearby = Closing(system, p).nearby(configuration, _MOVE, _TRIES, _SEED)
+    configurations = [configuration, *islice(nearby, _CHECKS)]
+    ways = [ways_from(system, stages, start(q), q, p) for q in configurations]
     shortest = min(ways, key=len)
     if len(shortest) < len(stages):
         raise NoClosedForm(
@@ -217,7 +218,7 @@ def verified(
             " directions of its axes suggest; use mbs.loops.solve without branch"
         )
     chosen = [replace(stage, chosen=way) for stage, way in zip(stages, ways[0], strict=True)]
-    starts = [start(q) for q in postures]
+    starts = [start(q) for q in configurations]
     return tuple(_without_open_ways(system, chosen, starts, p))
 
 
@@ -293,7 +294,9 @@ def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
     def build() -> tuple[Stage, ...]:
         q = SX.sym("q", extent(system))
         stages = ordered(system, known, q)
-        return verified(system, stages, lambda posture: started_at(system, posture, known))
+        return verified(
+            system, stages, lambda configuration: started_at(system, configuration, known)
+        )
 
     stages: tuple[Stage, ...] = system.cached(("closed form from", *sorted(known)), build)
     return stages
@@ -334,7 +337,7 @@ class _Work:
 
 
 def ordered(system: System, known: Collection[int], q: SX) -> list[Stage]:
-    """The stages in their order, not yet held against postures.
+    """The stages in their order, not yet held against configurations.
 
     Args:
         system: whose loops they are.
@@ -480,7 +483,9 @@ def completed(system: System, given: Sequence[int]) -> Known:
     Raises:
         NoClosedForm: balls or free bodies beside them move in some of their ways only.
     """
-    free = null_space(Closing(system, closure_parameters(system)).rows(regular_posture(system))[1])
+    free = null_space(
+        Closing(system, closure_parameters(system)).rows(regular_configuration(system))[1]
+    )
     independent = _raising(free, given, ())
     dependent = tuple(k for k in given if k not in independent)
     return Known(independent, dependent, held_beside(system, free, independent))
@@ -521,11 +526,11 @@ def _gain(free: Vector, taken: tuple[int, ...], places: tuple[int, ...]) -> int:
     return rank(free[[*taken, *places]], _LOOSE) - (rank(free[list(taken)], _LOOSE) if taken else 0)
 
 
-def regular_posture(system: System) -> Vector:
-    """A closed posture near the assembled one, where nothing is aligned by accident."""
-    posture = np.array(system.posture)
+def regular_configuration(system: System) -> Vector:
+    """A closed configuration near the assembled one, where nothing is aligned by accident."""
+    configuration = np.array(system.configuration)
     closing = Closing(system, closure_parameters(system))
-    return next(closing.nearby(posture, _REACH, _KNOWN_TRIES, _KNOWN_SEED), posture)
+    return next(closing.nearby(configuration, _REACH, _KNOWN_TRIES, _KNOWN_SEED), configuration)
 
 
 def _raising(free: Vector, candidates: Sequence[int], first: tuple[int, ...]) -> tuple[int, ...]:
@@ -597,8 +602,8 @@ def _plan_to(system: System, frame: str | int) -> Posed:
     known = {*held, *spin_places(welded).values(), *range(first, first + _POSE)}
     plan = Posed(tuple(ordered(welded, known, q)), first + _POSE, held)
 
-    def started(posture: Vector) -> Vector:
-        return plan.started(np.array(at(posture, p)[0]), posture)
+    def started(configuration: Vector) -> Vector:
+        return plan.started(np.array(at(configuration, p)[0]), configuration)
 
     return replace(plan, stages=verified(system, plan.stages, started))
 
@@ -610,7 +615,7 @@ def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
 
 def _posed_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
     """Independent joints that move while the frame stays."""
-    q = regular_posture(system)
+    q = regular_configuration(system)
     rows = np.vstack([Closing(system, p).rows(q)[1], np.array(at(q, p)[1])])
     return held_beside(system, null_space(rows), ())
 

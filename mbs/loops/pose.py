@@ -1,4 +1,4 @@
-"""The inverse geometric model by iteration: a posture that brings a frame to a pose."""
+"""The inverse geometric model by iteration: a configuration that brings a frame to a pose."""
 
 from __future__ import annotations
 
@@ -188,13 +188,13 @@ class Goal:
         return float(np.max(np.abs(self.residual(q)[0]) / self.sizes, initial=0.0))
 
     def nearest(self, q: Vector) -> Closed:
-        """The posture that Gauss-Newton reaches from q, (nq,), with loops and pose together."""
+        """The configuration that Gauss-Newton reaches from q, (nq,), loops and pose together."""
         tolerance = TOLERANCE * self.sizes
         root = gauss_newton(self.residual, q, tolerance=tolerance, iterations=_ITERATIONS)
         return Closed(root.x, root.residual, root.converged and self.closing.faces(root.x))
 
     def approached(self, q: Vector) -> Closed:
-        """The posture with closed loops that is, next to q, as near to the pose as it can be."""
+        """The configuration next to q with closed loops that is nearest to the pose."""
         root = levenberg_marquardt(lambda x: self.residual(x, _CLOSURE_WEIGHT), q)
         return self.closing.nearest(root.x)
 
@@ -265,11 +265,11 @@ def solve_pose(
     guess: Mapping[str, float] | Sequence[float] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Vector:
-    """A posture that closes the loops and brings a frame to a pose: the inverse geometric model.
+    """A configuration that closes the loops and brings a frame to a pose.
 
     Gauss-Newton on the closure rows and those of the pose together, every position of the tree
     free, from the guess and then from starts ever further away, always the same ones. Which of
-    several postures is found depends on the guess; `working_modes` looks for the others.
+    several configurations is found depends on the guess; `working_modes` looks for the others.
 
     Args:
         system: open or closed.
@@ -280,14 +280,14 @@ def solve_pose(
             the frame alone; the whole pose when left out. A robot of fewer than six freedoms needs
             a pose that it can take, or names, such as ["x", "y"] in a plane.
         guess: approximate positions, by name or all of them; the others as in the assembled
-            posture.
+            configuration.
         parameters: values of symbols, the others at their defaults.
 
     Returns:
         q (nq,) [rad or m]. The rows of the loops and of the pose are below 1e-12.
 
     Raises:
-        Unclosable: no posture was found; the message says how near the frame comes.
+        Unclosable: no configuration was found; the message says how near the frame comes.
         ModelError: there is no such frame, row or coordinate, or T is no pose.
     """
     wanted = goal(system, frame, T, rows, parameters)
@@ -302,14 +302,15 @@ def solve_pose(
 
 
 def _refusal(wanted: Goal, start: Vector, tried: Sequence[Closed]) -> str:
-    """Why no posture was found: the loops stay open, or the pose is out of reach."""
+    """Why no configuration was found: the loops stay open, or the pose is out of reach."""
     closing = wanted.closing
     best = sorted(tried, key=lambda found: found.residual)[:_FEWEST]
     near = [wanted.approached(q) for q in (*(found.q for found in best), start)]
     gaps = [wanted.gap(found.q) for found in near if found.is_closed]
     title = f"{closing.system.name}: frame {quoted(wanted.frame)} cannot be brought to this pose"
     if not gaps:
-        return f"{title}; the best posture found leaves {closing.gap(best[0].q)}; change the guess"
+        left = closing.gap(best[0].q)
+        return f"{title}; the best configuration found leaves {left}; change the guess"
     distance, angle = min(gaps, key=lambda gap: gap[0] ** 2 + gap[1] ** 2)
     away = [f"{round(distance, 6):.4g} m away"] * bool(set(wanted.rows) & set("xyz"))
     away += [f"turned by {round(angle, 6):.4g} rad"] * bool(
@@ -318,6 +319,7 @@ def _refusal(wanted: Goal, start: Vector, tried: Sequence[Closed]) -> str:
     named = wanted.rows != WHOLE or len(closing.system.active) >= 6
     remedy = "" if named else f"name the rows=[...] that count, of {', '.join(ROWS)}, or "
     return (
-        f"{title}; the nearest posture found with closed loops leaves it {' and '.join(away)};"
+        f"{title}; the nearest configuration found with closed loops leaves it"
+        f" {' and '.join(away)};"
         f" {remedy}give another pose or guess"
     )

@@ -83,7 +83,7 @@ def kept_rows(system: System) -> list[int]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeterminingRows:
-    """Rows from which the passive velocities follow in every posture that leads them.
+    """Rows from which the passive velocities follow in every configuration that leads them.
 
     These are the kept rows; all of them, by least squares, where no choice of rows is independent
     everywhere: as rows agree with each other on closed loops, the solution is the same.
@@ -196,7 +196,7 @@ def _against_slip(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
 #
 # Rows are lengths or cosines, columns belong to angles or displacements. A displacement is
 # measured by the length that an angle moves the rows of positions, and a row by its own size at
-# the assembled posture.
+# the assembled configuration.
 
 
 _VANISHING = 1e-9
@@ -223,7 +223,7 @@ def scales(system: System) -> Scales:
     """The scales of a system; ones where a symbol has no value, and no rows in an open chain."""
 
     def build() -> Scales:
-        J = np.array(constraint_jacobian(system)(list(system.posture), system.p_default))
+        J = np.array(constraint_jacobian(system)(list(system.configuration), system.p_default))
         if J.size == 0 or not np.all(np.isfinite(J)):
             return Scales(np.ones(len(J)), 1.0)
         units = [speed.unit for speed in system.speeds]

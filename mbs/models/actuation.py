@@ -17,7 +17,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.loops.closing import closure_parameters
 from mbs.loops.velocity import constraint_jacobian
-from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
+from mbs.models.symbols import ModelSymbols, configuration_check, symbols_of
 from mbs.solvers.linear import solve_square
 from mbs.solvers.rank import independent_rows, null_space_of
 from mbs.spatial import zeros
@@ -44,7 +44,7 @@ def actuation_matrix(system: System) -> Function:
         return [("q", s.q)], [("B", SX(_velocities(system, s).T))]
 
     require_system(system)
-    return model_function(system, ("actuation",), build, posture_check(system, "independent"))
+    return model_function(system, ("actuation",), build, configuration_check(system, "independent"))
 
 
 def actuation_null_space(system: System) -> Function:
@@ -76,7 +76,7 @@ def actuation_null_space(system: System) -> Function:
 
     require_system(system)
     return model_function(
-        system, ("actuation_null_space",), build, posture_check(system, "independent")
+        system, ("actuation_null_space",), build, configuration_check(system, "independent")
     )
 
 
@@ -132,7 +132,7 @@ def _independent_motors(system: System) -> list[int]:
     """Among the motors, by their place, as many as drive the mechanism; the active ones first."""
     if system.closure is None:
         return list(range(system.nv))
-    J = np.array(constraint_jacobian(system)(system.posture, closure_parameters(system)))
+    J = np.array(constraint_jacobian(system)(system.configuration, closure_parameters(system)))
     free = null_space_of(J, system.closure.mobility)[list(system.motors)]
     first = tuple(k for k, motor in enumerate(system.motors) if motor in system.active)
     return independent_rows([free], system.closure.mobility, first)

@@ -95,16 +95,16 @@ def loop_rows(system: System, s: ModelSymbols) -> tuple[SX, SX]:
 
 
 def inertia_size(system: System, A: SX, s: ModelSymbols) -> float:
-    """The mean diagonal element of A at the assembled posture; 1 where symbols have no value."""
+    """The mean diagonal element of A as assembled; 1 where symbols have no value."""
     if any(p.default is None for p in system.parameters):
         return 1.0
     trace = casadi.Function("trace", [s.q, system.p], [casadi.trace(A)])
-    value = float(trace(np.array(system.posture), system.p_default))
+    value = float(trace(np.array(system.configuration), system.p_default))
     return value / system.nv if value > 0 else 1.0
 
 
 def every_velocity_moves_its_link(system: System) -> bool:
-    """Whether the inertia matrix of the tree is known to be positive definite in every posture.
+    """Whether the inertia matrix of the tree is known to be positive definite everywhere.
 
     It is where every link is a body, not one of grouped parameters, with inertia of its own
     against the velocity of its joint: what the links behind it add to a pivot is never negative.

@@ -213,7 +213,7 @@ class ContactPhases:
             touching: the points that do.
             form: one of the five words of `mbs.models.dae`.
             q0: positions at the start by name, which are kept; the others move from the assembled
-                posture as little as the points and the loops need.
+                configuration as little as the points and the loops need.
             v0: velocities at the start by name, or all of them; the others are the smallest.
             tau0: efforts of motors at the start by name, the others zero.
             parameters: values of symbols at the start, the others at their defaults.
@@ -221,7 +221,7 @@ class ContactPhases:
         Raises:
             ModelError: as of `accelerations` and `mbs.models.dae`; or the points allow no motion
                 with the velocities v0.
-            Unclosable: no posture with the positions q0 lets all of them touch.
+            Unclosable: no configuration with the positions q0 lets all of them touch.
         """
         ways, begin = self._ways(touching), PhaseStart(q0, v0, tau0, parameters)
         explicit = self.accelerations(touching)

@@ -1,4 +1,4 @@
-"""Coordinates that rigid stops and dry friction may hold: modes, accelerations, impacts.
+"""Coordinates that rigid stops and Coulomb friction may hold: modes, accelerations, impacts.
 
 A mode is constant between events. Every such coordinate has two: its place, -1 at the lower limit,
 1 at the upper one, 0 between them; and the direction in which it slides, 0 where friction holds it.
@@ -47,7 +47,7 @@ class Modes:
 
     Attributes:
         place: (k, 1) -1 at the lower limit, 1 at the upper one, 0 between.
-        slide: (k, 1) direction of sliding against dry friction, 0 for none.
+        slide: (k, 1) direction of sliding against Coulomb friction, 0 for none.
         held: (k, 1) 1 where the coordinate is held at rest, 0 where it moves.
     """
 
@@ -166,7 +166,7 @@ class Contacts:
 
 
 def contacts_of(system: System) -> Contacts:
-    """The coordinates of a system with rigid stops and dry friction.
+    """The coordinates of a system with rigid stops and Coulomb friction.
 
     Raises:
         ModelError: two elements of one kind act on a coordinate.
@@ -176,7 +176,7 @@ def contacts_of(system: System) -> Contacts:
 
 
 def require_no_contacts(system: System, what: str) -> None:
-    """Refuse a system with rigid stops or dry friction, for what does not know them.
+    """Refuse a system with rigid stops or Coulomb friction, for what does not know them.
 
     Raises:
         ModelError: names the element, and what to use instead.
@@ -205,25 +205,27 @@ def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) 
     for name, number in zip(contacts.names, contacts.velocities, strict=True):
         if number in driven:
             raise ModelError(
-                f"{system.name}: motion prescribes {name}, on which a rigid stop or dry friction"
+                f"{system.name}: motion prescribes {name}, on which a rigid stop or Coulomb"
+                " friction"
                 " acts; leave out one of the two"
             )
         if driven and not are_independent(system, (*driven, number)):
             raise ModelError(
                 f"{system.name}: the motions that are prescribed move {name} through the loops, on"
-                " which a rigid stop or dry friction acts; use a JointStop or JointFriction there"
+                " which a rigid stop or Coulomb friction acts; use a JointStop or JointFriction"
+                " there"
             )
 
 
 def require_lasting_rows(system: System, contacts: Contacts) -> None:
-    """Refuse contacts on loops whose independent rows change with the posture.
+    """Refuse contacts on loops whose independent rows change with the configuration.
 
     Raises:
         ModelError: which contact, and the remedy.
     """
     if len(contacts) and system.closure is not None and system.closure.varies:
         raise ModelError(
-            f"{system.name}: the independent rows of its loops change with the posture, which"
+            f"{system.name}: the independent rows of its loops change with the configuration, which"
             f" the contact on {contacts.names[0]} does not follow; use a JointStop or"
             " JointFriction there"
         )

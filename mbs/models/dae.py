@@ -428,7 +428,7 @@ def dae(
     Args:
         system: open or closed.
         form: one of the five words.
-        q0: positions at the start by name, as in `mbs.simulate.run`: the assembled posture.
+        q0: positions at the start by name, as in `mbs.simulate.run`: the assembled configuration.
         v0: velocities at the start by name; at rest when left out.
         tau0: efforts of motors at the start by name, the others zero; they tell u0 and z0.
         parameters: values of symbols at the start, the others at their defaults.
@@ -491,7 +491,7 @@ def _winds(system: System) -> bool:
 
 
 def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
-    """The labels of the closed posture q."""
+    """The labels of the closed configuration q."""
     stages = plan(system)
     ways = ways_at(system, stages, q, p)
     if len(ways) < len(stages):

@@ -62,7 +62,7 @@ class ContactPoint:
         name: of the contact.
         frame: a body, a named frame, or the number of a link.
         plane: likewise, 0 for the base; its z points from the ground to the point.
-        friction: coefficient of dry friction, None where the ground never lets the point slip.
+        friction: coefficient of Coulomb friction, None where the ground never lets the point slip.
     """
 
     name: str
@@ -242,10 +242,11 @@ def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
 
 Array = NDArray[np.float64]
 
-_POSTURES, _REACH, _SEED = 4, 0.05, 20
-"""Postures near the start at which dependent rows show, and how far from it they are tried."""
+_CONFIGURATIONS, _REACH, _SEED = 4, 0.05, 20
+"""Configurations near the start at which dependent rows show, and how far from it they are
+tried."""
 _OFF = 1e-10
-"""How far a given posture may be from touching by rounding [m]."""
+"""How far a given configuration may be from touching by rounding [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,15 +310,15 @@ class Standing:
         return distances, drifts
 
     def independent(self, q: Array, p: Array) -> tuple[int, ...]:
-        """The held elements that depend neither on loops nor on each other near a posture q.
+        """The held elements that depend neither on loops nor on each other near a configuration q.
 
         Rows that depend on others only there, as those of a straight leg, are kept.
         """
         held, loops = self.held, kept_rows(self.system)
         numbers = _numbers(self)
         matrices = []
-        for posture in self._near(q, p):
-            _, _, J_loops, _, J, _ = (np.array(x) for x in numbers(posture, 0 * q[:1], p))
+        for configuration in self._near(q, p):
+            _, _, J_loops, _, J, _ = (np.array(x) for x in numbers(configuration, 0 * q[:1], p))
             matrices.append(np.vstack([J_loops[loops], J[held]]))
         ranks = [rank(matrix) for matrix in matrices]
         best = [m for m, r in zip(matrices, ranks, strict=True) if r == max(ranks)]
@@ -326,14 +327,14 @@ class Standing:
         return tuple(held[k - len(loops)] for k in chosen if k >= len(loops))
 
     def _near(self, q: Array, p: Array) -> Iterator[Array]:
-        """The posture q, and others that touch and close the loops too."""
+        """The configuration q, and others that touch and close the loops too."""
         yield q
         rng, function = np.random.default_rng(_SEED), _touching(self)
 
         def residual(x: Array) -> tuple[Array, Array]:
             return _pair(function(x, p))
 
-        for _ in range(_POSTURES):
+        for _ in range(_CONFIGURATIONS):
             root = gauss_newton(residual, q + rng.uniform(-_REACH, _REACH, len(q)))
             if root.converged:
                 yield root.x
@@ -342,7 +343,7 @@ class Standing:
         """Positions (nq,) at which the points touch, and velocities (nv,) that keep them there.
 
         Raises:
-            Unclosable: no posture with the positions that are given touches.
+            Unclosable: no configuration with the positions that are given touches.
             ModelError: a name is unknown, or the velocities that are given do not fit.
         """
         system = self.system
@@ -361,7 +362,8 @@ class Standing:
         missing = _pair(function(q, p))[0]
         if np.abs(missing).max(initial=0) > _OFF:
             raise Unclosable(
-                f"{system.name}: no posture near the start lets {self.names or 'no point'} touch,"
+                f"{system.name}: no configuration near the start lets {self.names or 'no point'}"
+                " touch,"
                 f" {np.abs(missing).max():.2g} m is missing; give fewer positions in q0"
             )
         return q, self._velocity(q, p, begin.v0)

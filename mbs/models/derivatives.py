@@ -24,9 +24,9 @@ from mbs.models.inverse_dynamics import tree_efforts
 from mbs.models.symbols import (
     ModelSymbols,
     check_coordinates,
+    configuration_check,
     is_reduced,
     outputs_of,
-    posture_check,
     solution_order,
     surroundings,
     symbols_of,
@@ -258,7 +258,7 @@ def inverse_dynamics_derivatives(
             return inputs, _outputs("tau" + s.suffix, s, names, blocks, tau)
 
         key = ("idm_derivatives", chosen, coordinates, names)
-        return model_function(system, key, symbols, posture_check(system, coordinates))
+        return model_function(system, key, symbols, configuration_check(system, coordinates))
 
     candidates = ("ad",) if is_reduced(system, coordinates) else _compared(system, "analytical")
     return _chosen(system, ("idm_derivatives", coordinates, names), method, build, candidates)
@@ -320,7 +320,7 @@ def direct_dynamics_derivatives(
         if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
             staged: Function = system.cached(key, lambda: _staged(system, names))
             return staged
-        return model_function(system, key, symbols, posture_check(system, coordinates))
+        return model_function(system, key, symbols, configuration_check(system, coordinates))
 
     candidates = ("implicit",) if system.is_closed else _compared(system, "implicit")
     return _chosen(system, ("ddm_derivatives", coordinates, names), method, build, candidates)

@@ -20,8 +20,8 @@ from mbs.models.symbols import (
     ModelSymbols,
     Surroundings,
     check_coordinates,
+    configuration_check,
     exerted,
-    posture_check,
     solution_order,
     surroundings,
     symbols_of,
@@ -59,7 +59,7 @@ def inertia_matrix(system: System, coordinates: str = "independent") -> Function
         return [("q", s.q)], [("A" + s.suffix, A)]
 
     return model_function(
-        system, ("inertia", coordinates), build, posture_check(system, coordinates)
+        system, ("inertia", coordinates), build, configuration_check(system, coordinates)
     )
 
 
@@ -133,7 +133,7 @@ def independent_dynamics(system: System) -> Function:
         return [("q", s.q), ("v" + s.suffix, s.v), (name, tau)], [("a" + s.suffix, a)]
 
     return model_function(
-        system, ("ddm", "independent"), build, posture_check(system, "independent")
+        system, ("ddm", "independent"), build, configuration_check(system, "independent")
     )
 
 
@@ -184,7 +184,7 @@ def _model(
         system,
         ("ddm", method, coordinates, f_ext, moving_base),
         build,
-        posture_check(system, coordinates),
+        configuration_check(system, coordinates),
     )
 
 
@@ -229,15 +229,15 @@ def _loose_in_tree(system: System) -> int | None:
     both = casadi.horzcat(*inertia_pivots(system.tree, poses))
     pivots = Function("pivots", [q, system.p], [both], {"cse": True})
     rng = np.random.default_rng(_SEED)
-    posture = np.array(system.posture) + rng.uniform(-1.0, 1.0, system.nq)
-    free, locked = np.array(pivots(posture, system.p_default)).T
+    configuration = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
+    free, locked = np.array(pivots(configuration, system.p_default)).T
     moves = free > _VANISHING * np.maximum(locked, 1e-30)
     return None if moves.all() else int(np.max(np.flatnonzero(~moves)))
 
 
 def _loose_in_loops(system: System) -> int | None:
     """An independent velocity of a closed system that moves no inertia."""
-    A = np.array(inertia_matrix(system)(list(system.posture)))
+    A = np.array(inertia_matrix(system)(list(system.configuration)))
     size = 1 / np.sqrt(np.maximum(np.diag(A), 1e-30))
     A = A * np.outer(size, size)
     return None if rank(A) == len(A) else first_best(np.abs(np.linalg.svd(A)[2][-1]))
@@ -307,10 +307,10 @@ def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
 
 
 def are_independent(system: System, numbers: tuple[int, ...]) -> bool:
-    """Whether the loops leave these velocities free of each other at the assembled posture."""
+    """Whether the loops leave these velocities independent in the assembled configuration."""
     if not system.is_closed:
         return True
     p = [system.p_default] if system.parameters else []
-    J = np.array(closure_jacobian(system)(list(system.posture), *p))
+    J = np.array(closure_jacobian(system)(list(system.configuration), *p))
     E = np.eye(system.nv)[list(numbers)]
     return rank(np.vstack([J, E])) == rank(J) + len(numbers)

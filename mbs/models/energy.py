@@ -6,7 +6,7 @@ from casadi import Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.models.symbols import posture_check, symbols_of
+from mbs.models.symbols import configuration_check, symbols_of
 from mbs.recursions.energy import kinetic_energy, potential_energy
 from mbs.recursions.force_elements import element_energy
 from mbs.recursions.newton_euler import spring_energy
@@ -37,5 +37,5 @@ def energy(system: System, coordinates: str = "independent") -> Function:
         return [("q", s.q), ("v" + s.suffix, s.v)], [("E", E), ("U", U)]
 
     return model_function(
-        system, ("energy", coordinates), build, posture_check(system, coordinates)
+        system, ("energy", coordinates), build, configuration_check(system, coordinates)
     )

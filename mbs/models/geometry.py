@@ -80,9 +80,9 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
     """``dgm(q) -> T``: the pose of the terminal frame seen from the base.
 
     For a closed system the input is q_a, the positions of the independent joints; the others
-    follow on the branch of the assembled posture: in closed form where `mbs.loops.function` knows
-    one, else in small steps. Where that leads nowhere T is NaN, and a call with numbers raises
-    Unclosable.
+    follow on the branch of the assembled configuration: in closed form where `mbs.loops.function`
+    knows one, else in small steps. Where that leads nowhere T is NaN, and a call with numbers
+    raises Unclosable.
 
     Source: Khalil & Creusot 1997, section 3.1.
 
@@ -131,7 +131,7 @@ class _FollowedGeometry(LoopFunction):
             solve(self.system, q_a.tolist(), parameters=dict(zip(names, p.tolist(), strict=True)))
         except Unclosable as error:
             return str(error)
-        return f"{self.system.name}: no posture of the assembled branch has these positions"
+        return f"{self.system.name}: no configuration of the assembled branch has these positions"
 
 
 def _followed_geometry(system: System, name: str | int, pose: Function) -> Function:

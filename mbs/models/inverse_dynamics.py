@@ -11,8 +11,8 @@ from mbs.models.actuation import effort_output
 from mbs.models.symbols import (
     ModelSymbols,
     Surroundings,
+    configuration_check,
     exerted,
-    posture_check,
     surroundings,
     symbols_of,
 )
@@ -31,7 +31,7 @@ def inverse_dynamics(
 ) -> Function:
     """``idm(q, v, a) -> tau``: the joint efforts that produce the accelerations a.
 
-    Rotors, viscous and dry friction and springs of the joints are included, and force elements.
+    Rotors, viscous and Coulomb friction and springs of the joints are included, and force elements.
     Where a closed system has more motors than independent joints, they are idm(q, v_a, a_a) ->
     tau_m, the efforts of all `system.motors` with the least sum of squares of the numbers in N m
     and N; `actuation_null_space` has the other choices.
@@ -61,7 +61,10 @@ def inverse_dynamics(
         return inputs, [effort_output(system, s, tau)], names
 
     return model_function(
-        system, ("idm", f_ext, moving_base, coordinates), build, posture_check(system, coordinates)
+        system,
+        ("idm", f_ext, moving_base, coordinates),
+        build,
+        configuration_check(system, coordinates),
     )
 
 
@@ -91,7 +94,7 @@ def bias(
         return inputs, [("H" + s.suffix, H)], names
 
     return model_function(
-        system, ("bias", moving_base, coordinates), build, posture_check(system, coordinates)
+        system, ("bias", moving_base, coordinates), build, configuration_check(system, coordinates)
     )
 
 
@@ -124,7 +127,10 @@ def gravity_effort(
         return [("q", s.q), *extra], [("Q" + s.suffix, Q)]
 
     return model_function(
-        system, ("gravity", moving_base, coordinates), build, posture_check(system, coordinates)
+        system,
+        ("gravity", moving_base, coordinates),
+        build,
+        configuration_check(system, coordinates),
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import Named, PostureCheck, model_function, require_system
+from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.examine import LED
 from mbs.loops.reduction import reduction
@@ -46,8 +46,8 @@ class Selection:
     names: tuple[str, ...]
 
     @property
-    def check(self) -> PostureCheck | None:
-        """What refuses the postures that functions of the matrix cannot take."""
+    def check(self) -> ConfigurationCheck | None:
+        """What refuses the configurations that functions of the matrix cannot take."""
         return LED if self.reduced else None
 
     def of(self, system: System) -> tuple[SX, SquareJacobian]:
@@ -68,14 +68,14 @@ class Selection:
         """The same of a matrix that has an inverse.
 
         Raises:
-            ModelError: it is singular in every posture.
+            ModelError: it is singular in every configuration.
         """
         q, square = self.of(system)
         if square.blocks is None:
             raise ModelError(
                 f"{system.name}: rows {', '.join(map(str, self.rows))} and columns"
                 f" {', '.join(self.names)} of the Jacobian of {quoted(self.frame)} are singular in"
-                " every posture; name other rows or columns"
+                " every configuration; name other rows or columns"
             )
         return q, square
 
@@ -187,7 +187,7 @@ def inverse_jacobian(
 
     Raises:
         ModelError: no such frame, row or column, not as many rows as columns, or the matrix is
-            singular in every posture.
+            singular in every configuration.
     """
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
 
@@ -247,7 +247,7 @@ def jacobian_determinant(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """``determinant(q) -> det``: zero in singular postures.
+    """``determinant(q) -> det``: zero in singular configurations.
 
     The product of the determinants of the blocks of `inverse_jacobian`; `singularities` gives
     its factors one by one.

@@ -22,8 +22,8 @@ from mbs.models.symbols import (
     ModelSymbols,
     Surroundings,
     check_coordinates,
+    configuration_check,
     exerted,
-    posture_check,
     surroundings,
     symbols_of,
     wrenches_on_links,
@@ -127,8 +127,8 @@ def joint_wrenches(
     independent coordinates the independent joints have the efforts that the motion needs and the
     others none; with tree coordinates the input tau gives them all. Along closure rows that were
     dropped (`system.loops[..].dropped`) rigid bodies do not determine the forces; the wrenches are
-    those with zero there. In over-constrained loops whose independent rows change with the posture
-    (`system.closure.varies`) they are those with the smallest efforts of rows.
+    those with zero there. In over-constrained loops whose independent rows change with the
+    configuration (`system.closure.varies`) they are those with the smallest efforts of rows.
 
     Source: Khalil & Creusot 1997, eq. 15-19 and 22; Haug 1989 for cut joints.
 
@@ -156,7 +156,7 @@ def joint_wrenches(
         return [*inputs, *around.inputs], [("F", F)]
 
     key = ("joint_wrenches", f_ext, moving_base, coordinates)
-    return model_function(system, key, build, posture_check(system, coordinates))
+    return model_function(system, key, build, configuration_check(system, coordinates))
 
 
 def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None]:

@@ -12,8 +12,8 @@ from mbs.loops.reduction import reduction
 from mbs.models.symbols import (
     ModelSymbols,
     check_coordinates,
+    configuration_check,
     is_reduced,
-    posture_check,
     symbols_of,
 )
 from mbs.recursions.jacobian import VelocityTarget, cheapest_jacobian, renaud
@@ -89,10 +89,10 @@ def jacobian(
             system,
             ("jacobian", frame, expressed_in, coordinates),
             full,
-            posture_check(system, coordinates),
+            configuration_check(system, coordinates),
         )
     key = ("jacobian_renaud", frame, expressed_in, coordinates, intermediate, reference)
-    return model_function(system, key, factors, posture_check(system, coordinates))
+    return model_function(system, key, factors, configuration_check(system, coordinates))
 
 
 def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
@@ -152,7 +152,7 @@ def link_velocities(
         system,
         ("link_velocities", moving_base, coordinates),
         build,
-        posture_check(system, coordinates),
+        configuration_check(system, coordinates),
     )
 
 
@@ -189,7 +189,7 @@ def link_accelerations(
         system,
         ("link_accelerations", moving_base, coordinates),
         build,
-        posture_check(system, coordinates),
+        configuration_check(system, coordinates),
     )
 
 
@@ -239,7 +239,7 @@ def jacobian_dot_velocity(
         return [*_state(s), *extra], [("jpqp", casadi.vertcat(*parts))]
 
     key = ("jpqp", frame, expressed_in, moving_base, coordinates)
-    return model_function(system, key, build, posture_check(system, coordinates))
+    return model_function(system, key, build, configuration_check(system, coordinates))
 
 
 def _state(s: ModelSymbols) -> Named:

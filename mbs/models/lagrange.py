@@ -10,7 +10,7 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
 from mbs.models.inverse_dynamics import static_efforts, tree_gravity
-from mbs.models.symbols import ModelSymbols, posture_check, symbols_of
+from mbs.models.symbols import ModelSymbols, configuration_check, symbols_of
 from mbs.operations.counts import cheapest
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.lagrange import LagrangeForm, christoffel, lagrange_form
@@ -78,7 +78,7 @@ def _model(system: System, method: str, coordinates: str) -> Function:
         return [("q", s.q), ("v" + s.suffix, s.v)], [(n + s.suffix, x) for n, x in outputs]
 
     return model_function(
-        system, ("lagrange", method, coordinates), build, posture_check(system, coordinates)
+        system, ("lagrange", method, coordinates), build, configuration_check(system, coordinates)
     )
 
 

@@ -29,7 +29,7 @@ from mbs.models.symbols import (
     ModelSymbols,
     Surroundings,
     check_coordinates,
-    posture_check,
+    configuration_check,
     surroundings,
     symbols_of,
 )
@@ -84,7 +84,7 @@ def measurements(system: System, coordinates: str = "independent") -> Function:
         inputs, a, tau = motion_inputs(system, s)
         return inputs, readings(system, s, a, tau, surroundings(system))
 
-    check = posture_check(system, coordinates)
+    check = configuration_check(system, coordinates)
     return model_function(system, ("measurements", coordinates), build, check)
 
 

@@ -1,4 +1,4 @@
-"""Singular postures of a frame: the determinant of its Jacobian as a product of factors."""
+"""Singular configurations of a frame: the determinant of its Jacobian as a product of factors."""
 
 from __future__ import annotations
 
@@ -387,7 +387,7 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SingularFactor:
-    """A factor of the determinant: the posture is singular where it is zero.
+    """A factor of the determinant: the configuration is singular where it is zero.
 
     Attributes:
         text: the factor as one reads it; S23 is sin(q2 + q3).
@@ -411,7 +411,7 @@ class Singularities:
 
     Attributes:
         constant: the factor that depends on no position, as one reads it.
-        factors: the others; none when no posture is singular.
+        factors: the others; none when no configuration is singular.
         determinant: ``determinant(q) -> det``.
     """
 
@@ -449,7 +449,7 @@ def singularities(
         coordinates: of a closed system, "independent" or "tree".
 
     Returns:
-        The factors; a constant "0" and no factor when every posture is singular.
+        The factors; a constant "0" and no factor when every configuration is singular.
 
     Raises:
         ModelError: no such frame, row or column, or not as many rows as columns.

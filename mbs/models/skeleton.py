@@ -1,4 +1,4 @@
-"""The skeleton of a mechanism: points, axes and lines to draw it with, at any posture."""
+"""The skeleton of a mechanism: points, axes and lines to draw it with, at any configuration."""
 
 from __future__ import annotations
 

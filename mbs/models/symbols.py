@@ -8,7 +8,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.model_function import Named, PostureCheck, model_function, require_system
+from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
 from mbs.loops.examine import LED
 from mbs.loops.reduction import Reduction, reduction
@@ -70,8 +70,8 @@ class ModelSymbols:
         return label, SX.sym(label, self.size)
 
 
-def posture_check(system: System, coordinates: str) -> PostureCheck | None:
-    """What refuses the postures that a model in these coordinates cannot take.
+def configuration_check(system: System, coordinates: str) -> ConfigurationCheck | None:
+    """What refuses the configurations that a model in these coordinates cannot take.
 
     Those of a reduced model close the loops, and its independent joints lead the others there.
     """

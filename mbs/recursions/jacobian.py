@@ -203,9 +203,10 @@ def _moved(rotation: Rotation, column: Column) -> Column:
     return k, V, w
 
 
-# Where the entries of a Jacobian are zero or constant, frame by frame, found on random postures.
+# Where the entries of a Jacobian are zero or constant, frame by frame, found on random
+# configurations.
 #
-# An entry that is zero at several random postures with random lengths is zero always; so the
+# An entry that is zero at several random configurations with random lengths is zero always; so the
 # structure is known before a symbol is touched.
 
 
@@ -218,7 +219,7 @@ _ZERO = 1e-10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """A frame's Jacobian and the frames on the way to it, at random postures.
+    """A frame's Jacobian and the frames on the way to it, at random configurations.
 
     Lengths are parts of the largest one, so that a small mechanism has no more zeros than a large
     one.
@@ -283,7 +284,7 @@ class Survey:
 
 
 def survey(target: VelocityTarget) -> Survey:
-    """The Jacobian of a frame at random postures and parameters."""
+    """The Jacobian of a frame at random configurations and parameters."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     path = tree.path(frame[0])
     poses = base_poses(tree, link_poses(tree, q))
@@ -330,7 +331,7 @@ def nonzero(values: Array) -> NDArray[np.bool_]:
 
 
 def varying(values: Array) -> NDArray[np.bool_]:
-    """Where a matrix, (samples, ...), changes from posture to posture."""
+    """Where a matrix, (samples, ...), changes from configuration to configuration."""
     return nonzero(values - values[0])
 
 

@@ -139,7 +139,7 @@ def square_jacobian(
 
 
 def _values(target: VelocityTarget, A: SX) -> Array:
-    """(samples, ...) a matrix at the postures of a survey."""
+    """(samples, ...) a matrix at the configurations of a survey."""
     f = Function("f", [target.q, target.p], [casadi.densify(A)])
     samples = random_samples(target.tree, target.p.numel())
     return np.array([np.array(f(*sample)) for sample in samples])

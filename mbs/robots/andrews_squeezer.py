@@ -6,7 +6,8 @@ from mbs.components import Body, Mechanism, Revolute, Spring
 
 _SOURCE = (
     "Schiehlen 1990, Multibody Systems Handbook; Hairer & Wanner 1996, section VII.7; Mazzia &"
-    " Magherini 2008, Test Set for IVP Solvers, Andrews' squeezing mechanism, whose initial posture"
+    " Magherini 2008, Test Set for IVP Solvers, Andrews' squeezing mechanism, whose initial"
+    " configuration"
     " this is"
 )
 _GUESS = {

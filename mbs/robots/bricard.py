@@ -20,8 +20,8 @@ def bricard() -> Mechanism:
 
     Five rods of 1 m, 1 kg and 0.1 m x 0.1 m section run along the edges of a unit cube, along x,
     -y, z, -x and y; the ground is the sixth edge. Joints j1 .. j6 about y, z, x, y, z, x of the
-    assembled posture, where all are zero; j6, back on the ground at (0, 0, 1), closes the loop.
-    Gravity is along -y; it starts at rest. Its output is P3, the end of the third rod.
+    assembled configuration, where all are zero; j6, back on the ground at (0, 0, 1), closes the
+    loop. Gravity is along -y; it starts at rest. Its output is P3, the end of the third rod.
 
     Source: Gonzalez et al. 2006, problem A04; Bricard 1897.
     """

@@ -1,4 +1,4 @@
-"""The arm of Manseur and Doty, which reaches a pose in sixteen postures."""
+"""The arm of Manseur and Doty, which reaches a pose in sixteen configurations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SOURCE = (
 
 
 def manseur_doty() -> Mechanism:
-    """Manseur and Doty's arm: six revolute joints; some poses have sixteen real postures.
+    """Manseur and Doty's arm: six revolute joints; some poses have sixteen real configurations.
 
     Frame 6 is on the last joint; the last twist of the table, one degree about its x axis, belongs
     to the hand and is left out.

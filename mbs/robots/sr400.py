@@ -19,7 +19,7 @@ def sr400() -> Mechanism:
 
     Actuated are q1, q2, q4, q5, q6 and q7; the loop is opened at q9. It is closed where
     q3 = pi/2 - q2 + q7, q8 = q2 - q7 and q9 = pi - q8, and singular where q2 = q7, as at the zero
-    posture; it is assembled at q2 = -pi/2, the arm upright.
+    configuration; it is assembled at q2 = -pi/2, the arm upright.
 
     Source: frames of Khalil & Dombre 2002, section 7 (after Khalil & Kleinfinger 1986), d2 = d7,
     d9 = d3, d10 = -d8, gamma10 = pi/2. Lengths, masses and inertias are illustrative.

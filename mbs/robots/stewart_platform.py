@@ -24,8 +24,8 @@ def stewart_platform() -> Mechanism:
 
     The lower joints lie in pairs on a circle of 0.6 m radius, the upper ones on one of 0.3 m,
     pairs facing gaps; the platform is assembled level, 0.7 m above the base. There all
-    coordinates of the legs are zero: leg<k> is the lengthening of leg k from that posture. The
-    frame `platform` is in the middle of the upper circle.
+    coordinates of the legs are zero: leg<k> is the lengthening of leg k from that configuration.
+    The frame `platform` is in the middle of the upper circle.
 
     Source: structure of Gough & Whitehall 1962 and Stewart 1965. Lengths, masses and inertias are
     illustrative.
@@ -50,7 +50,7 @@ def stewart_platform() -> Mechanism:
 
 
 def leg_ends() -> tuple[Points, Points]:
-    """Lower and upper ends of the legs at the assembled posture, (6, 3) each [m]."""
+    """Lower and upper ends of the legs at the assembled configuration, (6, 3) each [m]."""
     thirds = np.repeat(2 * pi / 3 * np.arange(3), 2)
     sides = np.tile([-1.0, 1.0], 3)
     low, high = thirds + sides * (pi / 3 - _HALF_ANGLE), thirds + sides * _HALF_ANGLE

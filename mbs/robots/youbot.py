@@ -19,7 +19,7 @@ def youbot() -> Mechanism:
     It reaches a surface of poses, not all of them. At zero it stands upright; q1 and q5 turn about
     upward axes. The base is below axis 1; frame 5 is on the last joint.
 
-    Source: joint origins and ranges of youbot_description, measured from the upright posture.
+    Source: joint origins and ranges of youbot_description, measured from the upright configuration.
     Masses, inertias and rotors are illustrative.
     """
     half = pi / 2

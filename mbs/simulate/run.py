@@ -41,7 +41,7 @@ from mbs.solvers.integrate import is_compilable
 from mbs.solvers.problem import Event, failed
 from mbs.text import did_you_mean, quoted
 
-# Rigid stops and dry friction in a simulation: how they start, and what a result tells of them.
+# Rigid stops and Coulomb friction in a simulation: how they start, and what a result tells of them.
 
 
 Array = NDArray[np.float64]
@@ -65,11 +65,11 @@ class ContactMotion:
 
 
 def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> None:
-    """Refuse what rigid stops and dry friction cannot be simulated with.
+    """Refuse what rigid stops and Coulomb friction cannot be simulated with.
 
     Raises:
         ModelError: a motion is prescribed where one acts, two of one kind act on one coordinate,
-            or the loops are over-constrained in a way that changes with the posture.
+            or the loops are over-constrained in a way that changes with the configuration.
     """
     contacts = contacts_of(system)
     require_undriven(system, contacts, [motion.velocity for motion in motions])
@@ -294,7 +294,7 @@ class Leg:
         state: its equations.
         times: (m,) s, that were reached.
         x: (m, nx) states at these times.
-        contact: what rigid stops and dry friction do meanwhile, None where there are none.
+        contact: what rigid stops and Coulomb friction do meanwhile, None where there are none.
     """
 
     state: FullState
@@ -446,7 +446,7 @@ def _with_other_rows(
     p: Sequence[float],
     options: dict[str, Any],
 ) -> tuple[list[Leg], Stop]:
-    """Legs of an over-constrained system, each with rows that suit its first posture."""
+    """Legs of an over-constrained system, each with rows that suit its first configuration."""
     legs: list[Leg] = []
     start = Leg(equations(system), times[:1], x0.reshape(1, -1))
     system, limit = _next(system, x0[: system.nq], np.array(p, dtype=float))
@@ -715,7 +715,8 @@ def run(
         system: open or closed.
         duration: [s].
         q0: positions at the start by coordinate name [rad or m], the others as in the assembled
-            posture; in a closed system the loops are closed with the independent ones as given.
+            configuration; in a closed system the loops are closed with the independent ones as
+            given.
         v0: velocities at the start by name [rad/s or m/s], the others zero; in a closed system
             they may be of any joints, and the others follow.
         tau: joint efforts [N m or N]: constants of motors by name, or a function of (t, q, v) made
@@ -740,7 +741,7 @@ def run(
         A `Result` with, for every coordinate, `name.q`, `name.v`, `name.a`, `name.tau`, and
         `kinetic_energy`, `potential_energy`, `closure_residual`; for every device its input, its
         states and its outputs, such as `motor.voltage`, `motor.i`, `motor.tau`, `motor.w`; and
-        what every sensor reads, such as `tip.p.x`. A rigid stop or dry friction has `name.mode`
+        what every sensor reads, such as `tip.p.x`. A rigid stop or Coulomb friction has `name.mode`
         and `name.effort`, and `events` tells when they change.
 
     Raises:

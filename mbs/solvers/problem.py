@@ -372,7 +372,7 @@ REASONS = {
     "look for a singularity or a jump",
     "rhs": "the right-hand side has no value there",
     "projection": "the projection onto the constraints does not converge; "
-    "look for a singular posture",
+    "look for a singular configuration",
     "singular": "a singular configuration is not passed, the rows of the loops stay dependent "
     "around it; start elsewhere, or end the run before",
     "near miss": "branches of motion come near each other and do not meet, by so little that what "

@@ -1,4 +1,4 @@
-"""Rank and independent rows of matrices that depend on a posture."""
+"""Rank and independent rows of matrices that depend on a configuration."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def independent_rows(
     depends on them in a single matrix is avoided.
 
     Args:
-        matrices: (m, n) each, the same rows at several postures.
+        matrices: (m, n) each, the same rows at several configurations.
         count: how many rows.
         first: rows to take before all others, in this order.
     """

@@ -110,13 +110,13 @@ def show(
     theme: str = "auto",
     shown: Collection[str] = (),
 ) -> Picture:
-    """A picture of a mechanism at one posture.
+    """A picture of a mechanism at one configuration.
 
     Args:
         system: open or closed; every symbol in its geometry has a value.
         q: positions [rad or m]: all of them, or some by name, the others as assembled; the loops
-            are closed at those named, as `mbs.loops.solve` does. The assembled posture when left
-            out.
+            are closed at those named, as `mbs.loops.solve` does. The assembled configuration when
+            left out.
         path: file to write, see `Picture.save`.
         parameters: values of symbols, the others at their defaults.
         view: iso, front, side or top.

@@ -131,7 +131,7 @@ def _pose_function(system: System) -> Function:
 
 
 def position_of(system: System, q: Values) -> list[float]:
-    """(nq,) positions from a sequence, or from names, the others as in the assembled posture.
+    """(nq,) positions from a sequence, or from names, the others as in the assembled configuration.
 
     Raises:
         ModelError: a name is unknown, or the numbers do not fit.

@@ -62,10 +62,10 @@ class Scene:
         links: names of the base and the links.
         up: unit vector against gravity.
         size: of the mechanism [m].
-        bounds: a ball that holds it at the posture q.
+        bounds: a ball that holds it at the configuration q.
         floor: the ground grid.
         views: unit vectors towards who looks: iso, front, side, top.
-        q: (nq,) posture that it was made at.
+        q: (nq,) configuration that it was made at.
         parameters: value of every symbol.
     """
 
@@ -84,8 +84,8 @@ class Scene:
         """Where the base and the links are: 12 numbers each, the rows of R|p in the base frame.
 
         Args:
-            q: (nq,) positions [rad or m], or by name, the others as in the assembled posture; that
-                of the scene when left out. Loops are not closed here.
+            q: (nq,) positions [rad or m], or by name, the others as in the assembled
+                configuration; that of the scene when left out. Loops are not closed here.
             parameters: values of symbols, the others as in the scene.
 
         Raises:
@@ -97,12 +97,12 @@ class Scene:
         return flat
 
     def motion(self, q: Array) -> Array:
-        """(n, 12 links) poses, as `poses` gives them, at each of n postures q (n, nq)."""
+        """(n, 12 links) poses, as `poses` gives them, at each of n configurations q (n, nq)."""
         p = self.system.parameter_values(self.parameters)
         return pose_rows(self.system, np.transpose(q), p).T
 
     def spanning(self, q: Array) -> Scene:
-        """The same scene with bounds and ground for all of n postures q (n, nq)."""
+        """The same scene with bounds and ground for all of n configurations q (n, nq)."""
         marks = _marks(self.primitives)
         poses = self.motion(q).reshape(len(q), -1, 3, 4)
         points = np.vstack([poses[:, k, :, :3] @ at + poses[:, k, :, 3] for k, at in marks])
@@ -138,8 +138,9 @@ def scene(
 
     Args:
         system: open or closed; every symbol in its geometry has a value.
-        q: posture that bounds and ground are for, and the poses unless others are asked for: (nq,)
-            [rad or m], or by name; the assembled one when left out. Loops are not closed here.
+        q: configuration that bounds and ground are for, and the poses unless others are asked for:
+            (nq,) [rad or m], or by name; the assembled one when left out. Loops are not closed
+            here.
         parameters: values of symbols, the others at their defaults.
 
     Raises:

@@ -280,8 +280,8 @@ def test_a_gear_follows():
     system = m.assemble()
     assert [(c.name, c.actuated) for c in system.coordinates] == [("j1", True), ("j2", False)]
     assert [system.speeds[k].name for k in system.active] == ["j1"]
-    assert system.posture[1] == pytest.approx(
-        0.1 - 2 * system.posture[0] + 0.3 * system.posture[0] ** 2
+    assert system.configuration[1] == pytest.approx(
+        0.1 - 2 * system.configuration[0] + 0.3 * system.configuration[0] ** 2
     )
     assert system.loops[0].closing == "coupling"
     assert "Coupling ratio: j2 follows j1." in system.report()
@@ -388,7 +388,7 @@ def test_no_motion_left():
 
 def test_unclosable_says_by_how_much():
     m = four_bar((0.1, 0.5, 0.1), ground=1.0)
-    message = refused(Unclosable, "the best posture found leaves", by=m.assemble)
+    message = refused(Unclosable, "the best configuration found leaves", by=m.assemble)
     assert "open by 0.3 m" in message
 
 
@@ -407,7 +407,7 @@ def test_a_parallelogram_that_starts_flat_leaves_it():
     m = four_bar((0.5, 1.0, 0.5), ground=1.0)
     system = m.assemble()
     assert system.closure.mobility == 1
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     from mbs.loops import closure_jacobian
 
     J = closure_jacobian(system)
@@ -432,7 +432,7 @@ def test_a_parallelogram_with_three_legs_moves():
     assert m.assemble(guess=guess).closure.mobility == 1
 
 
-def test_sr400_leaves_the_singular_posture_of_its_guess():
+def test_sr400_leaves_the_singular_configuration_of_its_guess():
     system = mbs.load("sr400").assemble(guess={f"q{k}": 0.0 for k in range(1, 9)})
-    q = dict(zip(names(system), system.posture, strict=True))
+    q = dict(zip(names(system), system.configuration, strict=True))
     assert abs(q["q2"] - q["q7"]) > 1e-2

@@ -38,7 +38,7 @@ def names(system):
 
 
 def inertia(system):
-    return np.array(mbs.models.inertia_matrix(system)(list(system.posture)))
+    return np.array(mbs.models.inertia_matrix(system)(list(system.configuration)))
 
 
 def test_rigid_geared_rotor_is_part_of_the_joint():
@@ -260,7 +260,7 @@ def test_a_gear_whose_ratio_has_no_value_yet_is_no_ring():
     A = mbs.models.inertia_matrix(system)
     p = system.parameter_values({"N": 20.0, "M": 9.0})
     assert sorted(names) == ["M", "N"]
-    assert float(A(list(system.posture), p)) == pytest.approx(0.3 + (20 * 3) ** 2 * 1e-3)
+    assert float(A(list(system.configuration), p)) == pytest.approx(0.3 + (20 * 3) ** 2 * 1e-3)
 
 
 @pytest.mark.parametrize(("other", "agrees"), [("1 / (1 / N)", True), ("M", False), ("-N", False)])
@@ -277,7 +277,7 @@ def test_rings_of_gears_whose_ratios_have_no_values_yet(other, agrees):
     system = m.assemble()
     A = mbs.models.inertia_matrix(system)
     p = system.parameter_values({"N": 7.0})
-    assert float(A(list(system.posture), p)) == pytest.approx(0.3 + 0.49)
+    assert float(A(list(system.configuration), p)) == pytest.approx(0.3 + 0.49)
 
 
 def test_refused_twist_of_a_rigid_shaft():

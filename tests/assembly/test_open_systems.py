@@ -258,7 +258,7 @@ def test_tables():
         "cyl.phi": True,
         "rev": False,
     }
-    assert system.posture == (0, 0, 0, 1, 0, 0, 0, 0, 0, 0)
+    assert system.configuration == (0, 0, 0, 1, 0, 0, 0, 0, 0, 0)
     assert system.closure is None
     text = system.report()
     assert "m: 4 moving links in a tree, 10 positions q and 9 velocities v." in text
@@ -322,7 +322,7 @@ def test_values_by_name():
     m.connect(m.world, Revolute("hip"), a)
     m.connect(a, Revolute("knee"), b)
     system = m.assemble(guess={"knee": 0.5})
-    assert system.posture == (0, 0.5)
+    assert system.configuration == (0, 0.5)
     assert system.position({"hip": 1}) == [1, 0.5]
     assert system.position(None) == [0, 0.5]
     assert system.velocity({"knee": 2}) == [0, 2]

@@ -93,7 +93,7 @@ def test_a_body_stands_for_ten_parameters() -> None:
 def test_a_coupler_that_grows_closes_its_loop_and_pulls_in_its_pin() -> None:
     system, built = symbolic(four_bar(), ["lengths", "M2"]), four_bar(1.1, 2.5)
     assert "j3.frame_a.x" in [p.name for p in system.parameters]
-    assert system.posture == four_bar().posture
+    assert system.configuration == four_bar().configuration
     other = {"j3.frame_a.x": 1.1, "M2": 2.5}
     p = system.parameter_values(other)
     q = mbs.loops.solve(built, {"j1": 0.5})

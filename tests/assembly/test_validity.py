@@ -27,7 +27,7 @@ def ball():
 def bad(case, loop, ball):
     """A model, inputs that it takes, and inputs of which one is bad."""
     if case == "open loop":
-        q = np.array(loop.posture)
+        q = np.array(loop.configuration)
         return mbs.models.direct_dynamics(loop), (q, [0.1], [0.2]), (q + 0.1, [0.1], [0.2])
     ddm = mbs.models.direct_dynamics(ball)
     q, v, tau, p = np.array([1.0, 0, 0, 0]), np.ones(3), np.ones(3), np.array([2.0])
@@ -116,19 +116,19 @@ def test_sentences_say_what_to_do(loop, ball):
         ddm([1, 0, 0, 0], [0] * 3, [0] * 3, [-2])
     with pytest.raises(Unclosable, match="leaves the loops open"):
         mbs.native.compiled(mbs.models.direct_dynamics(loop))(
-            np.array(loop.posture) + 0.1, np.zeros(1), np.zeros(1)
+            np.array(loop.configuration) + 0.1, np.zeros(1), np.zeros(1)
         )
 
 
 def test_validity_is_a_function_beside_the_models(loop, ball):
     asked = mbs.models.validity(loop)
-    residual, bound = asked(loop.posture)
+    residual, bound = asked(loop.configuration)
     assert np.all(np.array(residual) <= np.array(bound))
-    residual, bound = asked(np.array(loop.posture) + 0.1)
+    residual, bound = asked(np.array(loop.configuration) + 0.1)
     rows = mbs.models.validity_rows(loop)
     late = [name for name, a, b in zip(rows, residual.nz, bound.nz, strict=True) if not a <= b]
     assert late == ["opening of the loops"]
-    many = asked.map(2)(np.column_stack((loop.posture, np.array(loop.posture) + 0.1)))
+    many = asked.map(2)(np.column_stack((loop.configuration, np.array(loop.configuration) + 0.1)))
     assert [bool(np.all(np.array(many[0][:, k]) <= np.array(many[1][:, k]))) for k in range(2)] == [
         True,
         False,
@@ -143,7 +143,7 @@ def test_systems_travel_whole(name):
     again = pickle.loads(pickle.dumps(system))
     assert again.report() == system.report()
     assert again.parameters == system.parameters
-    q, v = np.array(system.posture), np.full(len(system.active), 0.3)
+    q, v = np.array(system.configuration), np.full(len(system.active), 0.3)
     one, other = (mbs.models.direct_dynamics(s) for s in (system, again))
     assert np.array_equal(np.array(one(q, v, v)), np.array(other(q, v, v)))
     assert other.name_in() == one.name_in()

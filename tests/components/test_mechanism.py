@@ -225,7 +225,7 @@ def test_nested_cuts_and_guesses():
     system = m.assemble()
     assert [cut.edge.joint.name for cut in system.cuts] == ["loop.j2"]
     alone = loop.assemble()
-    np.testing.assert_allclose(sorted(system.posture), sorted(alone.posture), atol=1e-9)
+    np.testing.assert_allclose(sorted(system.configuration), sorted(alone.configuration), atol=1e-9)
 
 
 def test_handles_refuse_unknown_names():

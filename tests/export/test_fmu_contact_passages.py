@@ -1,4 +1,5 @@
-"""Co-simulation of rigid stops and dry friction through singular configurations of the loops."""
+"""Co-simulation of rigid stops and Coulomb friction through singular configurations of the
+loops."""
 
 import itertools
 
@@ -82,7 +83,7 @@ def test_a_host_of_fmi_3_is_told_the_times_of_events(made):
     assert twice == pytest.approx(told, abs=1e-7)
 
 
-def test_states_saved_before_events_and_flat_postures_go_on_bit_for_bit(made, tmp_path):
+def test_states_saved_before_events_and_flat_configurations_go_on_bit_for_bit(made, tmp_path):
     model = Fmu(made["stop"], tmp_path)
     instance = model.open(FMU2Slave, start={"a0.v": START["a0"]}, tolerance=1e-7)
     times = [*np.arange(0.0, 3.0, 0.05), 3.0]

@@ -245,7 +245,7 @@ def test_a_law_sees_the_whole_tree_of_a_closed_system() -> None:
     driven = [speed.name for speed in system.speeds].index("j1")
     model = fmu_model(system, Contents(controller=lambda t, q, v: [-3 * sum(q.nz) - v[0], 0, 0]))
     plain = fmu_model(system)
-    q, v = np.array(system.posture), 0.4
+    q, v = np.array(system.configuration), 0.4
     z = [q[k] for k in range(3) if k != driven]
     x = [q[driven], v]
     speeds = _values(plain, plain.rhs(0, x, z, [0], [])[1])

@@ -1,4 +1,4 @@
-"""Rigid stops and dry friction in the FMU of a mechanism, against simulations of the system."""
+"""Rigid stops and Coulomb friction in the FMU of a mechanism, against simulations of the system."""
 
 import fmpy
 import numpy as np

@@ -75,7 +75,7 @@ def test_wrenches_of_the_joints_of_a_loop_feel_the_wrench_on_its_coupler() -> No
     pushed, plain = (
         fmu_model(system, Contents(outputs=shown)) for system in (_bar(pushed=True), _bar())
     )
-    q = _bar().posture
+    q = _bar().configuration
     point = 0, [q[0], 1.2], q[1:]
     values = [
         [np.array(part).ravel() for part in m.rhs(*point, u, [])]

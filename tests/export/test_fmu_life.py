@@ -292,7 +292,7 @@ def test_a_loop_that_cannot_be_closed(crank):
     instance.freeInstance()
 
 
-def test_a_start_in_a_singular_posture(crank):
+def test_a_start_in_a_singular_configuration(crank):
     start = {"rod.length": 0.1, "crank.q": np.pi / 2, "rod.angle": np.pi / 2, "slider.s": 0.0}
     instance = crank.open(FMU2Slave, upto="initialization", start=start)
     refused(instance.exitInitializationMode)

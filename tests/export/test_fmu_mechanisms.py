@@ -35,7 +35,7 @@ def four_bar(tmp_path_factory):
     return path
 
 
-def start_posture(path, **start):
+def start_configuration(path, **start):
     """Where the coupler and the rocker are at the start."""
     result = mbs.simulate.fmu(path, 0.001, start=start, step=0.001, quiet=True)
     return np.array([result[name][0] for name in ("j2.q", "j4.q")])
@@ -46,9 +46,9 @@ def wrapped(angles):
 
 
 def test_one_guess_chooses_a_branch_of_the_loop(four_bar):
-    open_branch = start_posture(four_bar)
-    crossed = start_posture(four_bar, **{"j2.solved": -1.0})
-    by_rocker = start_posture(four_bar, **{"j4.solved": -1.4})
+    open_branch = start_configuration(four_bar)
+    crossed = start_configuration(four_bar, **{"j2.solved": -1.0})
+    by_rocker = start_configuration(four_bar, **{"j4.solved": -1.4})
     assert np.allclose(crossed, -open_branch, atol=1e-9)  # the crank lies in line with the ground
     assert np.allclose(wrapped(by_rocker - crossed), 0, atol=1e-9)
 
@@ -56,8 +56,8 @@ def test_one_guess_chooses_a_branch_of_the_loop(four_bar):
 def test_a_guess_near_the_own_branch_keeps_it(four_bar):
     start = {"j1.q": 0.4}
     assert np.allclose(
-        start_posture(four_bar, **start, **{"j2.solved": 0.9}),
-        start_posture(four_bar, **start),
+        start_configuration(four_bar, **start, **{"j2.solved": 0.9}),
+        start_configuration(four_bar, **start),
         atol=1e-9,
     )
 

@@ -62,7 +62,7 @@ def test_the_fmu_of_a_loop_takes_a_longer_coupler(tmp_path) -> None:
         path,
         0.4,
         step=0.05,
-        start={"j1.q": longer.posture[0]},
+        start={"j1.q": longer.configuration[0]},
         parameters={"j3.frame_a.x": 1.1},
         tolerance=1e-10,
         quiet=True,
@@ -71,7 +71,7 @@ def test_the_fmu_of_a_loop_takes_a_longer_coupler(tmp_path) -> None:
     assert np.abs(fmu["closure"]).max() < 1e-11
     for name in ("j1.q", "j2.q", "j4.q", "j4.v", "j1.a"):
         assert np.abs(fmu[name] - own[name]).max() < 1e-7 * (1 + np.abs(own[name]).max()), name
-    assert abs(own["j2.q"][0] - four_bar().posture[1]) > 0.05
+    assert abs(own["j2.q"][0] - four_bar().configuration[1]) > 0.05
 
 
 def test_what_variables_tell() -> None:
@@ -184,5 +184,5 @@ def test_an_fmu_refuses_what_the_description_of_a_mechanism_refuses(fmi, tmp_pat
     ):
         with pytest.raises(SolverError, match=rule):
             mbs.simulate.fmu(path, 0.1, parameters={name: value}, quiet=True)
-    with pytest.raises(SolverError, match="singular posture or a zero mass"):
+    with pytest.raises(SolverError, match="singular configuration or a zero mass"):
         mbs.simulate.fmu(path, 0.1, parameters={"m": 0.0}, quiet=True)  # here it moves nothing else

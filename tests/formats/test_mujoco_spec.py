@@ -249,11 +249,11 @@ def test_urdf_moves_as_in_mujoco(tmp_path):
     assert_equal_motion(Twin(system, model))
 
 
-def test_closed_posture_satisfies_mujoco(xml):
+def test_closed_configuration_satisfies_mujoco(xml):
     system = read_mjcf(xml(LOOP)).assemble()
     twin = Twin(system, mujoco.MjModel.from_xml_string(LOOP))
     assert isinstance(system.tree, Tree)
-    twin.place(np.array(system.posture))
+    twin.place(np.array(system.configuration))
     mujoco.mj_forward(twin.model, twin.data)
     rows = twin.data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     assert rows.sum() == 3 + 6 + 1

@@ -44,7 +44,7 @@ def example(name):
 
 @functools.cache
 def parametric_slider():
-    """A revolute and a prismatic joint with symbols, dry friction smooth and as a step."""
+    """A revolute and a prismatic joint with symbols, Coulomb friction smooth and as a step."""
     m = Mechanism("slider", gravity=(0, -9.81, 0), parameters={"L2": 0.7, "M1": 2.0, "FS1": 0.3})
     arm = m.add(Body("arm", mass="M1", com=("L2/2", 0, 0), inertia=(0.05, 0.06, "M1*L2^2/12")))
     block = m.add(Body("block", mass=1.5, com=(0.1, 0, 0), inertia=(0.01, 0.02, 0.03)))

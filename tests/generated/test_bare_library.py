@@ -241,7 +241,7 @@ def test_a_body_that_floats_is_that_of_an_fmu(tmp_path):
     system = floating()
     folder = mbs.export.c_library(system, tmp_path / "lib", target="bare")
     motion = Motion(folder, loaded(folder), system)
-    x = np.array([*system.posture, *np.linspace(-1, 1, system.nv)])
+    x = np.array([*system.configuration, *np.linspace(-1, 1, system.nv)])
     turned = x.copy()
     turned[3:7] = 0.5, 0.5, -0.5, 0.5
     assert motion.start(turned) == OK
@@ -348,11 +348,11 @@ def test_single_precision_is_near(tmp_path):
 
 
 def test_loops_in_single_precision(tmp_path):
-    """The bound is wider, and postures that are closed in double precision stay so."""
+    """The bound is wider, and configurations that are closed in double precision stay so."""
     system = mbs.load("five_bar").assemble()
     ddm = mbs.models.direct_dynamics(system)
     folder = mbs.export.c_library([system, ddm], tmp_path / "lib", target="bare", real="float")
-    library, q = loaded(folder), np.array(system.posture)
+    library, q = loaded(folder), np.array(system.configuration)
     v, tau = [0.1, 0.2], [0.3, 0.4]
     for angle, wanted in ((0.0, OK), (1e-3, OPEN)):
         turned = q + angle * np.eye(len(q))[0]
@@ -372,7 +372,7 @@ def test_the_motion_in_single_precision_is_near(name, count, tmp_path):
         assert motion.start() == OK
         ends.append(stepped(motion, 0.001, inputs)[-1][: system.nq])
     assert ends[1] == pytest.approx(ends[0], abs=1e-3)  # half a second of 500 roundings and Newton
-    assert np.abs(ends[0] - system.posture).max() > 0.05
+    assert np.abs(ends[0] - system.configuration).max() > 0.05
 
 
 def test_a_bound_of_more_than_zero_stays_one_in_single_precision(tmp_path):
@@ -397,7 +397,7 @@ def test_numbers_are_those_of_python_to_the_last_bit(tmp_path):
     system = mbs.load("sr400").assemble()
     models = [mbs.models.inverse_dynamics(system), mbs.models.lagrange(system)]
     folder = mbs.export.c_library(models, tmp_path / "lib", target="bare")
-    library, q = loaded(folder), system.posture
+    library, q = loaded(folder), system.configuration
     for model in models:
         values = [q, *(np.linspace(-1, 1, model.numel_in(k)) for k in range(1, model.n_in()))]
         status, outputs = called(folder, library, model, values)

@@ -43,7 +43,7 @@ class Written:
 def test_loops(target, tmp_path):
     system = mbs.load("four_bar").assemble()
     ddm = Written(tmp_path / "lib", mbs.models.direct_dynamics(system), target=target)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     assert ddm.status(q, [0.1], [0.2]) == OK
     assert ddm.status(q + 0.1, [0.1], [0.2]) == OPEN
     assert ddm.status([np.nan, 0, 0], [0.1], [0.2]) == NOT_FINITE
@@ -57,7 +57,7 @@ def test_the_bound_of_open_loops_is_that_of_python(target, tmp_path):
     """A crank turned by ever more, the others left: one step opens the loop too far for both."""
     system = mbs.load("five_bar").assemble()
     ddm = Written(tmp_path / "lib", mbs.models.direct_dynamics(system), target=target)
-    q, seen = np.array(system.posture), set()
+    q, seen = np.array(system.configuration), set()
     for angle in np.geomspace(1e-7, 1e-5, 41):
         turned = q + angle * np.eye(len(q))[0]
         try:
@@ -79,7 +79,7 @@ def test_joints_that_do_not_determine_the_others(target, tmp_path):
     with pytest.raises(SingularPosture):
         ddm.model(dead, [0.1], [0.2])
     assert ddm.status(dead, [0.1], [0.2]) == UNDETERMINED
-    assert ddm.status(system.posture, [0.1], [0.2]) == OK
+    assert ddm.status(system.configuration, [0.1], [0.2]) == OK
 
 
 @TARGETS
@@ -100,7 +100,7 @@ def test_models_ask_for_what_they_use(tmp_path):
     """On the tree loops may be open; every column of a map is asked."""
     system = mbs.load("four_bar").assemble()
     tree = mbs.models.inverse_dynamics(system, coordinates="tree")
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     assert Written(tmp_path / "tree", tree).status(q + 0.1, q, q) == OK
     many = mbs.models.inverse_dynamics(system).map(3)
     three = Written(tmp_path / "many", many)
@@ -163,7 +163,7 @@ def test_unchecked(target, tmp_path):
     system = mbs.load("four_bar").assemble()
     model = mbs.models.inverse_dynamics(system)
     folder = mbs.export.c_library(model, tmp_path / "lib", checked=False, target=target)
-    q = np.array(system.posture) + 0.1
+    q = np.array(system.configuration) + 0.1
     status, (tau,) = called(folder, loaded(folder), model, [q, [0.1], [0.2]])
     assert status == OK
     assert np.isfinite(tau).all()

@@ -160,14 +160,14 @@ def test_a_closed_robot_is_identified_from_its_independent_joints(method):
     motion = excitation(
         system,
         series=Series(period=4.0, harmonics=3, samples=24),
-        position=[(system.posture[k] - 0.5, system.posture[k] + 0.5) for k in places],
+        position=[(system.configuration[k] - 0.5, system.configuration[k] + 0.5) for k in places],
         velocity=3.0,
         starts=1,
         rounds=10,
         quiet=True,
     )
     t = np.arange(0, 12, 0.005)
-    q, v, a = motion.posture(t), motion.v(t), motion.a(t)
+    q, v, a = motion.configuration(t), motion.v(t), motion.a(t)
     tau = np.array(mbs.models.inverse_dynamics(system).map(len(t))(q.T, v.T, a.T)).T
     tau += 0.01 * np.random.default_rng(2).normal(size=tau.shape)
     record = Record.of(system, t, motion.q(t), tau)

@@ -1,4 +1,4 @@
-"""Records and motions of closed robots next to singular postures."""
+"""Records and motions of closed robots next to singular configurations."""
 
 from functools import cache
 
@@ -19,14 +19,15 @@ def sr400():
 
 
 def swinging(middle, size, seed=3):
-    """Time, postures, rates and efforts of all joints; the parallelogram swings about `middle`."""
+    """Time, configurations, rates and efforts of all joints; the parallelogram swings about
+    `middle`."""
     system = sr400()
     t = np.arange(0, 24, 0.005)
     w = 2 * np.pi * 0.2 * np.arange(1, 5)
     rng = np.random.default_rng(seed)
     sine, cosine = size * rng.uniform(-0.4, 0.4, (2, 4, 6))
     S, C = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-    start = np.array([system.posture[k] for k in active_places(system)])
+    start = np.array([system.configuration[k] for k in active_places(system)])
     start[1] += middle
     q_a = start + S @ sine + C @ cosine
     v = (C * w) @ sine - (S * w) @ cosine
@@ -38,14 +39,16 @@ def swinging(middle, size, seed=3):
 
 def test_leads_change_sign_where_the_parallelogram_is_flat():
     system = sr400()
-    start = np.array([system.posture[k] for k in active_places(system)])
+    start = np.array([system.configuration[k] for k in active_places(system)])
     turned = np.linspace(0, 2.5, 26)
     q = positions(system, start + np.outer(turned, np.eye(6)[1]))
     leads = leads_of(system, q)
-    for posture, value in zip(q, leads, strict=True):
-        state = mbs.loops.examine(system, posture)
+    for configuration, value in zip(q, leads, strict=True):
+        state = mbs.loops.examine(system, configuration)
         assert abs(value) == pytest.approx(state.leads, rel=1e-9, abs=1e-12)
-        assert float(signed_leads(system)(posture)) == pytest.approx(value, rel=1e-9, abs=1e-12)
+        assert float(signed_leads(system)(configuration)) == pytest.approx(
+            value, rel=1e-9, abs=1e-12
+        )
     assert (leads[turned < 1.5] > 0).all()
     assert (leads[turned > 1.7] < 0).all()
     good = led(system, q)
@@ -53,7 +56,7 @@ def test_leads_change_sign_where_the_parallelogram_is_flat():
     assert good[turned < 1.4].all()
 
 
-def test_rows_next_to_a_singular_posture_are_left_out_and_told():
+def test_rows_next_to_a_singular_configuration_are_left_out_and_told():
     t, q, tau = swinging(0.9, 1.0)
     assert 0.005 < np.mean(np.abs(leads_of(sr400(), q)) < LED) < 0.2
     noisy = q + 1e-5 * np.random.default_rng(1).normal(size=q.shape)
@@ -63,13 +66,13 @@ def test_rows_next_to_a_singular_posture_are_left_out_and_told():
     assert f"Loops: {found.observations.dropped} of " in found.text()
 
 
-def test_a_record_next_to_singular_postures_is_refused():
+def test_a_record_next_to_singular_configurations_is_refused():
     t, q, tau = swinging(np.pi / 2, 0.03)
     with pytest.raises(ModelError, match=r"sr400: \d+ % of the record is next to singular"):
         identify(sr400(), Record.of(sr400(), t, q, tau), 6.0, quiet=True)
 
 
-def test_an_exciting_motion_stays_on_its_side_of_a_singular_posture():
+def test_an_exciting_motion_stays_on_its_side_of_a_singular_configuration():
     motion = excitation(
         sr400(),
         series=Series(period=5.0, harmonics=3, samples=30),
@@ -79,7 +82,7 @@ def test_an_exciting_motion_stays_on_its_side_of_a_singular_posture():
         rounds=40,
         quiet=True,
     )
-    leads = leads_of(sr400(), motion.posture(np.linspace(0, 5, 1001)))
+    leads = leads_of(sr400(), motion.configuration(np.linspace(0, 5, 1001)))
     assert leads.min() > 0.0099
     assert motion.worst("leading").lowest == pytest.approx(leads.min(), abs=1e-4)
     assert motion.condition < 1000

@@ -36,13 +36,13 @@ def reference(system, q, v, tau):
     return np.linalg.lstsq(K, right, rcond=1e-11)[0][: len(v)]
 
 
-def test_posture_closes(closed):
-    phi = np.array(closure(closed)(list(closed.posture)))
+def test_configuration_closes(closed):
+    phi = np.array(closure(closed)(list(closed.configuration)))
     assert np.abs(phi).max() < 1e-12
 
 
 def test_mobility_is_coordinates_minus_rank(closed):
-    J = np.array(closure_jacobian(closed)(list(closed.posture)))
+    J = np.array(closure_jacobian(closed)(list(closed.configuration)))
     values = np.linalg.svd(J, compute_uv=False)
     assert closed.closure.mobility == closed.nv - np.sum(values > 1e-7)
     assert len(closed.closure.rows) == np.sum(values > 1e-7)
@@ -50,7 +50,7 @@ def test_mobility_is_coordinates_minus_rank(closed):
 
 def test_direct_dynamics(closed):
     rng = np.random.default_rng(0)
-    q = np.array(closed.posture)
+    q = np.array(closed.configuration)
     ddm = mbs.models.direct_dynamics(closed)
     in_tree = mbs.models.direct_dynamics(closed, coordinates="tree")
     active = list(closed.active)
@@ -72,7 +72,7 @@ def test_direct_dynamics(closed):
 
 def test_closed_matrices_agree(closed):
     rng = np.random.default_rng(1)
-    q = np.array(closed.posture)
+    q = np.array(closed.configuration)
     v_a = rng.uniform(-1, 1, len(closed.active))
     a_a = rng.uniform(-1, 1, len(closed.active))
     A = np.array(mbs.models.inertia_matrix(closed)(q))
@@ -86,7 +86,7 @@ def test_closed_matrices_agree(closed):
 
 def test_solve_keeps_what_is_given(closed):
     names = [closed.speeds[k].name for k in closed.active]
-    values = {name: closed.posture[closed.active[i]] + 0.01 for i, name in enumerate(names)}
+    values = {name: closed.configuration[closed.active[i]] + 0.01 for i, name in enumerate(names)}
     q = solve(closed, values)
     for name, value in values.items():
         k = [c.name for c in closed.coordinates].index(name)

@@ -108,7 +108,7 @@ def held(request):
     return held_chain(*request.param)
 
 
-def test_rows_mobility_and_posture(held):
+def test_rows_mobility_and_configuration(held):
     system = held.system
     kind = next(kind for kind in ROWS if system.name.startswith(kind))
     assert [row.name for row in system.loops] == ["held"]
@@ -116,14 +116,14 @@ def test_rows_mobility_and_posture(held):
     assert system.loops[0].dropped == ()
     assert system.closure.mobility == 2
     assert system.cut_coordinates == ()
-    assert held.openness(system.posture) < 1e-12
+    assert held.openness(system.configuration) < 1e-12
     assert f"{ROWS[kind]} of {ROWS[kind]} rows are independent" in system.report()
 
 
-def test_postures_and_velocities_keep_the_constraint(held):
+def test_configurations_and_velocities_keep_the_constraint(held):
     system = held.system
     names = [system.speeds[k].name for k in system.active]
-    q = solve(system, {name: system.posture[system.active[0]] + 0.02 for name in names[:1]})
+    q = solve(system, {name: system.configuration[system.active[0]] + 0.02 for name in names[:1]})
     assert held.openness(q) < 1e-12
     v = np.array(reduction_matrix(system)(q)) @ [0.7, -0.4]
     assert np.abs(np.array(closure_jacobian(system)(q)) @ v).max() < 1e-12
@@ -133,7 +133,7 @@ def test_postures_and_velocities_keep_the_constraint(held):
 
 def test_dynamics_are_consistent(held):
     system, rng = held.system, np.random.default_rng(3)
-    q, v_a, tau_a = np.array(system.posture), *rng.uniform(-1, 1, (2, 2))
+    q, v_a, tau_a = np.array(system.configuration), *rng.uniform(-1, 1, (2, 2))
     a_a = np.array(mbs.models.direct_dynamics(system)(q, v_a, tau_a)).ravel()
     back = np.array(mbs.models.inverse_dynamics(system)(q, v_a, a_a)).ravel()
     np.testing.assert_allclose(back, tau_a, rtol=0, atol=1e-9)

@@ -33,5 +33,5 @@ def test_constant_velocity_joint_turns_both_shafts_alike():
 
 def test_half_a_turn_does_not_close_a_constant_velocity_joint():
     system = shafts(ConstantVelocity("cv"), 0.6).assemble(guess={"left": 0.0, "right": 3.1})
-    left, right = system.posture
+    left, right = system.configuration
     assert np.cos(right - left) == pytest.approx(1.0, abs=1e-12)

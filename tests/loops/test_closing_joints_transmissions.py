@@ -142,7 +142,7 @@ def test_inside_another_mechanism():
     system = outer.assemble(guess={"left.rocker_axis": 1.8, "right.rocker_axis": 1.8})
     assert system.closure.mobility == 2
     assert [p.name for p in system.parameters] == ["left.rod_length", "right.rod_length"]
-    phi = closure(system)(system.posture, [0.8, 0.8])
+    phi = closure(system)(system.configuration, [0.8, 0.8])
     assert np.abs(np.array(phi)).max() < 1e-12
 
 

@@ -1,4 +1,4 @@
-"""What a posture is worth: closed or open, singular, led by its independent joints."""
+"""What a configuration is worth: closed or open, singular, led by its independent joints."""
 
 import math
 
@@ -27,18 +27,18 @@ def four_bar(crank=0.3, **driven):
     return m
 
 
-def test_a_regular_posture_is_closed_and_led():
+def test_a_regular_configuration_is_closed_and_led():
     system = four_bar(actuated=True).assemble(GUESS)
-    state = examine(system, system.posture)
+    state = examine(system, system.configuration)
     assert state.is_closed
     assert state.is_led
     assert not state.is_singular
     assert (state.mobility, state.generic) == (1, 1)
 
 
-def test_an_open_posture_says_by_how_much():
+def test_an_open_configuration_says_by_how_much():
     system = four_bar(actuated=True).assemble(GUESS)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     q[0] += 0.1
     state = examine(system, q)
     assert not state.is_closed
@@ -62,7 +62,7 @@ def test_a_dead_point_is_not_led_and_not_singular():
     assert not state.is_led
     refused(
         SingularPosture,
-        "the posture is singular, j4 cannot lead the other joints there",
+        "the configuration is singular, j4 cannot lead the other joints there",
         'coordinates="tree"',
         by=lambda: require_led(system, q, np.empty(0)),
     )
@@ -81,8 +81,8 @@ def test_a_row_of_four_bars_in_line_gains_a_motion_for_every_loop(loops):
 
 def test_the_parameters_count():
     system = four_bar(mbs.Parameter("L", 0.3)).assemble(GUESS)
-    assert examine(system, system.posture).is_closed
-    assert not examine(system, system.posture, parameters={"L": 0.35}).is_closed
+    assert examine(system, system.configuration).is_closed
+    assert not examine(system, system.configuration, parameters={"L": 0.35}).is_closed
 
 
 def test_an_open_chain_has_nothing_to_examine():

@@ -1,4 +1,4 @@
-"""Paul's method: its steps, their text, and that no posture is lost."""
+"""Paul's method: its steps, their text, and that no configuration is lost."""
 
 from __future__ import annotations
 
@@ -89,16 +89,16 @@ SOLVED = {
 
 
 @pytest.mark.parametrize("name", SOLVED)
-def test_leaves_hold_every_posture(name):
+def test_leaves_hold_every_configuration(name):
     system, steps, at = solved(name)
     assert steps.branches == SOLVED[name][1]
     assert sorted(n for step in steps.steps for n in step.names if n[0] != "x") == sorted(
         row.name for row in system.coordinates
     )
     plain, rng = plain_arm(system), np.random.default_rng(len(name))
-    for posture in plain.random(rng, 6):
-        T = plain.pose(posture)
-        assert_among(plain, posture, closing(plain, T, at(T)))
+    for configuration in plain.random(rng, 6):
+        T = plain.pose(configuration)
+        assert_among(plain, configuration, closing(plain, T, at(T)))
     for other in some(plain, T, rng, 60):
         assert_among(plain, other, closing(plain, T, at(T)))
 
@@ -145,12 +145,12 @@ def test_symbolic_lengths_stay_symbols():
     problem = with_wrist.problem()
     steps = paul(problem)
     leaves = steps.leaves(problem.given)
-    postures = Function("f", [problem.given], [casadi.horzcat(*(leaf.x for leaf in leaves))])
+    configurations = Function("f", [problem.given], [casadi.horzcat(*(leaf.x for leaf in leaves))])
     for p in ([0.1, 0.5, 0.2, 0.4], [-0.3, 0.2, 0.0, 0.7]):
         at = with_wrist.arm(np.array(p))
         q = np.array([0.3, -0.4, 1.2, 0.5])
         T = at.pose(q)
-        found = np.array(postures(np.concatenate([p, T[:3].ravel(order="F")]))).T
+        found = np.array(configurations(np.concatenate([p, T[:3].ravel(order="F")]))).T
         assert np.min(np.max(np.abs(found - q), axis=1)) < 1e-10
 
 
@@ -237,8 +237,8 @@ def closing(plain, T, q):
     return q[plain.residual(T, q) < 1e-6]
 
 
-def assert_among(plain, posture, found):
-    assert np.min(distance(plain, found, posture), initial=1.0) < 1e-5
+def assert_among(plain, configuration, found):
+    assert np.min(distance(plain, found, configuration), initial=1.0) < 1e-5
 
 
 def assert_holds(equation, names):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.configurations import same
 from support.parallel_geometry import LEGS, rotation
-from support.postures import same
 
 import mbs
 from mbs.components import Body, Mechanism, Revolute
@@ -23,12 +23,12 @@ def systems():
 
 
 def moved(system, away, seed):
-    """A closed posture whose independent joints stand elsewhere."""
+    """A closed configuration whose independent joints stand elsewhere."""
     rng = np.random.default_rng(seed)
     names = [c.name for c in system.coordinates]
     free = [system.speeds[k].name for k in system.free]
     return mbs.loops.solve(
-        system, {n: system.posture[names.index(n)] + rng.uniform(-away, away) for n in free}
+        system, {n: system.configuration[names.index(n)] + rng.uniform(-away, away) for n in free}
     )
 
 

@@ -74,7 +74,7 @@ def test_a_leaning_disc_follows_the_equations_of_routh(lean, yaw_rate, lean_rate
     names = [speed.name for speed in system.speeds]
     active = [names[k] for k in system.active]
     assert set(active) == {"yaw", "lean", "spin"}
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     q[names.index("lean")], q[names.index("z")] = lean, RADIUS * math.cos(lean)
     v = {"yaw": yaw_rate, "lean": lean_rate, "spin": spin}
     ddm = mbs.models.direct_dynamics(system)
@@ -130,15 +130,15 @@ def test_inverse_and_direct_models_agree():
     system = rolling_disc()
     rng = np.random.default_rng(5)
     v, tau = rng.normal(size=3), rng.normal(size=3)
-    a = mbs.models.direct_dynamics(system)(system.posture, v, tau)
-    back = mbs.models.inverse_dynamics(system)(system.posture, v, a)
+    a = mbs.models.direct_dynamics(system)(system.configuration, v, tau)
+    back = mbs.models.inverse_dynamics(system)(system.configuration, v, a)
     assert np.array(back).ravel() == pytest.approx(tau, abs=1e-10)
     whole = mbs.models.direct_dynamics(system, coordinates="tree")
-    G = np.array(mbs.loops.reduction_matrix(system)(system.posture))
-    J = np.array(mbs.loops.closure_jacobian(system)(system.posture))
+    G = np.array(mbs.loops.reduction_matrix(system)(system.configuration))
+    J = np.array(mbs.loops.closure_jacobian(system)(system.configuration))
     forces = np.zeros(system.nv)
     forces[list(system.active)] = tau
-    a_tree, lam = whole(system.posture, G @ v, forces)
+    a_tree, lam = whole(system.configuration, G @ v, forces)
     assert np.array(a_tree).ravel()[list(system.active)] == pytest.approx(np.array(a).ravel())
     assert lam.numel() == len(J) == 3
     assert pytest.approx(np.zeros((3, 3)), abs=1e-12) == J @ G
@@ -154,7 +154,7 @@ def test_a_slip_row_that_another_constraint_implies_is_dropped():
     m.connect(m.world, RollingDisc("contact", radius=0.3), wheel)
     system = m.assemble()
     assert system.loops[0].dropped == ("force normal", "slip y")
-    A = np.array(mbs.models.inertia_matrix(system)(system.posture))
+    A = np.array(mbs.models.inertia_matrix(system)(system.configuration))
     assert pytest.approx(np.array([[2.0 + 1.0 + 0.2 / 0.3**2]]), rel=1e-12) == A
 
 
@@ -205,11 +205,11 @@ def linearised_bicycle(speed):
     a = mbs.models.direct_dynamics(system)(q, v, SX.zeros(3))
     slopes = Function("slopes", [q, v], [a, casadi.jacobian(a, q), casadi.jacobian(a, v)])
     v0 = [-speed / 0.3 if name == "rear_spin" else 0.0 for name in active]
-    a0, by_q, by_v = (np.array(x) for x in slopes(system.posture, v0))
+    a0, by_q, by_v = (np.array(x) for x in slopes(system.configuration, v0))
     assert a0 == pytest.approx(np.zeros((3, 1)), abs=1e-9)
     rows = [active.index(name) for name in ("lean", "steer")]
     places = [names.index(name) for name in ("lean", "steer")]
-    A = np.array(mbs.models.inertia_matrix(system)(system.posture))[np.ix_(rows, rows)]
+    A = np.array(mbs.models.inertia_matrix(system)(system.configuration))[np.ix_(rows, rows)]
     return A, A @ by_q[np.ix_(rows, places)], A @ by_v[np.ix_(rows, rows)]
 
 

@@ -47,7 +47,7 @@ def scaled(request):
 
 def test_a_loop_that_is_open_by_a_hundredth_is_refused(scaled):
     size, system = scaled
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     assert examine(system, q).is_closed
     q[1] += OPEN_BY
     state = examine(system, q)
@@ -65,7 +65,7 @@ def test_all_sizes_close_alike(scaled):
     like = four_bar(1.0)
     assert system.closure.active == like.closure.active
     assert system.closure.mobility == 1
-    np.testing.assert_allclose(system.posture, like.posture, atol=1e-11)
+    np.testing.assert_allclose(system.configuration, like.configuration, atol=1e-11)
     np.testing.assert_allclose(solve(system, [0.7]), solve(like, [0.7]), atol=1e-11)
     found, wanted = modes(system, [0.7]), modes(like, [0.7])
     assert [mode.branch for mode in found] == [mode.branch for mode in wanted]
@@ -87,7 +87,7 @@ def test_all_sizes_move_alike(scaled):
 def test_one_step_of_projection_measures_by_the_size(scaled):
     """What is left is told in parts of the size, for velocities too."""
     _, system = scaled
-    q, v = np.array(system.posture), np.ones(system.nv)
+    q, v = np.array(system.configuration), np.ones(system.nv)
     x = np.concatenate([q + np.array([0, OPEN_BY, 0]), 0 * v])
     state = full_state(system)
     assert float(state.project(0.0, x, [])[1]) == pytest.approx(OPEN_BY / 1.7, rel=0.05)
@@ -159,7 +159,7 @@ def test_a_spatial_loop_of_any_size_has_its_mobility(size):
     m.connect(m.world.at(0.2 * size, 0.8 * size, 0.3 * size), Revolute("r2", axis="x"), c)
     system = m.assemble()
     assert system.closure.mobility == 2
-    assert examine(system, system.posture).opening < 1e-12
+    assert examine(system, system.configuration).opening < 1e-12
 
 
 @pytest.mark.parametrize("size", [1e-6, *SCALES])

@@ -4,8 +4,8 @@ import pytest
 import mbs
 from mbs.errors import ModelError
 from mbs.models.catalogue import entries, entry
+from mbs.models.catalogue.configurations import held_at, moving_joints, surplus_joints
 from mbs.models.catalogue.entry import regular_part
-from mbs.models.catalogue.postures import held_at, moving_joints, surplus_joints
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_the_default_part_of_a_jacobian_has_an_inverse(systems, name, frame, row
     chosen = entry("inverse-jacobian").choices(system, frame=frame)
     assert (chosen["rows"], chosen["columns"]) == (tuple(rows.split()), tuple(columns.split()))
     inverse = entry("inverse-jacobian").build(system, frame=frame)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     if not system.is_closed:
         q = np.random.default_rng(3).uniform(0.3, 1.0, system.nq)
     elif name == "sr400":
@@ -88,7 +88,7 @@ def test_a_refusal_says_why(systems):
 
 
 def test_a_model_without_function_says_so(systems):
-    with pytest.raises(ModelError, match="is no Function; ask for its text or postures"):
+    with pytest.raises(ModelError, match="is no Function; ask for its text or configurations"):
         entry("igm-paul").build(systems["sr400"])
     assert not entry("igm-general").has_function(systems["scara"])
     assert entry("igm-general").has_function(systems["rx90"])

@@ -34,17 +34,17 @@ def free_names(system):
 
 
 def active_positions(system, seed):
-    """Positions of the motorised joints near the assembled posture; no wrist is stretched."""
+    """Positions of the motorised joints near the assembled configuration; no wrist is stretched."""
     rng = np.random.default_rng(seed)
     names = [c.name for c in system.coordinates]
-    q_a = np.array([system.posture[names.index(name)] for name in free_names(system)])
+    q_a = np.array([system.configuration[names.index(name)] for name in free_names(system)])
     q_a += rng.uniform(-AWAY[system.name], AWAY[system.name], q_a.shape)
     for wrist in {"sr400": (3,), "akr3000": (4,)}.get(system.name, ()):
         q_a[wrist] += 0.8
     return q_a
 
 
-def posture(system, q_a):
+def configuration(system, q_a):
     return mbs.loops.solve(system, dict(zip(free_names(system), q_a, strict=True)))
 
 
@@ -58,7 +58,7 @@ def test_terminal_frame(systems, name):
 def test_direct_geometry_is_the_pose_after_closure(systems, name, seed):
     system = systems[name]
     q_a = active_positions(system, seed)
-    q = posture(system, q_a)
+    q = configuration(system, q_a)
     T = numbers(mbs.models.direct_geometry(system), q_a)
     np.testing.assert_allclose(T, numbers(mbs.models.transform(system, TOOLS[name]), q), atol=1e-9)
 
@@ -84,7 +84,7 @@ def test_direct_geometry_of_the_five_bar_is_where_two_circles_meet(systems):
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", TOOLS)
-def test_jacobian_is_the_slope_of_the_pose_along_closed_postures(systems, name, seed):
+def test_jacobian_is_the_slope_of_the_pose_along_closed_configurations(systems, name, seed):
     system, h = systems[name], 1e-5
     q_a = active_positions(system, seed)
     v_a = np.random.default_rng(seed).normal(size=q_a.shape)
@@ -93,7 +93,7 @@ def test_jacobian_is_the_slope_of_the_pose_along_closed_postures(systems, name, 
     V = (ahead[:3, 3] - behind[:3, 3]) / (2 * h)
     spin = (ahead[:3, :3] @ behind[:3, :3].T - behind[:3, :3] @ ahead[:3, :3].T) / (4 * h)
     w = [spin[2, 1], spin[0, 2], spin[1, 0]]
-    J = numbers(mbs.models.jacobian(system, TOOLS[name]), posture(system, q_a))
+    J = numbers(mbs.models.jacobian(system, TOOLS[name]), configuration(system, q_a))
     assert J.shape == (6, len(system.active))
     np.testing.assert_allclose(J @ v_a, [*V, *w], atol=2e-7)
 
@@ -102,7 +102,7 @@ def test_jacobian_is_the_slope_of_the_pose_along_closed_postures(systems, name, 
 @pytest.mark.parametrize("name", TOOLS)
 def test_determinant_and_inverse_are_those_of_the_square_part(systems, name, seed):
     system, frame, rows = systems[name], TOOLS[name], ROWS.get(name)
-    q = posture(system, active_positions(system, seed))
+    q = configuration(system, active_positions(system, seed))
     numbered = range(6) if rows is None else range(len(rows))
     square = numbers(mbs.models.jacobian(system, frame), q)[list(numbered)]
     det = float(mbs.models.jacobian_determinant(system, frame, rows)(q))
@@ -129,7 +129,7 @@ def test_jacobian_of_the_delta_by_its_rods(systems):
     tips = 0.25 * np.column_stack([-s * np.cos(around), -s * np.sin(around), -c])
     rods = three_spheres(elbows, 0.6) - elbows
     expected = np.linalg.solve(rods, np.diag(np.sum(rods * tips, axis=1)))
-    J = numbers(mbs.models.jacobian(system, "tool"), posture(system, q_a))
+    J = numbers(mbs.models.jacobian(system, "tool"), configuration(system, q_a))
     np.testing.assert_allclose(J, np.vstack([expected, np.zeros((3, 3))]), atol=1e-11)
 
 
@@ -183,7 +183,7 @@ def test_inverse_is_refused_where_crank_and_coupler_are_in_line(systems):
     system = systems["five_bar"]
     q = five_bar_at(1.2, (CRANK + COUPLER) * np.exp(1.2j), 1)
     q[1] = 0.0
-    with pytest.raises(ModelError, match="or the posture is singular"):
+    with pytest.raises(ModelError, match="or the configuration is singular"):
         mbs.models.inverse_jacobian(system, "tool", ["Vx", "Vy"])(q)
 
 
@@ -224,7 +224,7 @@ def test_rows_must_be_named_for_fewer_than_six_motors(systems, name):
 
 
 def test_link_of_the_loop_cannot_take_every_pose(systems):
-    with pytest.raises(ModelError, match="of 8 are singular in every posture"):
+    with pytest.raises(ModelError, match="of 8 are singular in every configuration"):
         mbs.models.inverse_jacobian(systems["sr400"], 8)
     assert mbs.models.singularities(systems["sr400"], 8).constant == "0"
 
@@ -232,7 +232,9 @@ def test_link_of_the_loop_cannot_take_every_pose(systems):
 def test_out_of_reach_is_refused(systems):
     with pytest.raises(Unclosable, match=r"leg1 = 2, .* whose branch ends near leg1 = "):
         mbs.models.direct_geometry(systems["stewart_platform"])([2, -0.5, 0, 0, 0, 0])
-    with pytest.raises(Unclosable, match=r"no posture on this branch .* q6 can be .* to 0\.2 m"):
+    with pytest.raises(
+        Unclosable, match=r"no configuration on this branch .* q6 can be .* to 0\.2 m"
+    ):
         mbs.models.direct_geometry(systems["akr3000"])([0, -0.08, 0.5, 0, 0, 0])
 
 

@@ -76,7 +76,7 @@ def test_flight_is_the_direct_dynamic_model(quadruped, phases):
 
 def test_a_force_in_a_phase_is_an_external_wrench(quadruped, phases):
     """The momentum that the ground gives: total force = mass (acceleration of the centre - g)."""
-    q, v = np.array(quadruped.posture), np.zeros(quadruped.nv)
+    q, v = np.array(quadruped.configuration), np.zeros(quadruped.nv)
     a, f = phases.accelerations(tuple(FEET))(q, v, 0)
     turn = numbers(mbs.models.transform(quadruped, "slope")(q))[:3, :3]
     ddm = mbs.models.direct_dynamics(quadruped, f_ext=True)
@@ -115,7 +115,7 @@ def test_points_that_hold_each_other_share_their_forces():
         corners.append(ContactPoint(f"corner{k}", f"corner{k}", friction=0.5))
     system = m.assemble()
     phases = contact_phases(system, corners)
-    a, f = phases.accelerations(phases.names)(system.posture, 0, 0)
+    a, f = phases.accelerations(phases.names)(system.configuration, 0, 0)
     np.testing.assert_allclose(numbers(a), 0, atol=1e-7)
     np.testing.assert_allclose(numbers(f)[2], 2 * 9.81 / 4, rtol=1e-6)
     np.testing.assert_allclose(numbers(f)[:2], 0, atol=1e-5)
@@ -124,7 +124,7 @@ def test_points_that_hold_each_other_share_their_forces():
 def test_loops_stay_closed_when_a_link_touches():
     system = four_bar()
     phases = contact_phases(system, [ContactPoint("tip", "b")])
-    q, tau = np.array(system.posture), np.array([3.0, 0, 0])
+    q, tau = np.array(system.configuration), np.array([3.0, 0, 0])
     v = numbers(mbs.loops.reduction_matrix(system)(q)).ravel() * 2.0
     p = system.p_default
     a, f, lam = phases.accelerations({"tip": "sliding"})(q, v, tau, p)

@@ -27,16 +27,18 @@ def built(name):
 
 
 def state(system, seed=0):
-    """A closed posture beside the assembled one, velocities that keep it closed, efforts."""
+    """A closed configuration beside the assembled one, velocities that keep it closed, efforts."""
     rng = np.random.default_rng(seed)
     if system.is_closed:
         moved = {system.speeds[k].name: rng.uniform(-0.2, 0.2) for k in system.active}
         names = [c.name for c in system.coordinates]
-        there = {n: system.posture[names.index(n)] + x for n, x in moved.items() if n in names}
+        there = {
+            n: system.configuration[names.index(n)] + x for n, x in moved.items() if n in names
+        }
         q = mbs.loops.solve(system, there)
         v = np.array(reduction_matrix(system)(q)) @ rng.uniform(-1, 1, len(system.active))
     else:
-        q = np.array(system.posture) + rng.uniform(-0.5, 0.5, system.nq)
+        q = np.array(system.configuration) + rng.uniform(-0.5, 0.5, system.nq)
         for part in quaternions(system):
             q[part] /= np.linalg.norm(q[part])
         v = rng.uniform(-1, 1, system.nv)

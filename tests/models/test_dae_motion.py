@@ -42,7 +42,7 @@ def moved(d, duration, method, **options):
 
 
 def unwound(system, q, other):
-    """What is between two postures, whole turns of revolute joints apart."""
+    """What is between two configurations, whole turns of revolute joints apart."""
     gap = q - other
     turns = [coordinate.unit == "rad" for coordinate in system.coordinates]
     gap[turns] = np.remainder(gap[turns] + np.pi, 2 * np.pi) - np.pi

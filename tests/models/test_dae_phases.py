@@ -189,7 +189,11 @@ def test_loops_and_points_together(form):
     ("error", "given", "message"),
     [
         (ModelError, {"form": "index4"}, "form is 'index4'; use one of reduced, index1"),
-        (Unclosable, {"q0": {"base.z": 3.0, "slide": 0.1}}, "no posture near the start lets foot"),
+        (
+            Unclosable,
+            {"q0": {"base.z": 3.0, "slide": 0.1}},
+            "no configuration near the start lets foot",
+        ),
         (ModelError, {"v0": [1.0] * 8}, "foot allow no motion with the velocities base.vx = 1"),
         (ModelError, {"tau0": {"base.vx": 1.0}}, "which has no motor"),
         (ModelError, {"touching": ["toe"]}, "there is no contact point 'toe'"),

@@ -65,7 +65,7 @@ def test_accelerations_with_respect_to_parameters(method):
 def test_closed_systems_along_their_motion(name):
     system = mbs.load(name).assemble()
     m, rng = len(system.active), np.random.default_rng(0)
-    start = np.array(system.posture)[list(system.active)]
+    start = np.array(system.configuration)[list(system.active)]
     q = np.array(mbs.loops.solve(system, start + 0.1))
     v, a = rng.uniform(-1, 1, (2, m))
 
@@ -227,5 +227,5 @@ def assert_finite_hessians(system, method):
             values.append(casadi.hessian(total, casadi.vertcat(q, v, a))[0])
     hessians = casadi.Function("h", [q, v, a, x], values)
     rest = np.zeros(system.nv)
-    found = hessians(list(system.posture), rest, rest, np.ones(system.nv))
+    found = hessians(list(system.configuration), rest, rest, np.ones(system.nv))
     assert all(casadi.DM(h).is_regular() for h in found)

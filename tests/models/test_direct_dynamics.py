@@ -171,7 +171,7 @@ def test_external_wrenches(method, name):
     method = "composite" if system.is_closed else method
     rng = np.random.default_rng(3)
     m = len(system.active)
-    q = list(system.posture)
+    q = list(system.configuration)
     v, a = rng.uniform(-1, 1, (2, m))
     wrenches = rng.uniform(-1, 1, (6, len(system.bodies)))
     loaded = mbs.models.inverse_dynamics(system, f_ext=True)(q, v, a, wrenches)

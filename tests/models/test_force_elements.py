@@ -355,7 +355,7 @@ def test_elements_in_a_loop(seed):
     system = m.assemble(guess=guess)
     assert system.is_closed
     assert len(system.active) == 1
-    q, name = np.array(system.posture), system.speeds[system.active[0]].name
+    q, name = np.array(system.configuration), system.speeds[system.active[0]].name
     place = [c.name for c in system.coordinates].index(name)
     U = MODELS.energy(system, "tree")
     ends = [mbs.loops.solve(system, {name: q[place] + h}) for h in (1e-5, -1e-5)]
@@ -395,11 +395,11 @@ def test_absent_elements_cost_nothing():
     st.tuples(*[st.floats(-3, 3)] * 3),
 )
 def test_a_pair_of_forces_does_not_move_the_mass_centre(points, q, v):
-    """Between two free bodies: no net force, no net moment, at any points and postures."""
-    posture = [*q, 1, 0, 0, 0, *v, 0.6, 0, 0.8, 0]
-    value = MODELS.gravity_effort(PAIR)(posture, points)
+    """Between two free bodies: no net force, no net moment, at any points and configurations."""
+    configuration = [*q, 1, 0, 0, 0, *v, 0.6, 0, 0.8, 0]
+    value = MODELS.gravity_effort(PAIR)(configuration, points)
     f_a, m_a, f_b, m_b = np.split(numbers(value).ravel(), 4)
-    R_b = numbers(MODELS.transform(PAIR, "b")(posture, points))[:3, :3]
+    R_b = numbers(MODELS.transform(PAIR, "b")(configuration, points))[:3, :3]
     scale = 1 + np.abs(f_a).max() * 10
     np.testing.assert_allclose(f_a + R_b @ f_b, 0, atol=1e-12 * scale)
     moment = m_a + np.cross(q, f_a) + R_b @ m_b + np.cross(v, R_b @ f_b)

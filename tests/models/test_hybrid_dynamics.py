@@ -17,7 +17,7 @@ def test_an_open_tree_needs_the_efforts_of_the_inverse_model(seed):
     names = [speed.name for speed in system.speeds]
     held = list(rng.choice(names, size=2, replace=False))
     numbers = [names.index(name) for name in held]
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     v, tau = rng.normal(size=system.nv), rng.normal(size=system.nv)
     wanted = rng.normal(size=2)
     a, added = (
@@ -35,15 +35,15 @@ def test_a_closed_chain_moves_as_with_the_effort_that_was_found(closing):
     system = mechanism.assemble(guess=guess)
     name = system.speeds[system.active[0]].name
     rng = np.random.default_rng(1)
-    G = np.array(mbs.loops.reduction_matrix(system)(system.posture))
+    G = np.array(mbs.loops.reduction_matrix(system)(system.configuration))
     v, tau = G @ rng.normal(size=len(system.active)), rng.normal(size=system.nv)
     hybrid = mbs.models.hybrid_dynamics(system, [name])
-    a, added, lam = (np.array(x).ravel() for x in hybrid(system.posture, v, tau, [1.7]))
+    a, added, lam = (np.array(x).ravel() for x in hybrid(system.configuration, v, tau, [1.7]))
     k = system.active[0]
     assert a[k] == pytest.approx(1.7, abs=1e-9)
     tau[k] += added[0]
     direct = mbs.models.direct_dynamics(system, coordinates="tree")
-    again, lam_again = (np.array(x).ravel() for x in direct(system.posture, v, tau))
+    again, lam_again = (np.array(x).ravel() for x in direct(system.configuration, v, tau))
     assert a == pytest.approx(again, rel=1e-7, abs=1e-7)
     assert lam == pytest.approx(lam_again, rel=1e-6, abs=1e-6)
 
@@ -51,7 +51,7 @@ def test_a_closed_chain_moves_as_with_the_effort_that_was_found(closing):
 def test_one_prescribed_joint_of_a_four_bar_fixes_the_motion():
     system = mbs.load("four_bar").assemble()
     closure = mbs.models.acceleration_closure(system)
-    q, v_a = np.array(system.posture), [1.3]
+    q, v_a = np.array(system.configuration), [1.3]
     G = np.array(mbs.loops.reduction_matrix(system)(q))
     bias = np.array(closure(q, v_a)[2]) @ v_a
     hybrid = mbs.models.hybrid_dynamics(system, ["j1"])

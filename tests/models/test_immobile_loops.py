@@ -39,7 +39,9 @@ class Pair:
         self.rigid_q, self.v, self.a, self.tau = rng.uniform(-1, 1, (4, self.rigid.nq))
         names = [c.name for c in self.bars.coordinates]
         there = dict(zip((c.name for c in self.rigid.coordinates), self.rigid_q, strict=True))
-        self.q = np.array([there.get(n, x) for n, x in zip(names, self.bars.posture, strict=True)])
+        self.q = np.array(
+            [there.get(n, x) for n, x in zip(names, self.bars.configuration, strict=True)]
+        )
         self.G = numbers(mbs.loops.reduction_matrix(self.bars)(self.q))
         self.rows = [names.index(name) for name in there]
 

@@ -37,7 +37,7 @@ def test_constraints(kind):
     system = mechanism.assemble(guess=guess)
     F = in_balance(mechanism, system)
     f, m = np.split(column(system, F, "held"), 2)
-    T = np.linalg.inv(joint) @ np.array(mbs.models.transform(system, "body7")(system.posture))
+    T = np.linalg.inv(joint) @ np.array(mbs.models.transform(system, "body7")(system.configuration))
     z = T[:3, :3].T @ [0, 0, 1]
     if kind == "rod":
         along = T[:3, :3].T @ T[:3, 3]
@@ -95,7 +95,7 @@ def test_rolling_discs():
     mechanism = mbs.load("whipple_bicycle")
     system = mechanism.assemble()
     in_balance(mechanism, system)
-    F = joint_wrenches(system)(system.posture, [0, 0, 4.0], [0, 0, 0])
+    F = joint_wrenches(system)(system.configuration, [0, 0, 4.0], [0, 0, 0])
     contacts = [column(system, F, f"{name}_contact") for name in ("rear", "front")]
     weight = sum(row.mass for row in system.bodies) * 9.81
     assert sum(abs(f[2]) for f in contacts) == pytest.approx(weight, rel=1e-3)
@@ -156,7 +156,7 @@ def test_gears_put_efforts_on_their_coordinates():
         m.connect(m.world.at(x), Revolute(name, actuated=name == "p"), body)
     m.add(Gear("mesh", driven="w", driver="p", ratio=-0.5))
     system = m.assemble()
-    F = joint_wrenches(system)(system.posture, 0.0, 2.0)
+    F = joint_wrenches(system)(system.configuration, 0.0, 2.0)
     assert column(system, F, "w")[5] == pytest.approx(0.3 * -0.5 * 2.0)
     assert column(system, F, "p")[5] == pytest.approx(0.3 * 2.0)
 
@@ -174,6 +174,6 @@ def test_massless_link_of_a_parallelogram():
     f, n = np.split(column(system, F, "j3"), 2)
     assert abs(n[2]) < 1e-12
     assert np.linalg.norm(f) > 1  # the bar pushes the passive crank, along itself
-    q = dict(zip([x.name for x in system.coordinates], system.posture, strict=True))
+    q = dict(zip([x.name for x in system.coordinates], system.configuration, strict=True))
     b_axis = np.array([np.cos(q["j4"]), -np.sin(q["j4"]), 0])
     np.testing.assert_allclose(np.cross(f, b_axis), 0, atol=1e-9)

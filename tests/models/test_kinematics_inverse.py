@@ -87,7 +87,7 @@ def test_factors_of_an_arm_with_symbols(name, constant, factors):
 
 
 @pytest.mark.parametrize(
-    ("name", "posture", "vanish"),
+    ("name", "configuration", "vanish"),
     [
         ("rx90", {"q3": np.pi / 2}, {"C3", "S23 - C2"}),
         ("rx90", {"q5": 0.0}, {"S5"}),
@@ -97,18 +97,18 @@ def test_factors_of_an_arm_with_symbols(name, constant, factors):
         ("puma560", {"q3": np.arctan2(-0.4331, 0.0203)}, {"0.0203*S3 + 0.4331*C3"}),
     ],
 )
-def test_singular_posture_is_where_a_factor_vanishes(name, posture, vanish):
+def test_singular_configuration_is_where_a_factor_vanishes(name, configuration, vanish):
     system = mbs.load(name).assemble()
-    q = np.array(system.position({f"q{k}": 0.3 + 0.2 * k for k in range(1, 7)} | posture))
+    q = np.array(system.position({f"q{k}": 0.3 + 0.2 * k for k in range(1, 7)} | configuration))
     factors = singularities(system, 6).factors
     assert {f.text for f in factors if abs(float(f.function(q))) < 1e-12} == vanish
     singular = np.linalg.svd(np.array(jacobian(system, 6)(q)), compute_uv=False)
     assert singular[-1] < 1e-12
 
 
-def test_inverse_at_a_singular_posture_is_refused():
+def test_inverse_at_a_singular_configuration_is_refused():
     system = mbs.load("rx90").assemble()
-    with pytest.raises(ModelError, match="the posture is singular"):
+    with pytest.raises(ModelError, match="the configuration is singular"):
         inverse_jacobian(system, 6)([0.1, 0.2, 0.3, 0.4, 0.0, 0.6])
 
 
@@ -158,7 +158,7 @@ def test_any_part_of_a_random_tree(seed, size, aligned):
     found = singularities(system, name, rows, columns, expressed_in=axes)
     if found.constant == "0":
         assert abs(det) < 1e-11 * scale
-        with pytest.raises(ModelError, match="are singular in every posture"):
+        with pytest.raises(ModelError, match="are singular in every configuration"):
             inverse_jacobian(system, name, rows, columns, expressed_in=axes)
         return
     values = [float(factor.function(q)) ** factor.power for factor in found.factors]
@@ -173,7 +173,7 @@ def test_any_part_of_a_random_tree(seed, size, aligned):
 def test_part_of_a_closed_system():
     mechanism, guess = closed_chain(3, "universal")
     system = mechanism.assemble(guess=guess)
-    q, m = np.array(system.posture), len(system.active)
+    q, m = np.array(system.configuration), len(system.active)
     name, rows = system.bodies[3].name, [1, 3, 5, 0][:m]
     J = np.array(jacobian(system, name)(q))[rows]
     det = float(jacobian_determinant(system, name, rows)(q))
@@ -202,7 +202,7 @@ def test_wrist_of_a_robot_with_a_parallelogram_separates():
 def test_planar_loop():
     mechanism, guess = planar_loop(1)
     system = mechanism.assemble(guess=guess)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     name = system.bodies[1].name
     J = np.array(jacobian(system, name)(q))[[0, 5]]
     inverse = np.array(inverse_jacobian(system, name, rows=["Vx", "wz"])(q))
@@ -210,7 +210,7 @@ def test_planar_loop():
     refused(
         ModelError,
         "rows 2, 5 and columns",
-        "singular in every posture; name other rows or columns",
+        "singular in every configuration; name other rows or columns",
         by=lambda: inverse_jacobian(system, name, rows=["Vz", "wz"]),
     )
 

@@ -61,9 +61,9 @@ def test_closed_system():
     system = mechanism.assemble(guess=guess)
     rng = np.random.default_rng(2)
     v = rng.uniform(-1, 1, len(system.active))
-    same(*both(system, list(system.posture), v))
+    same(*both(system, list(system.configuration), v))
     v = rng.uniform(-1, 1, system.nv)
-    same(*both(system, list(system.posture), v, coordinates="tree"))
+    same(*both(system, list(system.configuration), v, coordinates="tree"))
 
 
 @pytest.mark.parametrize("method", ["euler", None, "Renaud"])

@@ -83,7 +83,7 @@ def quadruped():
 
 def random_motion(system):
     rng = np.random.default_rng(4)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     fixed = system.nq != system.nv
     q[7 if fixed else 0 :] = rng.uniform(-1, 1, system.nq - 7 * fixed)
     if fixed:

@@ -35,8 +35,8 @@ def matrices(system, q):
 
 
 def along(system, v, h):
-    """The closed posture reached from the assembled one after a time h."""
-    q = np.array(system.posture)
+    """The closed configuration reached from the assembled one after a time h."""
+    q = np.array(system.configuration)
     rate = np.array(system.qdot(q, v)).ravel()
     found = Closing(system, closure_parameters(system)).nearest(q + h * rate)
     assert found.is_closed
@@ -44,9 +44,9 @@ def along(system, v, h):
 
 
 def motion(system, seed=3):
-    """Independent velocities and those of the tree that follow, at the assembled posture."""
+    """Independent velocities and those of the tree that follow, at the assembled configuration."""
     v_a = np.random.default_rng(seed).uniform(-1, 1, len(system.active))
-    return v_a, np.array(reduction_matrix(system)(list(system.posture))) @ v_a
+    return v_a, np.array(reduction_matrix(system)(list(system.configuration))) @ v_a
 
 
 def cut_pose(system, q):
@@ -90,7 +90,7 @@ def cut_positions(system, q):
 
 
 def test_the_rows_are_those_of_the_closure(system):
-    q, closure = list(system.posture), system.closure
+    q, closure = list(system.configuration), system.closure
     M = matrices(system, q)
     J = np.array(closure_jacobian(system)(q))[list(closure.rows)]
     np.testing.assert_allclose(M["Wa"], J[:, list(closure.active)], atol=1e-14)
@@ -107,7 +107,7 @@ def test_velocities_of_the_cut_joint(kind):
     v_a, v = motion(system)
     h = 1e-5
     ahead, behind = (cut_positions(system, along(system, v, s * h)) for s in (1, -1))
-    M = matrices(system, list(system.posture))
+    M = matrices(system, list(system.configuration))
     v_c = M["Wac"] @ v_a + M["Wpc"] @ M["W"] @ v_a
     assert v_c.shape == ahead.shape
     assert np.abs(v_c).min() > 1e-4
@@ -120,15 +120,15 @@ def test_angular_velocity_of_a_spherical_cut_joint():
     v_a, v = motion(system)
     h = 1e-5
     ahead, behind = (cut_pose(system, along(system, v, s * h))[:3, :3] for s in (1, -1))
-    spin = cut_pose(system, list(system.posture))[:3, :3].T @ (ahead - behind) / (2 * h)
-    M = matrices(system, list(system.posture))
+    spin = cut_pose(system, list(system.configuration))[:3, :3].T @ (ahead - behind) / (2 * h)
+    M = matrices(system, list(system.configuration))
     v_c = (M["Wac"] + M["Wpc"] @ M["W"]) @ v_a
     np.testing.assert_allclose(v_c, [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-8)
 
 
 def test_accelerations_are_the_rates_of_velocities(system):
     v_a, v = motion(system)
-    q, h = list(system.posture), 1e-5
+    q, h = list(system.configuration), 1e-5
     Psi, Phi, G_dot = (np.array(x) for x in acceleration_closure(system)(q, v_a))
     M, ahead, behind = (matrices(system, along(system, v, s * h)) for s in (0, 1, -1))
     v_p = M["W"] @ v_a
@@ -144,7 +144,7 @@ def test_accelerations_are_the_rates_of_velocities(system):
 
 def test_tree_velocities_give_the_same(system):
     v_a, v = motion(system)
-    q = list(system.posture)
+    q = list(system.configuration)
     independent = acceleration_closure(system)(q, v_a)
     tree = acceleration_closure(system, "tree")(q, v)
     for one, other in zip(independent, tree, strict=True):
@@ -155,7 +155,7 @@ def test_accelerations_of_the_tree_close_the_loops():
     mechanism, guess = closed_chain(4, "universal")
     system = mechanism.assemble(guess=guess)
     v_a, _ = motion(system)
-    q = list(system.posture)
+    q = list(system.configuration)
     Psi, _, G_dot = (np.array(x) for x in acceleration_closure(system)(q, v_a))
     M = matrices(system, q)
     a_p = -np.linalg.solve(M["Wp"], Psi.ravel())
@@ -176,7 +176,7 @@ def test_a_joint_has_one_velocity_wherever_the_loop_is_cut():
     names = [speed.name for speed in in_tree.speeds]
     known = dict(zip(names, v, strict=True))
     elsewhere = assembled("j2")
-    M = matrices(elsewhere, list(elsewhere.posture))
+    M = matrices(elsewhere, list(elsewhere.configuration))
     active = np.array([known.get(elsewhere.speeds[k].name, np.nan) for k in elsewhere.active])
     assert not np.isnan(active).any()
     v_c = (M["Wac"] + M["Wpc"] @ M["W"]) @ active

@@ -1,4 +1,4 @@
-"""Rigid stops and dry friction in the state equation of the independent joints."""
+"""Rigid stops and Coulomb friction in the state equation of the independent joints."""
 
 import casadi
 import numpy as np
@@ -176,11 +176,11 @@ def test_closed_systems_move_as_in_a_simulation(name):
 
 def test_more_contacts_than_freedoms_come_to_rest_as_in_a_simulation():
     m = mbs.load("five_bar")
-    posture = dict(zip(("q1", "q2", "q3", "q4"), m.assemble().posture, strict=True))
+    configuration = dict(zip(("q1", "q2", "q3", "q4"), m.assemble().configuration, strict=True))
     for name, strength in {"q3": 0.013, "q2": 0.19, "q4": 0.17}.items():
         m.add(CoulombFriction(f"dry_{name}", joint=name, sliding=strength))
     for name in ("q1", "q4"):
-        limits = {"lower": posture[name] - 0.1, "upper": posture[name] + 0.1}
+        limits = {"lower": configuration[name] - 0.1, "upper": configuration[name] + 0.1}
         m.add(RigidStop(f"end_{name}", joint=name, restitution=0.6566, **limits))
     system = m.assemble()
     state, own, full = compared(system, 0.6, v0={"q1": 0.3, "q3": -0.2})
@@ -192,7 +192,7 @@ def test_more_contacts_than_freedoms_come_to_rest_as_in_a_simulation():
 
 
 def test_a_dependent_joint_stays_at_its_stop_while_the_others_move():
-    limit = five_bar(0.0).posture[1]
+    limit = five_bar(0.0).configuration[1]
     system = five_bar(0.0, RigidStop("end", joint="a2", lower=limit))
     state = minimal_state(system)
     (column,) = (k for k, n in enumerate(state.dependents) if system.coordinates[n].name == "a2")

@@ -69,7 +69,7 @@ def test_a_controller_that_is_no_expression_of_scalars_stays_a_call():
 
 
 def loaded_arm(*acts):
-    """Four turns with a stop and dry friction; what acts on a point of the last link."""
+    """Four turns with a stop and Coulomb friction; what acts on a point of the last link."""
     m = mbs.Mechanism("arm", gravity=(0, 0, -9.81))
     end = m.world
     for k, axis in enumerate("zyyx", start=1):

@@ -35,14 +35,14 @@ def floating():
 
 
 def random_point(system, state, seed=0):
-    """x and z of a posture that closes the loops, with random velocities."""
+    """x and z of a configuration that closes the loops, with random velocities."""
     rng = np.random.default_rng(seed)
     x, z = (np.array(part) for part in consistent_start(system, state))
     x[len(state.positions) :] = rng.uniform(-1, 1, len(x) - len(state.positions))
     return x, z, rng
 
 
-def posture(system, state, x, z):
+def configuration(system, state, x, z):
     """(nq,) positions, quaternions of unit length."""
     q = np.zeros(system.nq)
     q[list(state.positions)], q[list(state.dependents)] = x[: len(state.positions)], z
@@ -85,7 +85,7 @@ def test_a_wrench_on_a_frame_is_the_opposite_of_f_ext(name):
     x, z, rng = random_point(system, state)
     tau, wrench = rng.uniform(-5, 5, len(state.inputs)), rng.uniform(-5, 5, 6)
     xdot, _ = state.rhs(0.0, x, z, [*tau, *wrench], system.p_default)
-    q = posture(system, state, x, z)
+    q = configuration(system, state, x, z)
     efforts = np.zeros(system.nv)
     efforts[list(state.inputs)] = tau
     v = x[len(state.positions) :]
@@ -99,7 +99,7 @@ def test_a_wrench_on_a_frame_is_the_opposite_of_f_ext(name):
 
 
 def pushed(*acts):
-    """A four-bar with dry friction; what acts on a point of its coupler."""
+    """A four-bar with Coulomb friction; what acts on a point of its coupler."""
     m = mbs.load("four_bar")
     m.add(CoulombFriction("dry", joint="j4", sliding=0.2))
     point = m.add_frame("middle", m.components["b"].at(0.3, 0.1, 0))
@@ -158,7 +158,7 @@ def test_a_prescribed_acceleration_of_a_loop_is_that_of_hybrid_dynamics():
     xdot, y = state.rhs(0.0, x, z, [3.0, 0.7], [])
     v = np.zeros(4)
     v[list(state.velocities)], v[list(state.passive)] = x[2:], np.array(y)[3:5, 0]
-    q = posture(system, state, x, z)
+    q = configuration(system, state, x, z)
     a, drive, _ = hybrid_dynamics(system, ["a1"])(q, v, [0, 0, 3.0, 0], [0.7])
     assert float(xdot[2]) == 0.7
     assert float(xdot[3]) == pytest.approx(float(a[2]), rel=1e-11)
@@ -168,7 +168,7 @@ def test_a_prescribed_acceleration_of_a_loop_is_that_of_hybrid_dynamics():
 
 @pytest.mark.parametrize("name", ["bricard", "four_bar"])
 def test_the_acceleration_that_a_loop_has_anyway_needs_no_drive(name):
-    """One of them has rows whose independence changes with the posture."""
+    """One of them has rows whose independence changes with the configuration."""
     system = mbs.load(name).assemble()
     first = system.active[0]
     motion = ((system.speeds[first].name, "a"),)
@@ -186,12 +186,12 @@ def test_the_acceleration_that_a_loop_has_anyway_needs_no_drive(name):
     assert abs(float(y[-1])) > 1e-4
 
 
-def test_the_start_is_the_assembled_posture_at_rest():
+def test_the_start_is_the_assembled_configuration_at_rest():
     system = five_bar(-9.81)
     state = minimal_state(system)
     x, z = start_of(system, state)
-    q = posture(system, state, x, z)
-    np.testing.assert_array_equal(q, system.posture)
+    q = configuration(system, state, x, z)
+    np.testing.assert_array_equal(q, system.configuration)
     assert np.array_equal(x[2:], [0, 0])
     after, residual = state.closure(x, z, [])
     assert float(residual) < 1e-12

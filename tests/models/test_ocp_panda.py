@@ -49,8 +49,8 @@ def by_stages(arm, most, stages, seconds=None):
     middle = q[:, :-1] + h / 2 * v[:, :-1] + h**2 / 8 * a, v[:, :-1] + h / 2 * a
     tau = Function.map(inverse_dynamics(arm), stages)(*middle, a)
     bounded(opti, most, q[:, 1:-1], v[:, 1:-1], tau)
-    for knot, posture in ((0, FROM), (-1, TO)):
-        opti.subject_to(q[:, knot] == posture)
+    for knot, configuration in ((0, FROM), (-1, TO)):
+        opti.subject_to(q[:, knot] == configuration)
         opti.subject_to(v[:, knot] == 0)
     opti.set_initial(q, np.linspace(FROM, TO, size).T)
     effort = h * casadi.sumsqr(tau / casadi.repmat(most.tau_upper, 1, stages))

@@ -68,17 +68,17 @@ def names(system, numbers):
     return [system.speeds[k].name for k in numbers]
 
 
-def posture(system):
-    return dict(zip((c.name for c in system.coordinates), system.posture, strict=True))
+def configuration(system):
+    return dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
 
 
 def closed(system, count=5):
     """Configurations near the assembled one, and independent velocities and accelerations."""
     rng = np.random.default_rng(7)
-    start = np.array(system.posture)[list(system.active)]
+    start = np.array(system.configuration)[list(system.active)]
     for _ in range(count):
         q_a = start + rng.uniform(-0.1, 0.1, len(start))
-        q = np.array(mbs.loops.solve(system, q_a, guess=posture(system))).ravel()
+        q = np.array(mbs.loops.solve(system, q_a, guess=configuration(system))).ravel()
         yield q, rng.normal(size=len(start)), rng.normal(size=len(start)), rng
 
 
@@ -111,7 +111,7 @@ def test_inverse_and_direct_dynamics_undo_each_other(redundant):
 
 def test_all_motors_do_what_equal_efforts_of_independent_joints_do(redundant):
     active = names(redundant, redundant.active)
-    alone = five_bar(tuple(active)).assemble(guess=posture(redundant), active=active)
+    alone = five_bar(tuple(active)).assemble(guess=configuration(redundant), active=active)
     assert alone.active == redundant.active == alone.motors
     ddm, reference = mbs.models.direct_dynamics(redundant), mbs.models.direct_dynamics(alone)
     tree = mbs.models.direct_dynamics(redundant, coordinates="tree")
@@ -151,7 +151,7 @@ def test_the_power_of_all_motors_is_the_rate_of_the_energy(redundant):
     np.testing.assert_allclose(energy - energy[0], work, atol=1e-4 * np.ptp(energy))
     matrix = mbs.models.actuation_matrix(redundant)
     active = names(redundant, redundant.active)
-    alone = five_bar(tuple(active)).assemble(guess=posture(redundant), active=active)
+    alone = five_bar(tuple(active)).assemble(guess=configuration(redundant), active=active)
 
     def equal(t, q, v):
         tau = casadi.vertcat(*pushed(redundant)(t, q, v))
@@ -208,7 +208,7 @@ def test_gas_forces_on_all_pistons_of_a_crankshaft():
         system = engine(active)
         assert system.closure.mobility == 1
         assert names(system, system.motors) == ["gas0", "gas1", "gas2"]
-        assert mbs.models.actuation_null_space(system)(system.posture).shape == (3, 2)
+        assert mbs.models.actuation_null_space(system)(system.configuration).shape == (3, 2)
     assert names(system, system.active) == ["crank_angle"]
     forces = {"gas0": -400.0, "gas1": -150.0, "gas2": 30.0}
     result = mbs.simulate.run(system, 0.2, tau=forces, step=1e-3, v0={"crank_angle": 30}, **QUIET)

@@ -24,9 +24,9 @@ def placed(system, q):
 
 
 def moved(system):
-    """A posture of the open tree that is not the assembled one."""
+    """A configuration of the open tree that is not the assembled one."""
     rng = np.random.default_rng(SEED)
-    q = np.array(system.posture) + rng.uniform(-0.5, 0.5, system.nq)
+    q = np.array(system.configuration) + rng.uniform(-0.5, 0.5, system.nq)
     turned = [k for k, c in enumerate(system.coordinates) if c.kind == "quaternion"]
     for four in np.array(turned, int).reshape(-1, 4):
         q[four] /= np.linalg.norm(q[four])
@@ -35,7 +35,7 @@ def moved(system):
 
 def test_joints_hold_links_together(robot):
     parts = skeleton(robot)
-    assembled, _ = placed(robot, robot.posture)
+    assembled, _ = placed(robot, robot.configuration)
     opened, _ = placed(robot, moved(robot))
     for joint in parts.joints:
         a, b = joint.points
@@ -51,7 +51,7 @@ def test_joints_hold_links_together(robot):
 
 
 def test_lines_keep_their_length(robot):
-    first, _ = placed(robot, robot.posture)
+    first, _ = placed(robot, robot.configuration)
     second, _ = placed(robot, moved(robot))
     lines = [line for link in skeleton(robot).links for line in link.segments]
     assert lines
@@ -118,7 +118,7 @@ def test_a_free_body_has_no_line_and_a_spring_has_two_ends():
     parts = skeleton(system)
     (force,) = parts.forces
     assert (force.name, force.kind, force.links) == ("rope", "spring", (0, 1))
-    q = list(system.posture)
+    q = list(system.configuration)
     q[:3] = [1, 2, 3]
     points, _ = placed(system, q)
     T = np.array(mbs.models.transform(system, "box")(q))

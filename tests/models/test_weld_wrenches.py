@@ -126,7 +126,7 @@ def test_a_weld_in_a_loop():
     F = in_balance(m, system)
     assert np.linalg.norm(column(system, F, "middle")) > 1
     v_a, a_a = np.random.default_rng(7).uniform(-1, 1, (2, 1))
-    f, n = mbs.models.measurements(system)(system.posture, v_a, a_a)
+    f, n = mbs.models.measurements(system)(system.configuration, v_a, a_a)
     np.testing.assert_allclose(
         np.vstack([numbers(f), numbers(n)]).ravel(), column(system, F, "middle"), rtol=0, atol=1e-10
     )

@@ -29,7 +29,7 @@ def system_of(name):
 
 
 def states_of(name, model):
-    """Inputs for some states; of a closed system, closed postures near its own."""
+    """Inputs for some states; of a closed system, closed configurations near its own."""
     system, rng = system_of(name), np.random.default_rng(0)
     sizes = [model.size1_in(k) for k in range(3)]
     if name == "floating":
@@ -37,7 +37,7 @@ def states_of(name, model):
         return [np.array([np.ravel(row[k]) for row in rows]) for k in range(3)]
     inputs = [rng.uniform(-2, 2, (STATES, size)) for size in sizes]
     if name == "five_bar":
-        inputs[0] = np.array(system.posture) + 1e-3 * inputs[0]
+        inputs[0] = np.array(system.configuration) + 1e-3 * inputs[0]
     return inputs
 
 

@@ -81,7 +81,7 @@ def test_a_floating_tree_with_quaternions(builder):
 def test_a_closed_chain():
     system = mbs.load("five_bar").assemble()
     model = mbs.models.inverse_dynamics(system)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     inputs = [q, *(np.full(model.size1_in(k), 0.3) for k in (1, 2))]
     assert worst(model, inputs) < 1e-13
 

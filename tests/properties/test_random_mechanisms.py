@@ -84,7 +84,7 @@ def test_lagrange_form_is_newton_euler(mechanism, seed):
 def test_closed_mechanism_assembles_and_its_models_agree(drawn):
     mechanism, guess = drawn
     system = mechanism.assemble(guess=guess)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     assert np.abs(np.array(closure(system)(q))).max() < 1e-12
     rng = np.random.default_rng(0)
     v_a, a_a = rng.uniform(-1, 1, (2, len(system.active)))
@@ -102,7 +102,7 @@ def test_loops_stay_closed_along_a_motion(drawn):
     mechanism, guess = drawn
     system = mechanism.assemble(guess=guess)
     result = mbs.simulate.run(
-        system, 0.5, q0=list(system.posture), step=0.05, tolerance=1e-9, quiet=True
+        system, 0.5, q0=list(system.configuration), step=0.05, tolerance=1e-9, quiet=True
     )
     for row in result.values:
         residual = np.array(closure(system)(row[: system.nq]))
@@ -116,7 +116,7 @@ def test_loops_stay_closed_along_a_motion(drawn):
 def dissipated(system, result):
     """Energy that viscous friction takes, integrated along the recorded motion [J]."""
     fine = mbs.simulate.run(
-        system, float(result.time[-1]), q0=list(system.posture), step=1e-3, quiet=True
+        system, float(result.time[-1]), q0=list(system.configuration), step=1e-3, quiet=True
     )
     power = sum(
         float(link.Fv) * fine[f"{speed.name}.v"] ** 2

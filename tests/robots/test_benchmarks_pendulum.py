@@ -53,7 +53,7 @@ def windows(request):
 
 
 @pytest.mark.parametrize("tolerance", LIMITS)
-def test_windows_whirl_through_every_singular_posture(windows, tolerance):
+def test_windows_whirl_through_every_singular_configuration(windows, tolerance):
     """On the parallelogram branch the uprights turn together and the couplers only translate.
 
     Then T = (N + 1) phi'^2 / 6 + N phi'^2 / 2 and U = g sin(phi) ((N + 1) / 2 + N).

@@ -91,8 +91,10 @@ def test_squeezer_reaches_the_published_digits(squeezer):
 def test_squeezer_against_free_bodies(squeezer, tolerance, limit):
     """Also beyond the published interval, where the crank turns five times."""
     model, com = seven_bodies()
-    posture = dict(zip((c.name for c in squeezer.coordinates), squeezer.posture, strict=True))
-    start = free_state([posture[name] for name in NAMES], com)
+    configuration = dict(
+        zip((c.name for c in squeezer.coordinates), squeezer.configuration, strict=True)
+    )
+    start = free_state([configuration[name] for name in NAMES], com)
     assert np.max(np.abs(model.gaps(start))) < 1e-15
     end = solution(model.rates, start, [0, 0.05], 1e-12, first=1e-4)[-1]
     assert np.max(np.abs(model.gaps(end))) < 1e-9

@@ -85,7 +85,7 @@ def cube():
 
 @pytest.mark.parametrize(("tolerance", "limit"), [(1e-6, 1e-4), (1e-9, 1e-6)])
 def test_bricard(cube, tolerance, limit):
-    """Half a period and more: through the lowest posture and on."""
+    """Half a period and more: through the lowest configuration and on."""
     chain, reference = cube
     system = bricard().assemble()
     assert system.closure.mobility == 1
@@ -150,7 +150,7 @@ def test_bricard_moves_alike_with_other_rows():
     for rows in ((0, 1, 2, 4), (0, 1, 2, 3), (0, 1, 3, 4)):
         closure = replace(system.closure, rows=rows)
         state = full_state(replace(system, closure=closure, _cache={}))
-        start = np.concatenate([system.posture, np.zeros(system.nv)])
+        start = np.concatenate([system.configuration, np.zeros(system.nv)])
         times = np.linspace(0.0, 3.0, 31)
         options = {"project": state.project, "rtol": 1e-11, "atol": 1e-11}
         ends.append(integrate(state.rhs, start, times, **options))

@@ -197,7 +197,7 @@ def test_five_bar_is_assembled_symmetric_above_the_ground():
     assert tip[1] == pytest.approx(
         0.25 * sin(2.1) + (0.35**2 - (0.1 - 0.25 * cos(2.1)) ** 2) ** 0.5
     )
-    assert abs(system.posture[0] + system.posture[2] - pi) < 0.1
+    assert abs(system.configuration[0] + system.configuration[2] - pi) < 0.1
 
 
 def test_four_bar_is_a_crank_and_a_rocker():

@@ -41,8 +41,8 @@ def elbows(q):
 def test_delta_platform_hangs_from_three_spheres(systems, seed):
     system = systems["delta"]
     q = np.random.default_rng(seed).uniform(-0.4, 0.9, 3)
-    posture = mbs.loops.solve(system, {f"q{k + 1}": q[k] for k in range(3)})
-    place = mbs.models.transform(system, "plate")(posture)
+    configuration = mbs.loops.solve(system, {f"q{k + 1}": q[k] for k in range(3)})
+    place = mbs.models.transform(system, "plate")(configuration)
     np.testing.assert_allclose(place[:3, 3], three_spheres(elbows(q), 0.6)[:, None], atol=1e-12)
     np.testing.assert_allclose(place[:3, :3], np.eye(3), atol=1e-12)
 
@@ -67,8 +67,8 @@ def test_delta_efforts_are_those_of_codourey(systems, seed):
     arm = 0.01 + 0.3 * ((3 * 0.015**2 + 0.25**2) / 12 + 0.125**2) + share * 0.25**2
     weight = -G * np.cos(q) * (0.3 * 0.125 + share * 0.25)
     expected = arm * a + weight + J.T @ (mass * (ddx + G * UP))
-    posture = mbs.loops.solve(system, {f"q{k + 1}": q[k] for k in range(3)})
-    efforts = numbers(mbs.models.inverse_dynamics(system), posture, v, a)
+    configuration = mbs.loops.solve(system, {f"q{k + 1}": q[k] for k in range(3)})
+    efforts = numbers(mbs.models.inverse_dynamics(system), configuration, v, a)
     np.testing.assert_allclose(efforts, expected, atol=1e-10)
 
 
@@ -79,7 +79,7 @@ def lengthenings(place, turn):
     return np.linalg.norm(heads - low, axis=1) - np.linalg.norm(high - low, axis=1)
 
 
-def stewart_posture(system, place, turn):
+def stewart_configuration(system, place, turn):
     lengths = lengthenings(place, turn)
     return mbs.loops.solve(system, {f"leg{k + 1}": lengths[k] for k in range(6)})
 
@@ -90,7 +90,7 @@ def test_stewart_platform_is_where_its_legs_carry_it(systems, seed):
     rng = np.random.default_rng(seed)
     place = 0.7 * UP + rng.uniform(-0.08, 0.08, 3)
     turn = rng.uniform(-0.2, 0.2, 3)
-    T = np.array(mbs.models.transform(system, "centre")(stewart_posture(system, place, turn)))
+    T = np.array(mbs.models.transform(system, "centre")(stewart_configuration(system, place, turn)))
     np.testing.assert_allclose(T[:3, 3], place, atol=1e-11)
     np.testing.assert_allclose(T[:3, :3], rotation(turn), atol=1e-11)
 
@@ -110,8 +110,8 @@ def test_stewart_platform_energy_and_weight(systems, seed):
         w = a.middle(b).T @ np.array([spin[2, 1], spin[0, 2], spin[1, 0]])
         kinetic += a.mass * v @ v / 2 + w @ (a.inertia * w) / 2
     speeds = (lengthenings(ahead[:3], ahead[3:]) - lengthenings(behind[:3], behind[3:])) / (2 * h)
-    posture = stewart_posture(system, pose[:3], pose[3:])
-    found = [float(e) for e in mbs.models.energy(system)(posture, speeds)]
+    configuration = stewart_configuration(system, pose[:3], pose[3:])
+    found = [float(e) for e in mbs.models.energy(system)(configuration, speeds)]
     height = sum(body.mass * body.com[2] for body in leg_bodies(pose))
     assert found[0] == pytest.approx(kinetic, rel=1e-6)
     assert found[1] == pytest.approx(G * height, rel=1e-12)
@@ -124,7 +124,7 @@ def test_stewart_platform_energy_and_weight(systems, seed):
         / (2 * h)
         for d in np.eye(6)
     ]
-    efforts = numbers(mbs.models.gravity_effort(system), posture)
+    efforts = numbers(mbs.models.gravity_effort(system), configuration)
     np.testing.assert_allclose(np.array(slopes) @ efforts, fall, atol=1e-6)
 
 

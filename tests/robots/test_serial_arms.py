@@ -1,4 +1,4 @@
-"""Serial arms of the catalogue against postures that their makers or papers publish."""
+"""Serial arms of the catalogue against configurations that their makers or papers publish."""
 
 from functools import cache
 from math import cos, pi, radians, sin
@@ -9,7 +9,7 @@ import pytest
 import mbs
 from mbs.robots import catalogue
 
-# Manocha & Canny 1994, table III: the sixteen postures of one pose [deg].
+# Manocha & Canny 1994, table III: the sixteen configurations of one pose [deg].
 SIXTEEN = np.array(
     [
         [-96.28, -6.27, 179.96, 38.48, 52.55, -39.40],
@@ -64,7 +64,7 @@ def tool(name, q):
         ("gantry", (0, 0, 1.5 - 0.12), DOWN),
     ],
 )
-def test_zero_posture(name, place, z):
+def test_zero_configuration(name, place, z):
     T = tool(name, np.zeros(assembled(name).nq))
     np.testing.assert_allclose(T[:3, 3], place, atol=1e-12)
     np.testing.assert_allclose(T[:3, 2], z, atol=1e-12)
@@ -125,7 +125,7 @@ AXES = {
 
 @pytest.mark.parametrize("name", AXES)
 def test_product_of_exponentials(name):
-    """The pose is that of turns about the axes of the zero posture."""
+    """The pose is that of turns about the axes of the zero configuration."""
     q = np.random.default_rng(0).uniform(-2, 2, len(AXES[name]))
     T = np.eye(4)
     for (axis, point), angle in zip(AXES[name], q, strict=True):
@@ -157,7 +157,7 @@ def test_ur5_with_standard_parameters():
     np.testing.assert_allclose(tool("ur5", q), T, atol=1e-12)
 
 
-def test_manseur_doty_reaches_one_pose_in_sixteen_postures():
+def test_manseur_doty_reaches_one_pose_in_sixteen_configurations():
     hand = turned(np.array([1.0, 0, 0]), np.zeros(3), radians(1))
     for q in np.radians(SIXTEEN):
         np.testing.assert_allclose(tool("manseur_doty", q) @ hand, HAND, atol=6e-4)
@@ -174,5 +174,5 @@ def test_gantry_slides_along_the_base_and_downwards():
 @pytest.mark.parametrize("name", ["tx90", "kr6", "irb120", "crx10", "panda", "youbot", "ur5"])
 def test_assembled_within_limits(name):
     system = assembled(name)
-    for place, row in zip(system.posture, system.coordinates, strict=True):
+    for place, row in zip(system.configuration, system.coordinates, strict=True):
         assert row.limits[0] <= place <= row.limits[1]

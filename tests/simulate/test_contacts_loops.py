@@ -1,4 +1,5 @@
-"""Rigid stops and dry friction in closed loops, against impulses and equilibria by plain numpy."""
+"""Rigid stops and Coulomb friction in closed loops, against impulses and equilibria by plain
+numpy."""
 
 import numpy as np
 import pytest
@@ -138,7 +139,7 @@ def test_friction_of_two_pivots_of_a_loop_holds_what_both_can(part):
     first = CoulombFriction("first", joint="a1", sliding=2.0)
     other = CoulombFriction("other", joint="b1", sliding=3.0)
     system = bars(FOUR, 0.8, 0.0, first, other, guess=FOUR_GUESS)
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     J = derivative(lambda x: numbers(x, FOUR, 0.8)[1], q)
     (motion,) = np.linalg.svd(J)[2][2:]
     most = 2.0 + 3.0 * abs(motion[2] / motion[0])
@@ -156,18 +157,18 @@ def test_friction_of_two_pivots_of_a_loop_holds_what_both_can(part):
 def test_more_contacts_than_freedoms_come_to_rest_and_gain_no_energy():
     strengths = {"q3": 0.013, "q2": 0.19, "q4": 0.17}
     m = mbs.load("five_bar")
-    posture = dict(zip(("q1", "q2", "q3", "q4"), m.assemble().position(None), strict=True))
+    configuration = dict(zip(("q1", "q2", "q3", "q4"), m.assemble().position(None), strict=True))
     for name, strength in strengths.items():
         m.add(CoulombFriction(f"dry_{name}", joint=name, sliding=strength))
     for name in ("q1", "q4"):
-        limits = {"lower": posture[name] - 0.1, "upper": posture[name] + 0.1}
+        limits = {"lower": configuration[name] - 0.1, "upper": configuration[name] + 0.1}
         m.add(RigidStop(f"end_{name}", joint=name, restitution=0.6566, **limits))
     result = run(m.assemble(), 1.0, v0={"q1": 0.3, "q3": -0.2})
     energy = result["kinetic_energy"] + result["potential_energy"]
     assert np.max(np.diff(energy)) < 1e-9
     assert len(result.events) > 10
     for name in ("q1", "q4"):
-        assert np.max(np.abs(result[f"{name}.q"] - posture[name])) < 0.1 + 1e-10
+        assert np.max(np.abs(result[f"{name}.q"] - configuration[name])) < 0.1 + 1e-10
     assert result["kinetic_energy"][-1] < 1e-12
     assert np.max(result["closure_residual"]) < 1e-12
 

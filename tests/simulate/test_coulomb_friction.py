@@ -1,4 +1,4 @@
-"""Dry friction that sticks, in simulations, against closed forms between events."""
+"""Coulomb friction that sticks, in simulations, against closed forms between events."""
 
 import numpy as np
 import pytest

@@ -171,12 +171,12 @@ def test_power_of_the_motor_is_stored_or_lost():
 
 def test_loop_on_an_elastic_drive_keeps_its_energy():
     """A five-bar one joint of which hangs on an elastic gear: the rotor is outside of the loop."""
-    m, posture = planar_loop(3)
+    m, configuration = planar_loop(3)
     joint = next(m.joints())
     gear = ElasticGear("gear", 400.0, ratio=10)
     m.connect(gear.flange_b, joint.flange)
     m.connect(gear.flange_a, ShaftInertia("rotor", 1e-2).flange_a)
-    system = m.assemble(guess={**posture, "rotor": 10 * posture[joint.name]})
+    system = m.assemble(guess={**configuration, "rotor": 10 * configuration[joint.name]})
     result = run(system, 0.5)
     total = result["kinetic_energy"] + result["potential_energy"]
     assert system.is_closed

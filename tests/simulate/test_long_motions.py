@@ -9,7 +9,7 @@ from mbs.robots import n_four_bar
 
 
 def test_a_four_bar_keeps_loop_energy_and_branch_for_a_thousand_seconds():
-    """Over 500 turns, each through two singular postures."""
+    """Over 500 turns, each through two singular configurations."""
     system = n_four_bar(1).assemble()
     result = mbs.simulate.run(system, 1000.0, v0={"a0": -1.0}, step=0.1, tolerance=1e-9, quiet=True)
     assert np.ptp(result["a0.q"]) > 1000 * np.pi

@@ -24,7 +24,7 @@ def run(system, seconds=1.0, **options):
 
 def test_a_crank_that_is_turned_gives_its_work_to_the_loop():
     system = mbs.load("four_bar").assemble()
-    start = system.posture[0]
+    start = system.configuration[0]
     result = run(system, 2.0, motion={"j1.q": lambda t: start + 2 * t + 0.3 * t**2}, step=1e-3)
     t = result.time
     assert result["j1.q"] == pytest.approx(start + 2 * t + 0.3 * t**2, abs=1e-11)

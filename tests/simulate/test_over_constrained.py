@@ -56,7 +56,7 @@ def test_models_hold_where_the_kept_rows_are_dependent(twists, driven, cut):
 
 
 def test_energy_is_exchanged_as_the_models_say():
-    """Power of gravity along v = G v_a, by the rate of the energy between close postures."""
+    """Power of gravity along v = G v_a, by the rate of the energy between close configurations."""
     system = bennett(1, 3, (0.9, 1.7))
     energy = mbs.models.energy(system)
     gravity = mbs.models.gravity_effort(system)
@@ -74,7 +74,7 @@ def test_planar_loops_keep_their_rows():
 
 
 def test_wrenches_stay_of_one_size_all_the_way_round():
-    """With the rows of one posture a joint seemed to carry forty times as much in another."""
+    """With the rows of one configuration a joint seemed to carry forty times as much in another."""
     system = bennett(1, 3, (0.9, 1.7))
     free = mbs.models.joint_wrenches(system)
     tree = mbs.models.joint_wrenches(system, "tree")

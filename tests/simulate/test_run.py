@@ -95,7 +95,7 @@ def test_four_bar_for_a_long_time_without_drift():
     assert np.ptp(total) < 1e-5 * result["kinetic_energy"].max()
 
 
-def test_loop_runs_through_a_posture_where_its_crank_turns_back():
+def test_loop_runs_through_a_configuration_where_its_crank_turns_back():
     """A double rocker: its driven joint is no coordinate where it reverses."""
     m = Mechanism("double_rocker", gravity=(0, -9.81, 0))
     a, b, c = (
@@ -219,7 +219,7 @@ def test_only_systems_move(wrong):
         mbs.simulate.run(wrong, 1.0)
 
 
-def test_posture_that_does_not_close():
+def test_configuration_that_does_not_close():
     system = mbs.load("four_bar").assemble()
     with pytest.raises(LoopError, match=r"leaves the loops open by .*; use mbs.loops.solve"):
         mbs.simulate.run(system, 1.0, q0=[0.0, 0.0, 0.0])

@@ -28,7 +28,8 @@ def test_columns_of_a_simulation():
 
 
 def test_columns_of_a_closed_simulation_with_a_motor():
-    """Sensors read the motor that is there, through postures where the driven rocker turns back."""
+    """Sensors read the motor that is there, through configurations where the driven rocker turns
+    back."""
     system = four_bar(driven="j4")
     options = dict(v0={"j1": 9.0}, step=0.002, quiet=True, tolerance=1e-10)
     result = mbs.simulate.run(system, 1.0, tau={"j4": 2.0}, **options)

@@ -29,11 +29,12 @@ def test_a_loop_of_another_size_moves_alike(size):
     motions = []
     for scale in (1.0, size):
         system = spatial_loop(scale)
-        start = spatial_loop(1.0).posture if scale != 1.0 else system.posture
+        start = spatial_loop(1.0).configuration if scale != 1.0 else system.configuration
         motions.append(mbs.simulate.run(system, 0.5, q0=list(start), **options))
     assert motions[1]["j1.q"] == pytest.approx(motions[0]["j1.q"], abs=1e-6)
     leads = [
-        mbs.loops.examine(spatial_loop(s), spatial_loop(1.0).posture).leads for s in (1.0, size)
+        mbs.loops.examine(spatial_loop(s), spatial_loop(1.0).configuration).leads
+        for s in (1.0, size)
     ]
     assert leads[1] == pytest.approx(leads[0], rel=0.2)  # other rows may have been kept
 

@@ -1,4 +1,4 @@
-"""What the inverse geometric model must answer: all postures of the search, and no other."""
+"""What the inverse geometric model must answer: all configurations of the search, and no other."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def free_places(system, locked):
 
 
 def assert_exact(arm, T, q):
-    """No posture is wrong, none is there twice."""
+    """No configuration is wrong, none is there twice."""
     scale = max(1.0, arm.reach)
     assert np.all(np.isfinite(q))
     assert np.all(arm.residual(T, q) < EXACT * scale)
@@ -27,21 +27,21 @@ def assert_exact(arm, T, q):
 
 
 def assert_same_set(arm, found, expected):
-    """As many, and to each expected posture one within SAME."""
+    """As many, and to each expected configuration one within SAME."""
     assert len(found) == len(expected)
     for q in expected:
         assert np.min(distance(arm, found, q)) < SAME
 
 
-def assert_complete(system, posture, locked=None, seed=0):
-    """`solve` answers what the search finds at the pose of a posture (free joints alone)."""
+def assert_complete(system, configuration, locked=None, seed=0):
+    """`solve` answers what the search finds at the pose of a configuration (free joints alone)."""
     arm, places = plain_arm(system, locked), free_places(system, locked)
-    T = arm.pose(posture)
+    T = arm.pose(configuration)
     answer = solve(system, T, locked=locked) if locked else solve(system, T)
     found = answer.q[:, places]
     assert_exact(arm, T, found)
     assert all(s.multiplicity == 1 and s.family is None for s in answer)
     expected = searched(arm, T, seed)
-    assert np.min(distance(arm, expected, posture)) < SAME  # else the search is not enough
+    assert np.min(distance(arm, expected, configuration)) < SAME  # else the search is not enough
     assert_same_set(arm, found, expected)
     return answer

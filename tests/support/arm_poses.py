@@ -1,4 +1,4 @@
-"""Postures of arms with a spherical wrist at which the usual solutions run together."""
+"""Configurations of arms with a spherical wrist at which the usual solutions run together."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import mbs
 
 
 def with_wrist(q, q5):
-    """The posture with q5 in place; zero is the wrist singularity of the arms used here."""
+    """The configuration with q5 in place; zero is the wrist singularity of the arms used here."""
     return np.array([*q[:4], q5, *q[5:]])
 
 
 def stretched(system, q):
-    """The posture with the wrist centre as far from axis 2 as it gets."""
+    """The configuration with the wrist centre as far from axis 2 as it gets."""
     return np.array([*q[:2], _stretch(system), *q[3:]])
 
 
 def folded(system, q, gap):
-    """The posture with the wrist centre at a distance from axis 2 near the least [m]."""
+    """The configuration with the wrist centre at a distance from axis 2 near the least [m]."""
     upper, fore, _ = _lengths(system)
     cosine = (upper**2 + fore**2 - gap**2) / (2 * upper * fore)
     return np.array([*q[:2], _stretch(system) + np.pi - np.arccos(cosine), *q[3:]])
@@ -31,7 +31,7 @@ def least_gap(system):
 
 
 def over_shoulder(system, q):
-    """The posture with the wrist centre on axis 1, of an arm that lies in a plane with it."""
+    """The configuration with the wrist centre on axis 1, of an arm that lies in a plane with it."""
     wrist = mbs.models.transform(system, 5)
 
     def radius(q2):

@@ -1,4 +1,4 @@
-"""Every posture of an arm for a pose, by damped Gauss-Newton from many random starts.
+"""Every configuration of an arm for a pose, by damped Gauss-Newton from many random starts.
 
 It shares nothing with the solvers but the numbers of the arm: the constant poses between its
 joints, read off the direct geometric models of single links.
@@ -31,7 +31,7 @@ class PlainArm:
         return float(np.linalg.norm(self.gaps[:, :3, 3], axis=1).sum()) or 1.0
 
     def pose(self, q):
-        """(..., 4, 4) pose of the tool at postures q (..., n)."""
+        """(..., 4, 4) pose of the tool at configurations q (..., n)."""
         return self._chain(np.asarray(q, dtype=float))[0]
 
     def jacobian(self, q):
@@ -56,7 +56,7 @@ class PlainArm:
         return np.max(np.abs(self.pose(q) - T), axis=(-1, -2))
 
     def random(self, rng, count=None):
-        """Postures, (count, n) or (n,): any angles, slides within half the reach."""
+        """Configurations, (count, n) or (n,): any angles, slides within half the reach."""
         shape = (len(self.slides),) if count is None else (count, len(self.slides))
         wide = np.where(self.slides, 0.5 * self.reach, np.pi)
         return rng.uniform(-wide, wide, shape)
@@ -98,7 +98,7 @@ def plain_arm(system, locked=None):
 
 
 def searched(arm, T, seed=0):
-    """All postures (m, n) that lead to T; more starts until three rounds find nothing new.
+    """All configurations (m, n) that lead to T; more starts until three rounds find nothing new.
 
     Not valid close to two singularities at once, where the search crawls.
     """
@@ -113,23 +113,23 @@ def searched(arm, T, seed=0):
 
 
 def some(arm, T, rng, starts=_ROUND):
-    """Postures (m, n) that random starts lead to, as often as they do."""
+    """Configurations (m, n) that random starts lead to, as often as they do."""
     q = _descended(arm, T, arm.random(rng, starts) * np.where(arm.slides, 3, 1))
     return q[arm.residual(T, q) < CLOSED]
 
 
 def merged(arm, T, q, tolerance=MERGED):
-    """One posture of each bunch, that of the smallest residual; angles in (-pi, pi]."""
+    """One configuration of each bunch, that of the smallest residual; angles in (-pi, pi]."""
     q = wrapped(arm, q[np.argsort(arm.residual(T, q))])
     kept = list[np.ndarray]()
-    for posture in q:
-        if not kept or np.min(distance(arm, np.array(kept), posture)) > tolerance:
-            kept.append(posture)
+    for configuration in q:
+        if not kept or np.min(distance(arm, np.array(kept), configuration)) > tolerance:
+            kept.append(configuration)
     return np.array(kept).reshape(-1, len(arm.slides))
 
 
 def wrapped(arm, q):
-    """The postures with their angles in (-pi, pi]."""
+    """The configurations with their angles in (-pi, pi]."""
     return np.where(arm.slides, q, np.pi - np.mod(np.pi - q, 2 * np.pi))
 
 

@@ -64,7 +64,7 @@ PARALLELOGRAM = [
 
 
 def parallelogram(gravity, rows=PARALLELOGRAM, **values):
-    """A parallelogram on the base, assembled away from the posture in which it is flat."""
+    """A parallelogram on the base, assembled away from the configuration in which it is flat."""
     return system(
         "parallelogram",
         rows,

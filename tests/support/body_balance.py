@@ -96,7 +96,7 @@ def out_of_balance(mechanism, system, state, F, forces=None):
 
 def tree_state(system, v_a, a_a):
     """The motion of the tree that independent velocities and accelerations make."""
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     G = np.array(mbs.loops.reduction_matrix(system)(q))
     psi = np.array(mbs.models.acceleration_closure(system)(q, v_a)[0])
     count = mbs.loops.closure(system).size1_out(0)

@@ -24,8 +24,8 @@ def phases(system):
 
 
 def standing(system):
-    """Equations of the last link's frame at rest on a plane through the assembled posture."""
-    q = dict(zip((c.name for c in system.coordinates), system.posture, strict=True))
+    """Equations of the last link's frame at rest on a plane through the assembled configuration."""
+    q = dict(zip((c.name for c in system.coordinates), system.configuration, strict=True))
     return phases(system).dae((), "index1", q0=q)
 
 
@@ -186,10 +186,10 @@ def public_builders():
 
 
 def point(system, f, seed=7):
-    """Arguments at which a model is finite: a closed posture, small numbers elsewhere."""
+    """Arguments at which a model is finite: a closed configuration, small numbers elsewhere."""
     rng = np.random.default_rng(seed)
     values = {name: rng.uniform(-1, 1, f.size_in(name)) for name in f.name_in()}
-    q = (random_state(system, rng)[0] if not system.is_closed else np.array(system.posture))[
+    q = (random_state(system, rng)[0] if not system.is_closed else np.array(system.configuration))[
         :, None
     ]
     fixed = {

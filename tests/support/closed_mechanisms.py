@@ -1,4 +1,5 @@
-"""Random closed mechanisms: a random tree, and a joint that closes a loop at a random posture."""
+"""Random closed mechanisms: a random tree, and a joint that closes a loop at a random
+configuration."""
 
 from __future__ import annotations
 

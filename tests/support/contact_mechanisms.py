@@ -1,4 +1,4 @@
-"""Small mechanisms with rigid stops and dry friction, for state equations and FMUs."""
+"""Small mechanisms with rigid stops and Coulomb friction, for state equations and FMUs."""
 
 import numpy as np
 

@@ -22,7 +22,7 @@ from mbs.components import (
 
 
 def four_bar():
-    """With a spring, a damper, dry friction and a length that is a symbol."""
+    """With a spring, a damper, Coulomb friction and a length that is a symbol."""
     m = Mechanism("four_bar", gravity=(0, -9.81, 0), parameters={"L": 1.0, "k": 30.0})
     a, b, c = (
         m.add(Box(n, length=x, width=0.05, mass=w))

@@ -31,14 +31,16 @@ def quarter_period(m):
 
 
 def swing(times, rate, turned):
-    """Angle from the lowest posture, released at rest at `turned`; angle'' = -rate^2 sin(angle)."""
+    """Angle from the lowest configuration, released at rest at `turned`; angle'' = -rate^2
+    sin(angle)."""
     m = np.sin(turned / 2) ** 2
     phi = amplitude(rate * times + quarter_period(m), m)
     return 2 * np.arcsin(np.sqrt(m) * np.sin(phi))
 
 
 def whirl(times, rate, speed):
-    """Angle from the lowest posture of a pendulum that passes the highest with `speed` at zero."""
+    """Angle from the lowest configuration of a pendulum that passes the highest with `speed` at
+    zero."""
     at_bottom = np.sqrt(speed**2 + 4 * rate**2)
     m = (2 * rate / at_bottom) ** 2
     return 2 * amplitude(at_bottom / 2 * times + quarter_period(m), m)

@@ -1,4 +1,4 @@
-"""Arms that Pieper's method solves, and the postures of all branches of its steps."""
+"""Arms that Pieper's method solves, and the configurations of all branches of its steps."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ def lengths():
 
 
 def leaves_of(problem):
-    """given -> postures, smallest radicands and regularity, a column a branch; the sequence."""
+    """given -> configurations, smallest radicands and regularity, a column a branch; the
+    sequence."""
     sequence = pieper(problem)
     rows = [
         casadi.vertcat(leaf.x, casadi.mmin(casadi.vertcat(leaf.real, 1)), square(leaf.regular))
@@ -70,7 +71,7 @@ def solved(build, *arguments):
     return system, *leaves_of(chain(system).problem()), plain_arm(system)
 
 
-def postures(leaves, T, p=()):
+def configurations(leaves, T, p=()):
     """(m, n) of all branches whose radicands are not negative."""
     columns = np.array(leaves(np.concatenate([p, np.ravel(T[:3], order="F")])))
     assert np.isfinite(columns).all()
@@ -78,9 +79,9 @@ def postures(leaves, T, p=()):
 
 
 def assert_all(leaves, arm, q, p=()):
-    """The postures for the pose of q: exact, distinct, q among them."""
+    """The configurations for the pose of q: exact, distinct, q among them."""
     T = arm.pose(q)
-    ours = postures(leaves, T, p)
+    ours = configurations(leaves, T, p)
     assert len(ours) > 0
     assert np.max(arm.residual(T, ours)) < EXACT
     assert len(merged(arm, T, ours)) == len(ours)
@@ -89,7 +90,7 @@ def assert_all(leaves, arm, q, p=()):
 
 
 def assert_complete(leaves, arm, seed):
-    """As many postures as a search from many starts finds, and these."""
+    """As many configurations as a search from many starts finds, and these."""
     q = arm.random(np.random.default_rng(seed))
     ours = assert_all(leaves, arm, q)
     theirs = searched(arm, arm.pose(q))

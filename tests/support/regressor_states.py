@@ -52,7 +52,7 @@ def state_of(system, seed=0):
     if not system.is_closed:
         return random_state(system, rng)
     n = len(system.active)
-    return np.array(system.posture), rng.normal(size=n), rng.normal(size=n)
+    return np.array(system.configuration), rng.normal(size=n), rng.normal(size=n)
 
 
 def moving(name):

@@ -12,12 +12,12 @@ X, Y, Z = np.eye(3)
 
 @dataclass(frozen=True)
 class Part:
-    """A hinge where it is in the posture at zero, and the body behind it.
+    """A hinge where it is in the configuration at zero, and the body behind it.
 
     Attributes:
         point: on the axis [m].
         axis: unit vector.
-        mass, com, inertia: of the body, com in the posture at zero, inertia about it.
+        mass, com, inertia: of the body, com in the configuration at zero, inertia about it.
     """
 
     point: np.ndarray
@@ -48,7 +48,7 @@ class Chain:
 
     Attributes:
         parts: the chain.
-        end: that point in the posture at zero.
+        end: that point in the configuration at zero.
         held: which of x, y, z it may not move along (0, 1, 2), the body turn about (3, 4, 5).
         rank: of these rows, where some follow from the others.
         gravity: [m/s^2].
@@ -81,7 +81,7 @@ class Chain:
         return np.linalg.solve(matrix, np.concatenate([-h, -bias]))[:n]
 
     def point(self, q, k, at):
-        """Where the point of body k is that is at `at` in the posture at zero."""
+        """Where the point of body k is that is at `at` in the configuration at zero."""
         body = self._moved(q, np.zeros(len(q)))[0][k]
         return body.p + body.R @ at
 

@@ -18,5 +18,5 @@ def assembled():
 
 @pytest.fixture(scope="session")
 def swing(assembled):
-    """A second of the four-bar linkage, falling from its posture."""
+    """A second of the four-bar linkage, falling from its configuration."""
     return mbs.simulate.run(assembled("four_bar"), 1.0, q0={"j1": 0.4}, step=0.05, quiet=True)

@@ -18,10 +18,10 @@ SEED = 20261122
 CATALOGUE = mbs.robots.catalogue()
 
 
-def posture(system):
+def configuration(system):
     """Random positions, quaternions of unit length."""
     rng = np.random.default_rng(SEED)
-    q = np.array(system.posture) + rng.uniform(-0.7, 0.7, system.nq)
+    q = np.array(system.configuration) + rng.uniform(-0.7, 0.7, system.nq)
     turned = [k for k, c in enumerate(system.coordinates) if c.kind == "quaternion"]
     for four in np.array(turned, int).reshape(-1, 4):
         q[four] /= np.linalg.norm(q[four])
@@ -61,13 +61,13 @@ def test_every_mechanism_has_a_scene(name, assembled):
 def test_links_stand_where_the_models_say(name, assembled):
     system = assembled(name)
     scene = mbs.view.scene(system)
-    q = posture(system)
+    q = configuration(system)
     poses = np.array(scene.poses(q.tolist())).reshape(-1, 3, 4)
     assert np.array_equal(poses[0], np.eye(3, 4))
     for number in range(1, len(poses)):
         expected = np.array(mbs.models.transform(system, number)(q))[:3]
         assert np.abs(poses[number] - expected).max() < 1e-12
-    rows = scene.motion(np.vstack([system.posture, q]))
+    rows = scene.motion(np.vstack([system.configuration, q]))
     assert np.array_equal(rows[1], poses.ravel())
     assert np.array_equal(rows[0], scene.poses())
 
@@ -76,7 +76,7 @@ def test_links_stand_where_the_models_say(name, assembled):
 def test_shapes_stay_on_the_skeleton(name, assembled):
     system = assembled(name)
     scene = mbs.view.scene(system)
-    q = posture(system)
+    q = configuration(system)
     poses = np.array(scene.poses(q.tolist())).reshape(-1, 3, 4)
     parts = skeleton(system)
     points = np.array(parts.function(q)[0]).T
@@ -130,7 +130,7 @@ def test_bodies_with_dimensions_are_drawn_as_they_are():
     centre = np.array(scene.poses({"j1": 0.0})).reshape(-1, 3, 4)[1]
     pose = np.array(next(i for i in scene.primitives if isinstance(i, BoxShape)).pose)
     middle = centre[:, :3] @ pose.reshape(3, 4)[:, 3] + centre[:, 3]
-    expected = np.array(mbs.models.transform(system, "box")(system.posture, [0.4]))
+    expected = np.array(mbs.models.transform(system, "box")(system.configuration, [0.4]))
     assert np.abs(middle - (expected @ [0.2, 0, 0, 1])[:3]).max() < 1e-12
 
 

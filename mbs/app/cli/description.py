@@ -56,9 +56,9 @@ def _coordinates(system: System) -> list[dict[str, Any]]:
             "unit": c.unit,
             "actuated": c.actuated,
             "limits": c.limits,
-            "posture": value,
+            "configuration": value,
         }
-        for c, value in zip(system.coordinates, system.posture, strict=True)
+        for c, value in zip(system.coordinates, system.configuration, strict=True)
     ]
 
 

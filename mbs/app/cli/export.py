@@ -10,7 +10,7 @@ import typer
 from mbs.app.cli import completion
 from mbs.app.cli.arguments import Parameters, Robot, examples, help_of
 from mbs.app.cli.group import Commands
-from mbs.app.cli.loading import posture, system
+from mbs.app.cli.loading import configuration, system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import note
 
@@ -185,7 +185,7 @@ Q = Annotated[
     Texts,
     typer.Option(
         metavar="NAME=VALUE",
-        help="Posture in rad or m; may be repeated; the others as assembled.",
+        help="Configuration in rad or m; may be repeated; the others as assembled.",
         show_default=False,
     ),
 ]
@@ -202,7 +202,7 @@ def export_html(
     from mbs.app.tasks import exporting
 
     assembled = system(robot, parameter)
-    _write(target, exporting.html(assembled, posture(assembled, q)))
+    _write(target, exporting.html(assembled, configuration(assembled, q)))
 
 
 def _write(target: Path, content: bytes) -> None:

@@ -52,8 +52,8 @@ def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
     return {name: number(text, f"{option} {name}") for name, text in given.items()}
 
 
-def posture(system: System, texts: Sequence[str] | None, option: str = "--q") -> list[float]:
-    """Positions q of a robot, its loops closed, the others as in the assembled posture.
+def configuration(system: System, texts: Sequence[str] | None, option: str = "--q") -> list[float]:
+    """Positions q of a robot, its loops closed, the others as in the assembled configuration.
 
     Args:
         system: the robot.

@@ -1,4 +1,4 @@
-"""`mbs solve-ik`: every posture that takes a frame to a pose."""
+"""`mbs solve-ik`: every configuration that takes a frame to a pose."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mbs.app.cli.arguments import Json, Parameters, Robot, examples
-from mbs.app.cli.loading import numbers, posture, system
+from mbs.app.cli.loading import configuration, numbers, system
 from mbs.app.cli.printing import note, print_json
 from mbs.errors import ModelError
 
 if TYPE_CHECKING:
-    from mbs.app.tasks.postures import PostureList
+    from mbs.app.tasks.configurations import ConfigurationList
     from mbs.assembly import System
 
 EXAMPLES = examples(
@@ -51,7 +51,7 @@ Q = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME=VALUE",
-        help="The pose that the frame has in this posture in rad or m; may be repeated.",
+        help="The pose that the frame has in this configuration in rad or m; may be repeated.",
         show_default=False,
     ),
 ]
@@ -70,7 +70,7 @@ Seed = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME=VALUE",
-        help="Posture that solutions are sorted by their distance from; may be repeated.",
+        help="Configuration that solutions are sorted by their distance from; may be repeated.",
         show_default=False,
     ),
 ]
@@ -98,17 +98,17 @@ def solve_ik(
     parameter: Parameters = None,
     json: Json = False,
 ) -> None:
-    """Solve the inverse geometry: every posture that takes a frame to a pose.
+    """Solve the inverse geometry: every configuration that takes a frame to a pose.
 
-    Say the pose in one way: --pose, --xyz with or without --rpy, or --q. Where no posture is
+    Say the pose in one way: --pose, --xyz with or without --rpy, or --q. Where no configuration is
     found the exit code is 1 and the reason stands on the standard error.
     """
-    from mbs.app.tasks.postures import postures
+    from mbs.app.tasks.configurations import configurations
 
     assembled = system(robot, parameter)
     place = _frame(frame)
     wanted = _pose(assembled, place, pose=pose, xyz=xyz, rpy=rpy, q=q)
-    found = postures(
+    found = configurations(
         assembled,
         wanted,
         place,
@@ -143,7 +143,7 @@ def _pose(
     Raises:
         ModelError: it is said in no way, or in several.
     """
-    from mbs.app.tasks.postures import pose_from, pose_from_text, pose_of
+    from mbs.app.tasks.configurations import pose_from, pose_from_text, pose_of
 
     ways = [pose is not None, xyz is not None, bool(q)]
     if sum(ways) != 1 or (rpy is not None and xyz is None):
@@ -154,7 +154,7 @@ def _pose(
         return pose_from_text(pose)
     if xyz is not None:
         return pose_from(_three(xyz, "--xyz"), _three(rpy or ("0", "0", "0"), "--rpy"))
-    return pose_of(system, posture(system, q), frame)
+    return pose_of(system, configuration(system, q), frame)
 
 
 def _three(texts: Sequence[str], option: str) -> list[float]:
@@ -163,7 +163,7 @@ def _three(texts: Sequence[str], option: str) -> list[float]:
     return [number(text, option) for text in texts]
 
 
-def _reason(found: PostureList) -> str:
+def _reason(found: ConfigurationList) -> str:
     reason = f"{found.system}: no solution, {found.reason}"
     near = found.nearest
     if near is None:
@@ -171,10 +171,10 @@ def _reason(found: PostureList) -> str:
     nearest = ", ".join(
         f"{name}={round(x, 6) + 0.0:g}" for name, x in zip(found.names, near.q, strict=True)
     )
-    return f"{reason}; the nearest posture is {nearest}"
+    return f"{reason}; the nearest configuration is {nearest}"
 
 
-def _data(found: PostureList) -> dict[str, Any]:
+def _data(found: ConfigurationList) -> dict[str, Any]:
     near = found.nearest
     return {
         "robot": found.system,

@@ -44,14 +44,14 @@ class DeskBase:
     """The session of a visitor and the page that shows it.
 
     Attributes:
-        session: the robot, its history and its posture.
+        session: the robot, its history and its configuration.
     """
 
     def __init__(self, session: Session) -> None:
         self.session = session
         self._client: Client = ui.context.client
         self._on_robot: list[Listener] = []
-        self._on_posture: list[Listener] = []
+        self._on_configuration: list[Listener] = []
         self._on_document: list[Listener] = []
 
     @property
@@ -61,7 +61,7 @@ class DeskBase:
 
     @property
     def q(self) -> Vector:
-        """(nq,) present posture [rad or m]."""
+        """(nq,) present configuration [rad or m]."""
         return self.session.q
 
     @property
@@ -131,9 +131,9 @@ class DeskBase:
         """Call a function after each robot that could be assembled."""
         self._on_robot.append(listener)
 
-    def on_posture(self, listener: Listener) -> None:
-        """Call a function after each change of the posture."""
-        self._on_posture.append(listener)
+    def on_configuration(self, listener: Listener) -> None:
+        """Call a function after each change of the configuration."""
+        self._on_configuration.append(listener)
 
     def on_document(self, listener: Listener) -> None:
         """Call a function after each edit, good or not."""
@@ -153,7 +153,7 @@ class DeskBase:
                     background_tasks.create(answer)
 
 
-# The posture of the mechanism, and the picture that shows it in the browser.
+# The configuration of the mechanism, and the picture that shows it in the browser.
 
 
 class DeskPicture(DeskBase):
@@ -177,19 +177,21 @@ class DeskPicture(DeskBase):
         self._send("mount", VIEW, drawn.as_dict(), self._camera)
         self._camera = None
 
-    async def set_posture(self, q: Sequence[float]) -> None:
-        """Show the mechanism at another posture.
+    async def set_configuration(self, q: Sequence[float]) -> None:
+        """Show the mechanism at another configuration.
 
         Args:
             q: (nq,) positions that close the loops [rad or m].
         """
         system = self.session.system
         if system is None or len(q) != system.nq:
-            self.complain("the posture is of a robot with other joints; make it anew for this one")
+            self.complain(
+                "the configuration is of a robot with other joints; make it anew for this one"
+            )
             return
         self.session.q = tuple(float(x) for x in q)
         await self._pose(self.session.q)
-        self._tell(self._on_posture)
+        self._tell(self._on_configuration)
 
     async def move(self, place: int, value: float) -> None:
         """Move one coordinate by hand; of many moves of it in a row the last one counts.
@@ -218,11 +220,11 @@ class DeskPicture(DeskBase):
             q = await self.aside(moved, system, q, place, value)
         except Exception as error:
             self.session.refusal = self._sentence(error)
-            self._tell(self._on_posture)
+            self._tell(self._on_configuration)
             return
         if self.session.system is system:
             self.session.refusal = ""
-            await self.set_posture(q)
+            await self.set_configuration(q)
 
     async def _pose(self, q: Vector) -> None:
         drawn = self._scene
@@ -230,16 +232,16 @@ class DeskPicture(DeskBase):
             flat = await self.aside(drawn.poses, q)
             self._send("poses", flat)
 
-    async def play(self, times: Sequence[float], postures: Any, speed: float = 1.0) -> None:
+    async def play(self, times: Sequence[float], configurations: Any, speed: float = 1.0) -> None:
         """Show a motion again and again until `pause`.
 
         Args:
             times: (n,) [s].
-            postures: (n, nq) [rad or m].
+            configurations: (n, nq) [rad or m].
             speed: of the film; 1 is as in reality.
         """
         drawn = self._scene
-        film_of = np.asarray(postures, dtype=float)
+        film_of = np.asarray(configurations, dtype=float)
         if drawn is None or film_of.shape[1:] != (drawn.system.nq,):
             self.complain("the motion is of a robot with other joints; simulate this one")
             return
@@ -292,7 +294,7 @@ class Desk(DeskPicture):
         self._cards.build()
 
     async def start(self) -> None:
-        """Assemble the document of the session and show it, in the posture of the session."""
+        """Assemble the document of the session and show it, in the configuration of the session."""
         await self._settle()
 
     async def edit(self, cell: Cell, text: str) -> None:
@@ -363,7 +365,7 @@ class Desk(DeskPicture):
         if drawn is not None:
             self._draw(drawn)
         self._tell(self._on_robot)
-        self._tell(self._on_posture)
+        self._tell(self._on_configuration)
 
     async def run(self, label: str, task: Callable[..., Any], *args: Any) -> Any:
         """What `task(system, *args)` returns, computed in a child process.
@@ -415,9 +417,9 @@ async def warm_up() -> None:
 
     def once() -> None:
         system = Document.of_name("rx90").system()
-        _drawn(system, system.posture)
+        _drawn(system, system.configuration)
         loop = Document.of_name("four_bar").system()
-        moved(loop, loop.posture, handles(loop)[0].place, loop.posture[0] + 0.01)
+        moved(loop, loop.configuration, handles(loop)[0].place, loop.configuration[0] + 0.01)
 
     await aside(once)
 

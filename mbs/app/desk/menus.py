@@ -14,11 +14,11 @@ from mbs.app.desk.document.document import Document
 from mbs.app.desk.document.reading import LARGEST_UPLOAD, READERS
 from mbs.app.desk.panels import base as base_panel
 from mbs.app.desk.panels import singular as singular_panel
+from mbs.app.desk.panels.configurations import open_configurations
 from mbs.app.desk.panels.equations import open_equations
 from mbs.app.desk.panels.export import open_export
 from mbs.app.desk.panels.identification import open_identification
 from mbs.app.desk.panels.optimizer import open_optimizer, optimizer_switch
-from mbs.app.desk.panels.postures import open_postures
 from mbs.app.desk.panels.simulation import open_simulation
 from mbs.app.tasks.equations import MENUS, entries
 from mbs.errors import MbsError
@@ -81,7 +81,7 @@ class _Item:
 
 def _act(desk: Desk, one: Entry) -> Act:
     if one.solver is not None:
-        return partial(open_postures, desk, one.key)
+        return partial(open_configurations, desk, one.key)
     if one.key == singular_panel.KEY:
         return partial(singular_panel.open_singular, desk)
     if one.key == base_panel.KEY:

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from mbs.app.desk.desk import Desk
 from mbs.app.desk.panels import base as base_panel
-from mbs.app.desk.panels import postures as postures_panel
+from mbs.app.desk.panels import configurations as configurations_panel
 from mbs.app.desk.panels import singular as singular_panel
 from mbs.app.desk.panels.equations import open_equations
 from mbs.app.desk.panels.export import open_export
@@ -28,7 +28,7 @@ _OPENERS: Mapping[str, Opener] = {
     "optimizer": open_optimizer,
     base_panel.KEY: base_panel.open_base,
     singular_panel.KEY: singular_panel.open_singular,
-    postures_panel.KEY: postures_panel.open_postures,
+    configurations_panel.KEY: configurations_panel.open_configurations,
 }
 
 

@@ -23,7 +23,7 @@ from mbs.loops import Mode
 _PART = 1000
 _THROTTLE = 0.03
 _PAUSE = 0.2
-"""Seconds that a posture stands before its assembly modes are looked for."""
+"""Seconds that a configuration stands before its assembly modes are looked for."""
 
 
 @dataclass(slots=True)
@@ -51,9 +51,9 @@ class JointSliders:
                 ui.label("Joints").classes("desk-joint-name")
                 self._kind = ui.label().classes("desk-note")
                 ui.element("div").classes("desk-space")
-                button = ui.button("Start posture", on_click=self._home)
+                button = ui.button("Start configuration", on_click=self._home)
                 button.props("flat dense no-caps size=12px")
-                button.tooltip("Back to the posture of assembly")
+                button.tooltip("Back to the configuration of assembly")
             self._grid = ui.element("div").classes("desk-joint-grid")
             self._others = ui.element("div").classes("desk-follow")
             with ui.element("div").classes("desk-modes") as self._mode_row:
@@ -62,7 +62,7 @@ class JointSliders:
                 self._mode.props("dense options-dense borderless")
                 self._mode_note = ui.label().classes("desk-note")
         desk.on_robot(self.rebuild)
-        desk.on_posture(self.refresh)
+        desk.on_configuration(self.refresh)
         self.rebuild()
 
     def rebuild(self) -> None:
@@ -90,7 +90,7 @@ class JointSliders:
         )
 
     async def refresh(self) -> None:
-        """Show the present posture, except on what its user moves."""
+        """Show the present configuration, except on what its user moves."""
         system, q = self._desk.session.system, self._desk.q
         if system is None or len(q) != system.nq:
             return
@@ -169,12 +169,12 @@ class JointSliders:
     async def _choose_mode(self, event: events.ValueChangeEventArguments[Any]) -> None:
         k = event.value
         if isinstance(k, int) and k < len(self._modes) and k != self._shown_mode:
-            await self._desk.set_posture(self._modes[k].q)
+            await self._desk.set_configuration(self._modes[k].q)
 
     async def _home(self) -> None:
         system = self._desk.session.system
         if system is not None:
-            await self._desk.set_posture(system.posture)
+            await self._desk.set_configuration(system.configuration)
 
 
 def _range(handle: Handle) -> str:
@@ -212,7 +212,7 @@ class PicturePanel:
                 self._veil = ui.label().classes("desk-veil")
             JointSliders(desk)
         desk.on_document(self.refresh)
-        desk.on_posture(self.refresh)
+        desk.on_configuration(self.refresh)
         self.refresh()
 
     def refresh(self) -> None:

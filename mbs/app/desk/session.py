@@ -1,4 +1,4 @@
-"""What one visitor has on the desk: the robot, its history, and the posture it stands in."""
+"""What one visitor has on the desk: the robot, its history, and the configuration it stands in."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
 from mbs.errors import DescriptionError, LoopError, MbsError, NoClosedForm, Unclosable
 from mbs.loops import Mode, modes
-from mbs.loops.closing import Closing, closure_parameters, followed_posture
+from mbs.loops.closing import Closing, closure_parameters, followed_configuration
 from mbs.loops.function import independent_names
 
-# Postures of the picture: joints that can be moved by hand, the others following.
+# Configurations of the picture: joints that can be moved by hand, the others following.
 
 
 Vector = tuple[float, ...]
@@ -66,7 +66,7 @@ def _handle(system: System, place: int, reach: float) -> Handle:
     if c.limits is not None:
         return Handle(c.name, place, c.unit, c.limits[0], c.limits[1], True)
     half = {"rad": _FULL_TURN, "m": reach}.get(c.unit, 1.0)
-    middle = system.posture[place] if c.unit == "m" else 0.0
+    middle = system.configuration[place] if c.unit == "m" else 0.0
     return Handle(c.name, place, c.unit, middle - half, middle + half, False)
 
 
@@ -85,11 +85,11 @@ def _number(value: object) -> float:
 
 
 def moved(system: System, q: Sequence[float], place: int, value: float) -> Vector:
-    """The posture with one coordinate at another value and the loops closed near to the old one.
+    """The configuration with one coordinate elsewhere and the loops closed near the old one.
 
     Args:
         system: the mechanism.
-        q: (nq,) present posture [rad or m].
+        q: (nq,) present configuration [rad or m].
         place: of the coordinate in q.
         value: where it is to be.
 
@@ -102,8 +102,8 @@ def moved(system: System, q: Sequence[float], place: int, value: float) -> Vecto
         return _unit(system, target, place)
     p = closure_parameters(system)
     try:
-        found = followed_posture(
-            replace(system, posture=tuple(q)), np.array(target), _held(system), p
+        found = followed_configuration(
+            replace(system, configuration=tuple(q)), np.array(target), _held(system), p
         )
     except Unclosable as error:
         name = system.coordinates[place].name
@@ -120,7 +120,7 @@ def _held(system: System) -> tuple[int, ...]:
 
 
 def _unit(system: System, q: list[float], place: int) -> Vector:
-    """The posture with quaternions of unit length, the moved part kept as far as it can be."""
+    """The configuration with quaternions of unit length, the moved part kept if it can be."""
     for part in quaternion_slices(system.tree):
         values = np.array(q[part])
         if part.start <= place < part.stop:
@@ -143,17 +143,17 @@ def _with_part(values: NDArray[np.float64], kept: int) -> NDArray[np.float64]:
 
 
 def carried(old: System | None, q: Sequence[float], new: System) -> Vector:
-    """The posture of a changed mechanism nearest to that of the old one.
+    """The configuration of a changed mechanism nearest to that of the old one.
 
     It is the assembled one where the mechanism is another, or cannot be closed there.
     """
     names = [c.name for c in new.coordinates]
     if old is None or [c.name for c in old.coordinates] != names:
-        return new.posture
+        return new.configuration
     if not new.is_closed:
         return tuple(q)
     closed = Closing(new, closure_parameters(new), _held(new)).nearest(np.array(q))
-    return tuple(float(x) for x in closed.q) if closed.is_closed else new.posture
+    return tuple(float(x) for x in closed.q) if closed.is_closed else new.configuration
 
 
 def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str:
@@ -175,7 +175,7 @@ def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str
 
 
 def mode_of(found: Sequence[Mode], q: Sequence[float]) -> int | None:
-    """The number of the mode that a posture is in, angles being alike after a whole turn."""
+    """The number of the mode that a configuration is in, angles being alike after a whole turn."""
     for k, mode in enumerate(found):
         apart = np.subtract(mode.q, q)
         turned = np.abs((apart + math.pi) % (2 * math.pi) - math.pi)
@@ -196,7 +196,7 @@ class Session:
         good: the last document that could be assembled.
         system: of `good`; None until the first is assembled.
         tables: what of `good` is shown in the grids.
-        q: (nq,) present posture of `system` [rad or m].
+        q: (nq,) present configuration of `system` [rad or m].
         refusal: why `document` could not be assembled, "" if it could.
         past: documents before the present one, the oldest first.
         future: documents that were undone, the next one last.
@@ -251,7 +251,7 @@ class Session:
         return True
 
     def settle(self, document: Document, q: Vector) -> None:
-        """Take a document that was assembled as the one that is shown, in the posture q (nq,)."""
+        """Take an assembled document as the one that is shown, in the configuration q (nq,)."""
         self.good, self.system, self.tables = document, document.system(), document.shown()
         self.q, self.refusal = q, ""
 

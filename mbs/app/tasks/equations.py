@@ -348,7 +348,7 @@ def _row(system: System, key: str, passes: Sequence[str], options: Mapping[str, 
     one = entry(key)
     reason = one.refusal(system)
     if not reason and not one.has_function(system):
-        reason = f"{one.title}: {system.name} has it as text or postures only"
+        reason = f"{one.title}: {system.name} has it as text or configurations only"
     if reason:
         return CountRow(key, one.title, None, None, reason)
     given = parsed_options(system, one, options)

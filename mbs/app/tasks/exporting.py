@@ -152,7 +152,7 @@ def toml(system: System) -> bytes:
 
 
 def _named(table: RobotTable, system: System) -> RobotTable:
-    """The table with the names and ranges of the joints of the system, its name and posture."""
+    """The table with names and ranges of the system's joints, its name and configuration."""
     joints = zip(system.coordinates, system.speeds, strict=True)
     frames = [
         replace(frame, name=c.name, limits=c.limits, velocity=s.limits, effort=s.effort)
@@ -162,7 +162,9 @@ def _named(table: RobotTable, system: System) -> RobotTable:
         table,
         name=system.name,
         frames=(*frames, *table.frames[len(frames) :]),
-        guess={c.name: x for c, x in zip(system.coordinates, system.posture, strict=True) if x},
+        guess={
+            c.name: x for c, x in zip(system.coordinates, system.configuration, strict=True) if x
+        },
     )
 
 
@@ -175,7 +177,7 @@ def html(
 
     Args:
         system: open or closed.
-        q: posture; the assembled one when left out [rad or m].
+        q: configuration; the assembled one when left out [rad or m].
         parameters: values of symbols, the others at their defaults.
     """
     from mbs import view

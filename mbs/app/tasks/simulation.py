@@ -192,8 +192,9 @@ class SimulationSettings:
         duration: [s].
         step: time between rows of the result [s].
         q0: positions at the start by name of the coordinate [rad or m], the others as in the
-            assembled posture.
-        posture: in place of q0 all positions at the start, which close the loops; none when empty.
+            assembled configuration.
+        configuration: in place of q0 all positions at the start, which close the loops; none when
+            empty.
         v0: velocities at the start by name [rad/s or m/s].
         tau: efforts by name of a joint with a motor [N m or N]: numbers, or laws of t, of
             positions and velocities such as `j1.q` and `j1.v`, and of symbols of the system.
@@ -207,7 +208,7 @@ class SimulationSettings:
     duration: float | str = 2.0
     step: float | str = 0.01
     q0: Laws = field(default_factory=dict)
-    posture: Sequence[float] = ()
+    configuration: Sequence[float] = ()
     v0: Laws = field(default_factory=dict)
     tau: Laws = field(default_factory=dict)
     inputs: Laws = field(default_factory=dict)
@@ -310,13 +311,13 @@ def _positions(
     system: System, settings: SimulationSettings, known: Mapping[str, float]
 ) -> dict[str, float] | list[float] | None:
     """Positions at the start, those that drives do not move where there are drives."""
-    if not settings.posture:
+    if not settings.configuration:
         return numbers(settings.q0, f"{system.name}: q0", known) or None
     if settings.q0:
         raise ModelError(
-            f"{system.name}: q0 and a posture are given for the start; leave one of them out"
+            f"{system.name}: q0 and a configuration are given for the start; leave one of them out"
         )
-    values = list(settings.posture)
+    values = list(settings.configuration)
     if not settings.motion or len(values) != system.nq:
         return values
     rates = {speed.name for speed in system.speeds}
@@ -344,7 +345,7 @@ def _inputs(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
     return law_of_motion(system, laws, names, known, "input")
 
 
-# A simulated motion with the postures that a picture needs to play it.
+# A simulated motion with the configurations that a picture needs to play it.
 
 
 MOST_ROWS = 100_000
@@ -357,17 +358,17 @@ _PER_SECOND = 30.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Film:
-    """A result, and the postures of some of its rows.
+    """A result, and the configurations of some of its rows.
 
     Attributes:
         result: of the simulation.
         times: (m,) of the frames [s].
-        postures: (m, nq) of the frames, in the order of `system.coordinates` [rad or m].
+        configurations: (m, nq) of the frames, in the order of `system.coordinates` [rad or m].
     """
 
     result: Result
     times: NDArray[np.float64]
-    postures: NDArray[np.float64]
+    configurations: NDArray[np.float64]
 
 
 def film(system: System, settings: SimulationSettings | None = None) -> Film:

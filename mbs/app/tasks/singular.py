@@ -1,4 +1,4 @@
-"""Singular postures of a frame: the determinant of its Jacobian in factors, each in words."""
+"""Singular configurations of a frame: the determinant of its Jacobian in factors, each in words."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ Array = NDArray[np.float64]
 _NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 _TRIES, _SEED = 12, 20260111
 _REACH = 1.0
-"""Largest difference of a position between a start and the posture at hand [rad or m]."""
+"""Largest difference of a position between a start and the configuration at hand [rad or m]."""
 _NUDGE = 1e-3
 _OPEN = 1e-9
 
@@ -76,15 +76,15 @@ class DeterminantFactor:
         text: as one reads it, with its power.
         power: how often it is a factor.
         condition: when it is zero, in words.
-        posture: (nq) a posture near the one at hand where it is zero, loops closed [rad or m];
-            None where none was found from there.
-        determinant: at that posture.
+        configuration: (nq) a configuration near the one at hand where it is zero, loops closed
+            [rad or m]; None where none was found from there.
+        determinant: at that configuration.
     """
 
     text: str
     power: int
     condition: str
-    posture: tuple[float, ...] | None
+    configuration: tuple[float, ...] | None
     determinant: float | None
 
 
@@ -122,8 +122,8 @@ def singular(
     Args:
         system: open or closed.
         options: of the model "determinant": frame, expressed_in, coordinates, rows, columns.
-        near: (nq,) a posture from which singular ones are looked for, the assembled one when left
-            out.
+        near: (nq,) a configuration from which singular ones are looked for, the assembled one when
+            left out.
 
     Raises:
         ModelError: no such frame, row or column, or not as many rows as columns.
@@ -146,9 +146,9 @@ def singular(
 
 def _verdict(constant: str, factors: Sequence[DeterminantFactor]) -> str:
     if constant == "0":
-        return "The determinant is zero in every posture; name other rows or columns."
+        return "The determinant is zero in every configuration; name other rows or columns."
     if not factors:
-        return f"The determinant is {constant} in every posture; none is singular."
+        return f"The determinant is {constant} in every configuration; none is singular."
     return "Singular where " + ", or where ".join(one.condition for one in factors) + "."
 
 
@@ -156,22 +156,22 @@ def _factor(
     system: System, one: SingularFactor, determinant: Function, start: Array
 ) -> DeterminantFactor:
     names = [(c.name, c.kind == "revolute") for c in system.coordinates]
-    posture = _zero(system, one.function, start)
+    configuration = _zero(system, one.function, start)
     value: float | None = None
-    if posture is not None:
+    if configuration is not None:
         p = [system.p_default] if system.parameters else []
-        value = float(Function.__call__(determinant, posture, *p))
+        value = float(Function.__call__(determinant, configuration, *p))
     return DeterminantFactor(
         text=str(one),
         power=one.power,
         condition=condition(one.text, names),
-        posture=posture,
+        configuration=configuration,
         determinant=value,
     )
 
 
 def _zero(system: System, function: Function, start: Array) -> tuple[float, ...] | None:
-    """The nearest posture found where a function of it is zero and the loops are closed."""
+    """The nearest configuration found where a function of it is zero and the loops are closed."""
     residual = _residual(system, function)
     rng = np.random.default_rng(_SEED)
     found = list[Array]()

@@ -130,8 +130,8 @@ def paul(problem: Problem) -> StepSequence:
         problem: the loop. Its symbols stay symbols.
 
     Returns:
-        the steps. Every posture that closes the loop is among its leaves, some of which may not
-        close it.
+        the steps. Every configuration that closes the loop is among its leaves, some of which may
+        not close it.
 
     Raises:
         NoClosedForm: no equation known here gives the joints that are left; names them.

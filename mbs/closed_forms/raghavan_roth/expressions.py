@@ -1,4 +1,4 @@
-"""The matrix of one joint that is singular at every posture of a pose, as expressions of the pose.
+"""The matrix in one joint that is singular at a solution, as expressions of the pose.
 
 The numeric method takes null rows from singular values; here joints 1 and 2 of the loop are
 eliminated with pivots chosen once, at the samples, so that the matrix is plain arithmetic.
@@ -234,7 +234,8 @@ def characteristic(problem: Problem) -> Characteristic:
         if found.regularity > _REGULAR:
             return found
     raise NoClosedForm(
-        "the matrix of the general inverse geometric model is singular at every posture of joints"
+        "the matrix of the general inverse geometric model is singular at every configuration of"
+        " joints"
         f" {' '.join(joint.name for joint in problem.ring.joints)}; use method='search'"
     )
 

@@ -1,4 +1,4 @@
-"""Postures for wanted poses by the general method."""
+"""Configurations for wanted poses by the general method."""
 
 from __future__ import annotations
 
@@ -348,8 +348,8 @@ class Arrangement:
     def _pose(self, T: Array) -> Array:
         return inverse(T) if self.sign > 0 else T
 
-    def postures(self, u: Array) -> Array:
-        """(..., 6) postures of the arm, angles in [-pi, pi), for the loop's joints at u."""
+    def configurations(self, u: Array) -> Array:
+        """(..., 6) configurations of the arm, angles in [-pi, pi), for the loop's joints at u."""
         u = self.sign * (u + self.offsets)
         wrapped = (u + np.pi) % (2 * np.pi) - np.pi
         q = np.empty_like(u)
@@ -426,8 +426,8 @@ class Pencil:
     def merit(self) -> float:
         """The regularity, and more where equations are left over.
 
-        The matrix then keeps its rank near postures where joints 4 and 6 of the loop align. It is
-        less where joint 3 slides, whose roots at infinity are near real ones.
+        The matrix then keeps its rank near configurations where joints 4 and 6 of the loop align.
+        It is less where joint 3 slides, whose roots at infinity are near real ones.
         """
         size, rows = self.mix.shape
         spare = min(float(rows / size) ** 12, _SPARE)
@@ -514,7 +514,7 @@ class Prepared:
         """Whether the method holds for the arm; where not, use another one.
 
         It may hold for an arm that is redundant in one direction and short of another, such as one
-        with four parallel axes: its postures make families, of which candidates are samples.
+        with four parallel axes: its configurations make families, of which candidates are samples.
         """
         return self.regularity > _REGULAR
 
@@ -545,7 +545,7 @@ def prepare(arm: Arm) -> Prepared:
 
 
 def _reached(arm: Arm) -> Array:
-    """(2, 4, 4) poses of generic postures."""
+    """(2, 4, 4) poses of generic configurations."""
     rng = np.random.default_rng(_PREPARE_SEED)
     turns = rng.uniform(-np.pi, np.pi, (_POSES, 6))
     slides = loop_length(arm) * rng.uniform(0.2, 0.8, (_POSES, 6))
@@ -723,10 +723,10 @@ _FAR = 1e3  # slides, in reaches of the arm, that are taken for infinite
 
 
 def candidates(prepared: Prepared, T: Array) -> Array:
-    """(m, 6) postures that may reach a wanted pose; polish and check them.
+    """(m, 6) configurations that may reach a wanted pose; polish and check them.
 
-    Among them is every isolated posture that does, near double ones too, some of them twice; others
-    do not reach the pose at all.
+    Among them is every isolated configuration that does, near double ones too, some of them twice;
+    others do not reach the pose at all.
 
     Args:
         prepared: see `prepare`.
@@ -739,21 +739,22 @@ def candidates(prepared: Prepared, T: Array) -> Array:
 
 
 def candidates_many(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
-    """Postures for many poses at once.
+    """Configurations for many poses at once.
 
     Args:
         prepared: see `prepare`.
         T: (N, 4, 4) wanted poses [m].
 
     Returns:
-        (m,) numbers of the poses, ascending, and (m, 6) postures for them.
+        (m,) numbers of the poses, ascending, and (m, 6) configurations for them.
 
     Raises:
         NoClosedForm: the method does not hold for the arm, see `Prepared.regular`.
     """
     if not prepared.regular:
         raise NoClosedForm(
-            "the matrix of the general inverse geometric model is singular at every posture of this"
+            "the matrix of the general inverse geometric model is singular at every configuration"
+            " of this"
             f" arm (its regularity is {prepared.regularity:.0e}); use method='search'"
         )
     loop, T = prepared.arrangement, np.asarray(T, dtype=float)
@@ -765,7 +766,7 @@ def candidates_many(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
     number, u = number[order], u[order]
     reach = 1 + np.linalg.norm(T[number, :3, 3], axis=1) / loop.length
     near = np.max(np.where(loop.prismatic, np.abs(u), 0.0), axis=1) < _FAR * reach
-    return number[near], loop.postures(u[near])
+    return number[near], loop.configurations(u[near])
 
 
 def _middle(prepared: Prepared, M: Array) -> tuple[Numbers, Array]:

@@ -14,8 +14,8 @@ enum {
     NEXT_X = POINT + NX,
     NEXT_Z = NEXT_X + NX,
     PASSIVE = NEXT_Z + NZ,
-    POSTURE = PASSIVE + 2 * N_PASSIVE,
-    W_SIZE = POSTURE + NX + NZ
+    CONFIGURATION = PASSIVE + 2 * N_PASSIVE,
+    W_SIZE = CONFIGURATION + NX + NZ
 };
 
 /* SYSTEM(SZ_W) of the header is as large. */
@@ -70,9 +70,9 @@ static int rates(equations *e, real t, const real *x, real *z, const real *u, re
 }
 
 #if NB > 0
-/* What is watched at an accepted posture. */
+/* What is watched at an accepted configuration. */
 static int look(equations *e, real t, const real *x, const real *u, watched *now, real *w) {
-    real *z = w + POSTURE + NX;
+    real *z = w + CONFIGURATION + NX;
     int status = status_of(closure_solve(&e->loop, x, z));
     if (status) return status;
     now->on = 1;
@@ -104,7 +104,7 @@ static int within_bounds(const real *p) {
     return 1;
 }
 
-/* s->x and s->z are the posture from which the loops are closed. */
+/* s->x and s->z are the configuration from which the loops are closed. */
 static int begin(SYSTEM(state) *s, const real *x, const real *guess, real *w) {
     equations e = {0};
     real *z = w + NEXT_Z;
@@ -206,7 +206,7 @@ int SYSTEM(step)(SYSTEM(state) *s, const real *u, real h, real *w) {
 
 static int motion(const SYSTEM(state) *s, const real *u, real *q, real *v, real *a, real *w) {
     equations e = {0};
-    real *x = w + POSTURE, *z = w + POSTURE + NX;
+    real *x = w + CONFIGURATION, *z = w + CONFIGURATION + NX;
     int status;
     if (!all_finite(u, NU)) return MBS_NOT_FINITE;
     if (!all_finite(s->x, NX)) return MBS_NO_RESULT;

@@ -151,7 +151,7 @@ class About:
 
     Attributes:
         tables: in the order of the page.
-        drawing: of it at the start posture, or None; the icon is made of it too.
+        drawing: of it at the start configuration, or None; the icon is made of it too.
     """
 
     tables: tuple[PageTable, ...] = ()
@@ -247,7 +247,8 @@ class FmuVariable:
         name: as other tools show it; a part that is no identifier gets quotes, as
             `mbs.export.fmu.description.structured` has it.
         unit: a name of `mbs.units.UNITS`.
-        start: value at the start; of a dependent coordinate, a guess that chooses the posture.
+        start: value at the start; of a dependent coordinate, a guess that chooses the
+            configuration.
         nominal: typical size, positive.
         min: least value; a parameter below it is refused. The smallest normal number stands for
             more than zero.

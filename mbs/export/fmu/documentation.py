@@ -200,7 +200,7 @@ _LONGEST = 24
 
 
 def about(system: System) -> About:
-    """The drawing at the assembled posture, and tables of joints, links, bodies and loops.
+    """The drawing at the assembled configuration, and tables of joints, links, bodies and loops.
 
     Args:
         system: open or closed; every symbol has a value.
@@ -271,7 +271,7 @@ def _inertias(system: System) -> PageTable:
         ("link", *TEN_PARAMETERS, "Ia", "Fv", "Fs"),
         tuple(_inertia(system, k, link) for k, link in enumerate(system.tree.links, start=1)),
         "Inertia [kg m²] and first moments [kg m] about the origin of the frame of the link and in"
-        " its axes, mass [kg]; of the joint, inertia of the rotor, viscous and dry friction.",
+        " its axes, mass [kg]; of the joint, inertia of the rotor, viscous and Coulomb friction.",
     )
 
 

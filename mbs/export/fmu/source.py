@@ -219,7 +219,7 @@ def steepness(
 ) -> casadi.MX:
     """How many nominal sizes z moves when x and p change by about their own size.
 
-    It is huge where rank is lost; p is there for postures where x and z lose it together.
+    It is huge where rank is lost; p is there for configurations where x and z lose it together.
 
     Args:
         closure: `closure(x, z, p)` as `FmuModel` has it.

@@ -65,10 +65,10 @@ def fmu(
     drive line turns one its own input, such as `motor.voltage`. Outputs are positions, velocities
     and accelerations of all joints, `name.q`, `name.v`, `name.a`, the terminal frame in the base,
     `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`, and efforts and
-    modes of rigid stops and dry friction, `stop.effort`, `stop.mode`. States are the independent
-    joints; in a closed system the others are solved for at every evaluation, so that loops cannot
-    drift. Every symbol of the system is a parameter. A solver for Co-Simulation is inside.
-    Directional derivatives, and in FMI 3.0 adjoint ones, are exact through closed loops.
+    modes of rigid stops and Coulomb friction, `stop.effort`, `stop.mode`. States are the
+    independent joints; in a closed system the others are solved for at every evaluation, so that
+    loops cannot drift. Every symbol of the system is a parameter. A solver for Co-Simulation is
+    inside. Directional derivatives, and in FMI 3.0 adjoint ones, are exact through closed loops.
 
     Args:
         system: open or closed.

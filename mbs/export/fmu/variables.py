@@ -97,7 +97,7 @@ def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterat
 def _prescribed(system: System, motion: InputMotion) -> Iterator[FmuVariable]:
     speed = system.speeds[motion.velocity]
     if motion.position is not None:
-        position, start = system.coordinates[motion.position], system.posture[motion.position]
+        position, start = system.coordinates[motion.position], system.configuration[motion.position]
         yield _position(position, f"{position.name}.q", start, "prescribed ")
         yield _velocity(speed, "prescribed ")
     yield _acceleration(speed, "prescribed ")
@@ -215,7 +215,7 @@ def _effort(speed: Coordinate, text: str) -> FmuVariable:
     return FmuVariable(name=f"{speed.name}.tau", unit=EFFORT_UNIT[speed.unit], description=text)
 
 
-# Events of a mechanism's FMU: its rigid stops and dry friction.
+# Events of a mechanism's FMU: its rigid stops and Coulomb friction.
 
 
 def jumps(system: System, state: MinimalState) -> Jumps | None:

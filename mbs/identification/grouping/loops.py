@@ -36,11 +36,11 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ClosedPostures:
-    """Postures that close the loops.
+class ClosedConfigurations:
+    """Configurations that close the loops.
 
     Attributes:
-        q: (nq, postures).
+        q: (nq, configurations).
         p: (np,) the parameters for which they do.
     """
 
@@ -99,16 +99,16 @@ def _along(freedom: Freedom) -> Pose:
 
 
 def pair_relations(
-    system: System, postures: Sequence[ClosedPostures], *, base_moves: bool = False
+    system: System, configurations: Sequence[ClosedConfigurations], *, base_moves: bool = False
 ) -> Iterator[Relation]:
     """Links whose orientations stay the same relative to each other or to the base.
 
     Args:
         system: with closed loops.
-        postures: on the branch; more than one set where lengths are symbols.
+        configurations: on the branch; more than one set where lengths are symbols.
         base_moves: whether the base turns, so that origins that keep their distance move apart.
     """
-    poses = [_link_poses(system, each) for each in postures]
+    poses = [_link_poses(system, each) for each in configurations]
     R = np.concatenate([turns for turns, _ in poses], axis=1)
     for b in range(1, len(R)):
         for a in range(b):
@@ -136,12 +136,12 @@ def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
         yield {(b, name): SX(1), **(on_link(a, -through[:, k]) if a >= 0 else {})}
 
 
-def _link_poses(system: System, postures: ClosedPostures) -> tuple[Array, Array]:
-    """Orientations (1 + links, postures, 3, 3) and origins (.., 3) of the base and all links."""
+def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[Array, Array]:
+    """Orientations (1 + links, n, 3, 3) and origins (.., 3) of base and links, n configurations."""
     q = SX.sym("q", system.nq)
     poses = [Pose.identity(), *base_poses(system.tree, link_poses(system.tree, q))]
     at = Function("poses", [q, system.p], [casadi.horzcat(*(pose.matrix for pose in poses))])
-    T = [np.array(at(position, postures.p)) for position in postures.q.T]
+    T = [np.array(at(position, configurations.p)) for position in configurations.q.T]
     matrices = np.array(T).reshape(len(T), 4, len(poses), 4).transpose(2, 0, 1, 3)
     return matrices[..., :3, :3], matrices[..., :3, 3]
 
@@ -168,7 +168,7 @@ class Effect:
 
     Attributes:
         parameter: it.
-        column: (values,) in all postures.
+        column: (values,) in all configurations.
     """
 
     parameter: Key
@@ -176,20 +176,20 @@ class Effect:
 
 
 def turning_relations(
-    system: System, postures: Sequence[ClosedPostures], *, base_moves: bool = False
+    system: System, configurations: Sequence[ClosedConfigurations], *, base_moves: bool = False
 ) -> Iterator[Relation]:
     """What the rates of links and joints say.
 
     Args:
         system: with closed loops.
-        postures: on the branch, more than one set where lengths are symbols; at least
-            `postures_needed`.
+        configurations: on the branch, more than one set where lengths are symbols; at least
+            `configurations_needed`.
         base_moves: whether the base turns, so that the rates of links are not those of joints.
     """
-    G = np.concatenate([_slopes(system, each) for each in postures])
+    G = np.concatenate([_slopes(system, each) for each in configurations])
     links = system.tree.links
     joints = {j: G[:, link.v.start] for j, link in enumerate(links) if link.motion.nv == 1}
-    angular = [] if base_moves else list(_angular(system, postures, G))
+    angular = [] if base_moves else list(_angular(system, configurations, G))
     for j, rows in enumerate(angular):
         axis = _one_direction(rows)
         if axis is not None:
@@ -202,34 +202,34 @@ def turning_relations(
     yield from _dry_friction(links, joints)
 
 
-def postures_needed(system: System) -> int:
+def configurations_needed(system: System) -> int:
     """So many that products of rates are not dependent by chance."""
     effects = 6 * len(system.tree.links) + system.nv
     m = max(len(system.active), 1)
     return max(12, -(-3 * effects // (m * (m + 1))))
 
 
-def _slopes(system: System, postures: ClosedPostures) -> Array:
-    """(postures, nv, m) velocities of the tree from the independent ones."""
+def _slopes(system: System, configurations: ClosedConfigurations) -> Array:
+    """(configurations, nv, m) velocities of the tree from the independent ones."""
     at = reduction_matrix(system)
-    p = [postures.p] if postures.p.size else []
-    return np.array([np.array(at(position, *p)) for position in postures.q.T])
+    p = [configurations.p] if configurations.p.size else []
+    return np.array([np.array(at(position, *p)) for position in configurations.q.T])
 
 
-def _angular(system: System, postures: Sequence[ClosedPostures], G: Array) -> Array:
-    """(links, postures, 3, m) angular velocities in the frames of the links."""
+def _angular(system: System, configurations: Sequence[ClosedConfigurations], G: Array) -> Array:
+    """(links, configurations, 3, m) angular velocities in the frames of the links."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     motions = link_velocities(system.tree, link_poses(system.tree, q), v)
     slopes = [casadi.densify(casadi.jacobian(motion.w, v)) for motion in motions]
     at = Function("angular", [q, system.p], slopes)
-    every = [at(position, each.p) for each in postures for position in each.q.T]
+    every = [at(position, each.p) for each in configurations for position in each.q.T]
     numbers = np.array([[np.array(slope) for slope in slopes] for slopes in every])
     rows: Array = np.einsum("njav,nvm->jnam", numbers, G)
     return rows
 
 
 def _one_direction(rows: Array) -> Array | None:
-    """(3,) the only direction of an angular velocity (postures, 3, m); None when it changes."""
+    """(3,) the one direction of an angular velocity (configurations, 3, m), or None."""
     columns = rows.transpose(1, 0, 2).reshape(3, -1)
     U, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     if sizes[0] < _SAME or sizes[1] > _SAME * sizes[0]:
@@ -241,13 +241,13 @@ def _one_direction(rows: Array) -> Array | None:
 
 
 def _rotational(j: int, rows: Array) -> Iterator[Effect]:
-    """Energies of the inertia tensor of link j, from its angular velocity (postures, 3, m)."""
+    """Energies of the inertia tensor of link j, of its angular velocity (configurations, 3, m)."""
     for name, (k, i) in zip(TEN_PARAMETERS, zip(*np.triu_indices(3), strict=True), strict=False):
         yield Effect((j, name), (1 if k == i else 2) * _product(rows[:, k], rows[:, i]))
 
 
 def _product(first: Array, second: Array) -> Array:
-    """Coefficients of a product of two rates, (postures, m) each, in all postures."""
+    """Coefficients of a product of two rates, (configurations, m) each, in all configurations."""
     k, i = np.triu_indices(first.shape[1])
     return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])
 
@@ -268,7 +268,7 @@ def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
 
 
 def _dry_friction(links: Sequence[Link], joints: dict[int, Array]) -> Iterator[Relation]:
-    """Dry friction of joints at rest, and of joints whose velocities keep a constant ratio."""
+    """Coulomb friction of joints at rest, and of joints whose velocities keep a constant ratio."""
     for k, rows in joints.items():
         if np.max(np.abs(rows)) < _SAME:
             yield {(k, "Fs"): SX(1)}

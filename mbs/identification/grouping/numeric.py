@@ -106,15 +106,15 @@ def plain(x: float) -> float:
     return float(round(x)) if abs(x - round(x)) < _ROUNDING else float(x)
 
 
-# Random states of a mechanism, those of a closed one on the branch of its assembled posture.
+# Random states of a mechanism, those of a closed one on the branch of its assembled configuration.
 
 
 _STEP, _STEPS = 0.1, 8
 """Of the fastest joint [rad or m], and how many steps lie between two states."""
-_POSTURES = 40
-"""Closed postures; more states repeat them with other velocities."""
+_CONFIGURATIONS = 40
+"""Closed configurations; more states repeat them with other velocities."""
 _LEAST_LEAD = 0.02
-"""Below this a posture is so near to a singular one that the walk could change its branch."""
+"""Below this a configuration is so near to a singular one that the walk could change its branch."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,12 +156,12 @@ def random_states(system: System, p: Array, count: int, seed: int) -> States:
         seed: of the random numbers.
 
     Raises:
-        ModelError: a closed mechanism cannot leave its assembled posture.
+        ModelError: a closed mechanism cannot leave its assembled configuration.
     """
     m, rng = len(system.active), np.random.default_rng(seed)
     if system.is_closed:
-        postures = closed_positions(system, p, _POSTURES, seed)
-        q = postures[:, np.arange(count) % postures.shape[1]]
+        configurations = closed_positions(system, p, _CONFIGURATIONS, seed)
+        q = configurations[:, np.arange(count) % configurations.shape[1]]
     else:
         q = _any(system, count, rng)
     return States(q, rng.uniform(-2, 2, (m, count)), rng.uniform(-3, 3, (m, count)))
@@ -174,7 +174,7 @@ def _any(system: System, count: int, rng: np.random.Generator) -> Array:
 
 
 def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
-    """(nq, count) closed postures, met on a random walk from the assembled one.
+    """(nq, count) closed configurations, met on a random walk from the assembled one.
 
     Steps are small and each is closed again, so that the walk stays on its branch; where the
     independent joints hardly lead the others it turns back. The system keeps them.
@@ -182,7 +182,7 @@ def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
     Args:
         system: closed.
         p: (np,) its parameters.
-        count: number of postures.
+        count: number of configurations.
         seed: of the random numbers.
 
     Raises:
@@ -190,20 +190,20 @@ def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
     """
 
     def walked() -> Array:
-        walk, rng = _PostureWalk.of(system, p), np.random.default_rng(seed)
-        q, postures = walk.start, list[Array]()
+        walk, rng = _ConfigurationWalk.of(system, p), np.random.default_rng(seed)
+        q, configurations = walk.start, list[Array]()
         for _ in range(count):
             q = walk.moved(q, rng)
-            postures.append(q)
-        return np.array(postures).T
+            configurations.append(q)
+        return np.array(configurations).T
 
     positions: Array = system.cached(("closed_positions", p.tobytes(), count, seed), walked)
     return positions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _PostureWalk:
-    """What a walk on closed postures needs."""
+class _ConfigurationWalk:
+    """What a walk on closed configurations needs."""
 
     system: System
     closing: Closing
@@ -213,23 +213,24 @@ class _PostureWalk:
     least: float
 
     @staticmethod
-    def of(system: System, p: Array) -> _PostureWalk:
-        """From the assembled posture, closed again for these parameters."""
+    def of(system: System, p: Array) -> _ConfigurationWalk:
+        """From the assembled configuration, closed again for these parameters."""
         closing = Closing(system, p)
-        found = closing.nearest(np.array(system.posture))
+        found = closing.nearest(np.array(system.configuration))
         if not found.is_closed:
             raise ModelError(
-                f"{system.name}: the loops cannot be closed near the assembled posture; give the"
+                f"{system.name}: the loops cannot be closed near the assembled configuration; give"
+                " the"
                 " symbols of the lengths values that the assembly can use"
             )
         names = [parameter.name for parameter in system.parameters]
         values = dict(zip(names, p.tolist(), strict=True))
         leads = examine(system, found.q.tolist(), parameters=values).leads
         G = Function(reduction_matrix(system))
-        return _PostureWalk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
+        return _ConfigurationWalk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
 
     def moved(self, q: Array, rng: np.random.Generator) -> Array:
-        """The posture after some steps in one direction, or back in the other."""
+        """The configuration after some steps in one direction, or back in the other."""
         direction = rng.uniform(-1, 1, len(self.system.active))
         for _ in range(_STEPS):
             following = self._step(q, direction)

@@ -72,7 +72,7 @@ class Entry:
         title: full name.
         symbol: what its formula is, in the signs of the notation.
         options: what its builders take besides the system.
-        function: builds its casadi.Function; None where it is text or postures only.
+        function: builds its casadi.Function; None where it is text or configurations only.
         text: writes its equations in words of their own; None where they are those of `function`.
         solver: the method of `inverse_geometry.solve` that it stands for, if any.
         structures: the mechanisms that have it: all, those without loops, or those with loops.
@@ -105,7 +105,7 @@ class Entry:
         return self.obstacle(system)
 
     def has_function(self, system: System) -> bool:
-        """Whether it is a Function of this mechanism, and not text or postures only."""
+        """Whether it is a Function of this mechanism, and not text or configurations only."""
         return self.function is not None and self.writes(system)
 
     def choices(self, system: System, **given: Any) -> dict[str, Any]:
@@ -142,7 +142,7 @@ class Entry:
         if self.function is None or not self.has_function(system):
             raise ModelError(
                 f"{self.key} of {system.name}: {self.title} is no Function; ask for its text or"
-                " postures"
+                " configurations"
             )
         return self.function(system, **self.choices(system, **given))
 
@@ -179,9 +179,9 @@ Jacobian = tuple[str | int, str | int, str]
 ROWS = ("Vx", "Vy", "Vz", "wx", "wy", "wz")
 """Names of the rows of [V; w]."""
 
-_POSTURES, _SEED = 3, 20260110
+_CONFIGURATIONS, _SEED = 3, 20260110
 _STEP = 0.1
-"""By how much independent joints leave the assembled posture [rad or m]."""
+"""By how much independent joints leave the assembled configuration [rad or m]."""
 _DEPENDENT = 1e-7
 """Sine of the angle to the others below which a row or column depends on them."""
 
@@ -192,11 +192,11 @@ def regular_part(
     rows: Sequence[str] | None = None,
     columns: Sequence[str] | None = None,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Rows and as many columns that have an inverse where the posture is not singular.
+    """Rows and as many columns that have an inverse where the configuration is not singular.
 
-    The first rows of [V; w] that are independent at random postures, then the first columns that
-    are so in these rows; what is given stays. A frame that moves in a plane gets Vx, Vy and wz;
-    one that a crank alone moves, the first row that it moves.
+    The first rows of [V; w] that are independent at random configurations, then the first columns
+    that are so in these rows; what is given stays. A frame that moves in a plane gets Vx, Vy and
+    wz; one that a crank alone moves, the first row that it moves.
 
     Args:
         system: open or closed.
@@ -224,14 +224,14 @@ def regular_part(
 
 
 def _values(system: System, of: Jacobian) -> Array:
-    """(postures, 6, m) the Jacobian at some postures, lengths by the longest one."""
+    """(configurations, 6, m) the Jacobian at some configurations, lengths by the longest one."""
 
     def find() -> Array:
         frame, axes, coordinates = of
         function = jacobian(system, frame, axes, coordinates=coordinates)
         every = list[Array]()
         for state in _states(system):
-            with suppress(LoopError):  # singular there; the other postures tell enough
+            with suppress(LoopError):  # singular there; the other configurations tell enough
                 every.append(np.array(function(*state)))
         J = np.array(every).reshape(len(every), 6, function.size2_out(0))
         J[:, :3] /= float(np.abs(J[:, :3]).max(initial=0.0)) or 1.0
@@ -248,18 +248,18 @@ def _states(system: System) -> Iterator[tuple[Array, ...]]:
             yield (q, p) if system.parameters else (q,)
         return
     p = closure_parameters(system, None)
-    for q in _closed_postures(system):
+    for q in _closed_configurations(system):
         yield (q, p) if system.parameters else (q,)
 
 
-def _closed_postures(system: System) -> Iterator[Array]:
-    """The assembled posture, and others near it as far as the loops close there."""
-    yield np.array(system.posture)
+def _closed_configurations(system: System) -> Iterator[Array]:
+    """The assembled configuration, and others near it as far as the loops close there."""
+    yield np.array(system.configuration)
     rng = np.random.default_rng(_SEED)
     names = [system.speeds[k].name for k in system.free]
-    places = {c.name: x for c, x in zip(system.coordinates, system.posture, strict=True)}
+    places = {c.name: x for c, x in zip(system.coordinates, system.configuration, strict=True)}
     own = [name for name in names if name in places]
-    for _ in range(_POSTURES):
+    for _ in range(_CONFIGURATIONS):
         moved = {name: places[name] + rng.uniform(-_STEP, _STEP) for name in own}
         with suppress(LoopError):  # it does not reach so far
             yield solve(system, moved)

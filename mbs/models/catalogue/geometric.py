@@ -5,8 +5,8 @@ from __future__ import annotations
 from mbs import loops
 from mbs.assembly import System
 from mbs.errors import NoClosedForm
+from mbs.models.catalogue.configurations import INVERSE_GEOMETRY
 from mbs.models.catalogue.entry import BASE, TARGET, Entry, one_frame
-from mbs.models.catalogue.postures import INVERSE_GEOMETRY
 from mbs.models.geometry import direct_geometry, transform
 
 

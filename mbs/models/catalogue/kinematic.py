@@ -1,4 +1,4 @@
-"""Kinematic models: Jacobians, their inverses and singular postures, motion of links and loops."""
+"""Kinematic models: Jacobians, their inverses and singularities, motion of links and loops."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ KINEMATIC: tuple[Entry, ...] = (
     Entry(
         "determinant",
         "Kinematic",
-        "Determinant of the Jacobian and singular postures",
+        "Determinant of the Jacobian and singular configurations",
         "det J(q)",
         SELECTION,
         jacobian_determinant,

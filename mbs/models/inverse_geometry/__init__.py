@@ -1,4 +1,4 @@
-"""Inverse geometric models: the postures that take a frame of a robot to a pose."""
+"""Inverse geometric models: the configurations that take a frame of a robot to a pose."""
 
 from mbs.models.inverse_geometry.closed_form import InverseGeometry, function
 from mbs.models.inverse_geometry.follow import Followed, follow

@@ -15,7 +15,7 @@ from mbs.models.inverse_geometry.search import Nearest, nearest
 from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
 from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes, unreachable
 from mbs.models.inverse_geometry.target import SINGULAR, Target, distinct, multiplicity, reduction
-from mbs.models.inverse_geometry.whole_robot import ClosedPosture, close, why_searched
+from mbs.models.inverse_geometry.whole_robot import ClosedConfiguration, close, why_searched
 
 # Names of the branches of an arm with a spherical wrist: shoulder, elbow, wrist.
 #
@@ -56,15 +56,15 @@ def anatomy(arm: Arm) -> Anatomy:
 
 
 def labels(arm: Arm, has: Anatomy, q: Array) -> list[str]:
-    """The names of postures' branches, such as "shoulder right, elbow up, no flip".
+    """The names of configurations' branches, such as "shoulder right, elbow up, no flip".
 
-    A name is left out where the posture stands between two branches; an arm without a spherical
-    wrist has none.
+    A name is left out where the configuration stands between two branches; an arm without a
+    spherical wrist has none.
 
     Args:
         arm: its joints.
         has: what it has of shoulder, elbow and wrist.
-        q: (m, n) postures [rad or m].
+        q: (m, n) configurations [rad or m].
     """
     if not has.wrist:
         return [""] * len(q)
@@ -97,7 +97,7 @@ def _elbow(bend: float, right: float) -> str:
 
 
 def _wrist_meets(arm: Arm) -> bool:
-    """Whether axes 4, 5, 6 meet in one point; they do so in every posture if in two."""
+    """Whether axes 4, 5, 6 meet in one point; they do so in every configuration if in two."""
     return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
 
 
@@ -132,7 +132,7 @@ class ChainRoot:
     """A solution of the chain.
 
     Attributes:
-        q: (n,) posture [rad or m].
+        q: (n,) configuration [rad or m].
         label: of the branch it comes from, "" where it comes from none.
         multiplicity: how many roots meet in it, 0 on a self-motion.
         family: the self-motion that it stands for.
@@ -150,7 +150,8 @@ class ChainPlace:
 
     Attributes:
         places: numbers of its joints in q.
-        whole: the posture (nq,) of the system for one of the chain, (n,); NaN where there is none.
+        whole: the configuration (nq,) of the system for one of the chain, (n,); NaN where there is
+            none.
     """
 
     places: tuple[int, ...]
@@ -219,7 +220,7 @@ def _examined(target: Target, root: ChainRoot, place: ChainPlace) -> tuple[Chain
 def _nearly_moving(target: Target, root: ChainRoot, place: ChainPlace) -> ChainRoot | None:
     """With the self-motion along which the pose is held within the tolerance of solutions.
 
-    It is one of rounding: no posture on it can be told to be better than the others.
+    It is one of rounding: no configuration on it can be told to be better than the others.
     """
     dimension, direction = freedoms(reduction(target, root.q))
     found = curve(target, root.q, direction, dimension, 1.0) if dimension else None
@@ -243,7 +244,7 @@ def _isolated(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
 
 
 def _on(target: Target, found: list[ChainRoot], k: int, others: list[int]) -> set[int]:
-    """Which of the others are postures of the self-motion of root k, if it has one."""
+    """Which of the others are configurations of the self-motion of root k, if it has one."""
     of = found[k].family
     if of is None or not others:
         return set()
@@ -286,18 +287,18 @@ class Question:
         return ChainPlace(self.chain.places, self.whole)
 
     def whole(self, q: Array) -> Array:
-        """(nq,) the posture of the robot for that of its chain, (n,); NaN where loops stay open."""
-        postures = self.closed(q)
-        return postures[0].q if postures else np.full(self.chain.system.nq, np.nan)
+        """(nq,) configuration of the robot for that of its chain, (n,); NaN if loops stay open."""
+        configurations = self.closed(q)
+        return configurations[0].q if configurations else np.full(self.chain.system.nq, np.nan)
 
-    def closed(self, q: Array) -> list[ClosedPosture]:
-        """The postures of the robot for that of its chain, (n,): several where loops allow."""
+    def closed(self, q: Array) -> list[ClosedConfiguration]:
+        """Configurations of the robot for that of its chain, (n,): several where loops allow."""
         near = self.wishes.near
         if self.chain.system.is_closed:
             return close(self.chain.system, self.chain, q[None, :], self.p, near)
         whole = near.copy()
         whole[list(self.chain.places)] = q
-        return [ClosedPosture(whole, "", 0.0)]
+        return [ClosedConfiguration(whole, "", 0.0)]
 
 
 def answer(question: Question, found: list[ChainRoot], method: str) -> Solutions:
@@ -325,15 +326,15 @@ def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
     residual, sigma = target.residual(q), target.singular_values(q)[:, -1]
     return [
         RobotSolution(
-            posture.q,
-            "; ".join(label for label in (root.label, posture.label) if label),
-            max(float(residual[k]), posture.residual),
+            configuration.q,
+            "; ".join(label for label in (root.label, configuration.label) if label),
+            max(float(residual[k]), configuration.residual),
             float(sigma[k]),
             root.multiplicity,
             root.family,
         )
         for k, root in enumerate(found)
-        for posture in question.closed(q[k])
+        for configuration in question.closed(q[k])
     ]
 
 
@@ -354,7 +355,7 @@ def _named(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
 
 
 def _shown(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
-    """With the postures that stand for self-motions; those that prove to be one are listed once."""
+    """With the configurations that stand for self-motions; what proves to be one stands once."""
     shown = list[ChainRoot]()
     for root in found:
         if root.family is None:
@@ -367,18 +368,18 @@ def _shown(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
 
 
 def _is_same(target: Target, other: ChainRoot, family: Family, q: Array) -> bool:
-    """Whether a root is a self-motion of the same joints through the same posture q, (n,)."""
+    """Whether a root is a self-motion of the same joints through the same configuration q, (n,)."""
     if other.family is None or other.family.moving != family.moving:
         return False
     return len(distinct(target, np.array([other.q, q]))) == 1
 
 
 def _representative(question: Question, family: Family) -> Array:
-    """The posture of a self-motion that is within limits, its free joint near the seed's."""
+    """The configuration of a self-motion that is within limits, its free joint near the seed's."""
     places, near = list(question.chain.places), question.wishes.near
     value = float(near[places[question.chain.names.index(family.free)]])
     first = family.nearest(value)
-    for q in (first, *family.postures_from(value)):
+    for q in (first, *family.configurations_from(value)):
         whole = near.copy()
         whole[places] = q
         if not set(question.wishes.bounds.outside(whole)) & set(question.chain.names):
@@ -387,7 +388,7 @@ def _representative(question: Question, family: Family) -> Array:
 
 
 def _whole(question: Question, found: Nearest) -> Nearest:
-    """The nearest pose with the posture of the whole robot; NaN where its loops stay open."""
+    """The nearest pose with the configuration of the whole robot; NaN where its loops stay open."""
     whole = question.whole(found.q)
     if not np.all(np.isfinite(whole)):
         return replace(found, q=whole)

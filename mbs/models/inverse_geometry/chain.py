@@ -234,13 +234,13 @@ def _require_few(
 
 
 def _proposal(system: System, free: list[Link], surplus: int) -> str:
-    """Joints before the middle of the chain, where they are in the assembled posture.
+    """Joints before the middle of the chain, where they are in the assembled configuration.
 
     An arm of seven joints keeps its elbow, without which it has one length alone.
     """
     first = (len(free) - surplus - 1) // 2
     held = free[first : first + surplus]
-    return ", ".join(f"{link.name!r}: {system.posture[link.q.start]:.6g}" for link in held)
+    return ", ".join(f"{link.name!r}: {system.configuration[link.q.start]:.6g}" for link in held)
 
 
 # Poses as a user gives them: one, or many at once.

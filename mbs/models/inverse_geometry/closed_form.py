@@ -173,7 +173,8 @@ def characteristic_function(way: Chain) -> Function:
         linear in a joint that slides.
 
     Raises:
-        NoClosedForm: the chain has not six joints, or the matrix is singular at every posture.
+        NoClosedForm: the chain has not six joints, or the matrix is singular at every
+            configuration.
     """
     from mbs.closed_forms.raghavan_roth.expressions import characteristic
 
@@ -194,7 +195,7 @@ def characteristic_function(way: Chain) -> Function:
     return made
 
 
-# How far postures are from the wanted pose: the forward model of a chain on symbols.
+# How far configurations are from the wanted pose: the forward model of a chain on symbols.
 
 
 def forward(chain: Chain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
@@ -289,7 +290,7 @@ def function(
     """``igm(T, branch) -> q, valid``: the joint positions of one branch, without iteration.
 
     One graph serves all branches. It can be differentiated with respect to T and to the
-    parameters wherever the posture is not singular.
+    parameters wherever the configuration is not singular.
 
     Source: Pieper 1968; Paul 1981; Khalil & Creusot 1997, section 3.3.
 
@@ -303,8 +304,8 @@ def function(
     Returns:
         InverseGeometry, a Function of T (4, 4) [m], the pose of the frame seen from the base, and
         of the number of the branch; q (nq, 1) [rad or m], finite for every T, joints outside the
-        chain as in the assembled posture; valid, 1 where q gives T back within 1e-9 of the size
-        of the robot, else 0.
+        chain as in the assembled configuration; valid, 1 where q gives T back within 1e-9 of the
+        size of the robot, else 0.
 
     Raises:
         NoClosedForm: no closed form is known; the message says what stood in the way.
@@ -339,7 +340,7 @@ def _require_open(system: System) -> None:
 def _built(way: Chain, sequence: StepSequence) -> tuple[Named, Named, Named]:
     T, branch = SX.sym("T", 4, 4), SX.sym("branch")
     leaf = sequence.leaf(given_of(way, T), signs_of(sequence, branch))
-    q = whole_posture(way, leaf.x)
+    q = whole_configuration(way, leaf.x)
     outputs: Named = [("q", q), ("valid", _valid(way, sequence, leaf, T, branch))]
     return [("T", T), ("branch", branch)], outputs, _names(way, sequence, leaf, branch)
 
@@ -352,7 +353,7 @@ def signs_of(sequence: StepSequence, branch: SX) -> SX:
     return SX(casadi.vertcat(*(1 - 2 * bit for bit in bits)))
 
 
-def whole_posture(way: Chain, x: SX) -> SX:
+def whole_configuration(way: Chain, x: SX) -> SX:
     """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
     q = SX(DM(way.system.position(way.locked)))
     q[list(way.places)] = x
@@ -413,7 +414,7 @@ def all_branches(
         Function of T (4, 4); q (n, branches) of the chain's joints [rad or m], finite; residual
         (branches, 1), the largest difference of an element between the forward model and T, in m
         and 1; real and regular (branches, 1), the smallest of each kind in `Leaf`; mark
-        (branches, 1), a number that is the same for equal postures, and hardly for others.
+        (branches, 1), a number that is the same for equal configurations, and hardly for others.
     """
     T = SX.sym("T", 4, 4)
     given = given_of(chain, T) if p is None else SX(casadi.vec(T[:3, :]))

@@ -88,13 +88,13 @@ def _loaded() -> ctypes.CDLL:
 
 
 def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Polished postures, (m, n), and their residuals, (m,).
+    """Polished configurations, (m, n), and their residuals, (m,).
 
     Args:
         library: the core.
-        arm: whose postures.
+        arm: whose configurations.
         T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
-        q: (m, n) postures [rad or m].
+        q: (m, n) configurations [rad or m].
     """
     own, residual, _ = _rooms(len(q), arm.size)
     own[:] = q
@@ -107,7 +107,7 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
 def found_by(
     library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
 ) -> tuple[Array, Hits]:
-    """Postures (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
+    """Configurations (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
     wanted = _wanted(T, 4, 4)
     q, residual, hits = _rooms(starts, arm.size)
     handed = Handed(arm)
@@ -118,7 +118,7 @@ def found_by(
 
 
 def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
-    """The distinct ones of postures q, (m, n), and how many are each of them."""
+    """The distinct ones of configurations q, (m, n), and how many are each of them."""
     wanted = _wanted(T, 4, 4)
     own, residual, hits = _rooms(len(q), arm.size)
     own[:] = q
@@ -130,7 +130,7 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
 
 
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
-    """The posture, (n,), whose pose is nearest to T."""
+    """The configuration, (n,), whose pose is nearest to T."""
     wanted, q = _wanted(T, 4, 4), np.empty(arm.size)
     handed = Handed(arm)
     library.mbs_nearest(handed.address, _at(wanted), starts, seed, _at(q))
@@ -165,8 +165,8 @@ def _at(array: Array) -> int:
 
 Numbers: TypeAlias = NDArray[np.int64]
 
-_ROOM = 4096  # postures of one call
-_CANDIDATES = 144  # ROTH_POSTURES: those of one pose, at most
+_ROOM = 4096  # configurations of one call
+_CANDIDATES = 144  # ROTH_CONFIGURATIONS: those of one pose, at most
 
 _int, _double = ctypes.c_int, ctypes.c_double
 
@@ -226,7 +226,7 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
     """The solutions for poses T, (N, 4, 4).
 
     Returns:
-        (m,) numbers of the poses, ascending, and (m, 6) postures for them.
+        (m,) numbers of the poses, ascending, and (m, 6) configurations for them.
     """
     wanted = np.ascontiguousarray(T, dtype=float)
     room = min(_ROOM, _CANDIDATES * len(wanted))
@@ -249,5 +249,5 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
         start += done.value
     if len(found) == 1:
         return found[0]
-    numbers, postures = zip(*found, strict=True)
-    return np.concatenate(numbers), np.concatenate(postures)
+    numbers, configurations = zip(*found, strict=True)
+    return np.concatenate(numbers), np.concatenate(configurations)

@@ -14,7 +14,7 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, gap_to
 from mbs.closed_forms.ring import spin_places
 from mbs.errors import ModelError
-from mbs.loops.plan import held_beside, regular_posture
+from mbs.loops.plan import held_beside, regular_configuration
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import chain, wanted_pose, wanted_poses
@@ -23,13 +23,13 @@ from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.solvers.rank import null_space
 from mbs.text import did_you_mean, quoted
 
-# Predictor and corrector: a posture carried on while the pose that is wanted moves.
+# Predictor and corrector: a configuration carried on while the pose that is wanted moves.
 #
 # The tangent of the path predicts, Newton's method corrects. A step counts only where the
 # corrector is shorter than the predictor and contracts, and where the Jacobian changes by less
 # than itself: all eigenvalues of J^-1 J' are within 1/2 of 1, whatever the units. So no singular
-# posture lies between, and no other branch is met. Towards a singular posture the steps shrink to
-# nothing.
+# configuration lies between, and no other branch is met. Towards a singular configuration the
+# steps shrink to nothing.
 #
 # Source: Deuflhard 2011, sections 2.1 and 5.1, with eigenvalues in the place of a norm.
 
@@ -39,7 +39,7 @@ Rows = Callable[[Array, Array], tuple[Array, Array]]
 """(x, T) -> what is missing to T, (m,), and the Jacobian (m, n) that leads there."""
 
 SINGULAR = 1e-7
-"""Smallest singular value below which a posture counts as singular."""
+"""Smallest singular value below which a configuration counts as singular."""
 
 _CHANGE = 0.5
 _CONTRACTION = 0.5
@@ -61,7 +61,7 @@ class Tracker:
         slack: directions that no row sees, such as rods that spin.
         exact: whether every pose can be reached nearby, so that rows are brought to zero between
             the given poses as well; elsewhere they are made as small as they can be.
-        may: None, or whether a posture is allowed.
+        may: None, or whether a configuration is allowed.
     """
 
     rows: Rows
@@ -72,10 +72,10 @@ class Tracker:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathPoint:
-    """A posture on the way.
+    """A configuration on the way.
 
     Attributes:
-        x: (n,) posture, scaled.
+        x: (n,) configuration, scaled.
         J: (m, n) Jacobian there.
         left: largest row that is missing there.
     """
@@ -88,7 +88,7 @@ class PathPoint:
 def carried(
     tracker: Tracker, start: PathPoint, pose: Callable[[float], Array], step: float
 ) -> tuple[PathPoint, float, float]:
-    """The posture carried on from the pose at 0 towards the pose at 1.
+    """The configuration carried on from the pose at 0 towards the pose at 1.
 
     Args:
         tracker: what follows.
@@ -98,7 +98,7 @@ def carried(
 
     Returns:
         Where it ended, at which number, and the last step tried; the number is 1 unless it stopped
-        at a singular posture, a limit, or after many steps that hardly advance.
+        at a singular configuration, a limit, or after many steps that hardly advance.
     """
     point, at = start, 0.0
     for _ in range(_MOST_STEPS):
@@ -114,7 +114,7 @@ def carried(
 
 
 def point_at(tracker: Tracker, x: Array, T: Array) -> PathPoint:
-    """A posture and what is missing there to the pose T."""
+    """A configuration and what is missing there to the pose T."""
     r, J = tracker.rows(x, T)
     return PathPoint(x, J, float(np.max(np.abs(r))))
 
@@ -126,7 +126,7 @@ def smallest(tracker: Tracker, J: Array) -> float:
 
 
 def _stepped(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
-    """The posture at the next pose; None where the step is too long."""
+    """The configuration at the next pose; None where the step is too long."""
     back, _ = _pseudo_inverse(tracker, point.J)
     led = point.x + back @ tracker.rows(point.x, T)[0]
     found = _corrected(tracker, led, T)
@@ -205,25 +205,25 @@ class Follower:
         return Tracker(self.rows, self.slack, self.exact, self._may)
 
     def scaled(self, q: Array) -> Array:
-        """(n,) the joints that move in a posture (nq,)."""
+        """(n,) the joints that move in a configuration (nq,)."""
         x: Array = q[list(self.places)] / self.scale
         return x
 
     def whole(self, q: Array, x: Array) -> Array:
-        """(nq,) the posture q with the joints that move elsewhere."""
+        """(nq,) the configuration q with the joints that move elsewhere."""
         whole = q.copy()
         whole[list(self.places)] = x * self.scale
         return whole
 
     def pose(self, q: Array) -> Array:
-        """(4, 4) of the frame in a posture (nq,)."""
+        """(4, 4) of the frame in a configuration (nq,)."""
         elements = self.wanted.pose(q)[0]
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = elements[3:].reshape(3, 3).T, elements[:3]
         return T
 
     def residual(self, q: Array, T: Array) -> float:
-        """Largest element by which a posture misses a pose, or row by which a loop is open."""
+        """Largest element by which a configuration misses a pose, or opens a loop."""
         return float(np.max(np.abs(self.wanted.at(T).residual(q)[0])))
 
     def passed(self, x: Array, slack: float = 0.0) -> tuple[int, float] | None:
@@ -252,7 +252,7 @@ def follower(
 
     Args:
         wanted: the frame, and the loops.
-        start: (nq,) posture, in which joints that do not follow stay.
+        start: (nq,) configuration, in which joints that do not follow stay.
         locked: by name, joints that stay where they are.
         limits: as in `follow`.
 
@@ -284,7 +284,7 @@ def _closed_follower(
                 f"{system.name}: joint {quoted(name)} cannot be locked;"
                 f" {did_you_mean(name, places)}"
             )
-    q = regular_posture(system)
+    q = regular_configuration(system)
     stays = tuple(places[name] for name in locked)
     still = null_space(np.vstack([wanted.residual(q)[1], np.eye(system.nq)[list(stays)]]))
     held = {*stays, *held_beside(system, still, ())}
@@ -405,7 +405,7 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
         led: what follows.
         poses: the path.
         number: of the pose.
-        q: (nq,) the last posture.
+        q: (nq,) the last configuration.
         at: how far it is between the pose before, 0, and this one, 1.
     """
     x, T = led.scaled(q), poses.poses[number]
@@ -421,17 +421,17 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
     if left > _REACHED:
         return f"{title} is out of reach: {_miss(led, led.whole(q, nearest), T)}"
     where = f"between poses {number - 1} and {number}" if number else "between the start and pose 0"
-    return f"stopped {where} of {poses.count}: singular posture, {_singular(led, q)}"
+    return f"stopped {where} of {poses.count}: singular configuration, {_singular(led, q)}"
 
 
 def _miss(led: Follower, q: Array, T: Array) -> str:
     gap = gap_to(T, led.pose(q))
     distance, angle = float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:]))
-    return f"the nearest posture found leaves the frame {apart(distance, angle)}"
+    return f"the nearest configuration found leaves the frame {apart(distance, angle)}"
 
 
 def _nearest(led: Follower, x: Array, T: Array) -> tuple[Array, float]:
-    """The posture nearest to the pose that some starts lead to, and what is missing there."""
+    """The configuration nearest to the pose that some starts lead to, and what is missing there."""
 
     def residual(y: Array) -> tuple[Array, Array]:
         r, J = led.rows(y, T)
@@ -475,12 +475,12 @@ class Followed:
     """How far a path was followed.
 
     Attributes:
-        q: (k, nq) postures at the poses reached [rad or m]; angles go on beyond half a turn.
+        q: (k, nq) configurations at the poses reached [rad or m]; angles go on beyond half a turn.
         reached: number of the last pose reached, counted from 0; -1 for none.
         reason: why it stopped there; empty where the path was followed to its end.
         residual: (k,) largest element by which the pose is missed, and row by which a loop is open.
         singular_values: (k,) the smallest of the Jacobian, lengths measured by the arm's.
-        stopped_at: (nq,) the last posture on the way, between two poses where it stopped.
+        stopped_at: (nq,) the last configuration on the way, between two poses where it stopped.
     """
 
     q: Array
@@ -502,7 +502,7 @@ def follow(
     limits: bool | Given | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Followed:
-    """The postures along a path of poses, on the branch of the first one.
+    """The configurations along a path of poses, on the branch of the first one.
 
     Between two poses the frame is led along a straight line and turned about a fixed axis, in
     steps so small that no other branch can be taken. Where the branch ends, or the joints can move
@@ -524,7 +524,7 @@ def follow(
         parameters: values of symbols, the others at their defaults.
 
     Returns:
-        The postures up to the last pose reached, and why it is not the last of the path.
+        The configurations up to the last pose reached, and why it is not the last of the path.
 
     Raises:
         ModelError: a pose, a name or the start is not understood, or the chain has more than six

@@ -1,4 +1,4 @@
-"""Postures that may solve: the leaves of a closed form, the general method, the search."""
+"""Configurations that may solve: the leaves of a closed form, the general method, the search."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Gathered:
     """Solutions as the methods give them, some of them more than once.
 
     Attributes:
-        q: (m, n) postures [rad or m].
+        q: (m, n) configurations [rad or m].
         labels: of the branches they come from, "" where they come from none.
         method: that gave them.
         doubtful: whether further ones may be missing, because the pose is next to a degenerate
@@ -108,7 +108,7 @@ def _by_closed_form(chain: Chain, target: Target, sequence: StepSequence, p: Arr
 def _leaves(chain: Chain, sequence: StepSequence, p: Array) -> Function:
     """``leaves(T) -> q, regular``: a column for every branch, kept on the system.
 
-    q (n, branches) are postures [rad or m], regular (1, branches) the least of the quantities
+    q (n, branches) are configurations [rad or m], regular (1, branches) the least of the quantities
     that must not vanish, and 1.
     """
 

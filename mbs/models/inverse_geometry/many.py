@@ -118,12 +118,13 @@ def _by_machine(call: Any, plain: Function, T: Array) -> PoseBatch:
 Booleans = NDArray[np.bool_]
 
 _DOUBTFUL = 1e-6
-"""Residual, of max(1 m, the arm's length), below which a solution may stand beside a posture."""
+"""Residual, of max(1 m, the arm's length), below which a solution may stand beside a
+configuration."""
 _DEGENERATE = 1e-12
 _FOLD = 1e-9
 _SAME, _MEETING = 1e-9, 1e-5
 _ALIKE = 12 * _MEETING
-"""Largest difference of the marks of two postures that differ by `_MEETING`."""
+"""Largest difference of the marks of two configurations that differ by `_MEETING`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,7 +179,7 @@ def drafted(chain: Chain, sequence: StepSequence, p: Array, arm: Arm, T: Array) 
 
 
 def _polish(arm: Arm, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
-    """Improve some postures, (m,), and tell which of them moved far."""
+    """Improve some configurations, (m,), and tell which of them moved far."""
     before = every.q[which]
     better = polish(arm, T[np.nonzero(which)[0]], before)
     every.q[which], every.residual[which] = better.q, better.residual
@@ -203,7 +204,9 @@ def _merge(arm: Arm, every: PoseBatch, valid: Booleans) -> Booleans:
     return meeting
 
 
-def with_postures(draft: BranchSolutions, k: int, arm: Arm, q: Array, T: Array) -> BranchSolutions:
+def with_configurations(
+    draft: BranchSolutions, k: int, arm: Arm, q: Array, T: Array
+) -> BranchSolutions:
     """With other solutions of one pose, each in the column of the nearest branch.
 
     Args:
@@ -233,13 +236,13 @@ def _widened(draft: BranchSolutions, columns: int) -> BranchSolutions:
 
 
 def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
-    """A column for every posture: the nearest pairs first."""
+    """A column for every configuration: the nearest pairs first."""
     apart = np.sum(np.abs(arm.wrapped(q[:, None] - branches[None])), axis=-1)
     columns = [-1] * len(q)
     for _ in columns:
-        posture, column = np.unravel_index(int(np.argmin(apart)), apart.shape)
-        columns[int(posture)] = int(column)
-        apart[posture, :], apart[:, column] = np.inf, np.inf
+        configuration, column = np.unravel_index(int(np.argmin(apart)), apart.shape)
+        columns[int(configuration)] = int(column)
+        apart[configuration, :], apart[:, column] = np.inf, np.inf
     return columns
 
 
@@ -283,7 +286,7 @@ def general_draft(general: General, T: Array) -> BranchSolutions:
 
 
 Repair = Callable[[Arm, Array], Array]
-"""All postures (m, n) of an arm that take its frame to a pose (4, 4)."""
+"""All configurations (m, n) of an arm that take its frame to a pose (4, 4)."""
 
 _WITHIN = 1e-9
 
@@ -293,13 +296,14 @@ class ManySolutions:
     """The solutions of N poses: a row for every pose, in it a column for every branch.
 
     Attributes:
-        q: (N, branches, nq) postures [rad or m]; where there is no solution any finite numbers.
+        q: (N, branches, nq) configurations [rad or m]; where there is no solution any finite
+            numbers.
         valid: (N, branches) whether there is a solution.
         residual: (N, branches) largest difference of an element between the pose of q and the
             wanted one, in m and 1; infinite where a column is not used.
         labels: of the branches; empty texts where no closed form tells them apart.
-        searched: (N,) whether the pose was solved by itself: its postures stand in the columns of
-            the nearest branches.
+        searched: (N,) whether the pose was solved by itself: its configurations stand in the
+            columns of the nearest branches.
     """
 
     q: Array
@@ -320,8 +324,8 @@ class ManySolutions:
 
     def of(self, k: int) -> Array:
         """(m, nq) the solutions of pose number k, counted from 0 [rad or m]."""
-        postures: Array = self.q[k, self.valid[k]]
-        return postures
+        configurations: Array = self.q[k, self.valid[k]]
+        return configurations
 
 
 def solve_many(
@@ -375,7 +379,7 @@ def solve_many(
     for k in np.flatnonzero(draft.searched):
         pose = poses[k]
         q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.way.places)]
-        draft = with_postures(draft, int(k), robot.arm, q, pose)
+        draft = with_configurations(draft, int(k), robot.arm, q, pose)
     q, valid = robot.whole(draft.q), draft.valid
     if leaves_out(limits):
         q, within = _wound(bounds(system, limits, robot.way.places), q)
@@ -445,7 +449,7 @@ def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
 
 
 def _wound(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
-    """Postures (N, branches, nq) changed by whole turns, and whether all is within limits."""
+    """Configurations (N, branches, nq) changed by whole turns, and whether all is within limits."""
     low, high = allowed.low - _WITHIN, allowed.high + _WITHIN
     missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)
     turns = np.copysign(np.ceil(np.abs(missing)), missing)

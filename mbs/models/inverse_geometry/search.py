@@ -13,7 +13,7 @@ from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.core import HandedLoop, Numbers, solved_by
 from mbs.models.inverse_geometry.raghavan_roth import Prepared, candidates_many, prepare
 
-# Levenberg and Marquardt's steps of many postures towards a wanted pose, on numpy arrays.
+# Levenberg and Marquardt's steps of many configurations towards a wanted pose, on numpy arrays.
 
 
 _STEPS = 60  # at most
@@ -24,7 +24,7 @@ _LEAST = 1e-31  # damping, so that no matrix is singular
 
 
 def examined(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Costs (m,), gaps (m, 6) and Jacobians (m, 6, n) of postures q, (m, n).
+    """Costs (m,), gaps (m, 6) and Jacobians (m, 6, n) of configurations q, (m, n).
 
     Lengths are measured by that of the arm; the cost is the square of the gap.
     """
@@ -37,16 +37,16 @@ def examined(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
 
 
 def descended(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Postures (m, n) where rounding or a smallest distance stops the steps; their costs (m,).
+    """Configurations (m, n) where rounding or a smallest distance stops; their costs (m,).
 
     The damping is proportional to the cost, which makes the last steps those of Newton, even
     where the Jacobian loses rank.
     Source: Yamashita and Fukushima 2001.
 
     Args:
-        arm: whose postures.
+        arm: whose configurations.
         T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
-        q: (m, n) postures to start from [rad or m].
+        q: (m, n) configurations to start from [rad or m].
     """
     wanted = np.broadcast_to(T, (len(q), 4, 4))
     q = np.array(q, dtype=float)
@@ -96,7 +96,7 @@ def _settle(
     stalls[going] = np.where(better, slow, stalls[going] + hopeless)
 
 
-# Which of many solutions for one pose are the same posture.
+# Which of many solutions for one pose are the same configuration.
 
 
 _SAME, _CLOSE, _BETWEEN = 1e-6, 1e-2, 1e-13  # see `merged`
@@ -108,8 +108,8 @@ class Merged:
     """Distinct solutions.
 
     Attributes:
-        q: (m, n) postures [rad or m].
-        hits: (m,) how many of the given postures are each of them.
+        q: (m, n) configurations [rad or m].
+        hits: (m,) how many of the given configurations are each of them.
     """
 
     q: Array
@@ -125,7 +125,7 @@ def merged(arm: Arm, T: Array, q: Array) -> Merged:
     lengths.
 
     Args:
-        arm: whose postures.
+        arm: whose configurations.
         T: (4, 4) wanted pose.
         q: (m, n) solutions [rad or m].
     """
@@ -152,7 +152,7 @@ def merged_with_numpy(arm: Arm, T: Array, q: Array) -> Merged:
 
 
 def reached(arm: Arm, T: Array, q: Array) -> NDArray[np.bool_]:
-    """(...,) whether postures have the pose but for rounding: a relative residual below 1e-12."""
+    """(...,) whether configurations have the pose: a relative residual below 1e-12."""
     return relative_residual(arm, T, q) < _REACHED
 
 
@@ -165,7 +165,7 @@ def relative_residual(arm: Arm, T: Array, q: Array) -> Array:
 
 
 def wrapped(arm: Arm, q: Array) -> Array:
-    """Postures with all angles in (-pi, pi]."""
+    """Configurations with all angles in (-pi, pi]."""
     turns = np.pi - np.mod(np.pi - q, 2 * np.pi)
     within = (q > -np.pi) & (q <= np.pi)
     return np.where(arm.prismatic | within, q, turns)
@@ -185,25 +185,25 @@ def _twin(arm: Arm, T: Array, found: Array, own: Array) -> int | None:
     return None
 
 
-# All solutions by many descents from random postures.
+# All solutions by many descents from random configurations.
 
 
 SEED = 20260105
 
 
 def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
-    """The solutions that Levenberg and Marquardt's steps lead to from random postures.
+    """The solutions that Levenberg and Marquardt's steps lead to from random configurations.
 
     Nothing proves that they are all; `counted_search` tells how often each was met.
 
     Args:
-        arm: whose postures; compiled for up to seven joints.
+        arm: whose configurations; compiled for up to seven joints.
         T: (4, 4) wanted pose.
-        starts: how many random postures.
+        starts: how many random configurations.
         seed: of them.
 
     Returns:
-        (m, n) distinct postures [rad or m]; samples of the families where there are such.
+        (m, n) distinct configurations [rad or m]; samples of the families where there are such.
     """
     return counted_search(arm, T, starts, seed).q
 
@@ -218,12 +218,12 @@ def counted_search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> M
 
 def searched_with_numpy(arm: Arm, T: Array, starts: int, seed: int) -> Merged:
     """`counted_search` where there is no C compiler."""
-    q = wrapped(arm, descended(arm, T, random_postures(arm, T, starts, seed))[0])
+    q = wrapped(arm, descended(arm, T, random_configurations(arm, T, starts, seed))[0])
     return merged_with_numpy(arm, T, q[reached(arm, T, q)])
 
 
-def random_postures(arm: Arm, T: Array, count: int, seed: int) -> Array:
-    """(count, n) postures: angles in (-pi, pi], slides as far as the arm and the pose reach."""
+def random_configurations(arm: Arm, T: Array, count: int, seed: int) -> Array:
+    """(count, n) configurations: angles in (-pi, pi], slides as far as arm and pose reach."""
     places = np.arange(1, count * arm.size + 1, dtype=np.uint64)
     chance = _split_mix(np.array([seed % 2**64], dtype=np.uint64), places).reshape(count, arm.size)
     reach = arm.length + np.linalg.norm(T[:3, 3])
@@ -240,15 +240,15 @@ def _split_mix(seed: NDArray[np.uint64], places: NDArray[np.uint64]) -> Array:
     return chance
 
 
-# Postures made as exact as rounding allows.
+# Configurations made as exact as rounding allows.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polished:
-    """Postures and how well they reach the wanted pose.
+    """Configurations and how well they reach the wanted pose.
 
     Attributes:
-        q: (m, n) postures, angles in (-pi, pi] where they were improved [rad or m].
+        q: (m, n) configurations, angles in (-pi, pi] where they were improved [rad or m].
         residual: (m,) max |pose(q) - T| [m and 1].
     """
 
@@ -257,15 +257,15 @@ class Polished:
 
 
 def polish(arm: Arm, T: Array, q: Array) -> Polished:
-    """The solutions beside postures.
+    """The solutions beside configurations.
 
-    A posture stays as it is where nothing better lies beside it, so that no residual grows. An
-    arm of fewer than six joints comes as near as least squares do.
+    A configuration stays as it is where nothing better lies beside it, so that no residual grows.
+    An arm of fewer than six joints comes as near as least squares do.
 
     Args:
-        arm: whose postures.
+        arm: whose configurations.
         T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
-        q: (m, n) postures [rad or m].
+        q: (m, n) configurations [rad or m].
     """
     library = core.core_of(arm)
     if library is None:
@@ -297,7 +297,7 @@ class Nearest:
     """The reachable pose nearest to a wanted one.
 
     Attributes:
-        q: (n,) a posture that has this pose [rad or m].
+        q: (n,) a configuration that has this pose [rad or m].
         distance: between the origins of both poses [m].
         angle: between their orientations [rad].
         T: (4, 4) the pose.
@@ -312,11 +312,11 @@ class Nearest:
 def nearest(arm: Arm, T: Array) -> Nearest:
     """The pose of least distance^2 + (arm.length * angle)^2 from a wanted one.
 
-    The best of several descents from random postures, each followed by Newton's method down to
-    where the slope vanishes.
+    The best of several descents from random configurations, each followed by Newton's method down
+    to where the slope vanishes.
 
     Args:
-        arm: whose postures; compiled for up to seven joints.
+        arm: whose configurations; compiled for up to seven joints.
         T: (4, 4) wanted pose [m].
     """
     library = core.core_of(arm)
@@ -326,8 +326,8 @@ def nearest(arm: Arm, T: Array) -> Nearest:
 
 
 def nearest_with_numpy(arm: Arm, T: Array) -> Array:
-    """(n,) the posture of `nearest` where there is no C compiler."""
-    q, cost = descended(arm, T, random_postures(arm, T, _STARTS, SEED))
+    """(n,) the configuration of `nearest` where there is no C compiler."""
+    q, cost = descended(arm, T, random_configurations(arm, T, _STARTS, SEED))
     best = [_refined(arm, T, q[k]) for k in _apart(cost)]
     lowest = min(best, key=lambda found: found[1])
     return wrapped(arm, lowest[0])
@@ -349,7 +349,7 @@ def _apart(cost: Array) -> list[int]:
 
 
 def _refined(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
-    """Newton's method with differences of the slope; the posture and its cost."""
+    """Newton's method with differences of the slope; the configuration and its cost."""
     cost, slope = _sloped(arm, T, q)
     curvature: Array | None = None
     shift = 1e-9
@@ -396,7 +396,7 @@ def _curvature(arm: Arm, T: Array, q: Array) -> Array:
     return 0.5 * (H + H.T)
 
 
-# All postures of a general arm of six joints that reach a pose.
+# All configurations of a general arm of six joints that reach a pose.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -425,14 +425,14 @@ def general_of(arm: Arm) -> General:
     if not prepared.regular:
         raise NoClosedForm(
             f"arm {' '.join(arm.names)}: the matrix of the general inverse geometric model is"
-            f" singular at every posture (its regularity is {prepared.regularity:.0e}); use"
+            f" singular at every configuration (its regularity is {prepared.regularity:.0e}); use"
             " method='search'"
         )
     return General(arm, prepared, HandedLoop(arm, prepared))
 
 
 def general(arm: General, T: Array) -> Array:
-    """The postures that reach a pose, by elimination; polished.
+    """The configurations that reach a pose, by elimination; polished.
 
     Source: Raghavan & Roth 1993.
 
@@ -454,7 +454,7 @@ def general_many(arm: General, T: Array) -> tuple[Numbers, Array]:
         T: (N, 4, 4) wanted poses [m].
 
     Returns:
-        (m,) numbers of the poses, ascending, and (m, 6) postures for them.
+        (m,) numbers of the poses, ascending, and (m, 6) configurations for them.
     """
     library = core.core_of(arm.arm)
     if library is not None:

@@ -13,7 +13,7 @@ from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.target import Target, TargetReduction
 
-# Self-motions of an arm whose frame is held: where they start, and the postures along them.
+# Self-motions of an arm whose frame is held: where they start, and the configurations along them.
 
 
 _STEP, _SMALLEST_STEP = 0.1, 1e-3
@@ -26,11 +26,11 @@ _INTEGER = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PostureCurve:
-    """Postures through which an arm moves while its frame stays.
+class ConfigurationCurve:
+    """Configurations through which an arm moves while its frame stays.
 
     Attributes:
-        x: (k, n) postures in order, turns unwrapped, see `Target` for the unit.
+        x: (k, n) configurations in order, turns unwrapped, see `Target` for the unit.
         closed: whether the last one is the first one again, up to whole turns.
         slope: (n,) the constant direction of a straight one, its largest element 1; empty where
             it bends.
@@ -93,16 +93,16 @@ def _nearest_on_sphere(reduced: TargetReduction, direction: Array) -> Array:
 
 def curve(
     target: Target, q: Array, direction: Array, dimension: int = 1, strictness: float = 0.1
-) -> PostureCurve | None:
-    """The self-motion through a posture; None where it soon ends.
+) -> ConfigurationCurve | None:
+    """The self-motion through a configuration; None where it soon ends.
 
     Args:
         target: the pose that is held.
-        q: (n,) posture on it [rad or m].
+        q: (n,) configuration on it [rad or m].
         direction: (n,) along it, in x.
         dimension: how many freedoms it has; with more than one, a short way along it is enough.
-        strictness: part of the tolerance of solutions within which postures hold the pose; next
-            to a singular posture those of no self-motion hold it nearly.
+        strictness: part of the tolerance of solutions within which configurations hold the pose;
+            next to a singular configuration those of no self-motion hold it nearly.
     """
     steps = _MOST_STEPS if dimension == 1 else _FEW_STEPS
     way = _Way(target, strictness * target.tolerance, steps)
@@ -120,7 +120,7 @@ class _Way:
     limit: float
     most: int
 
-    def straight(self, x: Array, direction: Array) -> PostureCurve | None:
+    def straight(self, x: Array, direction: Array) -> ConfigurationCurve | None:
         """The self-motion whose joints move in constant proportions."""
         target = self.target
         slope = direction / direction[np.argmax(np.abs(direction))]
@@ -131,20 +131,20 @@ class _Way:
         samples = x + extent[:, None] * slope
         if np.max(target.residual(samples * target.unit)) > self.limit:
             return None
-        return PostureCurve(samples, turns, slope)
+        return ConfigurationCurve(samples, turns, slope)
 
-    def followed(self, x: Array, direction: Array) -> PostureCurve | None:
+    def followed(self, x: Array, direction: Array) -> ConfigurationCurve | None:
         """The self-motion by small steps, to where it closes or ends."""
         ahead, closed = self._walked(x, direction)
         if closed:
-            return PostureCurve(np.array(ahead), True, np.zeros(0))
+            return ConfigurationCurve(np.array(ahead), True, np.zeros(0))
         back, _ = self._walked(x, -direction)
         samples = np.array([*back[:0:-1], *ahead])
         length = float(np.sum(np.linalg.norm(np.diff(samples, axis=0), axis=1)))
-        return PostureCurve(samples, False, np.zeros(0)) if length > _SHORTEST else None
+        return ConfigurationCurve(samples, False, np.zeros(0)) if length > _SHORTEST else None
 
     def _walked(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
-        """Postures from the start on, and whether they come back to it."""
+        """Configurations from the start on, and whether they come back to it."""
         points, step, target = [start], _STEP, self.target
         while len(points) < self.most and step > _SMALLEST_STEP:
             x = _stepped(target, points[-1], tangent, step)
@@ -181,7 +181,7 @@ def _tangent(target: Target, x: Array, before: Array) -> Array:
 
 
 Whole = Callable[[Array], Array]
-"""The posture (nq,) of a robot for one of its chain, (n,); NaN where there is none."""
+"""The configuration (nq,) of a robot for one of its chain, (n,); NaN where there is none."""
 
 _MOVES = 1e-6
 _SAME = 1e-6
@@ -195,13 +195,13 @@ class Family:
     """A self-motion: the frame stays while joints move.
 
     Attributes:
-        free: name of the joint that tells its postures apart.
+        free: name of the joint that tells its configurations apart.
         moving: names of all joints that move, the free one among them.
         relations: between them, such as "q4 + q6 = 0.7"; empty where they are not linear.
         range: lowest and highest position of the free joint [rad or m]; None where it may turn
             all the way round, or slide without end.
-        dimension: how many joints may be chosen; with more than one, only the postures along one
-            curve through the solution are described.
+        dimension: how many joints may be chosen; with more than one, only the configurations along
+            one curve through the solution are described.
     """
 
     free: str
@@ -213,12 +213,12 @@ class Family:
 
     @property
     def samples(self) -> Array:
-        """(k, nq) postures along it [rad or m], turns unwrapped."""
+        """(k, nq) configurations along it [rad or m], turns unwrapped."""
         motion = self._motion
         return np.array([motion.whole(q) for q in motion.curve.x * motion.target.unit])
 
     def at(self, value: float) -> Array:
-        """The posture q (nq,) whose free joint is at a value [rad or m].
+        """The configuration q (nq,) whose free joint is at a value [rad or m].
 
         Where the joint passes the value more than once, the first one from the solution on.
 
@@ -236,11 +236,11 @@ class Family:
         return whole
 
     def nearest(self, value: float) -> Array:
-        """The posture of the chain (n,) whose free joint is as near to a value as it gets."""
+        """The configuration of the chain (n,) whose free joint is as near to a value as it gets."""
         q = self._motion.at(value)
-        return next(iter(self.postures_from(value))) if q is None else q
+        return next(iter(self.configurations_from(value))) if q is None else q
 
-    def postures_from(self, value: float) -> Array:
+    def configurations_from(self, value: float) -> Array:
         """The samples of the chain (k, n), those whose free joint is near a value first."""
         motion = self._motion
         away = motion.target.wrapped(self._motion.curve.x - value / motion.target.unit)
@@ -248,11 +248,11 @@ class Family:
         return np.asarray((motion.curve.x * motion.target.unit)[order])
 
     def contains(self, q: Array) -> bool:
-        """Whether a posture (nq,) [rad or m] is one of it, up to whole turns."""
+        """Whether a configuration (nq,) [rad or m] is one of it, up to whole turns."""
         return bool(self.meets(np.asarray(q, dtype=float)[None, list(self._motion.places)])[0])
 
     def meets(self, q: Array) -> NDArray[np.bool_]:
-        """(m,) whether postures (m, n) of the chain belong to it."""
+        """(m,) whether configurations (m, n) of the chain belong to it."""
         return self._motion.meets(q)
 
     def __str__(self) -> str:
@@ -270,7 +270,7 @@ class _SelfMotion:
     """What a family is computed from: the curve in the chain, and the chain in the system."""
 
     target: Target
-    curve: PostureCurve
+    curve: ConfigurationCurve
     free: int
     places: tuple[int, ...]
     whole: Whole
@@ -293,7 +293,7 @@ class _SelfMotion:
         return q
 
     def _start(self, wanted: float) -> Array:
-        """The posture of the curve whose free joint is nearest the wanted position."""
+        """The configuration of the curve whose free joint is nearest the wanted position."""
         samples, k = self.curve.x, self.free
         away = np.abs(self.target.wrapped(samples - wanted)[:, k])
         x = samples[int(np.argmin(away))]
@@ -303,7 +303,7 @@ class _SelfMotion:
         return np.asarray(x, dtype=float)
 
     def meets(self, q: Array) -> NDArray[np.bool_]:
-        """By the postures of the curve in the planes through q that stand across it."""
+        """By the configurations of the curve in the planes through q that stand across it."""
         target, samples = self.target, self.curve.x
         x = q / target.unit
         away = target.wrapped(samples - x[:, None])
@@ -322,16 +322,16 @@ class _SelfMotion:
 
 
 def family(
-    target: Target, curve: PostureCurve, dimension: int, places: tuple[int, ...], whole: Whole
+    target: Target, curve: ConfigurationCurve, dimension: int, places: tuple[int, ...], whole: Whole
 ) -> Family:
     """The description of a self-motion.
 
     Args:
         target: the pose that is held.
-        curve: postures along it.
+        curve: configurations along it.
         dimension: how many freedoms it has.
         places: of the chain's joints in q.
-        whole: the posture (nq,) of the robot for one of the chain, (n,).
+        whole: the configuration (nq,) of the robot for one of the chain, (n,).
     """
     moves = np.ptp(curve.x, axis=0) > _MOVES
     free = _free_joint(curve, moves)
@@ -342,11 +342,11 @@ def family(
     return Family(names[free], moving, relations, _range(target, curve, free), dimension, motion)
 
 
-def _free_joint(curve: PostureCurve, moves: Array) -> int:
-    """The first joint that tells all postures apart, or moves as far as most of the others.
+def _free_joint(curve: ConfigurationCurve, moves: Array) -> int:
+    """The first joint that tells all configurations apart, or moves as far as most of the others.
 
-    Where every joint turns back, postures that share its position are told apart by the side from
-    which the curve reaches them.
+    Where every joint turns back, configurations that share its position are told apart by the side
+    from which the curve reaches them.
     """
     steps = np.diff(curve.x, axis=0)
     onwards = moves & (np.all(steps > 0, axis=0) | np.all(steps < 0, axis=0))
@@ -354,7 +354,7 @@ def _free_joint(curve: PostureCurve, moves: Array) -> int:
     return int(np.flatnonzero(span >= _COMPARABLE * np.max(span))[0])
 
 
-def _relations(target: Target, curve: PostureCurve, free: int) -> tuple[str, ...]:
+def _relations(target: Target, curve: ConfigurationCurve, free: int) -> tuple[str, ...]:
     """One equation for every joint that follows in proportion."""
     if not curve.slope.size:
         return ()
@@ -389,7 +389,7 @@ def _relation(
     return f"{name} {sign} {abs(factor):.6g} {free} = {constant:.6g}"
 
 
-def _range(target: Target, curve: PostureCurve, free: int) -> tuple[float, float] | None:
+def _range(target: Target, curve: ConfigurationCurve, free: int) -> tuple[float, float] | None:
     """Lowest and highest position of the free joint, None where nothing bounds it."""
     x, unit = curve.x[:, free], target.unit[free]
     whole_turn = curve.closed and abs(x[-1] - x[0]) > np.pi
@@ -400,7 +400,7 @@ def _range(target: Target, curve: PostureCurve, free: int) -> tuple[float, float
     )
 
 
-def _end(target: Target, curve: PostureCurve, free: int, sign: float) -> float:
+def _end(target: Target, curve: ConfigurationCurve, free: int, sign: float) -> float:
     """The highest position of a joint along a curve, the lowest for the other sign.
 
     The highest sample is moved to the vertex of the parabola through it and its neighbours, again
@@ -428,7 +428,7 @@ def _end(target: Target, curve: PostureCurve, free: int, sign: float) -> float:
     return float(x[free])
 
 
-# Which postures are joined by a self-motion of several freedoms.
+# Which configurations are joined by a self-motion of several freedoms.
 
 
 _SURFACE_STEP, _STEPS = 0.15, 150
@@ -437,7 +437,7 @@ _ARRIVED = 1e-6
 
 
 def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
-    """Whether postures reach another one in small steps that keep the frame where it is.
+    """Whether configurations reach another one in small steps that keep the frame where it is.
 
     Every step goes as straight towards the goal as the null space of the Jacobian allows; one
     that gets stuck on the way counts as not connected.

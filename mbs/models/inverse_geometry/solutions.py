@@ -1,4 +1,4 @@
-"""The answer of an inverse geometric model: every posture that takes the frame to a pose."""
+"""The answer of an inverse geometric model: every configuration that takes the frame to a pose."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mbs.models.inverse_geometry.self_motions import Family
 from mbs.models.inverse_geometry.target import Target
 from mbs.text import did_you_mean, quoted
 
-# Joint limits, and the whole turns by which a posture may be wound within them.
+# Joint limits, and the whole turns by which a configuration may be wound within them.
 
 
 Given = Mapping[str, tuple[float, float] | None]
@@ -53,11 +53,11 @@ class CoordinateLimits:
         return [self.names[k] for k in range(q.size) if not self._options(k, q[k], 0.0)]
 
     def windings(self, q: Array, near: Array) -> Array:
-        """Postures that differ from q by whole turns and are within the limits.
+        """Configurations that differ from q by whole turns and are within the limits.
 
         Args:
-            q: (nq,) posture [rad or m].
-            near: (nq,) posture by whose distance they are sorted.
+            q: (nq,) configuration [rad or m].
+            near: (nq,) configuration by whose distance they are sorted.
 
         Returns:
             (w, nq), at most 64 of them; none where a coordinate cannot be brought within.
@@ -161,7 +161,7 @@ _MOST_ROWS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """One posture that takes the frame to the wanted pose.
+    """One configuration that takes the frame to the wanted pose.
 
     Attributes:
         q: (nq,) positions [rad or m].
@@ -169,11 +169,11 @@ class Solution:
             else the signs of the closed form, else a number.
         residual: largest element of pose(q) - T [m or 1].
         sigma_min: smallest singular value of the Jacobian of the joints that were solved for,
-            lengths divided by the arm's length; zero at a singular posture.
-        multiplicity: how many roots meet in it; 1 but at a singular posture, 0 where it is one
-            of a self-motion.
+            lengths divided by the arm's length; zero at a singular configuration.
+        multiplicity: how many roots meet in it; 1 but at a singular configuration, 0 where it is
+            one of a self-motion.
         within_limits: whether every joint is within its limits.
-        windings: (w, nq) postures within the limits that differ from it by whole turns, q
+        windings: (w, nq) configurations within the limits that differ from it by whole turns, q
             itself the first; none where a joint is outside.
         family: the self-motion that it stands for, or None.
     """
@@ -190,17 +190,17 @@ class Solution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solutions(Sequence[Solution]):
-    """Every posture that takes the frame to the wanted pose, a sequence of `Solution`.
+    """Every configuration that takes the frame to the wanted pose, a sequence of `Solution`.
 
     Attributes:
         system: name of the robot.
         names: of its coordinates, in the order of q.
-        solutions: the postures; nearest to the seed first where there was one.
-        method: that found them: pieper, paul, general or search; next to singular postures the
-            others complete it.
+        solutions: the configurations; nearest to the seed first where there was one.
+        method: that found them: pieper, paul, general or search; next to singular configurations
+            the others complete it.
         reason: why there is none, "" where there is one.
-        nearest: the reachable pose nearest to the wanted one, and its posture, where there is no
-            solution at all.
+        nearest: the reachable pose nearest to the wanted one, and its configuration, where there
+            is no solution at all.
     """
 
     system: str
@@ -223,21 +223,21 @@ class Solutions(Sequence[Solution]):
 
     @property
     def q(self) -> Array:
-        """(m, nq) the postures [rad or m]."""
+        """(m, nq) the configurations [rad or m]."""
         return np.array([s.q for s in self.solutions]).reshape(len(self), len(self.names))
 
     def closest(self, q: Sequence[float] | Array) -> Solution:
-        """The solution nearest a posture (nq,) [rad or m], wound as near to it as limits allow.
+        """The solution nearest a configuration (nq,) [rad or m], wound as limits allow.
 
         Raises:
-            ModelError: there is no solution, or the posture is not that many finite numbers.
+            ModelError: there is no solution, or the configuration is not that many finite numbers.
         """
         if not self.solutions:
             raise ModelError(f"{self.system}: there is no solution; {self.reason}")
         near = _numbers(self.system, q)
         if near.size != len(self.names):
             raise ModelError(
-                f"{self.system}: the posture has {near.size} values, the robot has"
+                f"{self.system}: the configuration has {near.size} values, the robot has"
                 f" {len(self.names)}: {', '.join(self.names)}"
             )
         wound = [replace(s, q=self._bounds.wound(s.q, near)) for s in self.solutions]
@@ -281,12 +281,12 @@ def _numbers(system: str, q: object) -> Array:
         near = np.full(1, np.nan)
     if not np.all(np.isfinite(near)):
         raise ModelError(
-            f"{system}: the posture is {quoted(q)}; give a finite number for each coordinate"
+            f"{system}: the configuration is {quoted(q)}; give a finite number for each coordinate"
         )
     return near
 
 
-# Why no posture takes the frame to a pose.
+# Why no configuration takes the frame to a pose.
 
 
 _REASON_STARTS, _STEPS, _SEED = 40, 60, 20260109
@@ -353,7 +353,7 @@ def reaches_orientation(target: Target) -> bool:
 def _reaches(target: Target, rows: slice) -> bool:
     """Whether some rows of the equations alone have a solution.
 
-    Levenberg-Marquardt from several postures at once.
+    Levenberg-Marquardt from several configurations at once.
     """
     n = target.arm.size
     rng = np.random.default_rng(_SEED)
@@ -392,8 +392,8 @@ class Wishes:
 
     Attributes:
         system: the robot.
-        near: (nq,) the posture that solutions are wound towards; it places the joints that the
-            frame does not depend on.
+        near: (nq,) the configuration that solutions are wound towards; it places the joints that
+            the frame does not depend on.
         bounds: limits of the coordinates.
         strict: whether solutions outside the limits are left out.
         seeded: whether the nearest solution comes first.

@@ -1,4 +1,4 @@
-"""Every posture that takes a frame of a robot to a pose."""
+"""Every configuration that takes a frame of a robot to a pose."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def solve(
     locked: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Solutions:
-    """Every posture that takes a frame to a pose.
+    """Every configuration that takes a frame to a pose.
 
     Each is checked with the forward model to 1e-12 of max(1 m, the robot's length). Next to
-    singular postures several methods are joined so that none is missed.
+    singular configurations several methods are joined so that none is missed.
 
     Args:
         system: a serial robot, a tree, or a robot with loops.
@@ -46,8 +46,9 @@ def solve(
         limits: None leaves out no solution and says of each whether it is within the robot's own
             limits; True leaves out those that are not; (lowest, highest) by name replaces limits
             and leaves out likewise.
-        seed: a posture by name or (nq,) [rad or m]; solutions are sorted by their distance from
-            it and wound towards it, and it places the joints that the frame does not depend on.
+        seed: a configuration by name or (nq,) [rad or m]; solutions are sorted by their distance
+            from it and wound towards it, and it places the joints that the frame does not depend
+            on.
         locked: positions of joints that stay where they are, by name [rad or m].
         parameters: values of symbols, the others at their defaults.
 
@@ -100,7 +101,7 @@ def _chain_or_none(
 
 
 def _is_doubtful(target: Target, gathered: Gathered) -> bool:
-    """Whether a solution may be missing: none was found, or next to a singular posture."""
+    """Whether a solution may be missing: none was found, or next to a singular configuration."""
     if gathered.doubtful or not len(gathered.q):
         return True
     return bool(np.min(target.singular_values(gathered.q)[:, -1]) < _NEARLY_SINGULAR)

@@ -26,7 +26,7 @@ class Target:
 
     Attributes:
         arm: that moves the frame.
-        T: (4, 4) the wanted pose; (m, 4, 4) of m postures, each its own.
+        T: (4, 4) the wanted pose; (m, 4, 4) of m configurations, each its own.
     """
 
     arm: Arm
@@ -43,7 +43,7 @@ class Target:
         return SOLVED * max(1.0, self.arm.length)
 
     def residual(self, q: Array) -> Array:
-        """(...) largest element of pose(q) - T at postures q, (..., n)."""
+        """(...) largest element of pose(q) - T at configurations q, (..., n)."""
         return self.arm.residual(q, self.T)
 
     def excess(self, x: Array) -> tuple[Array, Array]:
@@ -85,17 +85,17 @@ class Target:
         return x
 
 
-# Which of the postures that were found are one solution.
+# Which of the configurations that were found are one solution.
 
 
 _SAME, _CLOSE, _BETWEEN = 1e-9, 1e-2, 1e-13
 
 
 def distinct(target: Target, q: Array) -> list[list[int]]:
-    """The postures in groups of equal ones, the groups and their members in the given order.
+    """The configurations in groups of equal ones, the groups and their members in the given order.
 
-    Two are one solution when they are closer than 1e-9, or closer than 1e-2 and the posture half
-    way between solves too, as copies of a multiple root do. Whole turns do not count.
+    Two are one solution when they are closer than 1e-9, or closer than 1e-2 and the configuration
+    half way between solves too, as copies of a multiple root do. Whole turns do not count.
 
     Args:
         target: the pose they take.
@@ -212,7 +212,7 @@ def multiplicity(reduced: TargetReduction) -> tuple[int, Array]:
         reduced: the equations near it.
 
     Returns:
-        the number of roots, and the posture q (n,) [rad or m] in their middle.
+        the number of roots, and the configuration q (n,) [rad or m] in their middle.
     """
     if reduced.corank == 0:
         return 1, reduced.x * reduced.target.unit
@@ -246,7 +246,7 @@ def _order(reduced: TargetReduction) -> tuple[int, Array]:
 
 
 def _best(reduced: TargetReduction, steps: list[float]) -> Array:
-    """The posture (n,) of least residual after one of several steps, or none."""
+    """The configuration (n,) of least residual after one of several steps, or none."""
     x, _, _ = reduced.at(np.clip(np.array(steps)[:, None], -_FARTHEST, _FARTHEST))
     q = np.vstack([reduced.x, x]) * reduced.target.unit
     best: Array = q[int(np.argmin(reduced.target.residual(q)))]

@@ -12,13 +12,13 @@ from mbs.closed_forms.arm import Array
 from mbs.closed_forms.ring import spin_places
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import CLOSED, TOLERANCE, Closing, difference
-from mbs.loops.modes import closed_postures, working_modes
+from mbs.loops.modes import closed_configurations, working_modes
 from mbs.loops.plan import (
     Known,
     Posed,
     Stage,
     completed,
-    every_posture,
+    every_configuration,
     plan_from,
     plan_to,
     started_at,
@@ -28,7 +28,8 @@ from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import Chain
 from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes
 
-# Whole postures of trees and of robots with closed loops, from the joints on the way to a frame.
+# Whole configurations of trees and of robots with closed loops, from the joints on the way to a
+# frame.
 #
 # The chain from the base to the frame is solved as if it stood alone; with its joints known the
 # loops give all others. Where balls or a free body stand in the chain, as in a parallel robot,
@@ -44,8 +45,8 @@ _MOVED = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ClosedPosture:
-    """A posture of the whole system that closes its loops.
+class ClosedConfiguration:
+    """A configuration of the whole system that closes its loops.
 
     Attributes:
         q: (nq,) positions [rad or m].
@@ -60,9 +61,9 @@ class ClosedPosture:
 
 
 def close(
-    system: System, chain: Chain, postures: Array, p: Array, seed: Array | None = None
-) -> list[ClosedPosture]:
-    """The whole postures that belong to postures of a chain.
+    system: System, chain: Chain, configurations: Array, p: Array, seed: Array | None = None
+) -> list[ClosedConfiguration]:
+    """The whole configurations that belong to configurations of a chain.
 
     The loops are closed in every way, by closed forms; by search from many starts where
     `why_searched` tells so. What neither chain nor loops determine stays as in the seed.
@@ -70,32 +71,32 @@ def close(
     Args:
         system: open or closed.
         chain: of its tree, to the frame that is wanted somewhere.
-        postures: (m, n) positions of the joints of the chain.
+        configurations: (m, n) positions of the joints of the chain.
         p: (np,) parameters.
-        seed: (nq,) posture, the assembled one when left out.
+        seed: (nq,) configuration, the assembled one when left out.
 
     Returns:
-        Those of the first posture of the chain, then those of the second, and so on; none where the
-        loops stay open.
+        Those of the first configuration of the chain, then those of the second, and so on; none
+        where the loops stay open.
 
     Raises:
         NoClosedForm: balls or free bodies beside the chain move in some of their ways only.
     """
-    rest = np.array(system.posture if seed is None else seed, dtype=float)
+    rest = np.array(system.configuration if seed is None else seed, dtype=float)
     given = _given(system, chain)
-    found = list[ClosedPosture]()
-    for posture in np.atleast_2d(np.asarray(postures, dtype=float)):
-        if posture.size:
+    found = list[ClosedConfiguration]()
+    for configuration in np.atleast_2d(np.asarray(configurations, dtype=float)):
+        if configuration.size:
             q = rest.copy()
-            q[list(given)] = [*posture, *chain.locked.values()]
+            q[list(given)] = [*configuration, *chain.locked.values()]
             found += _completed(system, given, q, p)
     return found
 
 
 def posed(
     system: System, frame: str | int, T: Array, p: Array, seed: Array | None = None
-) -> list[ClosedPosture]:
-    """The whole postures that bring a frame to a pose, where balls or free bodies carry it.
+) -> list[ClosedConfiguration]:
+    """The whole configurations that bring a frame to a pose, where balls or free bodies carry it.
 
     By closed forms where every loop has one; by search from many starts where `why_searched` tells
     so. What the pose does not determine stays as in the seed.
@@ -105,7 +106,7 @@ def posed(
         frame: a body, a named frame, or the number of a link.
         T: (4, 4) wanted pose, as `wanted_pose` gives it.
         p: (np,) parameters.
-        seed: (nq,) posture, the assembled one when left out.
+        seed: (nq,) configuration, the assembled one when left out.
 
     Returns:
         Those near the seed first.
@@ -113,21 +114,21 @@ def posed(
     Raises:
         LoopError: by search, where joints can move while the frame stays.
     """
-    rest = np.array(system.posture if seed is None else seed, dtype=float)
+    rest = np.array(system.configuration if seed is None else seed, dtype=float)
     given = zip(system.parameters, p, strict=True)
     values = {symbol.name: float(x) for symbol, x in given if np.isfinite(x)}
     plan = _plan_to(system, frame)
     if isinstance(plan, str):
         modes = working_modes(system, frame, T, guess=list(rest), parameters=values)
-        return [ClosedPosture(np.array(mode.q), "", mode.residual) for mode in modes]
+        return [ClosedConfiguration(np.array(mode.q), "", mode.residual) for mode in modes]
     wanted = goal(system, frame, T, None, values)
-    ways = every_posture(plan.stages, plan.started(T, rest), p)
+    ways = every_configuration(plan.stages, plan.started(T, rest), p)
     found = _distinct(system, _reaching(wanted, ways))
-    return sorted(found, key=lambda posture: _distance(system, posture.q, rest))
+    return sorted(found, key=lambda configuration: _distance(system, configuration.q, rest))
 
 
 def why_searched(system: System, way: Chain | str | int) -> str | None:
-    """Why postures are searched for, so that no proof of completeness stands behind them.
+    """Why configurations are searched for, so that no proof of completeness stands behind them.
 
     Args:
         system: open or closed.
@@ -184,10 +185,10 @@ def _plan_to(system: System, frame: str | int) -> Posed | str:
 
 def _completed(
     system: System, given: tuple[int, ...], q: Array, p: Array
-) -> Iterable[ClosedPosture]:
-    """The closed postures with the given positions as in q, and the held ones."""
+) -> Iterable[ClosedConfiguration]:
+    """The closed configurations with the given positions as in q, and the held ones."""
     if not system.is_closed:
-        return [ClosedPosture(q, "", 0.0)]
+        return [ClosedConfiguration(q, "", 0.0)]
     known = _known(system, given)
     closing = Closing(system, p, known.places)
     ways = _ways(closing, _stages(system, given), q)
@@ -200,8 +201,8 @@ _Ways = Iterable[tuple[Array, tuple[str, ...]]]
 def _ways(closing: Closing, stages: tuple[Stage, ...] | str, q: Array) -> _Ways:
     """All positions and the labels of the branch, by closed forms where every loop has one."""
     if isinstance(stages, str):
-        return [(found, ()) for found in closed_postures(closing, q)]
-    return every_posture(stages, started_at(closing.system, q, closing.held), closing.p)
+        return [(found, ()) for found in closed_configurations(closing, q)]
+    return every_configuration(stages, started_at(closing.system, q, closing.held), closing.p)
 
 
 def _agreeing(system: System, known: Known, q: Array, ways: _Ways) -> _Ways:
@@ -214,7 +215,7 @@ def _agreeing(system: System, known: Known, q: Array, ways: _Ways) -> _Ways:
             yield whole, branch
 
 
-def _closed(closing: Closing, ways: _Ways) -> Iterator[ClosedPosture]:
+def _closed(closing: Closing, ways: _Ways) -> Iterator[ClosedConfiguration]:
     """Those in which the loops are closed."""
     for found, branch in ways:
         q = found
@@ -223,10 +224,10 @@ def _closed(closing: Closing, ways: _Ways) -> Iterator[ClosedPosture]:
             if np.max(np.abs(nearest.q - found)) < _MOVED:
                 q = nearest.q
         if closing.openness(q) < CLOSED and closing.faces(q):
-            yield ClosedPosture(q, ", ".join(branch), _largest(closing.rows(q)[0]))
+            yield ClosedConfiguration(q, ", ".join(branch), _largest(closing.rows(q)[0]))
 
 
-def _reaching(wanted: Goal, ways: _Ways) -> Iterator[ClosedPosture]:
+def _reaching(wanted: Goal, ways: _Ways) -> Iterator[ClosedConfiguration]:
     """Those in which the loops are closed and the frame is where it is wanted."""
     for found, branch in ways:
         q = found[: wanted.closing.system.nq]
@@ -235,13 +236,15 @@ def _reaching(wanted: Goal, ways: _Ways) -> Iterator[ClosedPosture]:
             if np.max(np.abs(nearest.q - q)) < _MOVED:
                 q = nearest.q
         if wanted.openness(q) < CLOSED and wanted.closing.faces(q):
-            yield ClosedPosture(q, ", ".join(branch), _largest(wanted.residual(q)[0]))
+            yield ClosedConfiguration(q, ", ".join(branch), _largest(wanted.residual(q)[0]))
 
 
-def _distinct(system: System, postures: Iterable[ClosedPosture]) -> list[ClosedPosture]:
+def _distinct(
+    system: System, configurations: Iterable[ClosedConfiguration]
+) -> list[ClosedConfiguration]:
     """Two that meet are listed once."""
-    kept = list(postures)
-    along = [_mark(system, posture.q) for posture in kept]
+    kept = list(configurations)
+    along = [_mark(system, configuration.q) for configuration in kept]
     order = np.argsort(along, kind="stable")
     twins = set[int]()
     for k, number in enumerate(order):
@@ -250,11 +253,11 @@ def _distinct(system: System, postures: Iterable[ClosedPosture]) -> list[ClosedP
                 break
             if _distance(system, kept[other].q, kept[number].q) < _SAME:
                 twins.add(max(other, number))
-    return [posture for number, posture in enumerate(kept) if number not in twins]
+    return [configuration for number, configuration in enumerate(kept) if number not in twins]
 
 
 def _mark(system: System, q: Array) -> float:
-    """A number that is the same for the same posture, and most often for no other one."""
+    """A number that is the same for the same configuration, and most often for no other one."""
     turns = np.array([coordinate.unit == "rad" for coordinate in system.coordinates])
     weights = np.random.default_rng(_SEED).uniform(0.1, 0.5, (2, system.nq))
     return float(
@@ -277,7 +280,7 @@ _SINGULAR = 1e-6
 
 
 def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Solutions:
-    """Every posture that takes a frame of a robot with loops to a pose.
+    """Every configuration that takes a frame of a robot with loops to a pose.
 
     Args:
         wishes: the robot, and what is asked for beside the pose.
@@ -290,19 +293,26 @@ def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Sol
     searched = why_searched(system, name)
     found = posed(system, name, T, p, wishes.near)
     method = "loops in closed form" if searched is None else "search"
-    reason = "no posture closes the loops and takes the frame to the pose"
+    reason = "no configuration closes the loops and takes the frame to the pose"
     if searched is not None:
         reason += f"; it was searched for from many starts, which proves nothing: {searched}"
     values = {a.name: float(x) for a, x in zip(system.parameters, p, strict=True)}
     wanted = goal(system, name, T, None, values)
-    drafts = [_draft(posture, wanted.residual(posture.q)[1], k) for k, posture in enumerate(found)]
+    drafts = [
+        _draft(configuration, wanted.residual(configuration.q)[1], k)
+        for k, configuration in enumerate(found)
+    ]
     return wishes.solutions(drafts, method, "" if drafts else reason)
 
 
-def _draft(posture: ClosedPosture, slope: Array, number: int) -> RobotSolution:
+def _draft(configuration: ClosedConfiguration, slope: Array, number: int) -> RobotSolution:
     """A solution; its singular value is that of pose and loops together."""
     sigma = float(np.linalg.svd(slope, compute_uv=False)[-1])
     count = 1 if sigma > _SINGULAR else 0
     return RobotSolution(
-        posture.q, posture.label or str(number + 1), posture.residual, sigma, count
+        configuration.q,
+        configuration.label or str(number + 1),
+        configuration.residual,
+        sigma,
+        count,
     )

@@ -1,4 +1,4 @@
-"""Rigid stops and dry friction in the state equation of the independent joints.
+"""Rigid stops and Coulomb friction in the state equation of the independent joints.
 
 Only what the elements need is a mode or an indicator: a stop has its place, friction its direction
 of sliding, and a limit that is not given is not watched.
@@ -20,7 +20,7 @@ from mbs.models.contacts import KINDS, ContactEquations, Contacts, impact, jump
 from mbs.models.state.drive import TreeMotion
 from mbs.models.symbols import dense_function, outputs_of
 
-# What keeps dependent joints at rest that rigid stops or dry friction hold.
+# What keeps dependent joints at rest that rigid stops or Coulomb friction hold.
 #
 # A state equation of the independent joints is integrated without any projection. What it holds
 # of these stays where it is; a dependent joint would creep by the errors of the steps.
@@ -224,7 +224,7 @@ class MinimalEvents:
 
 @dataclass(frozen=True, slots=True)
 class ContactEffort:
-    """What a rigid stop or dry friction exerts, as an output.
+    """What a rigid stop or Coulomb friction exerts, as an output.
 
     Attributes:
         name: such as `stop.effort`.

@@ -199,7 +199,7 @@ class MinimalLayout:
         accelerations: numbers in v of the first part of y.
         passive: numbers in v of the velocities and accelerations of dependent joints in y.
         efforts: numbers in v of the efforts in y, each all that drives the joint but contacts.
-        contacts: efforts of rigid stops and dry friction in y.
+        contacts: efforts of rigid stops and Coulomb friction in y.
     """
 
     positions: tuple[int, ...]
@@ -539,7 +539,7 @@ class MinimalState(MinimalLayout):
         slopes: `slopes(x, z, p) -> J`, how the equations that the Newton step solves change with z,
             (nz, nz); None in open chains, and where they are of least squares, whose determinant
             has no sign.
-        events: of rigid stops and dry friction; None where there are none.
+        events: of rigid stops and Coulomb friction; None where there are none.
     """
 
     rhs: Function
@@ -561,7 +561,7 @@ def minimal_state(
 
     Raises:
         ModelError: a drive does not fit the system, or the independent rows of the loops change
-            with the posture, which contacts do not follow.
+            with the configuration, which contacts do not follow.
     """
     require_lasting_rows(system, contacts_of(system))
     drive = DriveInputs() if drive is None else drive
@@ -749,10 +749,10 @@ def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Func
 
 
 def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float], list[float]]:
-    """State x and dependents z of the assembled posture at rest."""
-    posture = np.array(system.posture)
+    """State x and dependents z of the assembled configuration at rest."""
+    configuration = np.array(system.configuration)
     rest = [0.0] * (len(state.velocities) + state_count(system))
-    x = [*posture[list(state.positions)], *rest]
+    x = [*configuration[list(state.positions)], *rest]
     return [float(value) for value in x], [
-        float(value) for value in posture[list(state.dependents)]
+        float(value) for value in configuration[list(state.dependents)]
     ]

@@ -73,7 +73,7 @@ def projected(
 
     The step is made on the independent rows of the loops: off the loops a dependent row is
     almost, not exactly, dependent, and would turn rounding into motion. Close to a singular
-    posture the same holds for a row that the others nearly imply there: it is left alone, and
+    configuration the same holds for a row that the others nearly imply there: it is left alone, and
     rows count little for as long. The largest row is that of all, dependent ones included.
 
     Args:
@@ -197,7 +197,7 @@ def passage(
         tau: (nv, 1) joint efforts, those of drives and contacts left out.
         rates: (nz, 1) of z.
         motions: coordinates that drives move along laws.
-        contact: what rigid stops and dry friction do.
+        contact: what rigid stops and Coulomb friction do.
         inputs: u, where the functions are to take (t, x, z, u, p), z empty.
     """
     closure = system.closure
@@ -295,7 +295,7 @@ def _regularity(system: System, q: SX, drives: SX) -> SX:
 def _typical(system: System, q: SX, measure: SX) -> float:
     """The regularity at the assembled configuration; zero where symbols have no value."""
     found = Function("typical", [q, system.p], [measure])
-    value = float(found(np.array(system.posture), system.p_default))
+    value = float(found(np.array(system.configuration), system.p_default))
     return value if np.isfinite(value) else 0.0
 
 
@@ -303,14 +303,14 @@ def _typical(system: System, q: SX, measure: SX) -> float:
 class TreeState:
     """A state equation of X = [q; v; states of devices]; functions take (t, X, z, u, p), z empty.
 
-    Where rigid stops or dry friction act, p has their modes behind the parameters.
+    Where rigid stops or Coulomb friction act, p has their modes behind the parameters.
 
     Attributes:
         rhs: `rhs(t, X, z, u, p) -> (Xdot, y)`, y the outputs of the independent state equation.
         project: `project(t, X, z, u, p) -> (X, residual)`, one Newton step onto the loops.
         start: `start(t, x, z, u, p) -> X` of states x and dependents z of the independent one.
         passage: of rows, forces and regularity.
-        events: of rigid stops and dry friction; None where there are none.
+        events: of rigid stops and Coulomb friction; None where there are none.
         rate: `rate(X) -> q'`, the rates of the positions in X.
         states: numbers in X of the states x.
         dependents: numbers in X of the dependents z.
@@ -427,8 +427,8 @@ def tree_state(
 
 # The state equation of the whole tree, with a projection that keeps its loops closed.
 #
-# Every position and velocity of the tree is a state: the motion runs through postures where no
-# choice of independent joints would hold.
+# Every position and velocity of the tree is a state: the motion runs through configurations where
+# no choice of independent joints would hold.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -441,9 +441,9 @@ class FullState:
             and prescribed motions, None where there is nothing to keep.
         observe: `observe(t, x, p) -> a, tau, u, y, held, E, U, openness`, what a result shows
             beside x: u and y are inputs and outputs of the devices, `held` the efforts of rigid
-            stops and of dry friction, the last is the largest closure row.
+            stops and of Coulomb friction, the last is the largest closure row.
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
-            and dry friction, whose modes are then the last of p; None where there are none.
+            and Coulomb friction, whose modes are then the last of p; None where there are none.
         passage: for steps through singular configurations of the loops; None where there are none.
     """
 

@@ -74,7 +74,7 @@ static void turn_between(const double *wanted, const double *T, double *turn) {
     for (i = 0; i < 3; i++) turn[i] = angle * vector[i];
 }
 
-static void find_gap(const arm *a, const double *wanted, posture *p) {
+static void find_gap(const arm *a, const double *wanted, configuration *p) {
     int i;
     turn_between(wanted, p->T, p->gap + 3);
     for (i = 0; i < 3; i++) p->gap[i] = (wanted[4 * i + 3] - p->T[4 * i + 3]) / a->length;
@@ -82,7 +82,7 @@ static void find_gap(const arm *a, const double *wanted, posture *p) {
     for (i = 0; i < 6; i++) p->cost += p->gap[i] * p->gap[i];
 }
 
-void arm_examine(const arm *a, const double *wanted, posture *p) {
+void arm_examine(const arm *a, const double *wanted, configuration *p) {
     double x[3], *T = p->T;
     int i, k;
     memcpy(T, a->gaps, 16 * sizeof(double));

@@ -15,7 +15,7 @@ typedef struct {
     double length;               /* of the arm's size [m] */
 } arm;
 
-/* A posture and what follows from it. */
+/* A configuration and what follows from it. */
 typedef struct {
     double q[ARM_JOINTS];    /* rad or m */
     double T[16];            /* its pose */
@@ -23,12 +23,12 @@ typedef struct {
                                 slides in arm lengths */
     double gap[6];           /* way to the wanted pose, [translation / length; rotation vector] */
     double cost;             /* |gap|^2 */
-} posture;
+} configuration;
 
 void arm_pose(const arm *a, const double *q, double *T);
 
 /* From p->q, all the rest of p. */
-void arm_examine(const arm *a, const double *wanted, posture *p);
+void arm_examine(const arm *a, const double *wanted, configuration *p);
 
 /* max |T - wanted| [m and 1]. */
 double arm_residual(const double *wanted, const double *T);
@@ -47,7 +47,7 @@ void arm_wrap(const arm *a, double *q);
 
 /* Steps of Levenberg and Marquardt from p->q towards the wanted pose. They end where rounding, or a
  * smallest distance greater than zero, lets them go no further. */
-void arm_descend(const arm *a, const double *wanted, posture *p);
+void arm_descend(const arm *a, const double *wanted, configuration *p);
 
 /* The solution beside q, or q itself where nothing better was found; gives its residual. */
 double arm_polish(const arm *a, const double *wanted, double *q);

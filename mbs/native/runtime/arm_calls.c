@@ -16,11 +16,11 @@ EXPORT void mbs_polish(const arm *a, const double *wanted, long long stride, lon
         residual[i] = arm_polish(a, wanted + i * stride, q + i * a->n);
 }
 
-/* Fills q (starts, n), residual and hits (starts,); gives how many postures were found. */
+/* Fills q (starts, n), residual and hits (starts,); gives how many configurations were found. */
 EXPORT long long mbs_search(const arm *a, const double *wanted, long long starts,
                             unsigned long long seed, double *q, double *residual,
                             long long *hits) {
-    arm_postures found = {q, residual, hits, 0};
+    arm_configurations found = {q, residual, hits, 0};
     arm_search(a, wanted, starts, seed, &found);
     return found.count;
 }
@@ -28,7 +28,7 @@ EXPORT long long mbs_search(const arm *a, const double *wanted, long long starts
 /* Keeps those of q (count, n) that are distinct, in their order; gives how many they are. */
 EXPORT long long mbs_merge(const arm *a, const double *wanted, long long count, double *q,
                            double *residual, long long *hits) {
-    arm_postures found = {q, residual, hits, 0};
+    arm_configurations found = {q, residual, hits, 0};
     double own[ARM_JOINTS];
     long long i;
     int k;
@@ -44,15 +44,15 @@ EXPORT double mbs_nearest(const arm *a, const double *wanted, long long starts,
     return arm_nearest(a, wanted, starts, seed, q);
 }
 
-/* All solutions for poses (poses, 4, 4): q (room, 6), which pose each is for and how many postures
+/* All solutions for poses (poses, 4, 4): q (room, 6), which pose each is for and how many configurations
  * it comes from. Stops where there might be no room for another pose; *done poses are solved. */
 EXPORT long long mbs_general(const arm *a, const roth_loop *r, const double *wanted,
                              long long poses, long long room, double *q, long long *number,
                              long long *hits, long long *done) {
-    double residual[ROTH_POSTURES];
+    double residual[ROTH_CONFIGURATIONS];
     long long i, count = 0;
-    for (*done = 0; *done < poses && count + ROTH_POSTURES <= room; ++*done) {
-        arm_postures found = {q + 6 * count, residual, hits + count, 0};
+    for (*done = 0; *done < poses && count + ROTH_CONFIGURATIONS <= room; ++*done) {
+        arm_configurations found = {q + 6 * count, residual, hits + count, 0};
         roth_solve(a, r, wanted + 16 * *done, &found);
         for (i = 0; i < found.count; i++) number[count + i] = *done;
         count += found.count;

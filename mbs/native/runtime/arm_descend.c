@@ -10,7 +10,7 @@ static const double WEAK = 1e-8;    /* pivots of squares below it are taken for 
 static const double LEAST = 1e-31;  /* damping, so that no matrix is singular */
 
 /* (J' J + shift) dx = J' gap by Cholesky. 0: too close to singular. */
-static int normal_step(const arm *a, const posture *p, double shift, double *dx) {
+static int normal_step(const arm *a, const configuration *p, double shift, double *dx) {
     double L[ARM_JOINTS][ARM_JOINTS], most = 0.0;
     int i, j, k, n = a->n;
     for (j = 0; j < n; j++) {
@@ -56,7 +56,7 @@ static void reflect(double A[ARM_JOINTS + 1][ROWS], int j, int n, int rows) {
 }
 
 /* The same step by reflections of [J gap; sqrt(shift) 0], which do not square the Jacobian. */
-static void orthogonal_step(const arm *a, const posture *p, double shift, double *dx) {
+static void orthogonal_step(const arm *a, const configuration *p, double shift, double *dx) {
     double A[ARM_JOINTS + 1][ROWS] = {{0.0}};
     int j, k, n = a->n, rows = 6 + a->n;
     for (j = 0; j < n; j++) {
@@ -72,9 +72,9 @@ static void orthogonal_step(const arm *a, const posture *p, double shift, double
     }
 }
 
-/* The posture that one step leads to. */
-static void attempt(const arm *a, const double *wanted, const posture *from, double damping,
-                    posture *to) {
+/* The configuration that one step leads to. */
+static void attempt(const arm *a, const double *wanted, const configuration *from, double damping,
+                    configuration *to) {
     double dx[ARM_JOINTS], shift = damping * from->cost + LEAST;
     int k;
     if (!normal_step(a, from, shift, dx)) orthogonal_step(a, from, shift, dx);
@@ -84,10 +84,10 @@ static void attempt(const arm *a, const double *wanted, const posture *from, dou
 
 /* The damping is proportional to the cost, which makes the last steps those of Newton
  * (Yamashita and Fukushima 2001), even where the Jacobian loses rank. */
-void arm_descend(const arm *a, const double *wanted, posture *p) {
+void arm_descend(const arm *a, const double *wanted, configuration *p) {
     double damping = 0.1;
     int stalls = 0, step;
-    posture next;
+    configuration next;
     arm_examine(a, wanted, p);
     for (step = 0; step < ARM_STEPS && p->cost > FINEST && stalls < STALLS; step++) {
         double gain;
@@ -106,7 +106,7 @@ void arm_descend(const arm *a, const double *wanted, posture *p) {
 
 double arm_polish(const arm *a, const double *wanted, double *q) {
     double before, after, T[16];
-    posture p;
+    configuration p;
     memcpy(p.q, q, (size_t)a->n * sizeof(double));
     arm_pose(a, q, T);
     before = arm_residual(wanted, T);

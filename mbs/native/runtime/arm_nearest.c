@@ -14,7 +14,7 @@ typedef double matrix[ARM_JOINTS][ARM_JOINTS];
 
 /* Half the gradient of the cost; exact although J is the motion of the frame and not of the
  * rotation vector, because that vector is the axis of its own turn. */
-static void slope(const arm *a, const posture *p, double *g) {
+static void slope(const arm *a, const configuration *p, double *g) {
     int j, k;
     for (j = 0; j < a->n; j++) {
         g[j] = 0.0;
@@ -30,9 +30,9 @@ static double norm(const double *v, int n) {
 }
 
 /* Differences of the slope. */
-static void curvature(const arm *a, const double *wanted, const posture *p, matrix H) {
+static void curvature(const arm *a, const double *wanted, const configuration *p, matrix H) {
     double ahead[ARM_JOINTS], behind[ARM_JOINTS];
-    posture near = *p;
+    configuration near = *p;
     int i, k;
     for (k = 0; k < a->n; k++) {
         near.q[k] = p->q[k] + NUDGE * arm_unit(a, k);
@@ -75,10 +75,10 @@ static int lower(double cost, double slope, double old_cost, double old_slope) {
 }
 
 /* Newton's method to the bottom of the valley that p is in. */
-static void refine(const arm *a, const double *wanted, posture *p) {
+static void refine(const arm *a, const double *wanted, configuration *p) {
     double g[ARM_JOINTS], next_g[ARM_JOINTS], dx[ARM_JOINTS], shift = 1e-9;
     int k, step, known = 0;
-    posture next;
+    configuration next;
     matrix H;
     slope(a, p, g);
     for (step = 0; step < REFINEMENTS && p->cost > FINEST && norm(g, a->n) > FLAT; step++) {
@@ -102,7 +102,7 @@ static void refine(const arm *a, const double *wanted, posture *p) {
 }
 
 /* Keeps the best ones apart, in the order of their costs. */
-static int keep(const posture *p, posture *best, int count) {
+static int keep(const configuration *p, configuration *best, int count) {
     int i, place = 0;
     while (place < count && best[place].cost <= p->cost) place++;
     if (place > 0 && p->cost - best[place - 1].cost < EQUAL * p->cost) return count;
@@ -115,7 +115,7 @@ static int keep(const posture *p, posture *best, int count) {
 
 double arm_nearest(const arm *a, const double *wanted, long long starts, unsigned long long seed,
                    double *q) {
-    posture best[KEPT], p;
+    configuration best[KEPT], p;
     int count = 0, i, nearest = 0;
     long long start;
     for (start = 0; start < starts; start++) {

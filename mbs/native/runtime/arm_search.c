@@ -53,7 +53,7 @@ int arm_same(const arm *a, const double *wanted, const double *q, const double *
     return missed(a, wanted, half) < fmax(BETWEEN, worse);
 }
 
-void arm_add(const arm *a, const double *wanted, const double *q, arm_postures *found) {
+void arm_add(const arm *a, const double *wanted, const double *q, arm_configurations *found) {
     double residual = missed(a, wanted, q);
     size_t n = (size_t)a->n;
     long long i;
@@ -71,8 +71,8 @@ void arm_add(const arm *a, const double *wanted, const double *q, arm_postures *
 }
 
 void arm_search(const arm *a, const double *wanted, long long starts, unsigned long long seed,
-                arm_postures *found) {
-    posture p;
+                arm_configurations *found) {
+    configuration p;
     long long start;
     found->count = 0;
     for (start = 0; start < starts; start++) {

@@ -1,4 +1,4 @@
-/* All postures that reach a pose, and those that come nearest to one, from random starts.
+/* All configurations that reach a pose, and those that come nearest to one, from random starts.
  *
  * Re-entrant: no globals and no allocation. The starts depend on the seed alone.
  */
@@ -8,13 +8,13 @@
 #include "arm.h"
 
 typedef struct {
-    double *q;        /* (room, n) distinct postures */
+    double *q;        /* (room, n) distinct configurations */
     double *residual; /* (room,) their relative residuals */
-    long long *hits;  /* (room,) how many postures were found to be this one */
+    long long *hits;  /* (room,) how many configurations were found to be this one */
     long long count;
-} arm_postures;
+} arm_configurations;
 
-/* A posture to start from, the same for the same numbers: angles in (-pi, pi], slides as far as
+/* A configuration to start from, the same for the same numbers: angles in (-pi, pi], slides as far as
  * the arm and the wanted pose reach. */
 void arm_start(const arm *a, const double *wanted, unsigned long long seed, long long number,
                double *q);
@@ -25,13 +25,13 @@ void arm_start(const arm *a, const double *wanted, unsigned long long seed, long
 int arm_same(const arm *a, const double *wanted, const double *q, const double *other);
 
 /* Puts a solution among the others, the better of two that are one. q is none of theirs. */
-void arm_add(const arm *a, const double *wanted, const double *q, arm_postures *found);
+void arm_add(const arm *a, const double *wanted, const double *q, arm_configurations *found);
 
 /* Solutions found from `starts` starts; there must be room for as many. */
 void arm_search(const arm *a, const double *wanted, long long starts, unsigned long long seed,
-                arm_postures *found);
+                arm_configurations *found);
 
-/* The posture whose pose is nearest, the gap's cost being the square of the distance; gives that
+/* The configuration whose pose is nearest, the gap's cost being the square of the distance; gives that
  * cost. At least one start. */
 double arm_nearest(const arm *a, const double *wanted, long long starts, unsigned long long seed,
                    double *q);

@@ -1,4 +1,4 @@
-/* All postures of an arm of six joints that reach a pose, by elimination.
+/* All configurations of an arm of six joints that reach a pose, by elimination.
  *
  * The loop Z_1 C_1 .. Z_6 C_6 = 1 of the joints' motions Z and constant ways C, one of which holds
  * the wanted pose, may begin at any joint and run either way; what is best for an arm is chosen
@@ -15,7 +15,7 @@ enum {
     ROTH_SIZE = 12,      /* monomials x4^i x5^j at most */
     ROTH_ROOTS = 24,     /* angles of joint 3 */
     ROTH_SHARED = 6,     /* solutions at one of them */
-    ROTH_POSTURES = 144, /* candidates */
+    ROTH_CONFIGURATIONS = 144, /* candidates */
     ROTH_ROWS = 28       /* equations before they are mixed */
 };
 
@@ -62,12 +62,12 @@ int roth_middle(const roth_loop *r, const roth_matrix *m, double u, int count, d
 
 /* Positions of all joints of the loop from those of joints 3, 4 and 5: one, two or three rows. */
 int roth_rest(const roth_loop *r, const double ways[6][16], const double *middle,
-              double postures[3][6]);
+              double configurations[3][6]);
 
-/* Postures (ROTH_POSTURES, 6) of the arm that may reach the pose; gives how many they are. */
+/* Configurations (ROTH_CONFIGURATIONS, 6) of the arm that may reach the pose; gives how many they are. */
 int roth_candidates(const roth_loop *r, const double *T, double *q);
 
-/* The distinct ones that do reach it, polished. There must be room for ROTH_POSTURES. */
-void roth_solve(const arm *a, const roth_loop *r, const double *T, arm_postures *found);
+/* The distinct ones that do reach it, polished. There must be room for ROTH_CONFIGURATIONS. */
+void roth_solve(const arm *a, const roth_loop *r, const double *T, arm_configurations *found);
 
 #endif

@@ -103,7 +103,7 @@ static double first_joint(int slides, const double *near, const double *goal) {
 }
 
 int roth_rest(const roth_loop *r, const double ways[6][16], const double *middle,
-              double postures[3][6]) {
+              double configurations[3][6]) {
     double beyond[16], goal[16], near[16], turned[16], back[16], q2[3];
     int i, k, count;
     memcpy(beyond, ways[1], sizeof beyond);
@@ -115,7 +115,7 @@ int roth_rest(const roth_loop *r, const double ways[6][16], const double *middle
     rigid_inverse(ways[5], goal);
     count = second_joint(r, ways, beyond, goal, q2);
     for (i = 0; i < count; i++) {
-        double *q = postures[i];
+        double *q = configurations[i];
         memcpy(turned, ways[0], sizeof turned);
         rigid_move(turned, q2[i], r->slides[1]);
         rigid_product(turned, beyond, near);

@@ -14,16 +14,16 @@ typedef struct {
     double ways[6][16];
     roth_matrix matrix;
     double reach; /* [arm lengths] */
-    double *q;    /* (ROTH_POSTURES, 6) postures of the arm so far */
+    double *q;    /* (ROTH_CONFIGURATIONS, 6) configurations of the arm so far */
     int count;
 } solution;
 
 /* From the joints of the loop to those of the arm. */
-static void add_posture(solution *s, const double *u) {
+static void add_configuration(solution *s, const double *u) {
     const roth_loop *r = s->loop;
     double *q = s->q + 6 * s->count;
     int k;
-    if (s->count == ROTH_POSTURES) return;
+    if (s->count == ROTH_CONFIGURATIONS) return;
     for (k = 0; k < 6; k++) {
         double value = r->sign * (u[k] + r->offsets[k]);
         if (r->slides[k] ? !(fabs(u[k]) < FAR * s->reach) : !(fabs(value) < HUGE_VAL)) return;
@@ -35,14 +35,14 @@ static void add_posture(solution *s, const double *u) {
 /* The solutions at one angle of joint 3 that `count` of them share. */
 static void add_shared(solution *s, double u, int count) {
     const roth_loop *r = s->loop;
-    double x[3][ROTH_SHARED], middle[3], postures[3][6];
+    double x[3][ROTH_SHARED], middle[3], configurations[3][6];
     int i, k, rows;
     count = roth_middle(r, &s->matrix, u, count, x[1], x[2]);
     for (i = 0; i < count; i++) {
         x[0][i] = tan(0.5 * u);
         for (k = 0; k < 3; k++) middle[k] = r->slides[2 + k] ? x[k][i] : 2.0 * atan(x[k][i]);
-        rows = roth_rest(r, (const double(*)[16])s->ways, middle, postures);
-        for (k = 0; k < rows; k++) add_posture(s, postures[k]);
+        rows = roth_rest(r, (const double(*)[16])s->ways, middle, configurations);
+        for (k = 0; k < rows; k++) add_configuration(s, configurations[k]);
     }
 }
 
@@ -99,8 +99,8 @@ int roth_candidates(const roth_loop *r, const double *T, double *q) {
     return s.count;
 }
 
-void roth_solve(const arm *a, const roth_loop *r, const double *T, arm_postures *found) {
-    double q[ROTH_POSTURES * 6], pose[16];
+void roth_solve(const arm *a, const roth_loop *r, const double *T, arm_configurations *found) {
+    double q[ROTH_CONFIGURATIONS * 6], pose[16];
     int i, count = roth_candidates(r, T, q);
     found->count = 0;
     for (i = 0; i < count; i++) {

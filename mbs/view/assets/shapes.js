@@ -155,7 +155,7 @@
     },
   };
 
-  // Between points on two links: drawn one unit long, stretched at every posture.
+  // Between points on two links: drawn one unit long, stretched at every configuration.
   const STRETCHED = {
     span: (item, paint) =>
       mesh(new T.CylinderGeometry(item.radius, item.radius, 1, ROUND), paint),

@@ -13,7 +13,7 @@ from mbs.app.desk.document.document import Document
 from mbs.app.desk.document.tables import Cell
 from mbs.operations import simplify
 
-POSTURE = [0.3, -0.6, 0.8, 0.4, 0.9, -0.5]
+CONFIGURATION = [0.3, -0.6, 0.8, 0.4, 0.9, -0.5]
 LARGEST_PAGE = 1_500_000
 
 
@@ -70,9 +70,9 @@ def test_the_first_page_is_light_and_a_mistake_is_a_sentence(visitor):
     sentence.wait_for(state="hidden")
 
 
-def test_every_posture_of_a_pose_can_be_shown(visitor):
+def test_every_configuration_of_a_pose_can_be_shown(visitor):
     visitor.arrive()
-    visitor.move(POSTURE)
+    visitor.move(CONFIGURATION)
     before = visitor.picture
     visitor.choose("Geometric", "Inverse geometric model, Pieper")
     visitor.button("Solve").click()
@@ -80,7 +80,7 @@ def test_every_posture_of_a_pose_can_be_shown(visitor):
     rows.first.wait_for()
     assert rows.count() == 8
     found = [[float(x) for x in row.locator("td").all_inner_texts()[2:8]] for row in rows.all()]
-    here = [np.allclose(q, POSTURE, atol=6e-5) for q in found]
+    here = [np.allclose(q, CONFIGURATION, atol=6e-5) for q in found]
     assert here.count(True) == 1
     other = 0 if here.index(True) else 1
     rows.nth(other).click()
@@ -123,12 +123,12 @@ def test_a_reload_loses_nothing_and_visitors_are_apart(visitor, launched, addres
     before = visitor.picture
     visitor.write(0, "r", "0.12")
     visitor.until_other_picture(before)
-    visitor.move(POSTURE)
+    visitor.move(CONFIGURATION)
     visitor.choose("Simulate", "Motion")
     visitor.page.get_by_label("law.q2").fill("30*sin(t)")
     visitor.come_back()
-    visitor.until_joint(5, POSTURE[5])
-    np.testing.assert_allclose(visitor.joints, POSTURE, atol=1e-9)
+    visitor.until_joint(5, CONFIGURATION[5])
+    np.testing.assert_allclose(visitor.joints, CONFIGURATION, atol=1e-9)
     law = visitor.page.get_by_label("law.q2")
     law.wait_for()
     assert law.input_value() == "30*sin(t)"

@@ -18,7 +18,7 @@ def read_csv(text: str) -> dict[str, np.ndarray]:
     return dict(zip(names, table.T, strict=True))
 
 
-def test_every_posture_of_the_pose_of_a_posture(command) -> None:
+def test_every_configuration_of_the_pose_of_a_configuration(command) -> None:
     words = ("--q", "q1=0.3", "--q", "q2=0.5", "--q", "q3=pi/3", "--q", "q5=1")
     data = json.loads(command("solve-ik", "rx90", *words, "--json").out)
     system = mbs.load("rx90").assemble()
@@ -42,7 +42,7 @@ def test_the_pose_can_be_said_in_three_ways(command) -> None:
     np.testing.assert_allclose(found[2], found[0], atol=1e-9)
 
 
-def test_loops_are_closed_at_a_posture(command) -> None:
+def test_loops_are_closed_at_a_configuration(command) -> None:
     data = json.loads(command("solve-ik", "four_bar", "--q", "j1=0.3", "--json").out)
     assert min(abs(solution["q"]["j1"] - 0.3) for solution in data["solutions"]) < 1e-12
 

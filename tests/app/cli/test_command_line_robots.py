@@ -63,7 +63,7 @@ def test_show_gives_the_tables_of_the_system(command) -> None:
         assert (row["name"], row["antecedent"], row["d"]) == (link.name, link.antecedent, link.d)
     for row, link in zip(data["inertia"], system.tree.links, strict=True):
         assert row["M"] == float(link.inertia.parameters[9])
-    assert [row["posture"] for row in data["coordinates"]] == list(system.posture)
+    assert [row["configuration"] for row in data["coordinates"]] == list(system.configuration)
     assert data["independent"] == [system.speeds[k].name for k in system.active]
     assert data["report"] == system.report()
     text = command("show", "sr400").out

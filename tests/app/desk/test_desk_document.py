@@ -211,7 +211,7 @@ def test_a_composed_mechanism_becomes_a_table_of_the_same_motion():
     assert table.is_table
     assert table.problems == ()
     one, other = (
-        mbs.models.direct_dynamics(d.system())(d.system().posture, [0.3], [0.1])
+        mbs.models.direct_dynamics(d.system())(d.system().configuration, [0.3], [0.1])
         for d in (document, table)
     )
     np.testing.assert_allclose(np.array(one), np.array(other), rtol=1e-9)

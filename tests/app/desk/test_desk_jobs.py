@@ -34,8 +34,8 @@ def test_a_task_runs_in_another_process_and_tells_how_far_it_is():
 
 
 def test_the_error_of_a_task_comes_back_as_it_is():
-    with pytest.raises(Unclosable, match=r"^arm: no posture; change it$"):
-        run(desk_tasks.refused, "arm: no posture; change it")
+    with pytest.raises(Unclosable, match=r"^arm: no configuration; change it$"):
+        run(desk_tasks.refused, "arm: no configuration; change it")
 
 
 def test_a_wrong_document_is_refused_with_its_sentence():

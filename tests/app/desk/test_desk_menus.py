@@ -12,8 +12,8 @@ from mbs.app.desk.menus import build_menus
 from mbs.app.desk.panels.form import frame_label
 from mbs.app.desk.panels.optimizer import optimizer_settings, passes_of
 from mbs.app.desk.session import Session
+from mbs.app.tasks.configurations import pose_of
 from mbs.app.tasks.equations import EVERY_PASS, MENUS, entries, equations
-from mbs.app.tasks.postures import pose_of
 
 
 @pytest.fixture(scope="module")
@@ -110,22 +110,22 @@ def test_rows_of_a_jacobian_follow_its_frame(monkeypatch, rx90):
     visited(build_menus, "rx90", visit, monkeypatch)
 
 
-def test_every_posture_is_listed_and_a_click_moves_the_picture(monkeypatch, rx90):
+def test_every_configuration_is_listed_and_a_click_moves_the_picture(monkeypatch, rx90):
     start = (0.3, -0.5, 0.7, 0.4, -0.9, 0.2)
 
     async def visit(user, desk):
-        await desk.set_posture(start)
+        await desk.set_configuration(start)
         user.find(marker="menu igm-pieper").click()
         await user.should_see(marker="solve", retries=PATIENT)
         T = pose_of(rx90, start)
         await until(lambda: element(user, "x").value)
         assert float(element(user, "x").value) == T[0, 3]
         user.find(marker="solve").click()
-        await user.should_see("8 postures by pieper", retries=PATIENT)
-        table = element(user, "postures")
+        await user.should_see("8 configurations by pieper", retries=PATIENT)
+        table = element(user, "configurations")
         assert len(table.rows) == 8
         assert {row["limits"] for row in table.rows} == {"within"}
-        user.find(marker="postures").trigger("rowClick", [{}, {"number": 5}, 4])
+        user.find(marker="configurations").trigger("rowClick", [{}, {"number": 5}, 4])
         await until(lambda: desk.q != start)
         assert np.allclose(pose_of(rx90, desk.q), T, atol=1e-12)
         assert not np.allclose(desk.q, start, atol=0.1)
@@ -134,7 +134,7 @@ def test_every_posture_is_listed_and_a_click_moves_the_picture(monkeypatch, rx90
     visited(build_menus, "rx90", visit, monkeypatch)
 
 
-def test_out_of_reach_offers_the_nearest_posture(monkeypatch, rx90):
+def test_out_of_reach_offers_the_nearest_configuration(monkeypatch, rx90):
     async def visit(user, desk):
         user.find(marker="menu igm-general").click()
         await user.should_see(marker="solve", retries=PATIENT)
@@ -145,7 +145,7 @@ def test_out_of_reach_offers_the_nearest_posture(monkeypatch, rx90):
         choose(user, "pose form", "matrix")
         choose(user, "matrix", "1 0 0 3  0 1 0 0  0 0 1 1/2")
         user.find(marker="solve").click()
-        await user.should_see("rx90: no posture takes frame 6 there", retries=PATIENT)
+        await user.should_see("rx90: no configuration takes frame 6 there", retries=PATIENT)
         assert element(user, "reason").text.startswith("Out of reach")
         user.find(marker="nearest").click()
         await until(lambda: any(desk.q))
@@ -154,9 +154,9 @@ def test_out_of_reach_offers_the_nearest_posture(monkeypatch, rx90):
     visited(build_menus, "rx90", visit, monkeypatch)
 
 
-def test_singular_postures_are_shown(monkeypatch, rx90):
+def test_singular_configurations_are_shown(monkeypatch, rx90):
     async def visit(user, desk):
-        await desk.set_posture((0.2, 0.4, -0.5, 0.3, 0.7, 0.1))
+        await desk.set_configuration((0.2, 0.4, -0.5, 0.3, 0.7, 0.1))
         user.find(marker="menu determinant").click()
         await user.should_see("q5 is 0 or pi (S5 = 0)", retries=PATIENT)
         assert await text_of(user) == "det J = (-0.091125) * (S23 - C2) * (C3) * (S5)\n"

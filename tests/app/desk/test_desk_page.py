@@ -172,7 +172,7 @@ def test_a_reload_loses_nothing_and_a_doubled_tab_goes_its_own_way(monkeypatch):
     async def story(user, desks, menus):
         (desk,) = desks
         await desk.edit(Cell("geometry", 1, "d"), "0.9")
-        await desk.set_posture([0.3, -0.4])
+        await desk.set_configuration([0.3, -0.4])
         tab = user.client.tab_id
         kept = app.storage._tabs[tab]["desk"]
         assert kept == (tab, desk.session)
@@ -236,8 +236,8 @@ def test_long_work_can_be_stopped_and_refusals_are_sentences(monkeypatch, tmp_pa
     async def story(user, desks, menus):
         (desk,) = desks
         assert (await desk.run("Counting", desk_tasks.counted, 10))[:2] == ("planar_2r", 2)
-        assert await desk.run("Asking", desk_tasks.refused, "no posture; change it") is None
-        await until(lambda: "no posture; change it" in user.notify.messages)
+        assert await desk.run("Asking", desk_tasks.refused, "no configuration; change it") is None
+        await until(lambda: "no configuration; change it" in user.notify.messages)
         told = tmp_path / "told"
         work = asyncio.ensure_future(desk.run("Waiting", desk_tasks.endless, str(told)))
         await until(told.exists)
@@ -269,14 +269,14 @@ def test_work_for_a_page_that_was_closed_is_stopped_without_a_word(monkeypatch, 
     visit(monkeypatch, "planar_2r", story)
 
 
-def test_a_posture_of_another_robot_is_refused(monkeypatch):
+def test_a_configuration_of_another_robot_is_refused(monkeypatch):
     async def story(user, desks, menus):
         (desk,) = desks
         sent, before = spied(desk), desk.q
-        await desk.set_posture([0.1, 0.2, 0.3])
+        await desk.set_configuration([0.1, 0.2, 0.3])
         await desk.play([0.0, 1.0], [[0.1] * 3] * 2)
         assert [m.partition(" is of")[0] for m in user.notify.messages] == [
-            "the posture",
+            "the configuration",
             "the motion",
         ]
         assert (desk.q, sent) == (before, [])

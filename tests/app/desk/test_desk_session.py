@@ -61,7 +61,7 @@ def test_the_system_is_that_of_the_document_as_typed_or_its_sentence():
     with pytest.raises(MbsError, match="still being assembled"):
         session.require_system()
     system = session.document.system()
-    session.settle(session.document, system.posture)
+    session.settle(session.document, system.configuration)
     assert session.require_system() is system
     session.change(edited(session.document, "("))
     with pytest.raises(MbsError, match="frame 2, d: cannot read"):
@@ -80,7 +80,7 @@ def test_sliders_of_an_open_chain_are_all_joints_and_of_loops_the_independent_on
 
 def test_the_other_joints_follow():
     system = Document.of_name("sr400").system()
-    q = system.posture
+    q = system.configuration
     for angle in np.linspace(-1.5, -0.8, 8):
         q = moved(system, q, 1, float(angle))
         require_closed(system, np.array(q))
@@ -90,27 +90,30 @@ def test_the_other_joints_follow():
 
 def test_a_large_move_stays_on_its_branch():
     system = Document.of_name("four_bar").system()
-    first = mode_of(assembly_modes(system, system.posture), system.posture)
-    q = moved(system, system.posture, 0, 2.5)
+    first = mode_of(assembly_modes(system, system.configuration), system.configuration)
+    q = moved(system, system.configuration, 0, 2.5)
     found = assembly_modes(system, q)
     assert len(found) == 2
-    assert found[mode_of(found, q)].branch == assembly_modes(system, system.posture)[first].branch
+    assert (
+        found[mode_of(found, q)].branch
+        == assembly_modes(system, system.configuration)[first].branch
+    )
 
 
 def test_what_cannot_be_reached_is_told_with_the_end_of_the_branch():
     system = Document.of_name("stewart_platform").system()
     with pytest.raises(Unclosable, match=r"cannot be closed with leg1 = 9; .* ends near 0\.3"):
-        moved(system, system.posture, handles(system)[0].place, 9.0)
+        moved(system, system.configuration, handles(system)[0].place, 9.0)
 
 
 def test_assembly_modes_are_listed_or_a_sentence_says_why_not():
     system = Document.of_name("andrews_squeezer").system()
-    found = assembly_modes(system, system.posture)
+    found = assembly_modes(system, system.configuration)
     assert len(found) == 4
     for mode in found:
         assert examine(system, mode.q).residual < 1e-9
     delta = Document.of_name("delta").system()
-    assert "by iteration" in assembly_modes(delta, delta.posture)
+    assert "by iteration" in assembly_modes(delta, delta.configuration)
     assert assembly_modes(Document.of_name("rx90").system(), [0.0] * 6) == ()
 
 
@@ -118,7 +121,7 @@ def test_quaternions_keep_unit_length_and_the_part_that_is_moved():
     m = Mechanism("stone")
     m.connect(m.world, Free("free"), m.add(PointMass("mass", 1.0)))
     system = m.assemble()
-    q = system.posture
+    q = system.configuration
     for place, value in ((4, 0.6), (5, -0.5), (3, 0.0), (6, 1.0), (4, 0.25)):
         q = moved(system, q, place, value)
         assert q[place] == pytest.approx(value)
@@ -126,10 +129,10 @@ def test_quaternions_keep_unit_length_and_the_part_that_is_moved():
     assert moved(system, q, 0, 2.0)[0] == 2.0
 
 
-def test_a_posture_is_carried_to_the_changed_mechanism():
+def test_a_configuration_is_carried_to_the_changed_mechanism():
     document = Document.of_name("sr400")
     old = document.system()
-    q = moved(old, old.posture, 1, -1.0)
+    q = moved(old, old.configuration, 1, -1.0)
     new = document.changed(Cell("geometry", 2, "d"), "0.85").changed(
         Cell("geometry", 8, "d"), "0.85"
     )
@@ -137,5 +140,5 @@ def test_a_posture_is_carried_to_the_changed_mechanism():
     require_closed(new.system(), np.array(there))
     assert there[1] == pytest.approx(-1.0)
     other = Document.of_name("rx90").system()
-    assert carried(old, q, other) == other.posture
-    assert carried(None, (), other) == other.posture
+    assert carried(old, q, other) == other.configuration
+    assert carried(None, (), other) == other.configuration

@@ -25,25 +25,25 @@ def four_bar():
     return mbs.load("four_bar").assemble()
 
 
-def test_an_untouched_form_starts_at_the_posture_of_the_picture(four_bar):
-    settings = settings_of(four_bar, first_texts({}), four_bar.posture)
+def test_an_untouched_form_starts_at_the_configuration_of_the_picture(four_bar):
+    settings = settings_of(four_bar, first_texts({}), four_bar.configuration)
     arguments = run_arguments(four_bar, settings)
-    assert arguments["q0"] == list(four_bar.posture)
+    assert arguments["q0"] == list(four_bar.configuration)
     assert arguments["tau"] is None
     assert (arguments["duration"], arguments["step"]) == (2.0, 0.01)
 
 
 def test_typed_fields_become_settings(four_bar):
     texts = {"start": TYPED, "q0.j1": " 0.3 ", "v0.j1": "1", "law.j1": "5*t", "law.j9": "7"}
-    settings = settings_of(four_bar, first_texts(texts), four_bar.posture)
+    settings = settings_of(four_bar, first_texts(texts), four_bar.configuration)
     assert settings.q0 == {"j1": "0.3"}
     assert settings.v0 == {"j1": "1"}
     assert (settings.tau, settings.motion) == ({"j1": "5*t"}, {})
-    driven = settings_of(four_bar, first_texts({**texts, "kind.j1": "q"}), four_bar.posture)
+    driven = settings_of(four_bar, first_texts({**texts, "kind.j1": "q"}), four_bar.configuration)
     assert (driven.tau, driven.motion) == ({}, {"j1.q": "5*t"})
 
 
-def test_a_drive_leaves_its_own_joint_out_of_the_posture():
+def test_a_drive_leaves_its_own_joint_out_of_the_configuration():
     arm = mbs.load("planar_2r").assemble()
     texts = first_texts({"law.q1": "0.2 + t", "kind.q1": "q", "duration": "0.1"})
     settings = settings_of(arm, texts, (0.0, 0.7))
@@ -117,10 +117,10 @@ def test_a_visitor_simulates_and_reads_a_mistake(monkeypatch):
 def test_the_slider_moves_the_picture(monkeypatch):
     seen = []
 
-    async def set_posture(desk, q):
+    async def set_configuration(desk, q):
         seen.append(tuple(q))
 
-    monkeypatch.setattr(Desk, "set_posture", set_posture)
+    monkeypatch.setattr(Desk, "set_configuration", set_configuration)
 
     async def visit(user, desk):
         user.find(marker="simulate").click()

@@ -69,7 +69,7 @@ def test_robot_files_read_back_as_the_same_dynamics(four_bar, tmp_path, write, s
     np.testing.assert_allclose(np.array(read), np.array(given), rtol=1e-9)
 
 
-def test_toml_keeps_names_ranges_and_posture(tmp_path):
+def test_toml_keeps_names_ranges_and_configuration(tmp_path):
     for name in ("panda", "sr400"):
         system = mbs.load(name).assemble()
         path = tmp_path / f"{name}.toml"
@@ -80,7 +80,7 @@ def test_toml_keeps_names_ranges_and_posture(tmp_path):
         assert [c.limits for c in again.coordinates] == [c.limits for c in system.coordinates]
         assert [s.limits for s in again.speeds] == [s.limits for s in system.speeds]
         assert [s.effort for s in again.speeds] == [s.effort for s in system.speeds]
-        np.testing.assert_allclose(again.posture, system.posture, atol=1e-9)
+        np.testing.assert_allclose(again.configuration, system.configuration, atol=1e-9)
 
 
 def test_a_picture_loads_nothing(four_bar):

@@ -88,10 +88,10 @@ def test_a_four_bar_stays_closed_and_keeps_its_energy():
 def test_a_film_keeps_the_rows_that_a_picture_needs(arm):
     shown = film(arm, SimulationSettings(duration=10, step=0.005))
     assert len(shown.result) == 2001
-    assert (len(shown.times), shown.postures.shape) == (300, (300, 2))
+    assert (len(shown.times), shown.configurations.shape) == (300, (300, 2))
     assert (shown.times[0], shown.times[-1]) == (0.0, 10.0)
     rows = np.searchsorted(shown.result.time, shown.times)
-    np.testing.assert_array_equal(shown.postures[:, 1], shown.result["q2.q"][rows])
+    np.testing.assert_array_equal(shown.configurations[:, 1], shown.result["q2.q"][rows])
     many = SimulationSettings(step=1e-6)
     refused(ModelError, "100000 rows", by=lambda: film(arm, many))
 

@@ -1,4 +1,4 @@
-"""Determinants in factors, their words, and postures where they vanish."""
+"""Determinants in factors, their words, and configurations where they vanish."""
 
 import pickle
 
@@ -27,14 +27,14 @@ def test_the_rx90_is_singular_in_three_ways():
     assert pickle.loads(pickle.dumps(found)) == found
 
 
-def test_the_postures_shown_are_singular_and_near():
+def test_the_configurations_shown_are_singular_and_near():
     rx90 = mbs.load("rx90").assemble()
     for one in singular(rx90, near=NEAR).factors:
-        J = np.array(jacobian(rx90, 6)(one.posture))
+        J = np.array(jacobian(rx90, 6)(one.configuration))
         assert np.linalg.svd(J)[1][-1] < 1e-9
         assert abs(one.determinant) < 1e-12
-        assert np.abs(np.array(one.posture) - NEAR).max() < 1.3
-    wrist = singular(rx90, near=NEAR).factors[2].posture
+        assert np.abs(np.array(one.configuration) - NEAR).max() < 1.3
+    wrist = singular(rx90, near=NEAR).factors[2].configuration
     assert wrist == pytest.approx([*NEAR[:4], 0.0, NEAR[5]])
 
 
@@ -43,17 +43,17 @@ def test_loops_are_closed_where_a_closed_robot_is_singular():
     found = singular(five_bar)
     assert (found.rows, found.columns) == (("Vx", "Vy"), ("q1", "q3"))
     for one in found.factors:
-        assert mbs.loops.examine(five_bar, one.posture).residual < 1e-9
+        assert mbs.loops.examine(five_bar, one.configuration).residual < 1e-9
         assert abs(one.determinant) < 1e-9
 
 
-def test_no_posture_or_every_posture_is_singular():
+def test_no_configuration_or_every_configuration_is_singular():
     planar = mbs.load("planar_2r").assemble()
     flat = singular(planar, {"frame": 1, "rows": ("wz",), "columns": ("q1",)})
     assert (flat.factors, flat.constant) == ((), "1")
-    assert flat.verdict == "The determinant is 1 in every posture; none is singular."
+    assert flat.verdict == "The determinant is 1 in every configuration; none is singular."
     never = singular(planar, {"rows": ("Vz",), "columns": ("q1",)})
-    assert never.verdict.startswith("The determinant is zero in every posture")
+    assert never.verdict.startswith("The determinant is zero in every configuration")
 
 
 def test_symbols_stay_in_the_constant():
@@ -71,7 +71,7 @@ def test_symbols_stay_in_the_constant():
     found = singular(arm, {"frame": 2, "rows": ("Vx", "wz")})
     det = jacobian_determinant(arm, 2, ("Vx", "wz"))
     assert found.constant == "-L1"
-    assert float(det(found.factors[0].posture)) == pytest.approx(0, abs=1e-12)
+    assert float(det(found.factors[0].configuration)) == pytest.approx(0, abs=1e-12)
 
 
 def test_conditions_in_words():

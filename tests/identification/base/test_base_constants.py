@@ -162,7 +162,7 @@ def test_lengths_that_only_the_loop_knows_are_constants_too(symbol):
     assert base.matrix == pytest.approx(expected.matrix, abs=1e-9)
     fewer = mbs.models.inverse_dynamics(base.apply())
     assert fewer.n_in() == 3
-    q = np.array(twin.posture)
+    q = np.array(twin.configuration)
     want = np.array(mbs.models.inverse_dynamics(twin)(q, [0.7], [-0.4]))
     assert np.array(fewer(q, [0.7], [-0.4])) == pytest.approx(want, abs=1e-9)
 

@@ -67,7 +67,7 @@ def test_a_closed_robot_is_simulated_in_its_independent_joints():
     D = regressor(system)
     K = numbers_of(system, D.columns)
     time = np.arange(400) / 200
-    middle = np.array([system.posture[k] for k in active_places(system)])
+    middle = np.array([system.configuration[k] for k in active_places(system)])
     wave, w = np.array([0.2, -0.15]), 4.0
     s, c = np.sin(w * time)[:, None] * wave, np.cos(w * time)[:, None] * wave
     q, v, a = middle + s, w * c, -w * w * s

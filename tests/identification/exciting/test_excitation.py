@@ -154,7 +154,7 @@ def test_same_seed_gives_the_same_motion() -> None:
 
 def test_closed_robot_keeps_its_loop_closed() -> None:
     system = system_of("five_bar")
-    middle = [system.posture[k] for k in system.active]
+    middle = [system.configuration[k] for k in system.active]
     found = excitation(
         system,
         series=FORM,
@@ -166,9 +166,9 @@ def test_closed_robot_keeps_its_loop_closed() -> None:
         rounds=40,  # after 20 the start that was drawn still shows: 57 to 110
     )
     t = np.linspace(0, 6, 25)
-    postures = found.posture(t)
-    assert postures[:, list(system.active)] == pytest.approx(found.q(t), abs=1e-14)
-    for q in postures[::6]:
+    configurations = found.configuration(t)
+    assert configurations[:, list(system.active)] == pytest.approx(found.q(t), abs=1e-14)
+    for q in configurations[::6]:
         closed = mbs.loops.solve(system, q[list(system.active)].tolist())
         assert np.array(closed).ravel() == pytest.approx(q, abs=1e-9)
     assert len(found.columns) == 19
@@ -180,7 +180,7 @@ def test_loops_without_closed_form_are_followed(monkeypatch: pytest.MonkeyPatch)
         raise NoClosedForm("no closed form")
 
     system = mbs.load("five_bar").assemble()
-    middle = [system.posture[k] for k in system.active]
+    middle = [system.configuration[k] for k in system.active]
     options = {
         "series": FORM,
         "position": [(x - 0.3, x + 0.3) for x in middle],
@@ -191,7 +191,7 @@ def test_loops_without_closed_form_are_followed(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("mbs.identification.leading.closed_form", refused)
     followed = excitation(system, **options)
     t = np.linspace(0, 6, 9)
-    assert followed.posture(t) == pytest.approx(explicit.posture(t), abs=1e-4)
+    assert followed.configuration(t) == pytest.approx(explicit.configuration(t), abs=1e-4)
     assert followed.condition == pytest.approx(explicit.condition, rel=1e-3)
 
 
@@ -245,10 +245,10 @@ def test_wrong_series_and_planes_are_told() -> None:
         Plane("tool", (0, 0, 0), (0, 0, float("nan")), 1.0)
 
 
-def gap(system: System, postures: np.ndarray) -> float:
-    """Largest error with which postures close the loops."""
+def gap(system: System, configurations: np.ndarray) -> float:
+    """Largest error with which configurations close the loops."""
     closing = Closing(system, np.array(system.parameter_values()))
-    return max(float(np.abs(closing.rows(q)[0]).max()) for q in postures)
+    return max(float(np.abs(closing.rows(q)[0]).max()) for q in configurations)
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,10 @@ def test_passive_joints_of_closed_robots_keep_their_limits(
     system, (joint, low, high) = system_of(name), passive
     coordinates = [c.name for c in system.coordinates]
     places = active_places(system)
-    ranges = {coordinates[k]: (system.posture[k] - half, system.posture[k] + half) for k in places}
+    ranges = {
+        coordinates[k]: (system.configuration[k] - half, system.configuration[k] + half)
+        for k in places
+    }
     found = excitation(
         system,
         series=Series(period=6.0, harmonics=3, samples=24),
@@ -273,20 +276,20 @@ def test_passive_joints_of_closed_robots_keep_their_limits(
         quiet=True,
     )
     t = np.linspace(0, 6, 601)
-    postures = found.posture(t)
-    turned = postures[:, coordinates.index(joint)]
+    configurations = found.configuration(t)
+    turned = configurations[:, coordinates.index(joint)]
     assert turned.min() >= low - 1e-3
     assert turned.max() <= high + 1e-3
     assert np.ptp(turned) > 0.3
-    assert np.abs(np.diff(postures, axis=0)).max() < 0.1
-    assert gap(system, postures[::20]) < 1e-9
+    assert np.abs(np.diff(configurations, axis=0)).max() < 0.1
+    assert gap(system, configurations[::20]) < 1e-9
     for k, place in enumerate(places):
-        assert postures[:, place].min() >= ranges[coordinates[place]][0]
-        assert postures[:, place].max() <= ranges[coordinates[place]][1]
+        assert configurations[:, place].min() >= ranges[coordinates[place]][0]
+        assert configurations[:, place].max() <= ranges[coordinates[place]][1]
         assert np.abs(found.v(t)[:, k]).max() <= 3.0
     v, a = found.v(t[::5]), found.a(t[::5])
     model = mbs.models.inverse_dynamics(system)
-    tau = np.array(model.map(len(v))(postures[::5].T, v.T, a.T))
+    tau = np.array(model.map(len(v))(configurations[::5].T, v.T, a.T))
     assert np.abs(tau).max() <= 400.0 * (1 + 1e-3)
 
 
@@ -301,11 +304,11 @@ def test_a_platform_that_follows_keeps_its_height() -> None:
         rounds=1,
         quiet=True,
     )
-    postures = found.posture(np.linspace(0, 4, 41))
-    height = postures[:, [c.name for c in system.coordinates].index("platform.z")]
+    configurations = found.configuration(np.linspace(0, 4, 41))
+    height = configurations[:, [c.name for c in system.coordinates].index("platform.z")]
     assert height.min() >= -0.55 - 1e-3
     assert height.max() <= -0.42 + 1e-3
-    assert gap(system, postures) < 1e-9
+    assert gap(system, configurations) < 1e-9
     assert found.table(10.0).names[:3] == ("q1.q", "q2.q", "q3.q")
 
 

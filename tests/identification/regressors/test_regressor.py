@@ -64,8 +64,8 @@ def test_tree_coordinates_of_a_closed_system(name):
     rng = np.random.default_rng(3)
     v, a = rng.normal(size=(2, system.nv))
     D = regressor(system, coordinates="tree")
-    tau = np.array(mbs.models.inverse_dynamics(system, "tree")(system.posture, v, a)).ravel()
-    found = np.array(D(system.posture, v, a)) @ numbers_of(system, D.columns)
+    tau = np.array(mbs.models.inverse_dynamics(system, "tree")(system.configuration, v, a)).ravel()
+    found = np.array(D(system.configuration, v, a)) @ numbers_of(system, D.columns)
     assert np.abs(found - tau).max() < 1e-12 * np.abs(tau).max()
 
 

@@ -3,7 +3,7 @@
 import casadi
 import numpy as np
 import pytest
-from support.postures import active, same, searched
+from support.configurations import active, same, searched
 from support.ring_loops import MADE_OF, ring_loop
 
 from mbs.assembly.tree import quaternion_slices
@@ -34,7 +34,7 @@ def check_modes(system):
     q_a = active(system)
     listed = modes(system, q_a)
     assert max(mode.residual for mode in listed) < 1e-12
-    assert any(same(system, mode.q, system.posture) for mode in listed)
+    assert any(same(system, mode.q, system.configuration) for mode in listed)
     for mode in listed[:2]:
         check_slope(system, mode, q_a)
     return listed

@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 import pytest
 from support.bennett import TWISTS, bennett
-from support.postures import active, same, searched
+from support.configurations import active, same, searched
 
 from mbs import Parameter
 from mbs.loops import function, modes, reduction_matrix

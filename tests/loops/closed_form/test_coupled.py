@@ -3,8 +3,8 @@
 import casadi
 import numpy as np
 import pytest
+from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
-from support.postures import active, same, searched
 
 import mbs
 import mbs.models
@@ -79,7 +79,7 @@ def test_a_loop_that_no_label_names_stays_as_it_was_assembled():
 
 
 @pytest.mark.parametrize("symbols", [None, SAME])
-def test_a_parallelogram_keeps_its_label_through_the_flat_posture(symbols):
+def test_a_parallelogram_keeps_its_label_through_the_flat_configuration(symbols):
     system = four_bars(1, EQUAL, symbols=symbols)
     (stage,) = plan(system)
     assert stage.labels == ("x1:parallel", "x1:crossed")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.postures import active, same, searched
+from support.configurations import active, same, searched
 from support.random_trees import random_body, random_rotation
 
 from mbs.components import Cylindrical, Mechanism, Prismatic, Revolute, Spherical, Universal
@@ -48,5 +48,5 @@ def test_what_a_joint_of_the_tree_does_not_use_is_found_as_well(joint, closing):
 
 
 def followed(system, q_a):
-    """The posture that following from the assembled one leads to."""
+    """The configuration that following from the assembled one leads to."""
     return solve(system, {"j1": q_a[0]})

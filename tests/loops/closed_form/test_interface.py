@@ -7,8 +7,8 @@ import casadi
 import numpy as np
 import pytest
 from support.closed_mechanisms import closed_chain, planar_loop
+from support.configurations import active, same
 from support.flat_loops import flat_loop
-from support.postures import active, same
 from support.random_trees import random_body
 
 import mbs
@@ -35,7 +35,7 @@ def test_out_of_reach_the_range_is_named():
     with pytest.raises(Unclosable) as error:
         solve(system, {"j1": 3.0}, branch="j3:+")
     text = str(error.value)
-    assert text.startswith("rocker: no posture on this branch has j1 = 3; j1 can be ")
+    assert text.startswith("rocker: no configuration on this branch has j1 = 3; j1 can be ")
     numbers = [float(x) for x in re.findall(r"-?\d\.\d+", text.split("can be")[1])]
     near = np.arccos((1.0 + 1.44 - 0.5**2) / 2.4)  # in line, one over the other
     np.testing.assert_allclose(numbers, [-limit, -near, near, limit], atol=1e-3)
@@ -117,9 +117,9 @@ def test_the_closed_form_agrees_with_following():
 def test_loops_of_the_other_tests(seed):
     mechanism, guess = planar_loop(seed, 3 + seed)
     system = mechanism.assemble(guess=guess)
-    assert any(same(system, mode.q, system.posture, 1e-6) for mode in modes(system))
+    assert any(same(system, mode.q, system.configuration, 1e-6) for mode in modes(system))
     q = np.array(function(system)(active(system))).ravel()
-    assert same(system, q, system.posture, 1e-8)
+    assert same(system, q, system.configuration, 1e-8)
 
 
 def test_loops_without_closed_form_say_why():

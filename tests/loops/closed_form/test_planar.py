@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
-from support.postures import active, same, searched
 from support.random_trees import random_body
 
 import mbs
@@ -73,7 +73,7 @@ def test_the_function_gives_every_mode(system):
 
 def test_the_assembled_branch_is_followed(system):
     rng = np.random.default_rng(1)
-    assert same(system, np.array(function(system)(active(system))).ravel(), system.posture)
+    assert same(system, np.array(function(system)(active(system))).ravel(), system.configuration)
     for _ in range(3):
         q_a = active(system) + rng.uniform(-0.03, 0.03, len(system.active))
         q = np.array(function(system)(q_a)).ravel()
@@ -186,5 +186,5 @@ def test_any_plane_loop(loop, seed):
     system = flat_loop(seed, *loop).assemble()
     listed = modes(system)
     assert 1 <= len(listed) <= 2
-    assert any(same(system, mode.q, system.posture, 1e-6) for mode in listed)
+    assert any(same(system, mode.q, system.configuration, 1e-6) for mode in listed)
     assert max(mode.residual for mode in listed) < 1e-10

@@ -3,7 +3,7 @@
 import casadi
 import numpy as np
 import pytest
-from support.postures import active, same, searched
+from support.configurations import active, same, searched
 from support.random_trees import random_body, random_rotation
 
 from mbs import Parameter

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.postures import same
+from support.configurations import same
 from support.ring_loops import ring_loop
 
 import mbs
@@ -28,7 +28,7 @@ def test_both_ways_close(kinds, cut):
     listed = modes(system)
     assert len(listed) == 2
     assert max(mode.residual for mode in listed) < 1e-12
-    assert any(same(system, mode.q, system.posture) for mode in listed)
+    assert any(same(system, mode.q, system.configuration) for mode in listed)
     assert len(plan(system)) == (2 if cut in (None, 1) else 3)
 
 
@@ -60,7 +60,7 @@ def test_the_rest_does_not_depend_on_the_spin():
 
 
 def is_searched(system, mode):
-    """Whether a search for any posture with the same crank finds that follower."""
+    """Whether a search for any configuration with the same crank finds that follower."""
     names = [coordinate.name for coordinate in system.coordinates]
     place = names.index("j3")
     rng = np.random.default_rng(0)

@@ -3,7 +3,7 @@
 import casadi
 import numpy as np
 import pytest
-from support.postures import active, same, searched
+from support.configurations import active, same, searched
 from support.ring_loops import ring_loop
 
 import mbs
@@ -70,11 +70,11 @@ def test_lengths_stay_symbols():
         assert checked == len(modes(plain, q_a)) > 1
 
 
-def test_out_of_reach_there_is_no_posture():
+def test_out_of_reach_there_is_no_configuration():
     system = askew()
     loops = function(system)
     q = np.array(loops([0.3])).ravel()
-    assert same(system, q, system.posture, 1e-8)
+    assert same(system, q, system.configuration, 1e-8)
     assert modes(system, [2.0]) == []
     with pytest.raises(Unclosable, match="drive can be"):
         loops([2.0])

@@ -3,7 +3,7 @@
 import casadi
 import numpy as np
 import pytest
-from support.postures import active, same, searched
+from support.configurations import active, same, searched
 
 from mbs import Parameter
 from mbs.components import Body, Mechanism, Prismatic, Revolute, Rod, Universal
@@ -77,7 +77,7 @@ def test_the_platform_is_where_three_spheres_meet():
         assert abs(np.linalg.norm(q[:3] - centre) - 0.9) < 1e-13
 
 
-def test_the_arms_of_a_delta_robot_have_eight_postures():
+def test_the_arms_of_a_delta_robot_have_eight_configurations():
     system = delta("rod", driven="platform")
     listed = modes(system)
     assert len(listed) == len(searched(system, active(system), starts=200)) == 8
@@ -89,7 +89,7 @@ def test_forearms_that_are_bodies():
     listed = modes(system)
     assert len(listed) == 16  # two places, and each elbow in either of two ways
     assert max(mode.residual for mode in listed) < 1e-12
-    assert any(same(system, mode.q, system.posture) for mode in listed)
+    assert any(same(system, mode.q, system.configuration) for mode in listed)
     check_slope(system, listed[0])
 
 

@@ -1,4 +1,4 @@
-"""Plans are held against postures: what does not close is refused or left out."""
+"""Plans are held against configurations: what does not close is refused or left out."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def test_a_way_that_never_closes_is_left_out():
     np.testing.assert_array_equal(np.array(kept.values(q, [])), np.array(stage.values(q, [])))
 
 
-def test_a_plan_that_does_not_give_the_assembled_posture_is_refused():
+def test_a_plan_that_does_not_give_the_assembled_configuration_is_refused():
     system = mbs.load("four_bar").assemble()
     (stage,) = plan(system)
     wrong = changed(stage, stage.labels, lambda v: v + 0.3)

@@ -1,14 +1,14 @@
-"""Whole postures of trees and closed robots: the one that made the pose is among them."""
+"""Whole configurations of trees and closed robots: the one that made the pose is among them."""
 
 import numpy as np
 import pytest
 from support.closed_mechanisms import closed_chain
-from support.postures import same
+from support.configurations import same
 
 import mbs
 from mbs.components import Body, Mechanism, Revolute, Spherical
 from mbs.loops.closing import Closing
-from mbs.loops.modes import closed_postures
+from mbs.loops.modes import closed_configurations
 from mbs.loops.plan import completed
 from mbs.models.inverse_geometry.chain import chain
 from mbs.models.inverse_geometry.search import search
@@ -25,10 +25,10 @@ def systems():
 
 
 def drawn(system, away, seed):
-    """A closed posture whose independent joints stand elsewhere."""
+    """A closed configuration whose independent joints stand elsewhere."""
     rng = np.random.default_rng(seed)
     held = completed(system, ()).held
-    q = np.array(system.posture)
+    q = np.array(system.configuration)
     q[list(held)] += rng.uniform(-away, away, len(held))
     closed = Closing(system, NONE, held).nearest(q)
     assert closed.is_closed
@@ -46,30 +46,30 @@ def solutions(system, frame, T):
 
 def assert_solved(system, frame, T, found):
     closure = mbs.loops.closure(system)
-    for posture in found:
-        assert np.abs(np.array(closure(posture.q))).max(initial=0.0) < 1e-12
-        assert posture.residual < 1e-12
-        np.testing.assert_allclose(pose(system, frame, posture.q), T, atol=1e-12)
+    for configuration in found:
+        assert np.abs(np.array(closure(configuration.q))).max(initial=0.0) < 1e-12
+        assert configuration.residual < 1e-12
+        np.testing.assert_allclose(pose(system, frame, configuration.q), T, atol=1e-12)
     for k, one in enumerate(found):
         assert not any(same(system, one.q, other.q, 1e-6) for other in found[:k])
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", FRAMES)
-def test_the_posture_that_made_the_pose_is_found(systems, name, seed):
+def test_the_configuration_that_made_the_pose_is_found(systems, name, seed):
     system, frame = systems[name], FRAMES[name]
     q = drawn(system, AWAY[name], seed)
     T = pose(system, frame, q)
     found = solutions(system, frame, T)
     assert_solved(system, frame, T, found)
-    assert any(same(system, posture.q, q, 1e-7) for posture in found)
+    assert any(same(system, configuration.q, q, 1e-7) for configuration in found)
     assert why_searched(system, chain(system, frame)) is None
 
 
 @pytest.mark.parametrize("way", ["parallel", "crossed"])
 @pytest.mark.parametrize("seed", range(5))
 def test_both_assemblies_of_the_sr400(systems, way, seed):
-    """The motors far from the assembled posture, the loop a parallelogram or crossed."""
+    """The motors far from the assembled configuration, the loop a parallelogram or crossed."""
     system = systems["sr400"]
     rng = np.random.default_rng(seed)
     names = [system.speeds[k].name for k in system.free]
@@ -78,8 +78,8 @@ def test_both_assemblies_of_the_sr400(systems, way, seed):
     T = pose(system, 6, q)
     found = solutions(system, 6, T)
     assert_solved(system, 6, T, found)
-    assert any(same(system, posture.q, q, 1e-7) for posture in found)
-    labels = [posture.label for posture in found]
+    assert any(same(system, configuration.q, q, 1e-7) for configuration in found)
+    labels = [configuration.label for configuration in found]
     assert labels.count("q8:parallel") == labels.count("q8:crossed") == len(found) / 2
 
 
@@ -92,11 +92,11 @@ def test_as_many_as_a_search_in_all_joints_finds(systems, name, count):
     modes = mbs.loops.working_modes(system, frame, T, tries=150)
     assert len(found) == count >= len(modes) >= count * 0.7
     for mode in modes:
-        assert any(same(system, posture.q, mode.q, 1e-6) for posture in found)
+        assert any(same(system, configuration.q, mode.q, 1e-6) for configuration in found)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_delta_has_eight_postures(systems, seed):
+def test_delta_has_eight_configurations(systems, seed):
     system = systems["delta"]
     q = drawn(system, 0.3, seed)
     T = pose(system, "tool", q)
@@ -104,8 +104,8 @@ def test_delta_has_eight_postures(systems, seed):
     assert_solved(system, "tool", T, found)
     assert why_searched(system, "tool") is None
     assert len(found) == len(mbs.loops.working_modes(system, "tool", T, tries=100)) == 8
-    assert len({posture.label for posture in found}) == 8
-    assert any(same(system, posture.q, q, 1e-7) for posture in found)
+    assert len({configuration.label for configuration in found}) == 8
+    assert any(same(system, configuration.q, q, 1e-7) for configuration in found)
     T[:3, :3] = T[:3, :3] @ np.diag([-1, -1, 1])
     assert posed(system, "tool", T, NONE) == []
 
@@ -127,7 +127,7 @@ def test_an_arm_with_a_ball_for_a_wrist(seed):
     assert_solved(system, "tool", T, found)
     modes = mbs.loops.working_modes(system, "tool", T, tries=100)
     assert len(found) == len(modes)
-    assert any(same(system, posture.q, q, 1e-8) for posture in found)
+    assert any(same(system, configuration.q, q, 1e-8) for configuration in found)
 
 
 def test_stewart_platform_has_four_ways_for_every_leg(systems):
@@ -138,7 +138,7 @@ def test_stewart_platform_has_four_ways_for_every_leg(systems):
     found = posed(system, "centre", T, NONE, q)
     assert len(found) == 4**6
     assert same(system, found[0].q, q, 1e-9)
-    assert max(posture.residual for posture in found) < 1e-12
+    assert max(configuration.residual for configuration in found) < 1e-12
     assert_solved(system, "centre", T, found[:6])
 
 
@@ -149,15 +149,15 @@ def test_a_tree_keeps_the_other_arm_where_it_is():
     for frame, other in ((4, [4, 5, 6]), (7, [1, 2, 3])):
         T = pose(system, frame, q)
         way = chain(system, frame)
-        postures = search(way.arm(NONE), T)
-        found = close(system, way, postures, NONE, q)
-        assert len(found) == len(postures) >= 1
-        assert any(same(system, posture.q, q, 1e-9) for posture in found)
-        for posture in found:
-            np.testing.assert_array_equal(posture.q[other], q[other])
-            np.testing.assert_allclose(pose(system, frame, posture.q), T, atol=1e-12)
-        at_rest = close(system, way, postures, NONE)
-        np.testing.assert_array_equal(at_rest[0].q[other], np.array(system.posture)[other])
+        configurations = search(way.arm(NONE), T)
+        found = close(system, way, configurations, NONE, q)
+        assert len(found) == len(configurations) >= 1
+        assert any(same(system, configuration.q, q, 1e-9) for configuration in found)
+        for configuration in found:
+            np.testing.assert_array_equal(configuration.q[other], q[other])
+            np.testing.assert_allclose(pose(system, frame, configuration.q), T, atol=1e-12)
+        at_rest = close(system, way, configurations, NONE)
+        np.testing.assert_array_equal(at_rest[0].q[other], np.array(system.configuration)[other])
 
 
 def test_joints_that_nothing_determines_stay(systems):
@@ -166,8 +166,8 @@ def test_joints_that_nothing_determines_stay(systems):
     way = chain(system, "link1")
     found = close(system, way, q[[0]], NONE, q)
     assert len(found) == 2
-    assert all(posture.q[0] == q[0] and posture.q[2] == q[2] for posture in found)
-    assert any(same(system, posture.q, q, 1e-9) for posture in found)
+    assert all(configuration.q[0] == q[0] and configuration.q[2] == q[2] for configuration in found)
+    assert any(same(system, configuration.q, q, 1e-9) for configuration in found)
 
 
 def test_locked_joints_are_known():
@@ -176,23 +176,24 @@ def test_locked_joints_are_known():
     way = chain(system, 6, {"q4": float(q[3])})
     found = close(system, way, q[[0, 1, 2, 4, 5]], NONE)
     assert len(found) == 2
-    assert any(same(system, posture.q, q, 1e-9) for posture in found)
+    assert any(same(system, configuration.q, q, 1e-9) for configuration in found)
 
 
-def test_a_posture_of_the_chain_that_leaves_the_loop_open(systems):
+def test_a_configuration_of_the_chain_that_leaves_the_loop_open(systems):
     assert close(systems["five_bar"], chain(systems["five_bar"], "tool"), [[3.0, 0.0]], NONE) == []
     nothing = np.zeros((0, 2))
     assert close(systems["five_bar"], chain(systems["five_bar"], "tool"), nothing, NONE) == []
 
 
 def test_chain_joints_that_depend_on_each_other():
-    """A point of the coupler of a four-bar: its two joints fit the loop, or there is no posture."""
+    """A point of the coupler of a four-bar: its two joints fit the loop, or there is no
+    configuration."""
     system = mbs.load("four_bar").assemble()
     q = drawn(system, 0.3, 1)
     frame = next(k + 1 for k in range(len(system.tree.links)) if len(system.tree.path(k)) == 2)
     way = chain(system, frame)
     found = solutions(system, frame, pose(system, frame, q))
-    assert [same(system, posture.q, q, 1e-8) for posture in found] == [True]
+    assert [same(system, configuration.q, q, 1e-8) for configuration in found] == [True]
     assert close(system, way, q[list(way.places)] + 0.1, NONE) == []
 
 
@@ -211,20 +212,20 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
         assert "no closed form known here" in reason
     held = completed(system, way.places).held
     rest = close(system, way, q[list(way.places)], NONE, q)
-    assert any(same(system, posture.q, q, 1e-6) for posture in rest)
-    for posture in rest:
-        np.testing.assert_allclose(posture.q[list(held)], q[list(held)], atol=1e-12)
+    assert any(same(system, configuration.q, q, 1e-6) for configuration in rest)
+    for configuration in rest:
+        np.testing.assert_allclose(configuration.q[list(held)], q[list(held)], atol=1e-12)
 
 
 def test_search_with_positions_held_finds_what_closed_forms_find(systems):
     system = systems["akr3000"]
     q = drawn(system, 0.03, 3)
     places = chain(system, 10).places
-    found = closed_postures(Closing(system, NONE, places), q)
+    found = closed_configurations(Closing(system, NONE, places), q)
     exact = close(system, chain(system, 10), q[list(places)], NONE)
     assert len(found) == len(exact) == 4
-    for posture in exact:
-        assert any(same(system, posture.q, other, 1e-7) for other in found)
+    for configuration in exact:
+        assert any(same(system, configuration.q, other, 1e-7) for other in found)
 
 
 def test_a_ball_that_turns_freely_stays():
@@ -237,10 +238,10 @@ def test_a_ball_that_turns_freely_stays():
     m.connect(b.at(0.3), Spherical("loose", actuated=False), c)
     system = m.assemble(guess={"j1": 1.2, "j2": -1.0, "j3": 1.5})
     places = [k for k, c in enumerate(system.coordinates) if c.name.startswith("loose")]
-    seed = np.array(system.posture)
+    seed = np.array(system.configuration)
     seed[places] = [0.5, -0.5, 0.5, 0.5]
     found = close(system, chain(system, "a"), [[1.1]], NONE, seed)
     assert len(found) == 2
-    for posture in found:
-        np.testing.assert_array_equal(posture.q[places], seed[places])
-        assert posture.q[0] == 1.1
+    for configuration in found:
+        np.testing.assert_array_equal(configuration.q[places], seed[places])
+        assert configuration.q[0] == 1.1

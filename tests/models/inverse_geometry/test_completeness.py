@@ -1,4 +1,5 @@
-"""Every posture of catalogue robots at generic poses: `solve` against a multi-start search."""
+"""Every configuration of catalogue robots at generic poses: `solve` against a multi-start
+search."""
 
 from functools import cache
 from math import radians
@@ -25,7 +26,7 @@ ROBOTS = (
     "scara",
     "youbot",
 )
-# Manocha & Canny 1994, table III, two of the sixteen postures, printed to 0.01 degree.
+# Manocha & Canny 1994, table III, two of the sixteen configurations, printed to 0.01 degree.
 PRINTED = [
     [2.51, 108.07, 112.04, -10.52, 0.0, -0.10],
     [-96.28, -6.27, -0.03, 141.51, 127.44, 140.59],
@@ -37,7 +38,7 @@ def assembled(name):
     return mbs.load(name).assemble()
 
 
-def posture(arm, name, seed):
+def configuration(arm, name, seed):
     return arm.random(np.random.default_rng((7, seed, *name.encode())))
 
 
@@ -45,7 +46,7 @@ def posture(arm, name, seed):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robot(name, seed):
     system = assembled(name)
-    assert_complete(system, posture(plain_arm(system), name, seed))
+    assert_complete(system, configuration(plain_arm(system), name, seed))
 
 
 @pytest.mark.parametrize("joint", range(7))
@@ -58,7 +59,7 @@ def test_panda_with_one_joint_locked(joint):
 
 @pytest.mark.parametrize("start", range(2))
 def test_manseur_doty_has_sixteen(start):
-    """The pose of a printed posture is the published one to the digits printed."""
+    """The pose of a printed configuration is the published one to the digits printed."""
     system = assembled("manseur_doty")
     arm = plain_arm(system)
     T = arm.pose([radians(angle) for angle in PRINTED[start]])
@@ -68,7 +69,7 @@ def test_manseur_doty_has_sixteen(start):
 
 
 def test_crx_has_up_to_sixteen():
-    """Among random poses some have more than the eight postures of a spherical wrist."""
+    """Among random poses some have more than the eight configurations of a spherical wrist."""
     system = assembled("crx10")
     arm = plain_arm(system)
     counts = []

@@ -1,4 +1,4 @@
-"""Every posture of random arms of each class: `solve` against a multi-start search."""
+"""Every configuration of random arms of each class: `solve` against a multi-start search."""
 
 import numpy as np
 import pytest

@@ -29,11 +29,14 @@ def test_arms_of_more_joints_than_the_core_has_room_for_are_solved_too():
 
 
 @pytest.mark.skipif(not compiler_found(), reason="no C compiler")
-def test_poses_and_postures_of_wrong_shapes_are_refused():
+def test_poses_and_configurations_of_wrong_shapes_are_refused():
     arm, T = manseur_doty()
-    for poses, postures in ((T[:3], np.zeros((2, 6))), (T[None].repeat(3, 0), np.zeros((2, 6)))):
+    for poses, configurations in (
+        (T[:3], np.zeros((2, 6))),
+        (T[None].repeat(3, 0), np.zeros((2, 6))),
+    ):
         with pytest.raises(ValueError, match="broadcast"):
-            polish(arm, poses, postures)
+            polish(arm, poses, configurations)
     with pytest.raises(ValueError, match="broadcast"):
         polish(arm, T, np.zeros((2, 5)))
     with pytest.raises(ValueError, match="broadcast"):

@@ -20,7 +20,7 @@ def at(arm, q):
     return Target(arm, arm.pose(q)), q
 
 
-def test_regular_postures_and_folds_do_not_move():
+def test_regular_configurations_and_folds_do_not_move():
     target, q = at(planar(3), [0.3, 0.8, -0.4])
     assert freedoms(reduction(target, q))[0] == 0
     target, q = at(planar(3), [0.3, 0.0, -0.4])

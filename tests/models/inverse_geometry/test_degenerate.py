@@ -20,7 +20,7 @@ def assembled(name):
     return mbs.load(name).assemble()
 
 
-def posture(name, seed=0):
+def configuration(name, seed=0):
     return np.random.default_rng((11, seed, *name.encode())).uniform(-2.5, 2.5, 6)
 
 
@@ -31,17 +31,18 @@ def flipped(q):
 
 @cache
 def regular_count(name):
-    """How many postures the wrist centre has, times two."""
+    """How many configurations the wrist centre has, times two."""
     arm = plain_arm(assembled(name))
-    return len(searched(arm, arm.pose(posture(name))))
+    return len(searched(arm, arm.pose(configuration(name))))
 
 
 @pytest.mark.parametrize("q5", [1e-5, 1e-7])
 @pytest.mark.parametrize("name", WRISTS)
 def test_near_the_wrist_singularity(name, q5):
-    """As many postures as with the same wrist centre elsewhere, the two close ones among them."""
+    """As many configurations as with the same wrist centre elsewhere, the two close ones among
+    them."""
     system = assembled(name)
-    arm, q = plain_arm(system), with_wrist(posture(name), q5)
+    arm, q = plain_arm(system), with_wrist(configuration(name), q5)
     T = arm.pose(q)
     answer = solve(system, T)
     assert_exact(arm, T, answer.q)
@@ -53,12 +54,12 @@ def test_near_the_wrist_singularity(name, q5):
 
 @pytest.mark.parametrize("name", WRISTS)
 def test_at_the_wrist_singularity(name):
-    """q4 and q6 turn together; the other postures of the wrist centre are regular.
+    """q4 and q6 turn together; the other configurations of the wrist centre are regular.
 
     An RX90 lies in a plane with axis 1: turned by half a turn it has the same forearm.
     """
     system = assembled(name)
-    arm, q = plain_arm(system), with_wrist(posture(name), 0.0)
+    arm, q = plain_arm(system), with_wrist(configuration(name), 0.0)
     T = arm.pose(q)
     answer = solve(system, T)
     assert_exact(arm, T, answer.q)
@@ -84,7 +85,7 @@ def test_at_the_wrist_singularity(name):
 def test_stretched_elbow_is_a_double_root(name, seed):
     """Both shoulders reach it with a stretched arm only: two times two wrists, all double."""
     system, count = assembled(name), 4
-    arm, q = plain_arm(system), stretched(system, posture(name, seed))
+    arm, q = plain_arm(system), stretched(system, configuration(name, seed))
     T = arm.pose(q)
     answer = solve(system, T)
     assert_exact(arm, T, answer.q)
@@ -98,7 +99,7 @@ def test_stretched_elbow_is_a_double_root(name, seed):
 def test_stretched_elbow_of_one_shoulder_is_a_double_root(name):
     """With axis 2 off axis 1 the other shoulder is nearer or out of reach, never stretched."""
     system = assembled(name)
-    arm, q = plain_arm(system), stretched(assembled(name), posture(name))
+    arm, q = plain_arm(system), stretched(assembled(name), configuration(name))
     T = arm.pose(q)
     answer = solve(system, T)
     assert_exact(arm, T, answer.q)
@@ -111,7 +112,7 @@ def test_stretched_elbow_of_one_shoulder_is_a_double_root(name):
 def test_wrist_over_the_shoulder(name):
     """The wrist centre on axis 1: the arm turns about it, the wrist makes up for it."""
     system = assembled(name)
-    arm, q = plain_arm(system), over_shoulder(assembled(name), posture(name, 1))
+    arm, q = plain_arm(system), over_shoulder(assembled(name), configuration(name, 1))
     T = arm.pose(q)
     answer = solve(system, T)
     assert_exact(arm, T, answer.q)
@@ -129,7 +130,7 @@ def test_folded_next_to_two_singularities(seed):
     """The wrist centre 2 mm from axis 2 and the arm folded: a search crawls, counts are known."""
     system = assembled("puma560")
     assert least_gap(system) < 2e-3
-    arm, q = plain_arm(system), folded(system, posture("puma560", seed), 2e-3)
+    arm, q = plain_arm(system), folded(system, configuration("puma560", seed), 2e-3)
     T = arm.pose(q)
     answer = solve(system, T)
     assert_exact(arm, T, answer.q)
@@ -143,7 +144,7 @@ def test_folded_next_to_two_singularities(seed):
 def test_out_of_reach(name):
     system = assembled(name)
     arm = plain_arm(system)
-    T = arm.pose(posture(name))
+    T = arm.pose(configuration(name))
     T[:3, 3] += 3 * arm.reach * T[:3, 0]
     answer = solve(system, T)
     assert len(answer) == 0

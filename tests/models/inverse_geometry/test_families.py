@@ -1,4 +1,4 @@
-"""Self-motions: which joints move, how they are related, and the postures along them."""
+"""Self-motions: which joints move, how they are related, and the configurations along them."""
 
 import math
 from functools import cache
@@ -45,7 +45,7 @@ def test_a_wrist_singularity():
     assert answer[0].multiplicity == 0
 
 
-def test_the_posture_that_stands_for_it():
+def test_the_configuration_that_stands_for_it():
     """Zero of the free joint, its seed, or the next place within limits."""
     system, q = assembled("puma560"), np.array([0.3, -0.5, 0.7, 0.4, 0.0, 0.2])
     T = pose(system, q)
@@ -126,7 +126,7 @@ def test_two_slides_along_one_line():
 
 
 def test_two_freedoms():
-    """Five turns in a plane: one family of dimension two, however many postures are met."""
+    """Five turns in a plane: one family of dimension two, however many configurations are met."""
     system, q = planar(5), np.array([0.3, 0.9, -0.5, 0.4, 0.2])
     answer = solve(system, pose(system, q))
     assert {s.family.dimension for s in answer} == {2}

@@ -19,9 +19,9 @@ def puma():
     return mbs.load("puma560").assemble()
 
 
-def poses(system, frame, postures):
+def poses(system, frame, configurations):
     T = mbs.models.transform(system, frame)
-    return np.array([np.array(T(q)) for q in postures])
+    return np.array([np.array(T(q)) for q in configurations])
 
 
 def line(start, end, count):
@@ -97,7 +97,8 @@ def test_beside_the_wrist_singularity_the_wrist_swings_round(puma, beside):
 
 
 def test_a_pose_too_far_is_out_of_reach(puma):
-    """A search from many starts finds postures for the last pose reached, and none for the next."""
+    """A search from many starts finds configurations for the last pose reached, and none for the
+    next."""
     path = np.repeat(poses(puma, 6, [ELBOW_UP]), 30, axis=0)
     path[:, 0, 3] += np.linspace(0, 2, 30)
     found = follow(puma, path, ELBOW_UP, limits=False)
@@ -172,7 +173,7 @@ def test_closed_loops_stay_closed(robot, frame):
     system = mbs.load(robot).assemble()
     names = [system.speeds[k].name for k in system.free]
     places = [[c.name for c in system.coordinates].index(name) for name in names]
-    start = np.array(system.posture)[places]
+    start = np.array(system.configuration)[places]
     away = 0.03 if robot == "akr3000" else 0.3
     end = start + away * np.cos(np.arange(len(names)))
     path = [mbs.loops.solve(system, dict(zip(names, x, strict=True))) for x in line(start, end, 6)]

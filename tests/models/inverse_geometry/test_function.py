@@ -40,7 +40,7 @@ def symbolic_puma():
 
 
 def state(system, seed):
-    """A posture (nq,) and the pose it gives."""
+    """A configuration (nq,) and the pose it gives."""
     rng = np.random.default_rng(seed)
     slides = [row.unit == "m" for row in system.coordinates]
     q = np.where(slides, rng.uniform(0.1, 0.6, system.nq), rng.uniform(-3, 3, system.nq))
@@ -48,7 +48,7 @@ def state(system, seed):
 
 
 def found(igm, T, **more):
-    """The valid postures (m, nq), and their branches."""
+    """The valid configurations (m, nq), and their branches."""
     rows = [(b, *igm(T, b, *more.values())) for b in range(igm.branches)]
     valid = [(b, np.array(q).ravel()) for b, q, good in rows if float(good) == 1]
     return np.array([q for _, q in valid]), [b for b, _ in valid]
@@ -102,10 +102,10 @@ def test_derivative_is_the_inverse_of_the_jacobian(name):
     x, branch = SX.sym("q", 6), SX.sym("b")
     there_and_back = Function("f", [x, branch], [igm(pose(x), branch)[0]])
     slope = Function("J", [x, branch], [casadi.jacobian(there_and_back(x, branch), x)])
-    postures, branches = found(igm, T)
-    for posture, b in zip(postures, branches, strict=True):
-        assert np.allclose(np.array(slope(posture, b)), np.eye(6), atol=1e-8)
-    assert np.min(np.max(np.abs(postures - q), axis=1)) < 1e-9
+    configurations, branches = found(igm, T)
+    for configuration, b in zip(configurations, branches, strict=True):
+        assert np.allclose(np.array(slope(configuration, b)), np.eye(6), atol=1e-8)
+    assert np.min(np.max(np.abs(configurations - q), axis=1)) < 1e-9
 
 
 def test_out_of_reach_is_finite_and_not_valid():
@@ -137,11 +137,11 @@ def test_parameters_stay_symbols():
         p = system.parameter_values(lengths)
         q, _ = state(system, 7)
         T = np.array(mbs.models.direct_geometry(system)(q, p))
-        postures, _ = found(igm, T, p=p)
-        assert len(postures) == 8
-        assert np.min(np.max(np.abs(postures - q), axis=1)) < 1e-9
-        for posture in postures:
-            assert np.allclose(np.array(mbs.models.direct_geometry(system)(posture, p)), T)
+        configurations, _ = found(igm, T, p=p)
+        assert len(configurations) == 8
+        assert np.min(np.max(np.abs(configurations - q), axis=1)) < 1e-9
+        for configuration in configurations:
+            assert np.allclose(np.array(mbs.models.direct_geometry(system)(configuration, p)), T)
     defaults = np.array(igm(T, 0, system.parameter_values())[0])
     assert np.array_equal(np.array(igm(T, 0)[0]), defaults)
 

@@ -23,7 +23,7 @@ WAYS = [
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_the_sixteen_postures_of_manseur_and_doty(way):
+def test_the_sixteen_configurations_of_manseur_and_doty(way):
     arm, T = manseur_doty()
     number, q = way(general_of(arm), T[None])
     assert number.tolist() == [0] * 16
@@ -80,7 +80,7 @@ def test_solutions_that_meet_count_once(way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_pose_out_of_reach_has_no_posture(way):
+def test_a_pose_out_of_reach_has_no_configuration(way):
     for arm in (puma(), manseur_doty()[0]):
         T = arm.pose(np.full(6, 0.3))
         T[:3, 3] += 1.5 * arm.length * np.array([0.6, 0.0, 0.8])
@@ -117,7 +117,7 @@ def test_arms_that_the_method_does_not_hold_for():
     with pytest.raises(ModelError, match="six joints"):
         general_of(random_arm(np.random.default_rng(0), 5))
     planar = khalil([(0, 0, 0, 0), *[(0, 1.0, 0, 0)] * 5])
-    with pytest.raises(NoClosedForm, match="singular at every posture"):
+    with pytest.raises(NoClosedForm, match="singular at every configuration"):
         general_of(planar)
 
 

@@ -51,9 +51,9 @@ def test_right_is_where_a_positive_joint_2_lifts_the_wrist():
     q, step = np.array([0.3, -0.5, 0.7, 0.4, 0.9, 0.2]), np.array([0, 1e-6, 0, 0, 0, 0])
     wrist = mbs.models.transform(mbs.load("puma560").assemble(), 4)
     for turn in (0.0, 1.2, 2.4, -2.0):
-        posture = q + turn * np.eye(6)[1]
-        height = [float(wrist(posture + way)[2, 3]) for way in (step, -step)]
-        assert label("puma560", posture).startswith(
+        configuration = q + turn * np.eye(6)[1]
+        height = [float(wrist(configuration + way)[2, 3]) for way in (step, -step)]
+        assert label("puma560", configuration).startswith(
             "shoulder right" if height[0] > height[1] else "shoulder left"
         )
 

@@ -19,7 +19,7 @@ def assembled(name):
 
 
 def poses(system, count, seed, locked=None):
-    """Postures (count, n) and their poses (count, 4, 4), by an arm that is no part of mbs."""
+    """Configurations (count, n) and their poses (count, 4, 4), by an arm that is no part of mbs."""
     arm = plain_arm(system, locked)
     rng = np.random.default_rng(seed)
     slides = rng.uniform(0.1, 0.6, (count, arm.slides.size))
@@ -71,7 +71,7 @@ def test_rows_are_branches():
             assert np.allclose(many.q[k, b], np.array(igm(T[k], b)[0]).ravel(), atol=1e-12)
 
 
-def singular_postures():
+def singular_configurations():
     """Wrist stretched, nearly so, elbow stretched, hand above the shoulder."""
     rng = np.random.default_rng(3)
     q = rng.uniform(-2, 2, (9, 6))
@@ -83,7 +83,7 @@ def singular_postures():
 
 def test_degenerate_poses_are_as_solve_has_them():
     system = assembled("puma560")
-    arm, q = plain_arm(system), singular_postures()
+    arm, q = plain_arm(system), singular_configurations()
     T = arm.pose(q)
     many = solve_many(system, T)
     assert many.searched[2]
@@ -153,7 +153,7 @@ def test_repair_solves_what_is_in_doubt():
         return np.full((9, 6), 0.25)
 
     system = assembled("puma560")
-    arm, q = plain_arm(system), singular_postures()
+    arm, q = plain_arm(system), singular_configurations()
     many = solve_many(system, arm.pose(q[[2, 7]]), repair=repair)
     assert len(asked) == 1
     assert many.q.shape == (2, 9, 6)
@@ -178,11 +178,11 @@ def test_parameters():
 
 def test_robots_with_loops_are_as_solve_has_them():
     system = assembled("five_bar")
-    posture = np.array(system.posture)
-    T = np.array(mbs.models.transform(system, terminal_frame(system))(posture))
+    configuration = np.array(system.configuration)
+    T = np.array(mbs.models.transform(system, terminal_frame(system))(configuration))
     many = solve_many(system, [T, T])
     assert many.count.tolist() == [len(solve(system, T))] * 2
-    assert np.min(np.max(np.abs(many.of(1) - posture), axis=1)) < 1e-9
+    assert np.min(np.max(np.abs(many.of(1) - configuration), axis=1)) < 1e-9
 
 
 def test_five_joints():

@@ -26,7 +26,7 @@ def arm_of(name):
     return chain(mbs.load(name).assemble()).arm(np.zeros(0))
 
 
-def test_a_regular_posture_counts_once():
+def test_a_regular_configuration_counts_once():
     assert counted(planar(0.5, 0.4, 0.3), [0.3, 0.8, -0.4])[0] == 1
     assert counted(arm_of("puma560"), [0.3, -0.5, 0.7, 0.4, 0.9, 0.2])[0] == 1
 

@@ -1,4 +1,4 @@
-"""Pieper's method: every posture of arms with a wrist anywhere, and of arms that slide."""
+"""Pieper's method: every configuration of arms with a wrist anywhere, and of arms that slide."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ SPECIAL = (
 
 
 @pytest.mark.parametrize("name", ["puma560", "rx90", "stanford"])
-def test_catalogue_arms_have_eight_postures(name):
+def test_catalogue_arms_have_eight_configurations(name):
     _, leaves, sequence, arm = solved(catalogue, name)
     assert sequence.signs == ("q3", "q2", "q5")
     for q in arm.random(np.random.default_rng(1), 20):

@@ -10,9 +10,9 @@ from support.arms import general_5r, general_6r, spherical
 from support.pieper_arms import (
     EXACT,
     catalogue,
+    configurations,
     leaves_of,
     lengths,
-    postures,
     solved,
     with_wrist,
 )
@@ -24,7 +24,7 @@ from mbs.models.inverse_geometry.chain import chain
 H = np.pi / 2
 
 
-def test_symbolic_lengths_give_the_same_postures():
+def test_symbolic_lengths_give_the_same_configurations():
     system, p = lengths()
     way = chain(system)
     symbolic, sequence = leaves_of(way.problem())
@@ -33,10 +33,10 @@ def test_symbolic_lengths_give_the_same_postures():
     arm = way.arm(p)
     for q in np.random.default_rng(10).uniform(-3, 3, (10, 6)):
         T = arm.pose(q)
-        ours = postures(symbolic, T, p)
+        ours = configurations(symbolic, T, p)
         assert len(ours) >= 2
         assert np.max(np.abs(arm.pose(ours) - T)) < EXACT
-        assert np.cos(ours - postures(numeric, T)) == pytest.approx(1, abs=1e-12)
+        assert np.cos(ours - configurations(numeric, T)) == pytest.approx(1, abs=1e-12)
 
 
 @pytest.mark.parametrize("scale", [1e-2, 1e3])
@@ -47,7 +47,7 @@ def test_the_size_of_the_arm_does_not_matter(scale):
     arm, like = way.arm(p * sizes), way.arm(p)
     same, _ = leaves_of(way.problem(p))
     for q in np.random.default_rng(11).uniform(-3, 3, (10, 6)):
-        ours, others = postures(leaves, arm.pose(q)), postures(same, like.pose(q))
+        ours, others = configurations(leaves, arm.pose(q)), configurations(same, like.pose(q))
         assert np.cos(ours - others) == pytest.approx(1, abs=1e-12)
 
 
@@ -57,7 +57,7 @@ def test_folded_arm_with_the_wrist_near_the_shoulder():
     for q3, q5 in ((-1.54, 1e-5), (-1.52, 1e-3), (-1.524, 1e-4)):
         q = np.array([0.3, -0.8, q3, 0.4, q5, 1.1])
         T = arm.pose(q)
-        ours = postures(leaves, T)
+        ours = configurations(leaves, T)
         assert len(ours) in (4, 8)
         assert np.max(arm.residual(T, ours)) < EXACT
 
@@ -65,7 +65,7 @@ def test_folded_arm_with_the_wrist_near_the_shoulder():
 @pytest.mark.parametrize(
     ("build", "arguments"), [(catalogue, ("puma560",)), (spherical, (3, 0)), (spherical, (4, 1))]
 )
-def test_singular_postures_are_found(build, arguments):
+def test_singular_configurations_are_found(build, arguments):
     _, leaves, _, arm = solved(build, *arguments)
     rng = np.random.default_rng(12)
     for _ in range(20):
@@ -89,10 +89,10 @@ def test_out_of_reach_has_no_real_branch():
         _, leaves, _, arm = solved(build, *arguments)
         T = arm.pose(np.full(6, 0.3))
         T[:3, 3] += 3 * arm.reach
-        assert len(postures(leaves, T)) == 0
+        assert len(configurations(leaves, T)) == 0
 
 
-def test_postures_move_with_the_pose():
+def test_configurations_move_with_the_pose():
     """The branches of a quartic follow a joint motion at the speed of the joints."""
     _, leaves, _, arm = solved(spherical, 4, 0)
     T = casadi.SX.sym("T", 12)
@@ -146,10 +146,10 @@ def test_refusals_name_the_joints_and_the_condition():
     with pytest.raises(NoClosedForm, match="the loop has 5 unknown joints"):
         pieper(chain(general_5r(0)).problem())
     flat = {1: {"alpha": 0.0}, 2: {"alpha": 0.0}}
-    with pytest.raises(NoClosedForm, match="singular in every posture"):
+    with pytest.raises(NoClosedForm, match="singular in every configuration"):
         pieper(chain(with_wrist("RRRRRR", 4, 3, flat)).problem())
     four = {1: {"d": 0.0, "r": 0.0}, 2: {"d": 0.0, "r": 0.0}, 3: {"d": 0.0}}
-    with pytest.raises(NoClosedForm, match="singular in every posture"):
+    with pytest.raises(NoClosedForm, match="singular in every configuration"):
         pieper(chain(with_wrist("RRRRRR", 4, 3, four)).problem())
     coplanar = {1: {"alpha": H}, 2: {"alpha": 0.0}}
     with pytest.raises(NoClosedForm, match="slide in one plane"):

@@ -24,7 +24,7 @@ def arms():
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("number", range(5))
-def test_postures_beside_solutions_become_solutions(way, number):
+def test_configurations_beside_solutions_become_solutions(way, number):
     arm, rng = arms()[number], np.random.default_rng(number)
     q = rng.uniform(-3, 3, (40, arm.size))
     T = arm.pose(q)
@@ -36,7 +36,7 @@ def test_postures_beside_solutions_become_solutions(way, number):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_one_pose_serves_all_postures(way):
+def test_one_pose_serves_all_configurations(way):
     arm, T = manseur_doty()
     given = np.random.default_rng(1).uniform(-3, 3, (30, 6))
     each = way(arm, np.repeat(T[None], 30, axis=0), given)
@@ -57,7 +57,7 @@ def test_no_residual_grows(way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_an_exact_posture_stays(way):
+def test_an_exact_configuration_stays(way):
     arm, q = puma(), np.array([[0.1, -0.4, 0.7, 0.2, 0.9, 4.0]])
     assert np.array_equal(way(arm, arm.pose(q[0]), q).q, q)
 

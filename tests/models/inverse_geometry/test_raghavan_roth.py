@@ -38,13 +38,13 @@ def arm_of(system):
     return chain(system).arm(np.array(system.p_default))
 
 
-def postures(arm, rng, count):
+def configurations(arm, rng, count):
     turns = rng.uniform(-np.pi, np.pi, (count, arm.size))
     return np.where(arm.prismatic, 0.6 * arm.length * rng.uniform(-1, 1, turns.shape), turns)
 
 
 def newton(arm, T, q, steps=12):
-    """Damped Gauss-Newton steps from postures q, (m, n), and how far from T each ends."""
+    """Damped Gauss-Newton steps from configurations q, (m, n), and how far from T each ends."""
     unit = np.array([1 / arm.length] * 3 + [1.0] * 3)
     size = np.where(arm.prismatic, arm.length, 1.0)
     pose, J = arm.pose_and_jacobian(q)
@@ -77,9 +77,9 @@ def distance(arm, a, b):
 
 def distinct(arm, q, tolerance=1e-5):
     kept = np.zeros((0, arm.size))
-    for posture in q:
-        if np.all(distance(arm, kept, posture) > tolerance):
-            kept = np.vstack([kept, posture])
+    for configuration in q:
+        if np.all(distance(arm, kept, configuration) > tolerance):
+            kept = np.vstack([kept, configuration])
     return kept
 
 
@@ -89,14 +89,14 @@ def solved(arm, prepared, T):
 
 
 def searched(arm, T, rng, starts=120):
-    q, residual = newton(arm, T, postures(arm, rng, starts), 40)
+    q, residual = newton(arm, T, configurations(arm, rng, starts), 40)
     return distinct(arm, q[residual < 1e-10 * (1 + arm.length)])
 
 
 def assert_complete(arm, rng, poses, oracle=1):
     prepared = prepare(arm)
     assert prepared.regular
-    for number, q in enumerate(postures(arm, rng, poses)):
+    for number, q in enumerate(configurations(arm, rng, poses)):
         T = arm.pose(q)
         found = solved(arm, prepared, T)
         assert np.min(distance(arm, found, q)) < 1e-6
@@ -160,9 +160,9 @@ def test_slides_against_a_search(kinds):
     assert_complete(arm_of(slides_and_turns(kinds, 1)), np.random.default_rng(4), 2, oracle=2)
 
 
-def test_sixteen_postures_of_one_pose():
+def test_sixteen_configurations_of_one_pose():
     arm = arm_of(mbs.load("manseur_doty").assemble())
-    T = arm.pose(postures(arm, np.random.default_rng(0), 40))
+    T = arm.pose(configurations(arm, np.random.default_rng(0), 40))
     number, q = candidates_many(prepare(arm), T)
     reached = np.max(np.abs(arm.pose(q) - T[number]), axis=(1, 2)) < 1e-7
     counts = [len(distinct(arm, q[reached & (number == k)])) for k in range(len(T))]
@@ -172,19 +172,19 @@ def test_sixteen_postures_of_one_pose():
 
 def test_many_poses_are_as_one_by_one():
     arm = arm_of(general_6r(1))
-    prepared, T = prepare(arm), arm.pose(postures(arm, np.random.default_rng(5), 4))
+    prepared, T = prepare(arm), arm.pose(configurations(arm, np.random.default_rng(5), 4))
     number, q = candidates_many(prepared, T)
     assert np.all(np.diff(number) >= 0)
     for k in range(len(T)):
         alone = candidates(prepared, T[k])
         assert len(alone) == np.sum(number == k)
-        for posture in alone:
-            assert np.min(distance(arm, q[number == k], posture)) < 1e-6
+        for configuration in alone:
+            assert np.min(distance(arm, q[number == k], configuration)) < 1e-6
 
 
 def test_candidates_are_accurate_before_any_step():
     arm = arm_of(general_6r(2))
-    T = arm.pose(postures(arm, np.random.default_rng(6), 20))
+    T = arm.pose(configurations(arm, np.random.default_rng(6), 20))
     number, q = candidates_many(prepare(arm), T)
     residual = np.max(np.abs(arm.pose(q) - T[number]), axis=(1, 2))
     best = [np.min(residual[number == k]) for k in range(len(T))]
@@ -196,28 +196,28 @@ def test_right_angles_of_a_general_arm(value):
     arm = arm_of(general_6r(3))
     prepared, rng = prepare(arm), np.random.default_rng(7)
     for _ in range(4):
-        q = np.where(rng.uniform(size=6) < 0.6, value, postures(arm, rng, 1)[0])
+        q = np.where(rng.uniform(size=6) < 0.6, value, configurations(arm, rng, 1)[0])
         assert np.min(distance(arm, solved(arm, prepared, arm.pose(q)), q)) < 1e-6
 
 
 @pytest.mark.parametrize("system", [general_6r(4), slides_and_turns("PRRRRR", 2)])
-def test_double_postures(system):
+def test_double_configurations(system):
     arm = arm_of(system)
     prepared, rng = prepare(arm), np.random.default_rng(8)
     for _ in range(4):
-        q = singular_posture(arm, rng)
+        q = singular_configuration(arm, rng)
         assert np.min(distance(arm, candidates(prepared, arm.pose(q)), q)) < 1e-4
 
 
-def singular_posture(arm, rng):
-    """Where the determinant of the Jacobian changes its sign between two postures."""
+def singular_configuration(arm, rng):
+    """Where the determinant of the Jacobian changes its sign between two configurations."""
 
     def determinant(q):
         return np.linalg.det(arm.pose_and_jacobian(q)[1])
 
-    low, high = postures(arm, rng, 2)
+    low, high = configurations(arm, rng, 2)
     while determinant(low) * determinant(high) > 0:
-        low, high = postures(arm, rng, 2)
+        low, high = configurations(arm, rng, 2)
     for _ in range(60):
         middle = 0.5 * (low + high)
         if determinant(low) * determinant(middle) > 0:
@@ -238,7 +238,10 @@ def test_units_do_not_matter():
     arm = arm_of(general_6r(6))
     gaps = arm.gaps.copy()
     gaps[:, :3, 3] *= 1000
-    large, q = Arm(arm.names, arm.prismatic, gaps), postures(arm, np.random.default_rng(9), 1)[0]
+    large, q = (
+        Arm(arm.names, arm.prismatic, gaps),
+        configurations(arm, np.random.default_rng(9), 1)[0],
+    )
     assert prepare(large).regularity == pytest.approx(prepare(arm).regularity, rel=1e-6)
     assert np.min(distance(large, candidates(prepare(large), large.pose(q)), q)) < 1e-8
 
@@ -248,7 +251,10 @@ def test_a_far_base_and_a_long_tool_do_not_matter():
     gaps, far, long = arm.gaps.copy(), np.eye(4), np.eye(4)
     far[:3, 3], long[:3, 3] = (300, 200, 100), (-20, 40, 30)
     gaps[0], gaps[6] = far @ gaps[0], gaps[6] @ long
-    moved, q = Arm(arm.names, arm.prismatic, gaps), postures(arm, np.random.default_rng(9), 1)[0]
+    moved, q = (
+        Arm(arm.names, arm.prismatic, gaps),
+        configurations(arm, np.random.default_rng(9), 1)[0],
+    )
     assert prepare(moved).regularity == pytest.approx(prepare(arm).regularity, rel=1e-6)
     assert np.min(distance(arm, candidates(prepare(moved), moved.pose(q)), q)) < 1e-8
 
@@ -258,7 +264,7 @@ def test_four_parallel_axes_give_samples_of_the_self_motion():
     gaps = arm.gaps.copy()
     gaps[2:5, :3, :3] = np.eye(3)
     arm = Arm(arm.names, arm.prismatic, gaps)
-    prepared, q = prepare(arm), postures(arm, np.random.default_rng(10), 1)[0]
+    prepared, q = prepare(arm), configurations(arm, np.random.default_rng(10), 1)[0]
     assert prepared.regular
     assert len(solved(arm, prepared, arm.pose(q))) > 2
 

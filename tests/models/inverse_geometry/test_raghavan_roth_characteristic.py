@@ -23,26 +23,26 @@ def arm_of(system):
     return chain(system).arm(np.array(system.p_default))
 
 
-def postures(arm, rng, count):
+def configurations(arm, rng, count):
     turns = rng.uniform(-np.pi, np.pi, (count, arm.size))
     return np.where(arm.prismatic, 0.6 * arm.length * rng.uniform(-1, 1, turns.shape), turns)
 
 
 def conditions(arm, found, given, shift, p=()):
-    """Reciprocal conditions of the matrix at postures, the joint moved by a shift."""
+    """Reciprocal conditions of the matrix at configurations, the joint moved by a shift."""
     q = SX.sym("q")
     function = Function("M", [q, given], [found.matrix(q)])
     result = []
-    for posture in postures(arm, np.random.default_rng(11), 12):
-        T = arm.pose(posture)[:3].ravel(order="F")
-        M = np.array(DM(function(posture[found.place] + shift, np.concatenate([p, T]))))
+    for configuration in configurations(arm, np.random.default_rng(11), 12):
+        T = arm.pose(configuration)[:3].ravel(order="F")
+        M = np.array(DM(function(configuration[found.place] + shift, np.concatenate([p, T]))))
         s = np.linalg.svd(M, compute_uv=False)
         result.append(s[-1] / s[0])
     return np.array(result)
 
 
 @pytest.mark.parametrize("name", CHARACTERISTIC)
-def test_characteristic_matrix_is_singular_at_postures(name):
+def test_characteristic_matrix_is_singular_at_configurations(name):
     system = CHARACTERISTIC[name]()
     own = chain(system)
     problem, arm = own.problem(np.zeros(0)), arm_of(system)

@@ -5,14 +5,14 @@ from support.plain_arms import apart, manseur_doty, puma, random_arm
 from mbs.models.inverse_geometry.search import (
     SEED,
     counted_search,
-    random_postures,
+    random_configurations,
     search,
     searched_with_numpy,
 )
 from mbs.native import compiler_found
 
 
-def test_all_postures_of_an_arm_with_a_wrist():
+def test_all_configurations_of_an_arm_with_a_wrist():
     arm, q = puma(), np.array([0.4, -0.7, 0.5, 1.1, 0.8, -2.0])
     T = arm.pose(q)
     found = search(arm, T)
@@ -21,7 +21,7 @@ def test_all_postures_of_an_arm_with_a_wrist():
     assert np.min(apart(arm, found, q[None])) < 1e-12
 
 
-def test_the_sixteen_postures_of_manseur_and_doty():
+def test_the_sixteen_configurations_of_manseur_and_doty():
     arm, T = manseur_doty()
     found = counted_search(arm, T, starts=600)
     assert found.q.shape == (16, 6)
@@ -58,16 +58,16 @@ def test_seven_joints_give_samples_that_all_solve():
     assert np.max(np.abs(arm.pose(found) - T)) < 1e-12
 
 
-def test_the_same_seed_gives_the_same_postures():
+def test_the_same_seed_gives_the_same_configurations():
     arm, T = manseur_doty()
     assert np.array_equal(search(arm, T, 50, seed=3), search(arm, T, 50, seed=3))
     assert not np.array_equal(search(arm, T, 50, seed=3), search(arm, T, 50, seed=4))
 
 
-def test_random_postures_fill_the_range():
+def test_random_configurations_fill_the_range():
     arm = random_arm(np.random.default_rng(1), 2, [False, True])
     T = arm.pose(np.array([0.2, 0.3]))
-    q = random_postures(arm, T, 4000, SEED)
+    q = random_configurations(arm, T, 4000, SEED)
     reach = arm.length + np.linalg.norm(T[:3, 3])
     for values, span in ((q[:, 0], np.pi), (q[:, 1], reach)):
         assert np.max(np.abs(values)) <= span

@@ -1,4 +1,4 @@
-"""The one entry: every posture of a pose, on robots whose answer is known beforehand."""
+"""The one entry: every configuration of a pose, on robots whose answer is known beforehand."""
 
 from functools import cache
 
@@ -44,7 +44,7 @@ def nearest_of(system, answer, q):
 
 @settings(max_examples=12, deadline=None, derandomize=True)
 @given(st.sampled_from(sorted(ROBOTS)), st.lists(ANGLES, min_size=6, max_size=6))
-def test_the_answer_contains_the_posture_that_made_the_pose(name, angles):
+def test_the_answer_contains_the_configuration_that_made_the_pose(name, angles):
     size, slides = ROBOTS[name]
     q = np.array(angles[:size])
     q[list(slides)] *= 0.2
@@ -112,7 +112,7 @@ def test_a_double_root_is_listed_once():
 
 @pytest.mark.parametrize("beyond", [1e-4, -1e-4])
 def test_the_boundary_of_the_reach(beyond):
-    """Two postures within the boundary, none beyond it."""
+    """Two configurations within the boundary, none beyond it."""
     T = pose("scara", [0.3, 0.0, 0.2, -0.1])
     T[:2, 3] *= 1 + beyond
     answer = solve(assembled("scara"), T)
@@ -205,7 +205,7 @@ def test_a_robot_with_a_loop():
 
 def test_a_parallel_robot():
     system = assembled("delta")
-    T = np.array(mbs.models.transform(system, "tool")(np.array(system.posture)))
+    T = np.array(mbs.models.transform(system, "tool")(np.array(system.configuration)))
     answer = solve(system, T, "tool")
     assert len(answer) == 8
     assert max(s.residual for s in answer) < 1e-12

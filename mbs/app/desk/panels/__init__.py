@@ -1,1 +1,1 @@
-"""What the menus open: forms, equations, postures, tables, plots and downloads."""
+"""What the menus open: forms, equations, configurations, tables, plots and downloads."""

@@ -196,7 +196,7 @@ def _files_card(desk: Desk) -> None:
         _head(
             "Robot and picture",
             "the description as text, and the mechanism in the present"
-            " posture as one file that any browser opens",
+            " configuration as one file that any browser opens",
         )
         with ui.row().style("gap: 8px"):
             _button("TOML", "toml", lambda: _robot_file(desk, ".toml"))

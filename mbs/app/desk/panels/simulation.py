@@ -38,7 +38,7 @@ Row = tuple[str, str, str, bool]
 KINDS = {"tau": "effort", "q": "position", "v": "velocity", "a": "acceleration"}
 """What a law of a joint gives."""
 
-PICTURE = "the posture of the picture"
+PICTURE = "the configuration of the picture"
 TYPED = "typed positions"
 
 _FIRST = {
@@ -68,7 +68,7 @@ def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) ->
     Args:
         system: that moves; fields of joints that it does not have are left alone.
         texts: of the form; empty ones are left out.
-        q: (nq,) posture of the picture [rad or m].
+        q: (nq,) configuration of the picture [rad or m].
     """
     rows = chosen_rows(system)
     typed = texts["start"] == TYPED
@@ -80,7 +80,7 @@ def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) ->
         tolerance=texts["tolerance"],
         method=texts["method"],
         q0=_given(texts, "q0", [name for name, unit, *_ in rows if unit]) if typed else {},
-        posture=() if typed else tuple(q),
+        configuration=() if typed else tuple(q),
         v0=_given(texts, "v0", [name for name, *_ in rows]),
         tau={n: law for n, law in laws.items() if law and kinds[n] in ("", "tau")},
         motion={f"{n}.{kinds[n]}": x for n, x in laws.items() if x and kinds[n] in ("q", "v", "a")},
@@ -249,7 +249,7 @@ class Player:
         self._playing = True
         self._button.props("icon=pause")
         times, speed = self._film.times.tolist(), float(self._speed.value)
-        await self._desk.play(times, self._film.postures, speed)
+        await self._desk.play(times, self._film.configurations, speed)
 
     def stop(self) -> None:
         """Leave the picture where it is."""
@@ -276,9 +276,9 @@ class Player:
         await self._keep(instant)
 
     async def _keep(self, instant: float) -> None:
-        """Make the posture of this instant that of the desk, its sliders included."""
+        """Make the configuration of this instant that of the desk, its sliders included."""
         row = int(np.abs(self._film.times - instant).argmin())
-        await self._desk.set_posture(self._film.postures[row].tolist())
+        await self._desk.set_configuration(self._film.configurations[row].tolist())
 
     def _reached(self, instant: float) -> None:
         """What the picture shows now, where it plays this film; a closed panel ends it."""

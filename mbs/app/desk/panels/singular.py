@@ -1,4 +1,4 @@
-"""The panel of singular postures: the determinant of a Jacobian in factors, each to be shown."""
+"""The panel of singular configurations: the determinant of a Jacobian in factors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ async def open_singular(desk: Desk) -> None:
     given = cast(Given, desk.session.notes.setdefault(f"options {KEY}", {}))
     if desk.checked_system() is None:
         return
-    with desk.open("Determinant and singular postures", key=KEY):
+    with desk.open("Determinant and singular configurations", key=KEY):
         left, shown = two_sides()
     with left:
         form = OptionForm(desk, one, given)
@@ -72,11 +72,11 @@ def _show(desk: Desk, made: Singular) -> None:
 def _factor(desk: Desk, number: int, one: DeterminantFactor) -> None:
     with in_a_row():
         show = ui.button("Show").props("flat no-caps dense").mark(f"show {number}")
-        if one.posture is None:
+        if one.configuration is None:
             show.disable()
-            show.tooltip("No posture near the present one makes it zero")
+            show.tooltip("No configuration near the present one makes it zero")
         else:
-            show.on_click(partial(desk.set_posture, one.posture))
+            show.on_click(partial(desk.set_configuration, one.configuration))
             show.tooltip(f"Move the picture there; the determinant is {one.determinant:.1e}")
         ui.label(one.text).style("font-family: var(--d-mono)")
         ui.label(f"zero where {one.condition}").classes("desk-note")

@@ -105,8 +105,8 @@ static void follow(core *c) {
     m->time = c->m.time;
     memcpy(m->X, c->m.tree, sizeof m->X);
     memcpy(m->slope, c->m.slope, sizeof m->slope);
-    memcpy(c->m.posture_x, c->m.values + STATES, NX * sizeof(double));
-    memcpy(c->m.posture_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
+    memcpy(c->m.configuration_x, c->m.values + STATES, NX * sizeof(double));
+    memcpy(c->m.configuration_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
 }
 
 /* How far the state is from where the independent joints do not serve: 1 at the limit. */

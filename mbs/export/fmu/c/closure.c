@@ -27,7 +27,7 @@
 /* Part of a move by which the dependents may end beside where their slope leads: on another branch
  * they differ by about the difference of the slopes, on the same one by half the step. */
 #define BENT REAL(0.1)
-#define TRIALS 64 /* postures from which a branch is looked for */
+#define TRIALS 64 /* configurations from which a branch is looked for */
 #define RANGE REAL(3.14159265358979) /* of them about the start values, in nominal sizes */
 #define ALIKE REAL(1e-3)             /* weight of the coordinates that were not guessed */
 #define UNBOUNDED REAL(HUGE_VAL)
@@ -78,7 +78,7 @@ static int newton(const loops *l, const real *x, real *z, real reach) {
     return CLOSURE_OPEN;
 }
 
-/* From the accepted posture to x in one go, or along a straight line in shorter ones. */
+/* From the accepted configuration to x in one go, or along a straight line in shorter ones. */
 SHARED int closure_solve(const loops *l, const real *x, real *z) {
     const real *from = l->x;
     real at[NX + 1], trial[NZ], done = REAL(0.0), part = REAL(1.0);
@@ -101,7 +101,7 @@ SHARED int closure_solve(const loops *l, const real *x, real *z) {
     return CLOSURE_OK;
 }
 
-/* From the accepted posture to x along a straight line, on the branch that the slopes lead to: it also
+/* From the accepted configuration to x along a straight line, on the branch that the slopes lead to: it also
  * goes on where branches cross. */
 static int follow(const loops *l, const real *x, real *z) {
     const real *from = l->x, *size = MODEL_NOMINAL;
@@ -188,7 +188,7 @@ static real scattered(unsigned k, unsigned i) {
     return (real)s / REAL(2147483648.0) - REAL(1.0);
 }
 
-/* Where trial k starts: at the guesses; the other coordinates at the start values, near the posture
+/* Where trial k starts: at the guesses; the other coordinates at the start values, near the configuration
  * that continues them, or anywhere. */
 static void trial_start(const loops *l, int k, const real *near, real *z) {
     int i;
@@ -201,7 +201,7 @@ static void trial_start(const loops *l, int k, const real *near, real *z) {
     }
 }
 
-/* Of the posture on the start values' branch and of those that Newton steps reach from other
+/* Of the configuration on the start values' branch and of those that Newton steps reach from other
  * places, the nearest to the guesses: a single guess is enough to choose a branch. */
 static int near_guesses(const loops *l, const real *x, real *z) {
     real near[NZ], trial[NZ], best = UNBOUNDED;

@@ -1,4 +1,4 @@
-/* Dependent coordinates of closed loops, by Newton steps from a known posture.
+/* Dependent coordinates of closed loops, by Newton steps from a known configuration.
  *
  * FMUs and bare C libraries share this file and watch.h: no heap, no stdio, nothing kept between
  * calls, and numbers are `real`, see real.h.
@@ -13,7 +13,7 @@ enum { CLOSURE_OK, CLOSURE_OPEN, CLOSURE_SINGULAR };
 
 /* What a run knows of its loops. */
 typedef struct {
-    real *x, *z;       /* the last accepted posture */
+    real *x, *z;       /* the last accepted configuration */
     const real *guess; /* of z at the start; where it is not MODEL_START, it chooses the branch */
     const real *p;     /* parameters */
     const real **arg;  /* scratch of the generated functions */
@@ -22,10 +22,10 @@ typedef struct {
     real *w;
 } loops;
 
-/* z of the posture x, on the branch of the last accepted posture. */
+/* z of the configuration x, on the branch of the last accepted configuration. */
 SHARED int closure_solve(const loops *l, const real *x, real *z);
 
-/* The first posture of a run: from the guesses, by way of the start values of the states. */
+/* The first configuration of a run: from the guesses, by way of the start values of the states. */
 SHARED int closure_start(const loops *l, const real *x, real *z);
 
 /* 1 where a small change of the states moves the dependent coordinates almost without bound. */

@@ -113,18 +113,18 @@ int core_call_rhs(core *c, double t, const double *x, const double *z, double *x
 static core_status closure_failed(core *c, int status) {
     char where[CORE_WHERE];
     if (status == CLOSURE_SINGULAR)
-        return core_no_answer(c, "%s: singular posture at time %.9g (%s): the states do not determine "
+        return core_no_answer(c, "%s: singular configuration at time %.9g (%s): the states do not determine "
                               "the dependent coordinates; start elsewhere or choose other states",
                               c->name, c->m.time, core_where(c, where));
-    return core_no_answer(c, "%s: unclosable posture at time %.9g (%s): no dependent coordinates near "
+    return core_no_answer(c, "%s: unclosable configuration at time %.9g (%s): no dependent coordinates near "
                           "the last ones close the loops; start elsewhere or move less",
                           c->name, c->m.time, core_where(c, where));
 }
 
-core_status core_accept_posture(core *c, const double *x, const double *z) {
+core_status core_accept_configuration(core *c, const double *x, const double *z) {
     if (closure_singular(&c->loops, x, z)) return closure_failed(c, CLOSURE_SINGULAR);
-    memcpy(c->m.posture_x, x, NX * sizeof *x);
-    memcpy(c->m.posture_z, z, NZ * sizeof *z);
+    memcpy(c->m.configuration_x, x, NX * sizeof *x);
+    memcpy(c->m.configuration_z, z, NZ * sizeof *z);
     c->m.closed = 1;
     return CORE_OK;
 }
@@ -132,7 +132,7 @@ core_status core_accept_posture(core *c, const double *x, const double *z) {
 core_status core_accept_states(core *c) {
     const double *x = c->m.values + STATES;
     int status = closure_solve(&c->loops, x, c->z);
-    return status ? closure_failed(c, status) : core_accept_posture(c, x, c->z);
+    return status ? closure_failed(c, status) : core_accept_configuration(c, x, c->z);
 }
 
 /* What was calculated may be shown. */
@@ -142,7 +142,7 @@ static core_status core_show(core *c) {
     for (i = 0; i < INDICATORS; i++) /* those are looked at when they are shown */
         if (!isfinite(v[i]))
             return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular "
-                                  "posture or a zero mass", c->name, MODEL_NAMES[i], c->m.time);
+                                  "configuration or a zero mass", c->name, MODEL_NAMES[i], c->m.time);
     c->m.stale = 0;
     return CORE_OK;
 }
@@ -245,7 +245,7 @@ static void to_start(core *c) {
 }
 
 static void init_loops(core *c) {
-    loops l = {c->m.posture_x, c->m.posture_z, c->m.guess, c->m.values + PARAMETERS,
+    loops l = {c->m.configuration_x, c->m.configuration_z, c->m.guess, c->m.values + PARAMETERS,
                c->arg,         c->res,         c->iw,      c->w};
     c->loops = l;
 }
@@ -329,7 +329,7 @@ core_status core_exit_initialization(core *c) {
     if (core_check_rules(c)) return CORE_ERROR;
     status = core_refresh(c);
     if (status) return status;
-    status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+    status = core_accept_configuration(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     if (status) return status;
     stepper_start(&c->solver, c->m.time);
 #ifdef MODEL_TREE

@@ -87,12 +87,12 @@ typedef struct {
 typedef struct {
     int mode, cosimulation;
     int stale;   /* the calculated values do not belong to the others any more */
-    int closed;  /* a posture that closes the loops is known */
+    int closed;  /* a configuration that closes the loops is known */
     int inputs;  /* a core_input_motion */
     double time, tolerance, stop; /* stop: the end of the experiment, HUGE_VAL where none is given */
     double values[N_VALUES + 1];
     double guess[NZ + 1];
-    double posture_x[NX + 1], posture_z[NZ + 1]; /* the last accepted posture: warm start */
+    double configuration_x[NX + 1], configuration_z[NZ + 1]; /* the last accepted configuration: warm start */
     double input_time;                  /* to which the inputs and their derivatives belong */
     double slopes[INPUT_ORDERS * NU + 1]; /* first derivatives of all inputs, then second ones */
     watched watched;

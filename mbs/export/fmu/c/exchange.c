@@ -19,7 +19,7 @@ core_status core_enter_event_mode(core *c) {
 #if MODEL_TREE_OUTSIDE
         if (!status) status = charts_pause(c);
 #else
-        if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+        if (!status) status = core_accept_configuration(c, c->m.values + STATES, c->m.values + DEPENDENTS);
         if (!status) status = guard_pass(c);
 #endif
         if (status) return status;
@@ -58,7 +58,7 @@ core_status core_completed_step(core *c, int *event) {
     status = charts_completed(c, event);
 #else
     status = core_arm_indicators(c);
-    if (!status) status = core_accept_posture(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+    if (!status) status = core_accept_configuration(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     if (!status) status = guard_pass(c);
 #endif
     return status;

@@ -75,8 +75,8 @@ core_status core_settle(core *c, int *changed);
 core_status core_show_indicators(core *c);
 core_status core_arm_indicators(core *c);
 
-/* From here on loops are closed starting at this posture; refused where they lose rank. */
-core_status core_accept_posture(core *c, const double *x, const double *z);
+/* From here on loops are closed starting at this configuration; refused where they lose rank. */
+core_status core_accept_configuration(core *c, const double *x, const double *z);
 
 /* The same, of the present states, whose dependent coordinates are not at hand. */
 core_status core_accept_states(core *c);

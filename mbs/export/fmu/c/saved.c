@@ -149,8 +149,8 @@ static int sane(const core_memory *m) {
     if (!all_finite(v + PARAMETERS, NP + NM)) return 0;
     if (!parameters_in_bounds(v)) return 0;
     if (!m->stale && !all_finite(v, INDICATORS)) return 0;
-    if (!all_finite(m->guess, NZ) || !all_finite(m->posture_z, NZ)) return 0;
-    if (!all_finite(m->posture_x, NX) || !sane_inputs(m) || !sane_events(m)) return 0;
+    if (!all_finite(m->guess, NZ) || !all_finite(m->configuration_z, NZ)) return 0;
+    if (!all_finite(m->configuration_x, NX) || !sane_inputs(m) || !sane_events(m)) return 0;
     if (!sane_watch(&m->watched)) return 0;
 #ifdef MODEL_TREE
     if (!is_flag(m->loose) || !all_finite(m->tree, NT)) return 0;

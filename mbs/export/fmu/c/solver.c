@@ -108,8 +108,8 @@ void core_show_tree(core *c) {
     int i;
     for (i = 0; i < NX; i++) c->m.values[STATES + i] = c->m.tree[MODEL_TREE_STATES[i]];
     for (i = 0; i < NZ; i++) c->m.values[DEPENDENTS + i] = c->m.tree[MODEL_TREE_DEPENDENTS[i]];
-    memcpy(c->m.posture_x, c->m.values + STATES, NX * sizeof(double));
-    memcpy(c->m.posture_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
+    memcpy(c->m.configuration_x, c->m.values + STATES, NX * sizeof(double));
+    memcpy(c->m.configuration_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
 }
 
 int core_call_tree(core *c, const double *X, double *Xdot, double *y) {

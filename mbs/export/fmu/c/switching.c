@@ -35,13 +35,13 @@ static core_status step_failed(core *c, int status) {
     static const char *const reason[] = {
         "", "", "too many steps", "the step size became too small",
         "the loops cannot be closed or the equations have no solution (unclosable or singular "
-        "posture)", "the projection failed", "a derivative is not finite (singular posture?)",
+        "configuration)", "the projection failed", "a derivative is not finite (singular configuration?)",
         "a singular configuration is not passed", "a singular configuration is not passed",
         "branches of motion come near each other and do not meet, by too little to tell what turns "
         "from what goes on; make them meet, miss by more, or ask for a looser tolerance",
         "a singular configuration is not passed",
         "it starts in a singular configuration, and its velocities choose no branch of motion",
-        "an event indicator has no value (unclosable or singular posture)",
+        "an event indicator has no value (unclosable or singular configuration)",
         "a jump has no solution", "its jumps do not come to an end",
         "chattering, events follow each other and time stands still"};
     const char *why = status < (int)(sizeof reason / sizeof *reason) ? reason[status] : "";
@@ -102,7 +102,7 @@ static core_status accept(core *c, int at_hand) {
         return CORE_OK;
     }
 #endif
-    return at_hand ? core_accept_posture(c, c->m.values + STATES, c->z) : core_accept_states(c);
+    return at_hand ? core_accept_configuration(c, c->m.values + STATES, c->z) : core_accept_states(c);
 }
 
 core_status core_step(core *c, double limit) {

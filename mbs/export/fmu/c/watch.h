@@ -24,7 +24,7 @@ typedef struct {
 
 #if NB > 0
 
-/* The signs of the determinants of the diagonal blocks at a posture; 1 where one is singular.
+/* The signs of the determinants of the diagonal blocks at a configuration; 1 where one is singular.
  * J: WATCH_WORK numbers. */
 SHARED int watch_signs(const loops *l, const real *x, const real *z, real *sign, real *J);
 

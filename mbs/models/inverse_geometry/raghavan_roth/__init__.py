@@ -18,10 +18,10 @@ For each pose, `candidates`, in units of the loop's length:
 4. `middle`: the null space of the matrix at a root, as large as the cluster; joints 4 and 5 from
    its shifts.
 5. `rest`: joint 2 from linear equations, one root or two, then joints 1 and 6.
-6. `Arrangement.postures`: back to the joints of the arm.
+6. `Arrangement.configurations`: back to the joints of the arm.
 
-What comes out is to be polished and checked by the direct model. No posture is lost at a root that
-several postures share, and near double ones neither.
+What comes out is to be polished and checked by the direct model. No configuration is lost at a
+root that several configurations share, and near double ones neither.
 
 `characteristic` is the same matrix in expressions of the pose, for users.
 

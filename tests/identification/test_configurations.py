@@ -8,7 +8,7 @@ from mbs.errors import ModelError
 from mbs.identification.leading import active_places, is_explicit, positions
 
 
-def test_open_systems_are_their_own_posture():
+def test_open_systems_are_their_own_configuration():
     q = np.random.default_rng(1).normal(size=(4, 3))
     assert positions(arm(), q) is q
     assert active_places(arm()) == [0, 1, 2]
@@ -20,21 +20,21 @@ def test_angles_that_follow_do_not_jump():
     places = active_places(system)
     swing = np.linspace(-0.6, 0.6, 121)
     rates = np.array([1, 1, 1, 1, 1, -0.5])
-    q_a = np.array([system.posture[k] for k in places]) + np.outer(swing, rates)
-    postures = positions(system, q_a)
-    assert postures[:, places] == pytest.approx(q_a, abs=1e-12)
-    assert postures[60] == pytest.approx(np.array(system.posture), abs=1e-9)
-    assert np.abs(np.diff(postures, axis=0)).max() < 0.05
-    assert postures[:, 2].max() > np.pi > postures[:, 2].min()
+    q_a = np.array([system.configuration[k] for k in places]) + np.outer(swing, rates)
+    configurations = positions(system, q_a)
+    assert configurations[:, places] == pytest.approx(q_a, abs=1e-12)
+    assert configurations[60] == pytest.approx(np.array(system.configuration), abs=1e-9)
+    assert np.abs(np.diff(configurations, axis=0)).max() < 0.05
+    assert configurations[:, 2].max() > np.pi > configurations[:, 2].min()
 
 
 def test_a_platform_is_followed_from_its_arms():
     system = mbs.load("delta").assemble()
     assert not is_explicit(system)
-    postures = positions(system, np.array([[0.0, 0.0, 0.0], [0.2, 0.2, 0.2]]))
-    assert postures[0] == pytest.approx(np.array(system.posture), abs=1e-9)
-    assert postures[1, 2] < postures[0, 2] - 0.02
-    assert postures[1, :2] == pytest.approx([0, 0], abs=1e-9)
+    configurations = positions(system, np.array([[0.0, 0.0, 0.0], [0.2, 0.2, 0.2]]))
+    assert configurations[0] == pytest.approx(np.array(system.configuration), abs=1e-9)
+    assert configurations[1, 2] < configurations[0, 2] - 0.02
+    assert configurations[1, :2] == pytest.approx([0, 0], abs=1e-9)
 
 
 def test_a_ball_is_no_independent_position():

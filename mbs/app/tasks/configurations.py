@@ -1,4 +1,4 @@
-"""Every posture that takes a frame to a pose, as rows of a table."""
+"""Every configuration that takes a frame to a pose, as rows of a table."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mbs.errors import ModelError
 from mbs.expressions import Scalar, number
 from mbs.loops.pose import goal
 from mbs.models import inverse_geometry, transform
-from mbs.models.catalogue.postures import SIX, held_at, moving_joints, surplus_joints
+from mbs.models.catalogue.configurations import SIX, held_at, moving_joints, surplus_joints
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry import Solution, Solutions
 from mbs.models.inverse_geometry.solutions import CoordinateLimits, bounds
@@ -125,14 +125,14 @@ def _turn(axis: int, angle: float) -> Array:
 
 __all__ = [
     "METHODS",
+    "Configuration",
+    "ConfigurationList",
     "Near",
-    "Posture",
-    "PostureList",
+    "configurations",
     "locked_by_default",
     "pose_from",
     "pose_from_text",
     "pose_of",
-    "postures",
     "rpy_of",
 ]
 
@@ -144,19 +144,19 @@ METHODS = ("auto", "pieper", "paul", "general", "search")
 
 
 @dataclass(frozen=True, slots=True)
-class Posture:
-    """One posture that takes the frame to the pose.
+class Configuration:
+    """One configuration that takes the frame to the pose.
 
     Attributes:
         q: (nq) positions [rad or m].
         label: what tells it from the others, such as the side of shoulder, elbow and wrist.
         residual: largest element of the pose at q less the wanted one [m or 1].
-        sigma: smallest singular value of the Jacobian; zero at a singular posture.
+        sigma: smallest singular value of the Jacobian; zero at a singular configuration.
         multiplicity: how many roots meet in it; 0 where it is one of a self-motion.
         within_limits: whether whole turns bring every joint within its limits.
         outside: names of the joints that none brings within.
         family: the self-motion that it stands for, in words; "" where there is none.
-        windings: how many postures within limits differ from it by whole turns.
+        windings: how many configurations within limits differ from it by whole turns.
     """
 
     q: tuple[float, ...]
@@ -175,7 +175,7 @@ class Near:
     """The reachable pose that is nearest to the wanted one.
 
     Attributes:
-        q: (nq) a whole posture that has it, loops closed [rad or m].
+        q: (nq) a whole configuration that has it, loops closed [rad or m].
         distance: between the origins of both poses [m].
         angle: between their orientations [rad].
         T: the pose, rows of (4, 4).
@@ -188,8 +188,8 @@ class Near:
 
 
 @dataclass(frozen=True, slots=True)
-class PostureList:
-    """Every posture that takes a frame to a pose.
+class ConfigurationList:
+    """Every configuration that takes a frame to a pose.
 
     Attributes:
         system: name of the mechanism.
@@ -200,8 +200,8 @@ class PostureList:
         locked: joints that stayed, with their positions.
         method: that found them.
         reason: why there is none; "" where there is one.
-        rows: the postures, those near the seed first.
-        nearest: the reachable pose next to the wanted one, where there is no posture.
+        rows: the configurations, those near the seed first.
+        nearest: the reachable pose next to the wanted one, where there is no configuration.
         text: the same as a plain table.
     """
 
@@ -213,7 +213,7 @@ class PostureList:
     locked: tuple[tuple[str, float], ...]
     method: str
     reason: str
-    rows: tuple[Posture, ...]
+    rows: tuple[Configuration, ...]
     nearest: Near | None
     text: str
 
@@ -221,12 +221,12 @@ class PostureList:
 def locked_by_default(
     system: System, frame: str | int | None = None, seed: Seed = None
 ) -> dict[str, float]:
-    """The joints that are locked when nothing is said, as in a posture; none up to six joints."""
+    """The joints that are locked when nothing is said; none up to six joints."""
     name = terminal_frame(system) if frame is None else frame
     return held_at(system, surplus_joints(system, name), system.position(seed))
 
 
-def postures(
+def configurations(
     system: System,
     T: Any,
     frame: str | int | None = None,
@@ -235,8 +235,8 @@ def postures(
     seed: Seed = None,
     locked: Mapping[str, float] | None = None,
     parameters: Values = None,
-) -> PostureList:
-    """Every posture that takes a frame to a pose, with and without loops.
+) -> ConfigurationList:
+    """Every configuration that takes a frame to a pose, with and without loops.
 
     Args:
         system: the mechanism.
@@ -244,7 +244,7 @@ def postures(
         frame: a body, a named frame, the number of a link, or None for the terminal frame.
         method: one of `METHODS`. The general method is for six joints; of another chain "general"
             takes the search.
-        seed: a posture from which distances count and that places joints beside the chain.
+        seed: a configuration from which distances count and that places joints beside the chain.
         locked: positions of joints that stay, by name; `locked_by_default` when left out.
         parameters: values of symbols, the others at their defaults.
 
@@ -259,7 +259,7 @@ def postures(
         system, T, name, way, seed=seed, locked=held or None, parameters=parameters
     )
     limits = bounds(system)
-    return PostureList(
+    return ConfigurationList(
         system=system.name,
         frame=name,
         T=_rows_of(np.asarray(T, dtype=float)),
@@ -279,8 +279,8 @@ def _method(system: System, frame: str | int, method: str, held: Mapping[str, fl
     return "search" if method == "general" and free and len(free) != SIX else method
 
 
-def _row(one: Solution, limits: CoordinateLimits) -> Posture:
-    return Posture(
+def _row(one: Solution, limits: CoordinateLimits) -> Configuration:
+    return Configuration(
         q=_tuple(one.q),
         label=one.branch,
         residual=float(one.residual),

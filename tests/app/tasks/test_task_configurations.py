@@ -1,4 +1,4 @@
-"""All postures of a pose, with and without loops, and poses as people write them."""
+"""All configurations of a pose, with and without loops, and poses as people write them."""
 
 import math
 import pickle
@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.app.tasks.postures import (
+from mbs.app.tasks.configurations import (
+    configurations,
     locked_by_default,
     pose_from,
     pose_from_text,
     pose_of,
-    postures,
     rpy_of,
 )
 from mbs.errors import MbsError, ModelError, NoClosedForm
@@ -36,9 +36,9 @@ def _is_in(found, q):
 
 
 @pytest.mark.parametrize("method", ["auto", "pieper", "paul", "general", "search"])
-def test_every_method_finds_eight_postures_of_the_rx90(rx90, method):
+def test_every_method_finds_eight_configurations_of_the_rx90(rx90, method):
     T = pose_of(rx90, START)
-    found = postures(rx90, T, method=method, seed=START)
+    found = configurations(rx90, T, method=method, seed=START)
     assert len(found.rows) == 8
     assert np.allclose(found.rows[0].q, START, atol=1e-9)
     assert len({row.label for row in found.rows}) == 8
@@ -50,44 +50,44 @@ def test_every_method_finds_eight_postures_of_the_rx90(rx90, method):
     assert pickle.loads(pickle.dumps(found)) == found
 
 
-def test_postures_of_robots_with_loops_close_them(five_bar):
+def test_configurations_of_robots_with_loops_close_them(five_bar):
     sr400 = mbs.load("sr400").assemble()
     q = mbs.loops.solve(sr400, {"q2": -1.2, "q4": 0.3, "q5": 0.8, "q6": -0.4})
-    found = postures(sr400, pose_of(sr400, q), seed=q)
+    found = configurations(sr400, pose_of(sr400, q), seed=q)
     assert np.allclose(found.rows[0].q, q, atol=1e-9)
     assert len(found.rows) >= 8
     assert all(mbs.loops.examine(sr400, row.q).residual < 1e-10 for row in found.rows)
-    T = pose_of(five_bar, five_bar.posture)
-    found = postures(five_bar, T)
+    T = pose_of(five_bar, five_bar.configuration)
+    found = configurations(five_bar, T)
     assert len(found.rows) == 2
-    assert _is_in(found, five_bar.posture)
+    assert _is_in(found, five_bar.configuration)
 
 
 def test_legs_and_short_chains():
     delta = mbs.load("delta").assemble()
-    found = postures(delta, pose_of(delta, None), method="pieper")
+    found = configurations(delta, pose_of(delta, None), method="pieper")
     assert (len(found.rows), found.method) == (8, "loops in closed form")
     tree = mbs.load("two_branch_tree").assemble()
     q = [0.2, 0.1, -0.3, 0.05, 0.6, -0.7, 0.4]
-    found = postures(tree, pose_of(tree, q), method="general", seed=q)
+    found = configurations(tree, pose_of(tree, q), method="general", seed=q)
     assert found.method == "search"
     assert np.allclose(found.rows[0].q, q, atol=1e-9)
     with pytest.raises(NoClosedForm, match="Pieper's method takes six"):
-        postures(tree, pose_of(tree, q), method="pieper")
+        configurations(tree, pose_of(tree, q), method="pieper")
 
 
 def test_seven_joints_keep_one_where_it_is():
     panda = mbs.load("panda").assemble()
     q = [0.1, 0.3, -0.2, -1.5, 0.2, 1.4, 0.3]
     assert locked_by_default(panda, seed=q) == {"q3": -0.2}
-    found = postures(panda, pose_of(panda, q), seed=q)
+    found = configurations(panda, pose_of(panda, q), seed=q)
     assert found.locked == (("q3", -0.2),)
     assert np.allclose(found.rows[0].q, q, atol=1e-8)
 
 
 def test_limits_are_told_joint_by_joint():
     puma = mbs.load("puma560").assemble()
-    found = postures(puma, pose_of(puma, [0.3, 0.2, 0.4, 0.1, 0.5, 0.2]))
+    found = configurations(puma, pose_of(puma, [0.3, 0.2, 0.4, 0.1, 0.5, 0.2]))
     for row in found.rows:
         assert row.within_limits == (not row.outside)
         for name in row.outside:
@@ -100,7 +100,7 @@ def test_limits_are_told_joint_by_joint():
 def test_out_of_reach_tells_why_and_offers_the_nearest(rx90, five_bar):
     T = pose_of(rx90, START)
     T[0, 3] += 5.0
-    found = postures(rx90, T)
+    found = configurations(rx90, T)
     assert found.rows == ()
     assert "out of reach" in found.reason
     near = pose_of(rx90, found.nearest.q)
@@ -108,7 +108,7 @@ def test_out_of_reach_tells_why_and_offers_the_nearest(rx90, five_bar):
     assert math.isclose(np.linalg.norm(near[:3, 3] - T[:3, 3]), found.nearest.distance)
     T = pose_of(five_bar, None)
     T[1, 3] += 5.0
-    found = postures(five_bar, T)
+    found = configurations(five_bar, T)
     assert found.rows == ()
     assert mbs.loops.examine(five_bar, found.nearest.q).residual < 1e-10
     assert 4.0 < found.nearest.distance < 5.1
@@ -151,8 +151,8 @@ def test_wrong_poses_are_refused(text, sentence):
 def test_what_is_no_pose_or_no_name_is_refused(rx90):
     T = pose_of(rx90, START)
     with pytest.raises(ModelError, match="there is no frame 'tip'"):
-        postures(rx90, T, "tip")
+        configurations(rx90, T, "tip")
     with pytest.raises(ModelError, match="has length 2"):
-        postures(rx90, T @ np.diag([2.0, 1, 1, 1]))
+        configurations(rx90, T @ np.diag([2.0, 1, 1, 1]))
     with pytest.raises(ModelError, match="three places and three angles"):
         pose_from((1, 2), (0, 0, 0))

@@ -1,4 +1,4 @@
-"""Postures found by search alone: Gauss-Newton from many random starts."""
+"""Configurations found by search alone: Gauss-Newton from many random starts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mbs.loops.closing import Closing, closure_parameters
 
 
 def searched(system, q_a, starts=150, seed=0, reach=3.5):
-    """All postures with these independent positions that random starts lead to."""
+    """All configurations with these independent positions that random starts lead to."""
     rng = np.random.default_rng(seed)
     places = independent_places(system)
     closing = Closing(system, closure_parameters(system), tuple(places))
@@ -25,7 +25,7 @@ def searched(system, q_a, starts=150, seed=0, reach=3.5):
 
 
 def same(system, q, other, tolerance=1e-5):
-    """Whether two postures agree, angles up to whole turns, quaternions up to their sign."""
+    """Whether two configurations agree, angles up to whole turns, quaternions up to their sign."""
     gap = np.subtract(q, other)
     turns = [coordinate.unit == "rad" for coordinate in system.coordinates]
     gap[turns] = np.remainder(gap[turns] + np.pi, 2 * np.pi) - np.pi
@@ -36,9 +36,10 @@ def same(system, q, other, tolerance=1e-5):
 
 
 def active(system, q=None):
-    """The positions of the independent joints at a posture, the assembled one if none is given.
+    """The positions of the independent joints at a configuration, the assembled one if none is
+    given.
 
-    Rods that spin are as in the assembled posture.
+    Rods that spin are as in the assembled configuration.
     """
-    whole = np.array(system.posture if q is None else q)
+    whole = np.array(system.configuration if q is None else q)
     return np.array([whole[k] if k < system.nq else 0.0 for k in independent_places(system)])

@@ -1,4 +1,4 @@
-"""The panel of inverse geometry: a pose, and every posture that takes a frame there."""
+"""The panel of inverse geometry: a pose, and every configuration that takes a frame there."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ from mbs.app.desk.panels.layout import (
     waiting_note,
 )
 from mbs.app.desk.panels.text_view import column
-from mbs.app.tasks.equations import entry
-from mbs.app.tasks.postures import (
+from mbs.app.tasks.configurations import (
     Array,
-    Posture,
-    PostureList,
+    Configuration,
+    ConfigurationList,
+    configurations,
     pose_from,
     pose_from_text,
     pose_of,
-    postures,
     rpy_of,
 )
+from mbs.app.tasks.equations import entry
 from mbs.assembly import System
 from mbs.errors import MbsError
 from mbs.models.geometry import terminal_frame
 
-# The postures that solve the inverse geometry as a table whose rows move the picture.
+# The configurations that solve the inverse geometry as a table whose rows move the picture.
 
 
 _PAGE = 32
@@ -48,8 +48,8 @@ _DEGREES = 180 / math.pi
 RAD, DEG = "rad", "deg"
 
 
-def show_postures(desk: Desk, made: PostureList) -> None:
-    """The postures where the slot is, or why there are none.
+def show_configurations(desk: Desk, made: ConfigurationList) -> None:
+    """The configurations where the slot is, or why there are none.
 
     Args:
         desk: of the page.
@@ -64,7 +64,7 @@ def show_postures(desk: Desk, made: PostureList) -> None:
         ui.button(
             "CSV",
             icon="download",
-            on_click=lambda: desk.download(csv_of(made), f"{made.system}_postures.csv"),
+            on_click=lambda: desk.download(csv_of(made), f"{made.system}_configurations.csv"),
         ).props("flat dense no-caps")
         ui.label("Click a row to move the picture there.").classes("desk-note")
     table = ui.table(
@@ -74,7 +74,7 @@ def show_postures(desk: Desk, made: PostureList) -> None:
         pagination=_PAGE if len(made.rows) > _PAGE else 0,
     )
     few = "" if len(made.rows) > _PAGE else "hide-bottom"
-    table.props(f"dense flat bordered {few}").classes("desk-table").mark("postures")
+    table.props(f"dense flat bordered {few}").classes("desk-table").mark("configurations")
     table.props(f':table-row-style-fn="{_ROW_STYLE}"')
     table.add_slot("body-cell-limits", _LIMITS)
 
@@ -87,15 +87,15 @@ def show_postures(desk: Desk, made: PostureList) -> None:
     async def clicked(event: events.GenericEventArguments) -> None:
         shown[0] = int(event.args[1]["number"])
         fill()
-        await desk.set_posture(made.rows[shown[0] - 1].q)
+        await desk.set_configuration(made.rows[shown[0] - 1].q)
 
     table.on("rowClick", clicked)
     unit.on_value_change(fill)
     ui.label(_COLUMN_MEANINGS).classes("desk-note")
 
 
-def csv_of(made: PostureList) -> bytes:
-    """The postures as comma-separated values, a header first; positions in rad and m."""
+def csv_of(made: ConfigurationList) -> bytes:
+    """The configurations as comma-separated values, a header first; positions in rad and m."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     units = zip(made.names, made.units, strict=True)
@@ -121,26 +121,26 @@ def csv_of(made: PostureList) -> bytes:
 _ROW_STYLE = "row => 'cursor: pointer' + (row.shown ? '; background: var(--d-accent-soft)' : '')"
 _COLUMN_MEANINGS = (
     "Residual: of the pose [m or 1]. Sigma: smallest singular value of the Jacobian, 0 at a"
-    " singular posture. Roots: how many solutions meet there, any along a self-motion."
+    " singular configuration. Roots: how many solutions meet there, any along a self-motion."
 )
 _LIMITS = """
 <q-td :props="props" :class="props.row.inside ? '' : 'desk-bad'">{{ props.value }}</q-td>
 """
 
 
-def _headline(made: PostureList) -> str:
+def _headline(made: ConfigurationList) -> str:
     count = len(made.rows)
     if not count:
-        return f"{made.system}: no posture takes frame {made.frame} there"
+        return f"{made.system}: no configuration takes frame {made.frame} there"
     outside = sum(not row.within_limits for row in made.rows)
-    told = f"{made.system}, frame {made.frame}: {count} posture{'s' if count > 1 else ''}"
+    told = f"{made.system}, frame {made.frame}: {count} configuration{'s' if count > 1 else ''}"
     told += f" by {made.method}"
     if made.locked:
         told += "; held: " + ", ".join(f"{name} = {x:.4g}" for name, x in made.locked)
     return told + (f"; {outside} outside of limits" if outside else "")
 
 
-def _nothing(desk: Desk, made: PostureList) -> None:
+def _nothing(desk: Desk, made: ConfigurationList) -> None:
     ui.label(made.reason[:1].upper() + made.reason[1:] + ".").mark("reason")
     near = made.nearest
     if near is None:
@@ -148,12 +148,14 @@ def _nothing(desk: Desk, made: PostureList) -> None:
     angle = round(near.angle * _DEGREES, 6)
     away = f"{round(near.distance, 9):.4g} m away and turned by {angle:.4g} degrees"
     with in_a_row():
-        show = ui.button("Show the nearest posture", on_click=lambda: desk.set_posture(near.q))
+        show = ui.button(
+            "Show the nearest configuration", on_click=lambda: desk.set_configuration(near.q)
+        )
         show.props("outline no-caps dense").style("padding: 2px 12px").mark("nearest")
         ui.label(f"Its frame is {away}.").classes("desk-note")
 
 
-def _columns(made: PostureList) -> list[dict[str, Any]]:
+def _columns(made: ConfigurationList) -> list[dict[str, Any]]:
     heads = [("number", "", "right"), ("label", "which one", "left")]
     heads += [(f"q{k}", name, "right") for k, name in enumerate(made.names)]
     heads += [("residual", "residual", "right"), ("sigma", "sigma", "right")]
@@ -163,11 +165,11 @@ def _columns(made: PostureList) -> list[dict[str, Any]]:
     return columns
 
 
-def _rows(made: PostureList, unit: str) -> list[dict[str, Any]]:
+def _rows(made: ConfigurationList, unit: str) -> list[dict[str, Any]]:
     return [_row(made, number, row, unit) for number, row in enumerate(made.rows, 1)]
 
 
-def _row(made: PostureList, number: int, row: Posture, unit: str) -> dict[str, Any]:
+def _row(made: ConfigurationList, number: int, row: Configuration, unit: str) -> dict[str, Any]:
     factors = [_DEGREES if unit == DEG and u == "rad" else 1.0 for u in made.units]
     digits = 2 if unit == DEG else 4
     values = {
@@ -186,7 +188,7 @@ def _row(made: PostureList, number: int, row: Posture, unit: str) -> dict[str, A
     }
 
 
-def _outside(row: Posture) -> str:
+def _outside(row: Configuration) -> str:
     return f"outside: {', '.join(row.outside)}" if row.outside else "outside"
 
 
@@ -252,7 +254,7 @@ def _line(row: Sequence[float]) -> str:
     return "  ".join(_text(value) for value in row)
 
 
-KEY = "postures"
+KEY = "configurations"
 
 _MEANINGS = {
     "auto": "the cheapest that fits",
@@ -263,7 +265,7 @@ _MEANINGS = {
 }
 
 
-async def open_postures(desk: Desk, key: str = "igm-general") -> None:
+async def open_configurations(desk: Desk, key: str = "igm-general") -> None:
     """Open the panel, with the pose that the frame has now.
 
     Args:
@@ -271,14 +273,14 @@ async def open_postures(desk: Desk, key: str = "igm-general") -> None:
         key: of the model whose method is chosen at first.
     """
     try:
-        panel = _PosturesPanel(desk, key)
+        panel = _ConfigurationsPanel(desk, key)
         await panel.take_present()
     except MbsError as error:
         desk.complain(error)
 
 
-class _PosturesPanel:
-    """Frame, method and pose above, the postures below."""
+class _ConfigurationsPanel:
+    """Frame, method and pose above, the configurations below."""
 
     def __init__(self, desk: Desk, key: str) -> None:
         self._desk = desk
@@ -307,7 +309,7 @@ class _PosturesPanel:
                 )
                 side_button("Equations", partial(self._equations, key), "Of the method, as text")
         with self._shown:
-            waiting_note("Every posture that takes the frame to the pose appears here.")
+            waiting_note("Every configuration that takes the frame to the pose appears here.")
         tell_of_changes(desk, self._shown)
         desk.on_robot(self._robot_changed)
 
@@ -332,16 +334,16 @@ class _PosturesPanel:
         self._pose.show(T)
 
     async def solve(self) -> None:
-        """List every posture that takes the frame to the pose."""
+        """List every configuration that takes the frame to the pose."""
         try:
             T = self._pose.T
         except MbsError as error:
             self._desk.complain(error)
             return
         task = partial(
-            postures, frame=self._frame.value, method=self._method.value, seed=self._desk.q
+            configurations, frame=self._frame.value, method=self._method.value, seed=self._desk.q
         )
-        show = partial(show_postures, self._desk)
+        show = partial(show_configurations, self._desk)
         asking = Asking(self._desk, self._button, self._shown, show)
         await asking.run("Solving the inverse geometry", task, T)
 

@@ -1,4 +1,4 @@
-"""Postures are followed along their branch, or looked for near a guess."""
+"""Configurations are followed along their branch, or looked for near a guess."""
 
 import casadi
 import numpy as np
@@ -29,7 +29,7 @@ def test_a_full_turn_stays_on_the_branch(angle):
     q = solve(system, {"j1": angle})
     assert q[0] == angle
     assert np.abs(np.array(closure(system)(q))).max() < 1e-12
-    assert elbow(q) == elbow(system.posture)
+    assert elbow(q) == elbow(system.configuration)
     assert np.abs(q[1:]).max() < 8
     T = np.array(mbs.models.direct_geometry(system, "b")(angle))
     np.testing.assert_allclose(T, np.array(mbs.models.transform(system, "b")(q)), atol=1e-9)
@@ -45,7 +45,7 @@ def test_a_guess_of_one_joint_leads_to_the_nearest_root_without_turns(j2, root):
 def test_a_guess_chooses_the_other_branch():
     system = four_bar()
     q = solve(system, {"j1": 0.3}, guess={"j2": -1.7, "j4": -1.8})
-    assert elbow(q) == -elbow(system.posture)
+    assert elbow(q) == -elbow(system.configuration)
     assert np.abs(np.array(closure(system)(q))).max() < 1e-12
 
 
@@ -66,7 +66,7 @@ def test_values_that_are_no_positions():
         mbs.load("four_bar").assemble(guess={"j2": np.nan})
 
 
-def test_parameters_move_the_posture():
+def test_parameters_move_the_configuration():
     m = Mechanism("rocker", gravity=(0, -9.81, 0), parameters={"L": 0.9, "rho": 2700})
     a, b, c = (
         m.add(Box(n, length=x, width=0.05, density="rho"))
@@ -80,7 +80,7 @@ def test_parameters_move_the_posture():
     for length in (0.8, 1.1):
         q = solve(system, {"j1": 0.5}, parameters={"L": length})
         assert np.abs(np.array(closure(system)(q, [2700, length]))).max() < 1e-12
-        assert elbow(q, c=length) == elbow(system.posture)
+        assert elbow(q, c=length) == elbow(system.configuration)
 
 
 def test_a_symbol_that_is_not_in_the_loop_needs_no_value():
@@ -115,13 +115,13 @@ def test_closed_geometry_is_differentiable_and_refuses_what_it_cannot_reach():
     m.connect(b.right, Revolute("j3"), c.right)
     m.connect(m.world.at(0.8), Revolute("j4"), c.left)
     rockers = m.assemble(guess={"j1": 1.2, "j2": -1.0})
-    with pytest.raises(Unclosable, match=r"no posture on this branch has j1 = 3; j1 can be"):
+    with pytest.raises(Unclosable, match=r"no configuration on this branch has j1 = 3; j1 can be"):
         mbs.models.direct_geometry(rockers)([3.0])
 
 
 @pytest.mark.parametrize("q7", [-2.0, 1.97, 3.1])
-def test_a_parallelogram_goes_straight_through_its_flat_posture(q7):
-    """At the flat posture two branches meet; the one that continues is taken."""
+def test_a_parallelogram_goes_straight_through_its_flat_configuration(q7):
+    """At the flat configuration two branches meet; the one that continues is taken."""
     system = mbs.load("sr400").assemble()
     q = solve(system, {"q7": q7})
     assert q[2] == pytest.approx(np.pi / 2 - q[1] + q7, abs=1e-9)

@@ -17,7 +17,7 @@ SIX = 6
 """Freedoms of a pose."""
 
 _INSTEAD = (
-    "Postures are found by closed form where there is one, else by search from random starts;"
+    "Configurations are found by closed form where there is one, else by search from random starts;"
     " each is checked with the forward model."
 )
 
@@ -61,8 +61,8 @@ LOCKED = several("locked", "joints that stay as assembled", _joints, _surplus)
 def held_at(
     system: System, names: Sequence[str], q: Sequence[float] | None = None
 ) -> dict[str, float]:
-    """Positions of joints in a posture, (nq), the assembled one when left out, by name."""
-    places = zip(system.coordinates, system.posture if q is None else q, strict=True)
+    """Positions of joints in a configuration, (nq), the assembled one when left out, by name."""
+    places = zip(system.coordinates, system.configuration if q is None else q, strict=True)
     return {c.name: float(x) for c, x in places if c.name in names}
 
 
@@ -109,7 +109,8 @@ def _characteristic(found: Function) -> str:
     return (
         f"1. {joint} from det({' + '.join(parts)}) = 0, matrices of {size} rows whose elements are"
         " functions of the pose T alone\n2. the other joints from the null vector of that matrix,"
-        " one posture for each root\n3. each posture is corrected and checked with the forward"
+        " one configuration for each root\n3. each configuration is corrected and checked with the"
+        " forward"
         " model\nSource: Raghavan & Roth 1993; Manocha & Canny 1994\n"
     )
 

@@ -284,5 +284,5 @@ def test_the_start_tells_what_touches_and_what_is_beyond(q, v, modes, beyond):
 
 def test_a_motion_is_not_prescribed_where_a_contact_acts():
     system = stick_slip()
-    with pytest.raises(ModelError, match="motion prescribes x, on which a rigid stop or dry"):
+    with pytest.raises(ModelError, match="motion prescribes x, on which a rigid stop or Coulomb"):
         minimal_state(system, drive=DriveInputs(motions=(("x", "a"),)))

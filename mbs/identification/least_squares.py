@@ -364,8 +364,8 @@ def simulated_motion(
     """The measured efforts drive the robot; a slow controller keeps it near the measured motion.
 
     Noise of the measured positions passes the controller only below its bandwidth, and that of the
-    efforts is integrated twice. Runge-Kutta's method of fourth order, a step for each sample; dry
-    friction changes its sign with the measured motion.
+    efforts is integrated twice. Runge-Kutta's method of fourth order, a step for each sample;
+    Coulomb friction changes its sign with the measured motion.
 
     Source: Janot, Vandanjon & Gautier 2014 (simulated instruments).
 

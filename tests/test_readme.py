@@ -55,5 +55,17 @@ def test_picture_is_small_enough_to_keep(name: str, most: int) -> None:
     assert 10_000 < (ROOT / "docs" / "images" / name).stat().st_size < most
 
 
+def test_measured_figures_of_the_readme_stand_on_the_pages_it_names() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    number = re.compile(r"(?<![\w.])\d[\d,.]*(?:e-\d+)?(?<![,.])")
+    rows = re.findall(
+        r"^\| [^|]+ \| ([^|]*\d[^|]*) \| \[[^|]*\]\((docs/\w+\.md)[^|]*\|$", text, re.MULTILINE
+    )
+    assert len(rows) == 11
+    for measured, page in rows:
+        known = set(number.findall((ROOT / page).read_text(encoding="utf-8")))
+        assert set(number.findall(measured.replace("PUMA 560", "PUMA"))) - known == set(), page
+
+
 def test_readme_has_two_screens() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 95

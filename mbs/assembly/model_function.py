@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import quaternion_slices
-from mbs.assembly.validity import all_hold, plain_fault, plain_rows
+from mbs.assembly.validity import Row, all_hold, plain_fault, plain_rows
 from mbs.errors import MbsError, ModelError
 from mbs.native import compiled
 from mbs.numbers import doubles
@@ -100,38 +100,17 @@ Named = Sequence[tuple[str, SX]]
 
 @dataclass(frozen=True, slots=True)
 class ConfigurationCheck:
-    """Which positions and parameters a model takes.
+    """What a model asks of a configuration beside what every model does.
 
     Attributes:
-        valid: `valid(system)` gives the Function ``valid(q, p)``, 1 where they are taken.
-        refuse: `refuse(system, q, p)` raises the error that says why they are not.
+        rows: `rows(system, q)` at symbols q and `system.p`.
+        refuse: `refuse(system, q, p)` raises the error that says why numbers are not taken.
     """
 
-    valid: Callable[[System], Function]
+    rows: Callable[[System, SX], list[Row]]
     refuse: Callable[[System, Any, Any], None]
 
 
-def _plainly_valid(system: System) -> Function:
-    """``valid(q, p)`` of quaternions and bounds of parameters."""
-    q = SX.sym("q", system.nq)
-    return all_hold(system, "plain", q, plain_rows(system, q))
-
-
-def _refuses(system: System, q: Any, p: Any) -> None:
-    """Say which row fails, of a rule that no component has a sentence for.
-
-    Raises:
-        ModelError: always.
-    """
-    symbols = SX.sym("q", system.nq)
-    rows = plain_rows(system, symbols)
-    residuals = casadi.vertcat(*(row.residual - row.bound for row in rows))
-    found = Function("rows", [symbols, system.p], [residuals])(q, p).full().ravel()
-    row = rows[int(np.argmin(found <= 0))]
-    raise ModelError(f"{system.name}: {row.sentence}")
-
-
-_PLAIN = ConfigurationCheck(_plainly_valid, _refuses)
 _SAME_UNIT = {unit: unit for unit in EFFORT_UNIT}
 
 
@@ -156,8 +135,10 @@ class ModelFunction(Function):
         self._annotate = annotate
         self._check_configuration = check
         self._sizes = {name: self.size_in(name) for name in self.name_in()}
-        self._valid: Function | None = None
-        self._asks = bool(check or system.bounds or quaternion_slices(system.tree))
+        self._of_one: Function | None = None
+        # what a call asks beyond finite numbers; the rows themselves are made when first needed
+        ruled = system.bounds or system.bounded or quaternion_slices(system.tree)
+        self._asks = bool(check or ruled)
 
     @property
     def system(self) -> System:
@@ -203,18 +184,55 @@ class ModelFunction(Function):
         """Another Function with the inputs of this one, checked and completed in the same way."""
         return ModelFunction(function, self._system, check=self._check_configuration)
 
+    def asked(self) -> tuple[str, ...]:
+        """The inputs of which more than finite numbers is asked: positions q, parameters p."""
+        sizes = {"q": self._system.nq, "p": len(self._system.parameters)}
+        return tuple(
+            name
+            for name, size in sizes.items()
+            if self._asks and size and self._sizes.get(name, (0,))[0] == size
+        )
+
+    def rows(self, q: SX) -> list[Row]:
+        """What is asked of the inputs `asked`; empty where it is nothing.
+
+        Args:
+            q: (nq, 1) symbols; parameters are those of the system.
+        """
+        asked, check = self.asked(), self._check_configuration
+        if not asked:
+            return []
+        of = {"parameter": "p"}
+        rows = [row for row in plain_rows(self._system, q) if of.get(row.kind, "q") in asked]
+        return [*rows, *(check.rows(self._system, q) if check and "q" in asked else [])]
+
     def valid(self) -> Function | None:
-        """``valid(q)``, or ``valid(q, p)``: 1 at positions and parameters that the model takes.
+        """``valid(q, p)``, of those of them that are asked: 1 where the model takes all columns.
 
         Returns:
-            None where it asks for nothing but numbers, or has no such input.
+            None where it asks for nothing but numbers.
         """
-        system = self._system
-        asked = plain_rows(system, SX.sym("q", system.nq)) or self._check_configuration
-        names = self.name_in()
-        if not asked or "q" not in names or self.size_in("q") != (system.nq, 1):
+        one = self._valid_of_one()
+        if one is None:
             return None
-        return self._validity()
+        width = max(self._sizes[name][1] for name in one.name_in())
+        if width == 1:
+            return one
+        given = [MX.sym(name, *self._sizes[name]) for name in one.name_in()]
+        every = casadi.mmin(one.map(width)(*given))
+        return Function("valid", given, [every], one.name_in(), ["valid"])
+
+    def _valid_of_one(self) -> Function | None:
+        """`valid` of one column."""
+        if self._of_one is None:
+            q = SX.sym("q", self._system.nq)
+            if not (rows := self.rows(q)):
+                return None
+            symbols = {"q": q, "p": self._system.p}
+            key = self.asked(), self._check_configuration
+            inputs = {name: symbols[name] for name in self.asked()}
+            self._of_one = all_hold(self._system, key, inputs, rows)
+        return self._of_one
 
     def guard(self) -> Callable[..., bool] | None:
         """What tells whether arrays are valid inputs, for calls that go past `__call__`.
@@ -349,39 +367,39 @@ class ModelFunction(Function):
 
     def _require_valid(self, inputs: dict[str, Any]) -> None:
         """Refuse numbers at which the model has no sense."""
-        if not self._asks:
+        one = self._valid_of_one() if self._asks else None
+        if one is None:
             return
-        system = self._system
-        q, p = inputs.get("q"), inputs.get("p")
-        point: list[Any] = [q] if p is None else [q, p]
-        wanted = [(system.nq, 1), (len(system.parameters), 1)][: len(point)]
-        alone = len(point) == 1 + bool(system.parameters) and all(isinstance(x, DM) for x in point)
-        if alone and [x.shape for x in point] == wanted and self._holds(point):
+        system, names = self._system, one.name_in()
+        point = [inputs[name] for name in names]
+        sizes = [(one.size1_in(k), 1) for k in range(len(names))]
+        plain = all(isinstance(x, DM) for x in point) and [x.shape for x in point] == sizes
+        if plain and _is_one(one, point):
             return
         # which sentence to say, of which column, is looked for where one of them fails
-        q, p = _columns(q, system.nq), _columns(p, len(system.parameters))
-        known = [values for values in (q, p) if values is not None]
-        whole = q is not None and (p is not None or not system.parameters)
-        for k in range(max((values.shape[1] for values in known), default=0)):
-            q_k, p_k = (None if x is None else x[:, k % x.shape[1]] for x in (q, p))
-            column = [_dm(x) for x in (q_k, p_k) if x is not None]
-            if whole and self._holds(column):
+        columns = {name: _columns(inputs[name], one.size1_in(name)) for name in names}
+        known = {name: values for name, values in columns.items() if values is not None}
+        for k in range(max((values.shape[1] for values in known.values()), default=0)):
+            column = {name: values[:, k % values.shape[1]] for name, values in known.items()}
+            whole = len(known) == len(names)
+            if whole and _is_one(one, [_dm(column[name]) for name in names]):
                 continue
-            if fault := plain_fault(system, q_k, p_k):
+            if fault := plain_fault(system, column.get("q"), column.get("p")):
                 raise ModelError(f"{self._title}: {fault}")
             if whole:
-                (self._check_configuration or _PLAIN).refuse(
-                    system, q_k, DM() if p_k is None else p_k
-                )
+                self._refuse(column)
 
-    def _holds(self, point: Sequence[Any]) -> bool:
-        return bool(self._validity().call([*point])[0] == 1)
-
-    def _validity(self) -> Function:
-        """``valid(q)``, or ``valid(q, p)``, made once."""
-        if self._valid is None:
-            self._valid = (self._check_configuration or _PLAIN).valid(self._system)
-        return self._valid
+    def _refuse(self, column: dict[str, NDArray[np.float64]]) -> None:
+        """Say what is wrong where no component and no quaternion has a sentence for it."""
+        given = {name: _dm(values) for name, values in column.items()}
+        if self._check_configuration is not None and "q" in given:
+            self._check_configuration.refuse(self._system, given["q"], given.get("p", DM()))
+        q = SX.sym("q", self._system.nq)
+        rows, symbols = self.rows(q), {"q": q, "p": self._system.p}
+        excess = casadi.vertcat(*(row.residual - row.bound for row in rows))
+        found = Function("rows", [symbols[name] for name in given], [excess])(*given.values())
+        broken = rows[int(np.argmin(found.full().ravel() <= 0))]
+        raise ModelError(f"{self._title}: {broken.sentence}")
 
     def _require_numbers(self, outputs: Any) -> None:
         every = outputs if isinstance(outputs, tuple) else (outputs,)
@@ -396,6 +414,10 @@ class ModelFunction(Function):
     def _shapes(self) -> str:
         sizes = (f"{name} {self.size_in(name)}" for name in self.name_in())
         return ", ".join(sizes)
+
+
+def _is_one(valid: Function, point: list[DM]) -> bool:
+    return bool(valid.call(point)[0] == 1)
 
 
 def _dm(array: NDArray[np.float64]) -> DM:

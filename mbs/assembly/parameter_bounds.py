@@ -23,10 +23,7 @@ from mbs.expressions import (
 Bounds = tuple[float | None, float | None]
 """The least and the greatest value; None where there is none."""
 
-_BELOW_ZERO = (
-    -1.0,
-    -1e-5,
-)  # far, and nearer than a limit is to zero; both are refused for the sign
+_BELOW_ZERO = (-1.0, -1e-5)  # far, and nearer than a limit is to zero: refused for the sign
 _ABOVE_ONE = (1.1, 1e3)
 
 

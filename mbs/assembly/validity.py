@@ -6,7 +6,7 @@ Loops add rows of their own; `mbs.models.validity` has all of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -106,13 +106,15 @@ def _bound_rows(name: str, value: SX, bounds: Bounds) -> list[Row]:
     return rows
 
 
-def all_hold(system: System, key: str, q: SX, rows: Iterable[Row]) -> Function:
-    """``valid(q)``, with parameters ``valid(q, p)``: 1 where every row holds, else 0, NaN too.
+def all_hold(
+    system: System, key: Hashable, inputs: Mapping[str, SX], rows: Iterable[Row]
+) -> Function:
+    """``valid(..)`` of the inputs: 1 where every row holds, else 0, NaN too.
 
     Args:
         system: whose cache keeps it.
         key: tells it from others of the system.
-        q: (nq, 1) symbols of the rows.
+        inputs: the symbols of the rows by name.
         rows: of which it is made.
     """
 
@@ -120,8 +122,7 @@ def all_hold(system: System, key: str, q: SX, rows: Iterable[Row]) -> Function:
         value = SX(1)
         for row in rows:  # a comparison with NaN is false, a maximum would lose it
             value = casadi.logic_and(value, row.residual <= row.bound)
-        given = {"q": q, **({"p": system.p} if system.parameters else {})}
-        return Function("valid", [*given.values()], [value], [*given], ["valid"], {"cse": True})
+        return Function("valid", [*inputs.values()], [value], [*inputs], ["valid"], {"cse": True})
 
     function: Function = system.cached(("valid", key), build)
     return function

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX, Function
 
-from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction
-from mbs.assembly.validity import Kind, Row, plain_rows
-from mbs.loops.examine import LED, loop_rows
+from mbs.assembly.validity import Kind, Row
 from mbs.native.bare_source import Real
 
 STATUS_OF: dict[Kind, str] = {
@@ -76,35 +74,21 @@ def check_of(model: Function, real: Real) -> StatusCheck | None:
     """
     if not isinstance(model, ModelFunction):
         return None
-    system, names = model.system, model.name_in()
-    has_q = "q" in names and model.size1_in("q") == system.nq
-    has_p = bool(system.parameters) and "p" in names
+    system, asked = model.system, model.asked()
     q = SX.sym("q", system.nq)
-    rows = [row for row in plain_rows(system, q) if has_p or row.kind != "parameter"]
-    rows = [row for row in rows if has_q or row.kind == "parameter"]
-    if has_q and _asks_for_loops(model, q):
-        rows += loop_rows(system, q)
+    rows = model.rows(q)
     if not rows:
         return None
     inputs = [SX.sym(f"x{k}", *model.size_in(k)) for k in range(model.n_in())]
-    given = dict(zip(names, inputs, strict=True))
-    columns = max(given[key].shape[1] for key, own in (("q", has_q), ("p", has_p)) if own)
-    of_one = Function("rows", [q, system.p], [_holds(rows, real)], {"cse": True})
-    holds = [
-        of_one(_column(given["q"] if has_q else q, k), _column(given.get("p", system.p), k))
-        for k in range(columns)
-    ]
+    given = dict(zip(model.name_in(), inputs, strict=True))
+    symbols = {"q": q, "p": system.p}
+    of_one = Function(
+        "rows", [symbols[name] for name in asked], [_holds(rows, real)], {"cse": True}
+    )
+    columns = max(given[name].shape[1] for name in asked)
+    holds = [of_one(*(_column(given[name], k) for name in asked)) for k in range(columns)]
     function = Function("holds", inputs, [casadi.densify(casadi.vertcat(*holds))], {"cse": True})
     return StatusCheck(function, tuple(STATUS_OF[row.kind] for row in rows) * columns)
-
-
-def _asks_for_loops(model: ModelFunction, q: SX) -> bool:
-    """Whether closed loops are asked for: of one configuration, as `valid` tells it."""
-    system: System = model.system
-    if not system.is_closed:
-        return False
-    of_one = model.like(Function("of_one", [q], [q], ["q"], ["same"]))
-    return of_one.valid() is LED.valid(system)
 
 
 def _holds(rows: Sequence[Row], real: Real) -> SX:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, require_system
-from mbs.assembly.validity import Row, all_hold, plain_rows
+from mbs.assembly.validity import Row
 from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters, row_sizes
 from mbs.loops.closure import closure_rows
@@ -141,12 +141,7 @@ def loop_rows(system: System, q: SX) -> list[Row]:
     ]
 
 
-def _valid(system: System) -> Function:
-    q = SX.sym("q", system.nq)
-    return all_hold(system, "led", q, [*plain_rows(system, q), *loop_rows(system, q)])
-
-
-LED = ConfigurationCheck(_valid, require_led)
+LED = ConfigurationCheck(loop_rows, require_led)
 """Closed loops whose independent joints lead the others."""
 
 

@@ -175,7 +175,7 @@ class LoopFunction(ModelFunction):
             return super().__call__(*args, **kwargs)
         except ModelError:
             given = self._numbers(args, kwargs)
-            if given is None:
+            if given is None or self.system.parameter_fault(given[1]):
                 raise
             raise Unclosable(self._refusal(*given)) from None
 

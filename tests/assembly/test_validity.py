@@ -172,3 +172,50 @@ def test_parameters_may_be_left_out_where_zeros_would_be_refused(ball, make):
     ddm = mbs.models.direct_dynamics(ball)
     q, v, tau = np.array([1.0, 0, 0, 0]), np.ones(3), np.array([0.1, 0.2, 0.3])
     assert make(ddm)(q, v, tau) == pytest.approx(np.array(ddm(q, v, tau)).ravel(), rel=1e-12)
+
+
+def test_a_mass_that_parameters_make_together_is_asked_for_where_nothing_else_is():
+    m = mbs.Mechanism("m", gravity=(0, -9.81, 0))
+    mass = mbs.Parameter("M", 2.0) - mbs.Parameter("cut", 0.5)
+    arm = m.add(Body("arm", mass=mass, com=(0.3, 0, 0), inertia=(0.1, 0.1, 0.1)))
+    m.connect(m.world, Revolute("j"), arm)
+    system = m.assemble()
+    assert not system.bounds
+    idm = mbs.models.inverse_dynamics(system)
+    one, p = np.array([0.1]), np.array([1.0, 3.0])
+    for call in (idm, idm.expand(), mbs.native.compiled(idm), pickle.loads(pickle.dumps(idm))):
+        found = np.array(call(one, one, one)).item()
+        assert found == pytest.approx(float(idm(one, one, one)), rel=1e-14)
+        with pytest.raises(ModelError, match="arm: mass is -2 kg; give zero or more"):
+            call(one, one, one, p)
+    assert np.isnan(mbs.native.batch(idm)(one, one, one, p)).all()
+
+
+@pytest.mark.parametrize("case", ["open loop", "long quaternion", "negative mass"])
+def test_compiled_maps_ask_every_column(case, loop, ball):
+    f, good, wrong = bad(case, loop, ball)
+    many = mbs.native.compiled(f.map(2))
+    one = np.array(f(*good)).ravel()
+    good, wrong = ([np.array(x, dtype=float).ravel() for x in values] for values in (good, wrong))
+    columns = [np.asfortranarray(np.column_stack((a, a))) for a in good]
+    assert np.array(many(*columns))[:, 1] == pytest.approx(one, rel=1e-12)
+    columns = [np.asfortranarray(np.column_stack((a, b))) for a, b in zip(good, wrong, strict=True)]
+    with pytest.raises(MbsError):
+        many(*columns)
+
+
+def test_parameters_are_asked_for_where_positions_are_not():
+    m = mbs.Mechanism("bars", gravity=(0, -9.81, 0))
+    lengths = {"a": mbs.Parameter("L", 0.4), "b": 1.0, "c": 0.9}
+    a, b, c = (m.add(Box(k, length=x, width=0.05, density=2700)) for k, x in lengths.items())
+    m.connect(m.world, Revolute("j1", actuated=True), a.left)
+    m.connect(a.right, Revolute("j2"), b.left)
+    m.connect(b.right, Revolute("j3"), c.right)
+    m.connect(m.world.at(0.8), Revolute("j4"), c.left)
+    closed = mbs.loops.function(m.assemble(guess={"j2": 1.0}))
+    q_a, p = np.array([0.3]), np.array([-0.4])
+    assert "q" not in closed.name_in()
+    for call in (closed, mbs.native.compiled(closed)):
+        with pytest.raises(ModelError, match=r"a: length is -0\.4; give a length above zero"):
+            call(q_a, p)
+    assert np.isnan(mbs.native.batch(closed)(q_a, p)).all()

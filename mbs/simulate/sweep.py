@@ -79,7 +79,7 @@ class Folder:
     """Where the results of a study are kept, a file for each case.
 
     Attributes:
-        path: the folder.
+        path: the folder, absolute: threads that load FMUs change the working directory meanwhile.
     """
 
     path: Path
@@ -96,7 +96,7 @@ class Folder:
             ModelError: it holds another study, or results of an unknown one.
             ExportError: it cannot be written.
         """
-        folder = Folder(_made(path_of(path)))
+        folder = Folder(_made(path_of(path).absolute()))
         index = folder.path / _INDEX
         text = json.dumps(study, indent=1, sort_keys=True) + "\n"
         known = index.read_bytes() if index.exists() else None
@@ -273,7 +273,7 @@ class Sweep:
         Raises:
             ModelError: there is no study.
         """
-        place = Folder(path_of(folder))
+        place = Folder(path_of(folder).absolute())
         name, cases = place.known()
         return cls(name, cases, place, {}, tuple(range(len(cases)))).as_found()
 

@@ -57,6 +57,25 @@ def test_every_combination_is_simulated_as_by_hand(system):
         assert result.units == alone.units
 
 
+def test_the_folder_is_the_one_named_at_the_start(system, tmp_path, monkeypatch):
+    """The working directory belongs to the process: another thread may change it meanwhile."""
+    monkeypatch.chdir(tmp_path)
+    (elsewhere := tmp_path / "elsewhere").mkdir()
+
+    def torque(*_):
+        os.chdir(elsewhere)
+        return [0.0]
+
+    study = mbs.simulate.sweep(system, GRID, 0.2, tau=torque, folder="study", **OPTIONS)
+    assert not study.failures
+    assert study[5].time[-1] == pytest.approx(0.2)
+    assert not list(elsewhere.iterdir())
+    monkeypatch.chdir(tmp_path)
+    again = mbs.simulate.Sweep.open("study")
+    os.chdir(elsewhere)
+    assert np.array_equal(again[5].values, study[5].values)
+
+
 def test_listed_cases_and_efforts(system):
     listed = [{"q1.tau": 1.0}, {"q1.tau": 2.0, "m": 4.0}]
     study = mbs.simulate.sweep(system, listed, 0.2, q0={"q1": 0.5}, **OPTIONS)

@@ -46,6 +46,7 @@ from mbs.components.joints import (
     Universal,
 )
 from mbs.components.mechanism import Mechanism, Placed
+from mbs.components.notes import Note
 from mbs.components.sensors import (
     AbsoluteSensor,
     DistanceSensor,
@@ -86,6 +87,7 @@ __all__ = [
     "JointStop",
     "KhalilBody",
     "Mechanism",
+    "Note",
     "Placed",
     "Planar",
     "Point",

@@ -12,6 +12,7 @@ from mbs.components.component import Component, Point
 from mbs.components.couplings import Coupling
 from mbs.components.drives import Flange, flange_pair
 from mbs.components.joints import Joint
+from mbs.components.notes import Note
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
 from mbs.text import quoted
@@ -125,6 +126,9 @@ class Mechanism:
         keep_order: number the links in the order in which the joints were added, as a table of
             frames does, instead of depth-first.
         guess: joint positions that `assemble` starts from when it closes loops.
+
+    Attributes:
+        notes: what the reader of a file renamed, ignored, doubted or completed; print them.
     """
 
     def __init__(
@@ -141,6 +145,7 @@ class Mechanism:
         self.keep_order = keep_order
         self.cuts: list[str] = []
         self.guess = dict(guess or {})
+        self.notes: list[Note] = []
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
         self.connections: list[tuple[Point, Point]] = []

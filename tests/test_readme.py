@@ -1,28 +1,35 @@
 """Every Python block of the README and of docs/ runs, in order, in an empty folder."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from PIL import Image
+from support.page import PROGRAM, blocks, documented_extras
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _LINK = re.compile(r"\]\((?!http|#)([^)#]+)")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_python_blocks_run(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+WITH_CODE = [page for page in PAGES if blocks(page)]
+AFTERWARDS = {
+    "getting_started.md": "assert abs(result['j4.q'] - other['j4.q']).max() < 1e-6",
+}
+"""What must hold of the names of a page when it has run."""
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.name)
+def test_python_blocks_run_in_the_installation_that_is_documented(
+    page: Path, tmp_path: Path
 ) -> None:
-    text = page.read_text(encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for block in _BLOCK.finditer(text):
-        line = text.count("\n", 0, block.start(1))
-        exec(compile("\n" * line + block[1], str(page), "exec"), names)
-    printed = capsys.readouterr().out
+    extras = ",".join(documented_extras(page)) or "none"
+    command = [sys.executable, str(PROGRAM), str(page), extras, AFTERWARDS.get(page.name, "")]
+    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    printed, text = ran.stdout, page.read_text(encoding="utf-8")
     if page.name in ("README.md", "getting_started.md"):
         quoted = re.search(r"The report says what was found:\n\n(.*?)\n\n", text, re.DOTALL)
         assert quoted is not None
@@ -35,7 +42,16 @@ def test_python_blocks_run(
         for number in ("6.70913 5", "-3.924", "-19.62", "['m', 'L']"):
             assert number in printed.replace("DM(", ""), number
         assert (tmp_path / "motion.png").stat().st_size > 1000
-        assert float(abs(names["result"]["j4.q"] - names["other"]["j4.q"]).max()) < 1e-6
+
+
+def test_what_an_installation_without_extras_lacks(tmp_path: Path) -> None:
+    """The test above can fail: a page that plots needs matplotlib, and is refused without."""
+    page = tmp_path / "page.md"
+    page.write_text("```python\nimport mbs\nimport matplotlib\n```\n", encoding="utf-8")
+    command = [sys.executable, str(PROGRAM), str(page)]
+    ran = subprocess.run([*command, "none"], capture_output=True, text=True)
+    assert "No module named 'matplotlib'" in ran.stderr
+    assert subprocess.run([*command, "plot"], capture_output=True).returncode == 0
 
 
 def _size_and_pictures(film: Path) -> tuple[int, int, int]:

@@ -6,12 +6,13 @@ import hashlib
 import importlib.util
 import os
 import platform
+import re
 import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -158,13 +159,18 @@ def compile_library(
     includes = [f"-I{folder}" for folder in include_dirs]
     libm = [] if output.suffix == ".dll" else ["-lm"]
     files = [str(source) for source in sources]
-    command = [*compiler.command, *flags, *includes, *files, "-o", str(output), *libm]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    _compile(compiler, [*flags, *includes, *files, "-o", str(output), *libm], sources)
+    return output
+
+
+def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Path]) -> None:
+    answer = subprocess.run(
+        [*compiler.command, *arguments], capture_output=True, text=True, check=False
+    )
     if answer.returncode != 0:
         complaint = _complaint(answer.stderr)
         names = ", ".join(source.name for source in sources)
         raise CompilerError(f"{compiler.command[0]} refused {names}: {complaint.strip()[:500]}")
-    return output
 
 
 def _complaint(stderr: str) -> str:
@@ -269,6 +275,7 @@ def cached_library(
     *,
     compiler: Compiler | None = None,
     suffix: str = LIBRARY_SUFFIX,
+    common: Collection[str] = (),
 ) -> Path:
     """The shared library of these sources, built when nobody has built it yet.
 
@@ -280,6 +287,7 @@ def cached_library(
         flags: every flag of the compiler.
         compiler: that builds it, the one of this computer when left out.
         suffix: of the library.
+        common: of the C files, those that many libraries have; each is compiled once and kept too.
 
     Returns:
         path of the library.
@@ -289,17 +297,46 @@ def cached_library(
     """
     folder, chosen = cache_dir(), compiler or find_compiler()
     key = _key(files, flags, chosen)
-    for known in sorted(folder.glob(f"{key}-*{suffix}")):
-        if is_whole(known):
-            return known
+    known = _known(folder, key, suffix)
+    if known is not None:
+        return known
     with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as name:
         build = Path(name)
         for file, text in files.items():
             (build / file).write_text(text, encoding="utf-8")
-        sources = [build / file for file in files if file.endswith(".c")]
+        parts = [
+            _common_object(file, files, flags, chosen, build) if file in common else build / file
+            for file in files
+            if file.endswith(".c")
+        ]
         output = build / f"library{suffix}"
-        library = compile_library(sources, [build], flags, output, compiler=chosen)
+        library = compile_library(parts, [build], flags, output, compiler=chosen)
         return _installed(library, folder / f"{key}-{_sum_of(library)}{suffix}")
+
+
+def _known(folder: Path, key: str, suffix: str) -> Path | None:
+    found = sorted(folder.glob(f"{key}-*{suffix}"))
+    return next((known for known in found if is_whole(known)), None)
+
+
+_INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
+
+
+def _common_object(
+    file: str, files: Mapping[str, str], flags: Sequence[str], compiler: Compiler, build: Path
+) -> Path:
+    """The object of one C file, built when nobody has: from its text, its headers and the flags."""
+    read = [file]
+    for name in read:  # grows by the headers of headers
+        read += [n for n in _INCLUDE.findall(files[name]) if n in files and n not in read]
+    chosen = [*(flag for flag in flags if flag not in ("-shared", "-s")), "-c"]
+    key, folder = _key({name: files[name] for name in read}, chosen, compiler), build.parent
+    known = _known(folder, key, ".o")
+    if known is not None:
+        return known
+    source, output = build / file, build / f"{Path(file).stem}.o"
+    _compile(compiler, [*chosen, f"-I{build}", str(source), "-o", str(output)], [source])
+    return _installed(output, folder / f"{key}-{_sum_of(output)}.o")
 
 
 def is_whole(library: Path) -> bool:

@@ -97,7 +97,8 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     if equations.passage is not None:
         names.extend(("dense", "passage"))
         flags.append("-DMBS_PASSAGE")
-    library = cached_library({"system.c": source, **_runtime(tuple(names))}, flags)
+    runtime = _runtime(tuple(names))
+    library = cached_library({"system.c": source, **runtime}, flags, common=tuple(runtime))
     return _load(library, equations.indicators is not None, equations.passage is not None)
 
 

@@ -113,7 +113,7 @@ def test_a_failing_compiler_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "x.fmu"
     path.write_text("old")
 
-    def refuse(*_):
+    def refuse(*_, **__):
         raise CompilerError("no C compiler was found")
 
     monkeypatch.setitem(write_fmu.__globals__, "cached_library", refuse)

@@ -1,5 +1,6 @@
 import ctypes
 import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -58,3 +59,45 @@ def test_the_platform_cache_folder(monkeypatch, tmp_path):
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_dir() == tmp_path / "mbs"
+
+
+PARTS = {
+    "own.c": '#include "shared.h"\nint f(void) { return shared() + OWN; }',
+    "shared.c": '#include "shared.h"\n#include <math.h>\nint shared(void) { return BASE; }',
+    "shared.h": '#include "base.h"\nint shared(void);\n#define OWN 2',
+    "base.h": "#define BASE 40",
+}
+
+
+def test_what_libraries_have_in_common_is_compiled_once(cache, monkeypatch):
+    compiled = []
+    module = sys.modules["mbs.native.compiler"]
+    run = module._compile
+    monkeypatch.setattr(
+        module, "_compile", lambda c, given, s: (compiled.append(s), run(c, given, s))
+    )
+    first = cached_library(PARTS, common=("shared.c",))
+    assert ctypes.CDLL(str(first)).f() == 42
+    other = cached_library({**PARTS, "own.c": PARTS["own.c"] + "\n"}, common=("shared.c",))
+    assert ctypes.CDLL(str(other)).f() == 42
+    assert [[file.name[-2:] for file in sources] for sources in compiled] == [
+        [".c"],
+        [".c", ".o"],
+        [".c", ".o"],
+    ]
+    assert sorted(file.suffix for file in cache.iterdir()) == [".o", first.suffix, first.suffix]
+
+
+def test_a_header_of_a_header_makes_another_object(cache):
+    cached_library(PARTS, common=("shared.c",))
+    changed = cached_library({**PARTS, "base.h": "#define BASE 41"}, common=("shared.c",))
+    assert ctypes.CDLL(str(changed)).f() == 43
+
+
+def test_a_damaged_object_is_compiled_again(cache):
+    cached_library(PARTS, common=("shared.c",))
+    (kept,) = cache.glob("*.o")
+    kept.write_bytes(b"")
+    other = cached_library({**PARTS, "own.c": PARTS["own.c"] + "\n"}, common=("shared.c",))
+    assert ctypes.CDLL(str(other)).f() == 42
+    assert kept.stat().st_size > 0

@@ -257,13 +257,18 @@ def _binaries(
 ) -> dict[str, bytes]:
     """The libraries: name in the FMU to content."""
     flags = (*plain_flags(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
+    common = tuple(f"{name}.c" for name in _runtime(model.solver))
     libraries: dict[Platform, Path] = {}
     if goals is None:
-        libraries[host_platform()] = cached_library(texts, flags)
+        libraries[host_platform()] = cached_library(texts, flags, common=common)
     for goal in goals or ():
         stripped = (*flags, "-s")
         libraries[goal] = cached_library(
-            texts, stripped, compiler=cross_compiler(goal), suffix=goal.suffix
+            texts,
+            stripped,
+            compiler=cross_compiler(goal),
+            suffix=goal.suffix,
+            common=common,
         )
     return {
         f"binaries/{folder_of(goal, fmi)}/{model.identifier}{goal.suffix}": library.read_bytes()

@@ -20,15 +20,22 @@ OTHER_KERNELS := tests/solvers/test_shortest_steps.py tests/solvers/test_partial
     tests/bridges/test_opti.py::test_four_bar_finds_its_optimum \
     tests/identification/exciting/test_excitation.py::test_a_platform_that_follows_keeps_its_height
 
+# What needs no compiler, no browser and no long motion.
+FAST := tests/assembly tests/components tests/expressions tests/formats tests/operations \
+    tests/recursions tests/spatial tests/structure tests/view
+
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --editable
 
 LOWEST := build/lowest/bin/python
 
-.PHONY: help demo test test-lowest kernels lint types layers docs clean
+.PHONY: help demo check test test-all test-lowest guides kernels lint types layers docs clean
 
 help:
 	@echo "make demo     install mbs into $(VENV) and run examples/01_four_bar.py; files go to build/four_bar"
-	@echo "make test     install the tools and run every check: lint, types, layers, tests"
+	@echo "make check    lint, types, layers and the fast half of the tests"
+	@echo "make test     install the tools and run every check: lint, types, layers, tests; of sweeps a part"
+	@echo "make test-all the same with every case of every sweep, and make guides"
+	@echo "make guides   every page in the installation that it documents, in build/guides"
 	@echo "make test-lowest  the tests with the lowest versions that pyproject.toml allows, in build/lowest; Python 3.11 or 3.12"
 	@echo "make kernels  a part of the tests with the linear algebra of another processor"
 	@echo "make lint     ruff: style and format"
@@ -43,6 +50,16 @@ demo: $(VENV)/.demo
 
 test: lint types layers
 	@$(RUN)/python -m pytest -n 2 --dist worksteal
+
+check: lint types layers
+	@$(RUN)/python -m pytest -n 2 --dist worksteal $(FAST)
+
+test-all: lint types layers
+	@MBS_TEST_ALL=1 $(RUN)/python -m pytest -n 2 --dist worksteal
+	@$(MAKE) --no-print-directory guides
+
+guides: $(VENV)/.dev
+	@$(RUN)/python .ci/guides
 
 # Old packages say that newer ones, on which they stand, have deprecated something: no error here.
 test-lowest: build/lowest/.made

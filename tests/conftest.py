@@ -1,11 +1,54 @@
 """Settings of every run of the tests."""
 
+import datetime
 import gc
+import math
 import os
+import random
+from collections import defaultdict
+
+from support.sweeps import EVERY_CASE
 
 # Each worker of a run fills a core: threads of linear algebra would only wait for one another.
 # NumPy reads it when it is loaded, which is after this file.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Where values are compared the compiler need not take its time; with every case it does.
+if not EVERY_CASE:
+    os.environ.setdefault("MBS_OPTIMIZE", "0")
+
+# Which part of a sweep runs changes from day to day, and is the same in all workers of a run.
+os.environ.setdefault("MBS_TEST_SEED", str(datetime.date.today().toordinal()))
+
+
+def pytest_configure(config):
+    """The markers of this project."""
+    config.addinivalue_line(
+        "markers", "sweep: many cases of one rule; a part runs, all with MBS_TEST_ALL=1"
+    )
+
+
+def pytest_report_header(config):
+    """What makes a run repeatable."""
+    part = "all cases" if EVERY_CASE else f"a part, MBS_TEST_SEED={os.environ['MBS_TEST_SEED']}"
+    return f"sweeps: {part}"
+
+
+def pytest_collection_modifyitems(config, items):
+    """Of each sweep a seeded fifth, at least three cases."""
+    if EVERY_CASE:
+        return
+    sweeps = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("sweep"):
+            sweeps[item.nodeid.partition("[")[0]].append(item)
+    left = set()
+    for name, cases in sweeps.items():
+        kept = max(3, math.ceil(len(cases) / 5))
+        chosen = random.Random(os.environ["MBS_TEST_SEED"] + name)
+        left.update(chosen.sample(cases, max(0, len(cases) - kept)))
+    config.hook.pytest_deselected(items=[item for item in items if item in left])
+    items[:] = [item for item in items if item not in left]
 
 
 def pytest_collection_finish():

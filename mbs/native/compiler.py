@@ -132,6 +132,25 @@ def flags_for(source: str) -> tuple[str, ...]:
     return (level, *FLAGS[1:])
 
 
+def at_chosen_level(flags: Sequence[str]) -> tuple[str, ...]:
+    """The flags at the level of optimization that MBS_OPTIMIZE names; as they are without it.
+
+    The numbers that code without contraction gives are the same at every level.
+
+    Raises:
+        CompilerError: MBS_OPTIMIZE is no level.
+    """
+    level = os.environ.get("MBS_OPTIMIZE", "").strip()
+    if not level:
+        return tuple(flags)
+    if level not in ("0", "1", "2", "3"):
+        raise CompilerError(
+            f"environment variable MBS_OPTIMIZE is {level!r}; set it to 0, 1, 2 or 3"
+        )
+    levels = {f"-O{number}" for number in range(4)}
+    return tuple(f"-O{level}" if flag in levels else flag for flag in flags)
+
+
 def compile_library(
     sources: Sequence[Path],
     include_dirs: Sequence[Path] = (),
@@ -284,7 +303,7 @@ def cached_library(
 
     Args:
         files: file name to its text; names that end in .c are compiled, the others are headers.
-        flags: every flag of the compiler.
+        flags: every flag of the compiler; MBS_OPTIMIZE replaces the level of optimization.
         compiler: that builds it, the one of this computer when left out.
         suffix: of the library.
         common: of the C files, those that many libraries have; each is compiled once and kept too.
@@ -295,7 +314,7 @@ def cached_library(
     Raises:
         CompilerError: there is no compiler, or it refused the code.
     """
-    folder, chosen = cache_dir(), compiler or find_compiler()
+    folder, chosen, flags = cache_dir(), compiler or find_compiler(), at_chosen_level(flags)
     key = _key(files, flags, chosen)
     known = _known(folder, key, suffix)
     if known is not None:

@@ -32,7 +32,13 @@ from mbs.native.c_code import (
     schedule,
     slots,
 )
-from mbs.native.compiler import cache_dir, cached_library, find_compiler, is_whole
+from mbs.native.compiler import (
+    at_chosen_level,
+    cache_dir,
+    cached_library,
+    find_compiler,
+    is_whole,
+)
 from mbs.native.staged import Mapped, Staged, staged
 from mbs.operations.graph import Graph, graph_of
 
@@ -432,7 +438,7 @@ def _index_key(text: str, options: str) -> str:
     compiler = find_compiler()
     facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
     digest = hashlib.sha256()
-    for part in (*facts, *FAST_FLAGS, _writer(), options, text):
+    for part in (*facts, *at_chosen_level(FAST_FLAGS), _writer(), options, text):
         digest.update(part.encode())
         digest.update(b"\0")
     return digest.hexdigest()[:40]

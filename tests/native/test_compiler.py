@@ -5,7 +5,7 @@ import pytest
 
 from mbs.errors import CompilerError
 from mbs.native import compile_library, compiler_found, find_compiler
-from mbs.native.compiler import FLAGS, flags_for
+from mbs.native.compiler import FLAGS, at_chosen_level, flags_for
 
 
 def test_a_compiler_is_found():
@@ -77,3 +77,13 @@ def test_long_code_is_optimized_less():
     assert flags_for("x\n" * 50_000)[0] == "-O1"
     assert flags_for("x\n" * 500_000)[0] == "-O0"
     assert flags_for("x\n" * 500_000)[1:] == FLAGS[1:]
+
+
+def test_the_level_of_optimization_can_be_chosen(monkeypatch):
+    monkeypatch.setenv("MBS_OPTIMIZE", "0")
+    assert at_chosen_level(("-O2", "-fPIC")) == ("-O0", "-fPIC")
+    monkeypatch.setenv("MBS_OPTIMIZE", "")
+    assert at_chosen_level(("-O2", "-fPIC")) == ("-O2", "-fPIC")
+    monkeypatch.setenv("MBS_OPTIMIZE", "fast")
+    with pytest.raises(CompilerError, match=r"MBS_OPTIMIZE is 'fast'; set it to 0, 1, 2 or 3"):
+        at_chosen_level(("-O2",))

@@ -2,7 +2,8 @@
 
     python benchmarks/validity.py
 
-The two are called in turn, so that both meet the same machine; the ratio is of the medians.
+The two are called in turn, so that both meet the same machine; times are those of the processor,
+to which other programs do not add; the ratio is of the medians.
 """
 
 from __future__ import annotations
@@ -44,15 +45,15 @@ def show(label: str, one: Callable[[], object], other: Callable[[], object], sta
     """A line of the table."""
     times: tuple[list[float], list[float]] = ([], [])
     one(), other()
-    started = time.perf_counter()
+    started = time.thread_time()
     one()
-    calls = max(1, int(SECONDS / (time.perf_counter() - started)))
+    calls = max(1, int(SECONDS / (time.thread_time() - started)))
     for _ in range(ROUNDS):
         for call, kept in zip((one, other), times, strict=True):
-            started = time.perf_counter()
+            started = time.thread_time()
             for _ in range(calls):
                 call()
-            kept.append((time.perf_counter() - started) / calls / states)
+            kept.append((time.thread_time() - started) / calls / states)
     a, b = (float(np.median(kept)) * 1e6 for kept in times)
     print(f"{label:34}{a:10.4g}{b:10.4g}{a / b:8.3f}", flush=True)
 

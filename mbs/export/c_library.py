@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Any, cast, get_args
 
 import casadi
 import numpy as np
@@ -19,7 +19,7 @@ from mbs.errors import ExportError, ModelError
 from mbs.export.c_check import NO_FAST_MATH, STATUS, StatusCheck, check_of
 from mbs.export.c_step import Step, step_texts
 from mbs.files import path_of, write_texts
-from mbs.native.bare_source import NOINLINE, Real, bare_source, literal
+from mbs.native.bare_source import NOINLINE, Real, Target, bare_source, literal
 from mbs.native.compiled import generated, require_function, require_names, unwritten
 from mbs.text import in_c_comment, quoted
 
@@ -217,7 +217,6 @@ _LARGEST: dict[Real, tuple[str, str]] = {
 _FEW = 64
 """Numbers that one expression adds up; where it overflows, each is looked at."""
 
-Target = Literal["hosted", "bare"]
 Model = Function | System
 Functions = Model | Sequence[Model] | Mapping[str, Model]
 

@@ -30,6 +30,9 @@ from mbs.operations.graph import Graph, Node, graph_of
 Real = Literal["double", "float"]
 """The C type of numbers."""
 
+Target = Literal["hosted", "bare"]
+"""What C is for: an operating system, or none."""
+
 _CALL = re.compile(r"\b([a-z]\w*)\(")
 _LITERAL = re.compile(r"\b\d+\.\d+\b")
 _LEAST = float(np.finfo(np.float32).tiny)

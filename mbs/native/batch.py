@@ -269,12 +269,11 @@ class Batch:
     note: str
     _code: _Code | None
     _functions: tuple[Function, ...]
-    _checked: bool
-    _valid: tuple[Batch, ...]
+    _guarded: Function | None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds the Functions, which are compiled where it is read."""
-        return functools.partial(batch, checked=self._checked), (self._functions,)
+        return functools.partial(batch, checked=self._guarded is not None), (self._functions,)
 
     @property
     def lanes(self) -> int:
@@ -317,8 +316,6 @@ class Batch:
             port.taken(value, self._name) for port, value in zip(self.inputs, values, strict=True)
         ]
         states = self._states(given)
-        named = dict(zip((port.name for port in self.inputs), given, strict=True))
-        every = [valid(*(named[port.name] for port in valid.inputs)) for valid in self._valid]
         results = self._results(out, states)
         if out is not None:
             self._require_apart(given, results)
@@ -327,10 +324,6 @@ class Batch:
             self._interpret(given, results, count)
         else:
             self._run(self._code, [*given, *results], count, self._threads(threads, count))
-        for taken in every:  # rows that a model does not take
-            if not np.all(taken == 1.0):
-                for result in results:
-                    result[taken[..., 0] != 1.0] = np.nan
         if out is not None:
             return out
         return results[0] if len(results) == 1 else tuple(results)
@@ -439,12 +432,15 @@ class Batch:
             columns.append(np.broadcast_to(every, (states, port.size)).T)
         if states == 0:
             return
-        answers = self.function.map(states).call([casadi.DM(c) for c in columns])
-        finite = np.all([np.isfinite(c).all(axis=0) for c in columns], axis=0)
-        for answer, result in zip(answers, results, strict=True):
+        function = self._guarded or self.function
+        answers = function.map(states).call([casadi.DM(c) for c in columns])
+        taken = np.all([np.isfinite(c).all(axis=0) for c in columns], axis=0)
+        for valid in answers[len(results) :]:
+            taken &= valid.full().ravel() == 1.0
+        for answer, result in zip(answers, results, strict=False):
             rows = np.array(answer.full().T)
-            if self._checked:
-                rows[~finite] = np.nan
+            if self._guarded is not None:
+                rows[~taken] = np.nan
             result[...] = rows.reshape(result.shape)
 
 
@@ -477,25 +473,25 @@ def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> 
         require_function(part)
     function, inputs, outputs = joined(parts)
     models = [part for part in parts if checked and hasattr(part, "valid")]
-    code, note = _code(function, bool(models))
     valid = _valid_functions(models)
+    guarded = joined([*parts, *valid])[0] if valid else function if models else None
+    code, note = _code(function if guarded is None else guarded, guarded is not None, len(valid))
     ports = tuple(inputs), tuple(outputs)
-    guards = tuple(batch(one, checked=False) for one in valid.values())
-    return Batch(function, *ports, _defaults(parts), note, code, tuple(parts), bool(models), guards)
+    return Batch(function, *ports, _defaults(parts), note, code, tuple(parts), guarded)
 
 
-def _valid_functions(models: Sequence[Any]) -> dict[int, Function]:
+def _valid_functions(models: Sequence[Any]) -> list[Function]:
     """What tells whether models take a state, each once."""
     asked = (model.valid() for model in models)
-    return {hash(valid): valid for valid in asked if valid is not None}
+    return list({hash(valid): valid for valid in asked if valid is not None}.values())
 
 
-def _code(function: Function, finite: bool) -> tuple[_Code | None, str]:
+def _code(function: Function, finite: bool, valid: int) -> tuple[_Code | None, str]:
     """The machine code, None where there can be none, and what to say about it."""
     if not compiler_found():
         return None, "interpreted by CasADi, for there is no C compiler"
     try:
-        source = batch_source(function, finite=finite)
+        source = batch_source(function, finite=finite, valid=valid)
     except ModelError as error:
         return None, f"interpreted by CasADi ({error})"
     files = {**source.files, "processor.h": f"/* {processor()} */\n"}

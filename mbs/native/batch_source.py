@@ -53,7 +53,9 @@ class _States(LaneCode):
         return LaneCode._written(self, graph, number)
 
 
-def batch_source(function: Function, block: int = BLOCK, finite: bool = False) -> BatchSource:
+def batch_source(
+    function: Function, block: int = BLOCK, finite: bool = False, valid: int = 0
+) -> BatchSource:
     """The C files of a Function whose inputs and outputs are dense columns.
 
     Args:
@@ -61,6 +63,8 @@ def batch_source(function: Function, block: int = BLOCK, finite: bool = False) -
         block: assignments in one C function.
         finite: outputs of a state are NaN where one of its inputs is not a finite number, also one
             that has no effect.
+        valid: the last outputs, so many of them, say whether a state is taken: where one is not 1,
+            the others are NaN. They do not leave the code.
 
     Raises:
         ModelError: it has no scalar operations, or one that C does not have.
@@ -75,7 +79,8 @@ def batch_source(function: Function, block: int = BLOCK, finite: bool = False) -
     given = [port.sparsity.nnz() for port in graph.outputs]
     starts = list(accumulate([*taken, *given], initial=where.count))
     places = [f"w + {start}" for start in starts]
-    count = len(taken)
+    count, shown = len(taken), len(given) - valid
+    flags = [f"out[{shown + k}][0]" for k in range(valid)]
     lines = [
         _HEAD,
         *(code.block(f"part{k}", k, steps) for k, steps in enumerate(pieces)),
@@ -96,10 +101,10 @@ def batch_source(function: Function, block: int = BLOCK, finite: bool = False) -
             for k, size in enumerate(taken)
         ),
         *(f"    part{k}(in, out, w);" for k in range(len(pieces))),
-        *(_flagged([*zip(places, taken, strict=False)], given) if finite else ()),
+        *(_flagged([*zip(places, taken, strict=False)], flags, given[:shown]) if finite else ()),
         *(
             f"    mbs_give(ports + {count + k}, k, many, {size}, out[{k}]);"
-            for k, size in enumerate(given)
+            for k, size in enumerate(given[:shown])
         ),
         "  }",
         "  mbs_store_end();",
@@ -110,11 +115,15 @@ def batch_source(function: Function, block: int = BLOCK, finite: bool = False) -
     return BatchSource({"batch.c": "\n".join(lines), **headers}, _WIDEST * (starts[-1] + 1))
 
 
-def _flagged(inputs: list[tuple[str, int]], outputs: list[int]) -> list[str]:
-    """What makes outputs NaN in the lanes where an input is not finite: x * 0 is NaN there."""
+def _flagged(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -> list[str]:
+    """What makes outputs NaN in lanes where an input is not finite, for x * 0 is NaN, or a flag 0.
+
+    A flag is 1 or 0, or NaN where an input is.
+    """
     return [
         "    mbs_lanes zero = mbs_all(0.0);",
         *(f"    zero += mbs_times_zero({place}, {size});" for place, size in inputs),
+        *(f"    zero += mbs_all(1.0) - {flag};" for flag in flags),
         "    const mbs_bits wrong = ~(mbs_bits)(zero == 0.0);",
         "    if (__builtin_expect(mbs_any(wrong), 0)) {",
         *(f"      mbs_spoil(out[{k}], {size}, wrong);" for k, size in enumerate(outputs)),

@@ -7,13 +7,14 @@ that is linear in the length, at any level of optimization.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from casadi import Function
 
 from mbs.native.c_code import BlockCode, Memory, Step, blocks, plain_order, slots
 from mbs.native.compiler import FLAGS
 from mbs.native.kernel import BLOCK
-from mbs.operations.graph import Graph, graph_of
+from mbs.operations.graph import graph_of
 
 _HEAD = """\
 #include <math.h>
@@ -29,21 +30,42 @@ _HEAD = """\
 _LONG = 100_000  # lines for which -O2 takes a minute
 
 
-def plain_source(functions: Iterable[Function], block: int = BLOCK) -> str:
+class Work(NamedTuple):
+    """How many elements the arrays that a C function takes must have at least."""
+
+    arg: int = 0
+    res: int = 0
+    iw: int = 0
+    w: int = 0
+
+    def covering(self, other: Work) -> Work:
+        """Enough for both."""
+        return Work(*map(max, self, other))
+
+
+def plain_source(functions: Iterable[Function], block: int = BLOCK) -> tuple[str, Work]:
     """One C file of Functions with different names, in CasADi's calling convention.
 
-    It holds `int NAME(const double **arg, double **res, long long *iw, double *w, int mem)` and
-    `int NAME_work(long long *arg, long long *res, long long *iw, long long *w)` for each.
+    It holds `int NAME(const double **arg, double **res, long long *iw, double *w, int mem)` for
+    each.
 
     Args:
         functions: made of scalar operations, or to be expanded to them.
         block: assignments in one piece.
 
+    Returns:
+        the text, and what is enough for each of them.
+
     Raises:
         ModelError: some Function calls another that has no scalar operations, or has an operation
             that C does not have.
     """
-    return "\n".join([_HEAD, *(_function(function, block) for function in functions)])
+    texts, most = [_HEAD], Work()
+    for function in functions:
+        text, work = _function(function, block)
+        texts.append(text)
+        most = most.covering(work)
+    return "\n".join(texts), most
 
 
 def plain_flags(source: str) -> tuple[str, ...]:
@@ -58,13 +80,13 @@ def plain_flags(source: str) -> tuple[str, ...]:
     return ("-O1" if source.count("\n") > _LONG else FLAGS[0], *FLAGS[1:])
 
 
-def _function(function: Function, block: int) -> str:
+def _function(function: Function, block: int) -> tuple[str, Work]:
     name, graph = function.name(), graph_of(function)
     pieces: list[list[Step]] = blocks(graph, plain_order(graph), block)
     where = slots(graph, pieces)
     code = BlockCode(graph, where, "")
     memory = Memory(function, graph, where.count)
-    return "\n".join(
+    text = "\n".join(
         [
             *(code.block(f"{name}_part{k}", k, steps) for k, steps in enumerate(pieces)),
             f"int {name}(const double **arg, double **res, long long *iw, double *w, int mem) {{",
@@ -72,15 +94,7 @@ def _function(function: Function, block: int) -> str:
             *memory.pointers(),
             *(f"  {name}_part{k}(in, out, w);" for k in range(len(pieces))),
             "  return 0;",
-            "}",
-            _work(name, graph, memory.size),
+            "}\n",
         ]
     )
-
-
-def _work(name: str, graph: Graph, size: int) -> str:
-    return (
-        f"int {name}_work(long long *arg, long long *res, long long *iw, long long *w) {{\n"
-        f"  *arg = {len(graph.inputs)}, *res = {len(graph.outputs)}, *iw = 0, *w = {size};\n"
-        "  return 0;\n}\n"
-    )
+    return text, Work(len(graph.inputs), len(graph.outputs), 0, memory.size)

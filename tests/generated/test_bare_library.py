@@ -124,7 +124,7 @@ def test_compilers_of_cpp_take_it(tmp_path):
 
 
 def test_the_equations_of_an_fmu_are_bare(tmp_path):
-    """model.c needs what a bare library needs; the rest of an FMU allocates and formats texts."""
+    """model.c and closure.c of a hosted FMU need what a bare library needs."""
     path = mbs.export.fmu(mbs.load("four_bar").assemble(), tmp_path / "m.fmu", solver="rk4")
     with zipfile.ZipFile(path) as archive:
         archive.extractall(tmp_path)

@@ -32,11 +32,9 @@ def library_of(source, folder):
     return ctypes.CDLL(str(folder / "f.so"))
 
 
-def called(library, function, *arguments):
-    f, work = (getattr(library, function.name() + end) for end in ("", "_work"))
-    sizes = [ctypes.c_longlong() for _ in range(4)]
-    assert work(*map(ctypes.byref, sizes)) == 0
-    w = np.zeros(sizes[3].value + 1)
+def called(library, function, work, *arguments):
+    f, w = library[function.name()], np.zeros(work.w + 1)
+    assert (work.arg, work.res, work.iw) == (function.n_in(), function.n_out(), 0)
     inputs = [np.ascontiguousarray(a, dtype=float) for a in arguments]
     outputs = [np.full(function.nnz_out(k), np.nan) for k in range(function.n_out())]
     pointer = ctypes.POINTER(ctypes.c_double)
@@ -49,19 +47,21 @@ def called(library, function, *arguments):
 @pytest.mark.parametrize("block", [10_000, 50])
 def test_pieces_give_the_bits_of_the_interpreted_function(block, tmp_path):
     function = long_function(4000)
-    library = library_of(plain_source([function], block), tmp_path)
+    source, work = plain_source([function], block)
+    library = library_of(source, tmp_path)
     rng = np.random.default_rng(1)
     for _ in range(5):
         x, p = rng.standard_normal(3), rng.standard_normal(2)
-        for found, wanted in zip(called(library, function, x, p), function(x, p), strict=True):
+        outputs = called(library, function, work, x, p)
+        for found, wanted in zip(outputs, function(x, p), strict=True):
             np.testing.assert_array_equal(found, wanted.full().ravel())
 
 
 def test_a_function_is_split_where_it_is_long():
     function = long_function(4000)
-    pieces = plain_source([function], 100).count("static NOINLINE void long_one_part")
+    pieces = plain_source([function], 100)[0].count("static NOINLINE void long_one_part")
     assert 5 <= pieces <= function.n_instructions() / 80
-    assert "NOINLINE void" not in plain_source([long_function(20)])
+    assert "NOINLINE void" not in plain_source([long_function(20)])[0]
 
 
 def test_what_has_no_scalar_operations_is_refused():

@@ -125,6 +125,10 @@ Platform = Annotated[
 Solver = Annotated[
     str, typer.Option(metavar="METHOD", help="Of co-simulation: dopri5, rodas or rk4.")
 ]
+Bare = Annotated[
+    bool,
+    typer.Option("--bare", help="For microcontrollers: no heap; co-simulation by rk4 alone."),
+]
 StopTime = Annotated[str, typer.Option(metavar="SECONDS", help="Default end.")]
 StepSize = Annotated[str, typer.Option(metavar="SECONDS", help="Default communication step.")]
 Tolerance = Annotated[str, typer.Option(metavar="NUMBER", help="Default relative tolerance.")]
@@ -140,6 +144,7 @@ def export_fmu(
     symbolic: Symbolic = None,
     platform: Platform = None,
     solver: Solver = "dopri5",
+    bare: Bare = False,
     stop_time: StopTime = "10",
     step_size: StepSize = "0.01",
     tolerance: Tolerance = "1e-8",
@@ -159,6 +164,7 @@ def export_fmu(
         parameters=tuple(symbolic or ()),
         platforms=tuple(platform or ()),
         solver=solver,
+        target="bare" if bare else "hosted",
         stop_time=stop_time,
         step_size=step_size,
         tolerance=tolerance,

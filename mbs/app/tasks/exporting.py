@@ -49,6 +49,7 @@ class FmuSettings:
         tolerance: default relative tolerance.
         solver: for co-simulation, one of `SOLVERS`.
         internal_step: of "rk4" [s].
+        target: "hosted", or "bare" for microcontrollers.
         platforms: such as "x86_64-windows"; this computer when empty.
     """
 
@@ -62,6 +63,7 @@ class FmuSettings:
     tolerance: float | str = 1e-8
     solver: str = "dopri5"
     internal_step: float | str = 0.001
+    target: str = "hosted"
     platforms: tuple[str, ...] = ()
 
 

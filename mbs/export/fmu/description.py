@@ -6,13 +6,14 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import casadi
 
 from mbs.assembly import System
 from mbs.errors import ExportError, ModelError
 from mbs.models.state.tree import TreeState
+from mbs.native.bare_source import Target
 from mbs.text import quoted
 from mbs.units import UNITS
 from mbs.view.drawing import Drawing
@@ -36,6 +37,7 @@ def check(model: FmuModel) -> None:
     _check_texts(model)
     _check_numbers(model)
     _check_functions(model)
+    _check_target(model)
 
 
 def _check_names(model: FmuModel) -> None:
@@ -107,6 +109,31 @@ def _check_functions(model: FmuModel) -> None:
         _check_shape(model, "first", model.jumps.first, point, (n_m, k))
         _check_shape(model, "indicators", model.jumps.indicators, point, (k,))
         _check_shape(model, "jump", model.jumps.jump, (*point, k), (nx, n_m))
+
+
+def _check_target(model: FmuModel) -> None:
+    """What bare C has: steps of a fixed length, of equations without events."""
+    if model.target not in get_args(Target):
+        raise ExportError(
+            f"FMU {model.name}: target is {quoted(model.target)}; use 'hosted' or 'bare'"
+        )
+    if model.target == "hosted":
+        return
+    if model.solver != "rk4":
+        raise ExportError(
+            f"FMU {model.name}: solver is {model.solver!r}, and target='bare' takes steps of a"
+            " fixed length alone; use solver='rk4'"
+        )
+    if model.jumps is not None:
+        raise ExportError(
+            f"FMU {model.name}: rigid stops and Coulomb friction have events, which target='bare'"
+            " does not handle; take elastic stops and viscous friction, or target='hosted'"
+        )
+    if model.sources:
+        raise ExportError(
+            f"FMU {model.name}: {model.sources[0][0]} is C of its own, which target='bare' cannot"
+            " vouch for; give the controller as scalar operations, or use target='hosted'"
+        )
 
 
 def _check_shape(
@@ -442,6 +469,7 @@ class FmuModel:
         solver: of co-simulation: "dopri5", explicit with error control; "rodas", the same for stiff
             equations; "rk4", with the fixed step `internal_step`.
         internal_step: length of the steps of "rk4", s.
+        target: "hosted", or "bare" for co-simulation alone, by C without heap and files.
         documentation: text for `documentation/index.html`; a blank line starts a paragraph.
         terminals: variables that belong together.
         sources: name and text of further C files, which are compiled with the FMU.
@@ -469,6 +497,7 @@ class FmuModel:
     step_size: float = 0.01
     solver: Solver = "dopri5"
     internal_step: float = 0.001
+    target: Target = "hosted"
     documentation: str = ""
     terminals: tuple[Terminal, ...] = ()
     sources: tuple[tuple[str, str], ...] = ()

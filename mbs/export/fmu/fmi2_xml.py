@@ -49,7 +49,8 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
     }
     root = Element("fmiModelDescription", attributes)
     files = list(sources)
-    _interface(root, "ModelExchange", model, files)
+    if model.target == "hosted":
+        _interface(root, "ModelExchange", model, files)
     _interface(root, "CoSimulation", model, files)
     add_units(root, model)
     add_categories_and_experiment(root, model)
@@ -72,7 +73,7 @@ def model_description(model: FmuModel, guid: str, sources: Iterable[str]) -> str
 def _interface(root: Element, tag: str, model: FmuModel, files: list[str]) -> None:
     attributes = {
         "modelIdentifier": model.identifier,
-        "canNotUseMemoryManagementFunctions": "true",
+        "canNotUseMemoryManagementFunctions": str(model.target == "hosted").lower(),
         "canGetAndSetFMUstate": "true",
         "canSerializeFMUstate": "true",
         "providesDirectionalDerivative": "true",

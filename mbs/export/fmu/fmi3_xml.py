@@ -51,7 +51,8 @@ def model_description(model: FmuModel, token: str) -> str:
         "variableNamingConvention": naming_convention(model),
     }
     root = Element("fmiModelDescription", attributes)
-    _interface(root, "ModelExchange", model)
+    if model.target == "hosted":
+        _interface(root, "ModelExchange", model)
     _interface(root, "CoSimulation", model)
     add_units(root, model)
     add_categories_and_experiment(root, model)

@@ -20,6 +20,7 @@ from mbs.export.fmu.reference import reference_files
 from mbs.export.fmu.source import header, source
 from mbs.export.fmu.xml import terminals_and_icons
 from mbs.files import path_of, write_bytes
+from mbs.native.bare_source import Target
 from mbs.native.compiler import (
     Platform,
     cached_library,
@@ -36,13 +37,13 @@ from mbs.view.drawing_files import icon, standalone
 
 _CORE = (
     "core.c",
+    "message.c",
     "values.c",
     "inputs.c",
     "derivatives.c",
     "closure.c",
     "watch.c",
     "guard.c",
-    "charts.c",
     "solver.c",
     "switching.c",
     "exchange.c",
@@ -51,6 +52,7 @@ _CORE = (
 )
 _CORE_HEADERS = (
     "core.h",
+    "message.h",
     "internal.h",
     "real.h",
     "closure.h",
@@ -59,9 +61,14 @@ _CORE_HEADERS = (
     "charts.h",
     "solver.h",
 )
+_HOSTED = ("charts.c",)
 _RUNTIME = ("stepper", "events", "dense", "passage")
 _TABLEAU = "dopri5"
 """What steps through singular configurations take, whichever the solver is."""
+
+_BARE_RUNTIME = ("stepper",)
+_MEMORY = "memory.c"
+"""Instances and saved states from the heap of C."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,25 +80,36 @@ class Face:
         headers: its own.
         standard: headers of the standard, which fmpy brings with their licence inside.
         adjoint: it has calls for adjoint derivatives.
+        callbacks: importers hand functions that give memory to each instance.
     """
 
     sources: tuple[str, ...]
     headers: tuple[str, ...]
     standard: tuple[str, ...]
     adjoint: bool
+    callbacks: bool
 
-    def compiled(self, solver: Solver) -> tuple[str, ...]:
+    def compiled(self, solver: Solver, target: Target = "hosted") -> tuple[str, ...]:
         """The C files to compile with a solver, in the folder `sources` of the FMU."""
-        return ("model.c", *_CORE, *(f"{name}.c" for name in _runtime(solver)), *self.sources)
+        return ("model.c", *self._own(solver, target))
 
-    def fixed(self, solver: Solver) -> dict[str, str]:
+    def _own(self, solver: Solver, target: Target) -> tuple[str, ...]:
+        heap = () if target == "bare" and self.callbacks else (_MEMORY,)
+        core = (*_CORE, *(_HOSTED if target == "hosted" else ()))
+        runtime = (f"{name}.c" for name in _runtime(solver, target))
+        return (*core, *runtime, *self.sources, *heap)
+
+    def fixed(self, solver: Solver, target: Target = "hosted") -> dict[str, str]:
         """The files that do not depend on the equations: name to text."""
         own = resources.files("mbs.export.fmu") / "c"
         runtime = resources.files("mbs.native") / "runtime"
         standard = resources.files("fmpy") / "c-code"
+        parts = tuple(f"{name}.{end}" for name in _runtime(solver, target) for end in "ch")
+        written = [name for name in self._own(solver, target) if name not in parts]
+        heap = ("memory.h",) if _MEMORY in written else ()
         folders = (
-            (own, (*_CORE, *_CORE_HEADERS, *self.sources, *self.headers)),
-            (runtime, tuple(f"{name}.{end}" for name in _runtime(solver) for end in "ch")),
+            (own, (*written, *_CORE_HEADERS, *self.headers, *heap)),
+            (runtime, parts),
             (standard, self.standard),
         )
         return {
@@ -101,22 +119,26 @@ class Face:
         }
 
 
-def _runtime(solver: Solver) -> tuple[str, ...]:
+def _runtime(solver: Solver, target: Target) -> tuple[str, ...]:
+    if target == "bare":
+        return (*_BARE_RUNTIME, solver)
     return (*_RUNTIME, *dict.fromkeys((_TABLEAU, solver)))
 
 
 FACES = {
     "2.0": Face(
         ("fmi2.c",),
-        (),
+        ("fmi2_face.h",),
         ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
         adjoint=False,
+        callbacks=True,
     ),
     "3.0": Face(
         ("fmi3.c", "fmi3_arrays.c", "fmi3_run.c", "fmi3_absent.c"),
         ("fmi3_face.h",),
         ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
         adjoint=True,
+        callbacks=False,
     ),
 }
 
@@ -223,12 +245,13 @@ def write_fmu(
     require_writable(target)
     results = reference_files(model) if reference else {}
     face = FACES[fmi]
-    code, compiled = source(model, adjoint=face.adjoint), _compiled(model, fmi)
+    (code, work), compiled = source(model, adjoint=face.adjoint), _compiled(model, fmi)
     unnamed = description(model, fmi, "", compiled)
-    tables = header(model, "", adjoint=face.adjoint)
+    tables = header(model, "", work, adjoint=face.adjoint)
     guid = _guid(unnamed, tables, code, *(text for _, text in model.sources))
-    named = header(model, guid, adjoint=face.adjoint)
-    texts = {"model.c": code, "model.h": named, **face.fixed(model.solver)}
+    named = header(model, guid, work, adjoint=face.adjoint)
+    fixed = face.fixed(model.solver, model.target)
+    texts = {"model.c": code, "model.h": named, **fixed}
     texts.update(model.sources)
     files = {
         "modelDescription.xml": _identified(unnamed, guid).encode(),
@@ -244,7 +267,7 @@ def write_fmu(
 def _compiled(model: FmuModel, fmi: str) -> tuple[str, ...]:
     """The C files to compile, those of the user last."""
     own = (name for name, _ in model.sources if name.endswith(".c"))
-    return (*FACES[fmi].compiled(model.solver), *own)
+    return (*FACES[fmi].compiled(model.solver, model.target), *own)
 
 
 def _identified(unnamed: str, guid: str) -> str:

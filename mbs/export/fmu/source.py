@@ -11,7 +11,7 @@ from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
 from mbs.models.state.tree import TreeState
 from mbs.native.compiled import generated, unwritten
-from mbs.native.plain_source import plain_source
+from mbs.native.plain_source import Work, plain_source
 from mbs.solvers.block_triangular import Block, block_triangular
 
 # The functions that an FMU evaluates, under the names that its C calls.
@@ -289,6 +289,11 @@ _HEADER = """\
 #define N_PASSIVE {n_passive}
 #define NS {ns}
 #define NC {nc}
+/* elements of the arrays that the functions below take */
+#define SZ_ARG {work.arg}
+#define SZ_RES {work.res}
+#define SZ_IW {work.iw}
+#define SZ_W {work.w}
 {options}
 extern const double MODEL_START[], MODEL_NOMINAL[], MODEL_MIN[], MODEL_MAX[];
 extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
@@ -308,16 +313,16 @@ extern const int MODEL_SIZES[];
 """
 _PROTOTYPE = """\
 int {name}(const double **arg, double **res, long long *iw, double *w, int mem);
-int {name}_work(long long *arg, long long *res, long long *iw, long long *w);
 """
 
 
-def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
+def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
     """The file model.h.
 
     Args:
         model: what the FMU is.
         guid: identity that the library asks for.
+        work: what the functions of model.c need.
         adjoint: the version of FMI calls adjoint derivatives.
 
     Returns:
@@ -338,6 +343,8 @@ def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
         options += f"#define MODEL_RULES_AT_START {rules.at_start}\n"
         options += f"#define MODEL_RULES {len(rules.sentences)}\n"
         options += "extern const char *const MODEL_SENTENCES[];\n"
+    if model.target == "bare":
+        options += "#define MODEL_BARE\n"
     if model.solver == "rodas":
         names = (*names, "mbs_jacobian")
         options += "#define MODEL_RODAS\n"
@@ -359,13 +366,18 @@ def header(model: FmuModel, guid: str, *, adjoint: bool) -> str:
         n_passive=model.passive[2],
         ns=len(model.slots),
         nc=int(model.charted),
+        work=work,
         arrays=_ARRAYS if model.arrays else "",
         options=options + ("" if tree is None else _tree_sizes(model, tree)),
         prototypes="".join(_PROTOTYPE.format(name=name) for name in names),
     )
 
 
-def source(model: FmuModel, *, adjoint: bool) -> str:
+_LEAST = Work(arg=9, res=8)
+"""What the C of an FMU sets of arg and res, whichever functions there are."""
+
+
+def source(model: FmuModel, *, adjoint: bool) -> tuple[str, Work]:
     """The file model.c.
 
     Args:
@@ -373,12 +385,12 @@ def source(model: FmuModel, *, adjoint: bool) -> str:
         adjoint: the version of FMI calls adjoint derivatives.
 
     Returns:
-        its text.
+        its text, and what its functions need.
 
     Raises:
-        ExportError: a function holds a node that CasADi cannot write as C.
+        ExportError: a function holds a node that CasADi cannot write as C, or that bare C has not.
     """
-    code = _code(functions(model, adjoint=adjoint))
+    code, work = _code(model, functions(model, adjoint=adjoint))
     if problem := unwritten(code):
         raise ExportError(f"FMU {model.name}: {problem}")
     variables = [entry.variable for entry in model.entries]
@@ -398,12 +410,13 @@ def source(model: FmuModel, *, adjoint: bool) -> str:
         *_block_tables(_blocks(model)),
         *_tree_tables(model),
     ]
-    return (
+    text = (
         '#include <math.h>\n\n#include "model.h"\n\n'
         + "\n".join(tables)
         + "\n/* The functions stay inside the library. */\n#define CASADI_SYMBOL_EXPORT\n"
         + code
     )
+    return text, work.covering(_LEAST)
 
 
 def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
@@ -491,15 +504,24 @@ def _block_tables(blocks: Sequence[Block]) -> list[str]:
     ]
 
 
-def _code(functions: Iterable[casadi.Function]) -> str:
+def _code(model: FmuModel, functions: Iterable[casadi.Function]) -> tuple[str, Work]:
     """Scalar operations in short pieces, which compile fast; the rest as CasADi has it."""
-    pieces, others = [], []
+    pieces, others, most = [], [], Work()
     for function in functions:
         try:
-            pieces.append(plain_source([function]))
-        except ModelError:  # it calls a foreign function, say
+            piece, work = plain_source([function])
+        except ModelError as error:  # it calls a foreign function, say
+            if model.target == "bare":
+                raise ExportError(
+                    f"FMU {model.name}: an equation is not made of scalar operations ({error});"
+                    " use target='hosted', or a controller that is"
+                ) from error
             others.append(function)
-    return "\n".join([*pieces, *([generated(others)] if others else [])])
+            work = Work(function.sz_arg(), function.sz_res(), function.sz_iw(), function.sz_w())
+        else:
+            pieces.append(piece)
+        most = most.covering(work)
+    return "\n".join([*pieces, *([generated(others)] if others else [])]), most
 
 
 def _numbers(name: str, values: Iterable[float]) -> str:

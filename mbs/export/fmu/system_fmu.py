@@ -31,6 +31,7 @@ from mbs.export.fmu.variables import dependents, inputs, jumps, outputs, paramet
 from mbs.files import PathLike, path_of
 from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
 from mbs.models.state.tree import tree_state
+from mbs.native.bare_source import Target
 
 
 def fmu(
@@ -51,6 +52,7 @@ def fmu(
     tolerance: float = 1e-8,
     solver: Solver = "dopri5",
     internal_step: float = 0.001,
+    target: Target = "hosted",
     reference: bool = False,
     arrays: bool = False,
     description: str = "",
@@ -102,6 +104,11 @@ def fmu(
         solver: of co-simulation: "dopri5", Dormand and Prince's explicit pair; "rodas", the
             linearly implicit RODAS5P for stiff systems; "rk4", with a fixed step, for real time.
         internal_step: length of the steps of "rk4" [s].
+        target: "hosted", or "bare" for what has no operating system: co-simulation alone, with
+            solver="rk4", of a system without events, by C99 without heap, files and variables that
+            change outside of functions. In FMI 2.0 its memory comes from the callbacks of the
+            importer; in FMI 3.0 from two functions in memory.c, which may be replaced. The numbers
+            are those of the same FMU with target="hosted", to the last bit.
         reference: whether to put in the results of the default experiment.
         arrays: whether positions, velocities, accelerations and efforts of the joints are arrays
             q, v, a and tau, in FMI 3.0; what loops determine is `q_dependent` and so on.
@@ -116,7 +123,8 @@ def fmu(
 
     Raises:
         ExportError: the file cannot be written, another FMI version was asked for, the controller
-            does not fit the system, or a text is no line of printable characters.
+            does not fit the system, a text is no line of printable characters, or the target cannot
+            have the solver, the events or the controller.
         ModelError: a parameter has no value, an input, output, parameter or frame is unknown or
             named twice, or the system has no minimal state.
         CompilerError: there is no C compiler, it refused the sources, or there is no such
@@ -126,7 +134,7 @@ def fmu(
     require_version(system.name, fmi)
     require_writable(path_of(path))
     wished = Contents(inputs, outputs, parameters, fixed, flanges, controller, sources)
-    settings = Settings(stop_time, step_size, tolerance, solver, internal_step)
+    settings = Settings(stop_time, step_size, tolerance, solver, internal_step, target)
     if arrays and fmi != "3.0":
         raise ExportError(
             f"{system.name}: arrays are variables of FMI 3.0, and fmi is {fmi!r}; use fmi='3.0' or"
@@ -159,6 +167,7 @@ class Settings:
     tolerance: float = 1e-8
     solver: Solver = "dopri5"
     internal_step: float = 0.001
+    target: Target = "hosted"
 
 
 def fmu_model(
@@ -194,7 +203,8 @@ def fmu_model(
         interface.drive(system, controller),
     )
     tree = None
-    if state.events is None or settings.solver == "dopri5":
+    followed = state.events is None or settings.solver == "dopri5"
+    if followed and settings.target != "bare":
         tree = tree_state(
             system,
             lambda seen: observed_values(system, request, seen),

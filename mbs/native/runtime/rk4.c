@@ -3,7 +3,7 @@
 #include <string.h>
 
 /* work after the first 2n: a slope, the state, the slope and the step for dense output, the point */
-static double *part(const stepper *s, int i) { return s->work + (size_t)i * s->n; }
+static double *part(const stepper *s, int i) { return s->work + i * s->n; }
 static double *slope(const stepper *s) { return part(s, 2); }
 static double *from(const stepper *s) { return part(s, 3); }
 static double *first(const stepper *s) { return part(s, 4); }

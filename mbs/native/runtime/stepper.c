@@ -213,7 +213,7 @@ int stepper_table(stepper *s, double *x, const double *times, long count, double
     int status = STEPPER_OK;
     while (*done < count && !status) {
         if (times[*done] <= s->memory[TIME]) {
-            status = stepper_state(s, x, times[*done], table + (size_t)*done * s->n);
+            status = stepper_state(s, x, times[*done], table + *done * s->n);
             if (!status) ++*done;
             s->since_output = 0;
         } else if (s->steps >= last) {

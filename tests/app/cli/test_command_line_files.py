@@ -88,6 +88,18 @@ def test_an_exported_fmu_runs_as_the_system_does(command) -> None:
     assert "energy.kinetic" in result
 
 
+def test_a_bare_fmu_has_no_heap(command) -> None:
+    words = ("planar_2r", "planar_2r.fmu", "--solver", "rk4", "--bare")
+    answer = command("export", "fmu", *words)
+    assert (answer.code, answer.err) == (0, "wrote planar_2r.fmu\n")
+    with zipfile.ZipFile("planar_2r.fmu") as archive:
+        assert "sources/memory.c" not in archive.namelist()
+        assert "#define MODEL_BARE" in archive.read("sources/model.h").decode()
+    answer = command("export", "fmu", *words[:2], "--bare")
+    assert answer.code != 0
+    assert "use solver='rk4'" in answer.err
+
+
 def test_c_source_is_a_folder_or_a_zip(command, tmp_path: Path) -> None:
     command("export", "c", "planar_2r", "arm", "--model", "idm", "--model", "inertia")
     header = (tmp_path / "arm" / "arm.h").read_text()

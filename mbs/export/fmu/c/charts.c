@@ -77,11 +77,10 @@ static int find(core *c, found *f) {
 }
 
 static core_status lost(core *c) {
-    char where[CORE_WHERE];
     return core_no_answer(c, "%s: at time %.9g the loops have no solution near the last one (%s), or "
                           "are in a singular configuration that the motion does not pass; ask for a "
                           "smaller tolerance or start elsewhere", c->name, c->m.time,
-                          core_where(c, where));
+                          core_where(c));
 }
 
 core_status charts_refresh(core *c) {
@@ -121,7 +120,6 @@ static double room(core *c) {
 static core_status choose(core *c, double least) {
     core_charts *m = &c->m.charts;
     double *slots = c->m.values + SLOTS;
-    char where[CORE_WHERE];
     int i;
     c->m.stale = 1;
     m->settled = 1;
@@ -137,7 +135,7 @@ static core_status choose(core *c, double least) {
         return CORE_OK;
     return core_no_answer(c, "%s: at time %.9g the motion is in a singular configuration (%s), and "
                           "its velocities choose no branch; start elsewhere", c->name, c->m.time,
-                          core_where(c, where));
+                          core_where(c));
 }
 
 /* The state of the tree by the joints, and the coordinates of the next steps. */

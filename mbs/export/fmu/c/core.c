@@ -2,13 +2,12 @@
 
 #include <math.h>
 #include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "charts.h"
 #include "closure.h"
 #include "guard.h"
+#include "message.h"
 
 static const char *const CATEGORIES[] = {"logAll", "logStatusDiscard", "logStatusError"};
 enum { LOG_ALL, LOG_DISCARD, LOG_ERROR, N_CATEGORIES };
@@ -34,10 +33,11 @@ core_status core_set_logging(core *c, int on, const char *const *categories, siz
 }
 
 static core_status say(core *c, core_status status, const char *format, va_list args) {
-    char message[1024];
-    if (status == CORE_DISCARD && !c->discards) return status;
-    vsnprintf(message, sizeof message, format, args);
-    if (c->log) c->log(c->host, c->name, status, message);
+    message m;
+    if (!c->log || (status == CORE_DISCARD && !c->discards)) return status;
+    message_begin(&m, c->text, sizeof c->text);
+    message_format(&m, format, args);
+    c->log(c->host, c->name, status, c->text);
     return status;
 }
 
@@ -79,14 +79,17 @@ int core_allowed(core *c, int modes, const char *action) {
     return 0;
 }
 
-const char *core_where(const core *c, char *where) {
-    size_t used = 0;
+const char *core_where(core *c) {
+    message m;
     int i;
-    where[0] = 0;
-    for (i = 0; i < NX && used < CORE_WHERE; i++)
-        used += (size_t)snprintf(where + used, CORE_WHERE - used, "%s%s = %.6g", used ? ", " : "",
-                                 MODEL_NAMES[STATES + i], c->m.values[STATES + i]);
-    return where;
+    message_begin(&m, c->where, sizeof c->where);
+    for (i = 0; i < NX; i++) {
+        message_text(&m, i ? ", " : "");
+        message_text(&m, MODEL_NAMES[STATES + i]);
+        message_text(&m, " = ");
+        message_number(&m, c->m.values[STATES + i], 6);
+    }
+    return c->where;
 }
 
 core_status core_before_stop(core *c, double time) {
@@ -111,14 +114,13 @@ int core_call_rhs(core *c, double t, const double *x, const double *z, double *x
 }
 
 static core_status closure_failed(core *c, int status) {
-    char where[CORE_WHERE];
     if (status == CLOSURE_SINGULAR)
         return core_no_answer(c, "%s: singular configuration at time %.9g (%s): the states do not determine "
                               "the dependent coordinates; start elsewhere or choose other states",
-                              c->name, c->m.time, core_where(c, where));
+                              c->name, c->m.time, core_where(c));
     return core_no_answer(c, "%s: unclosable configuration at time %.9g (%s): no dependent coordinates near "
                           "the last ones close the loops; start elsewhere or move less",
-                          c->name, c->m.time, core_where(c, where));
+                          c->name, c->m.time, core_where(c));
 }
 
 core_status core_accept_configuration(core *c, const double *x, const double *z) {
@@ -187,51 +189,6 @@ core_status core_refresh(core *c) {
     return show_joints(c);
 }
 
-static void *array(size_t count, size_t size) { return calloc(count + 1, size); }
-
-static int allocate(core *c) {
-    long long size[4] = {9, 8, 0, 0}, other[4];
-    int i, f;
-    static int (*const work[])(long long *, long long *, long long *, long long *) = {
-        mbs_rhs_work, mbs_tangent_work,
-#ifdef MODEL_ADJOINT
-        mbs_adjoint_work,
-#endif
-#if NZ > 0
-        mbs_closure_work, mbs_sensitivity_work,
-#endif
-#if NB > 0
-        mbs_slopes_work,
-#endif
-#ifdef MODEL_TREE
-        mbs_tree_rhs_work, mbs_tree_project_work, mbs_tree_rows_work, mbs_tree_forces_work,
-        mbs_tree_regularity_work, mbs_tree_start_work, mbs_tree_rate_work,
-#endif
-#if NK > 0
-        mbs_first_work, mbs_indicators_work, mbs_rates_work, mbs_jump_work,
-#endif
-#ifdef MODEL_RULES
-        mbs_excess_work,
-#endif
-#if NK > 0 && defined MODEL_TREE
-        mbs_tree_indicators_work, mbs_tree_rates_work, mbs_tree_jump_work,
-#endif
-#ifdef MODEL_RODAS
-        mbs_jacobian_work,
-#endif
-    };
-    for (f = 0; f < (int)(sizeof work / sizeof *work); f++) {
-        work[f](other, other + 1, other + 2, other + 3);
-        for (i = 0; i < 4; i++)
-            if (other[i] > size[i]) size[i] = other[i];
-    }
-    c->arg = array(size[0], sizeof *c->arg);
-    c->res = array(size[1], sizeof *c->res);
-    c->iw = array(size[2], sizeof *c->iw);
-    c->w = array(size[3], sizeof *c->w);
-    return c->arg && c->res && c->iw && c->w;
-}
-
 static void to_start(core *c) {
     int cosimulation = c->m.cosimulation;
     memset(&c->m, 0, sizeof c->m);
@@ -250,39 +207,26 @@ static void init_loops(core *c) {
     c->loops = l;
 }
 
-core *core_new(const char *name, int cosimulation, core_logger log, void *host) {
-    core *c = calloc(1, sizeof *c);
-    if (!c) return NULL;
-    c->name = malloc(strlen(name) + 1);
-    if (!c->name || !allocate(c)) {
-        core_free(c);
-        return NULL;
-    }
-    strcpy(c->name, name);
+int core_init(core *c, const char *name, int cosimulation, core_logger log, void *host,
+              core_supply supply) {
+    memset(c, 0, sizeof *c);
+    c->name = name;
     c->log = log;
     c->host = host;
+    c->supply = supply;
     c->m.cosimulation = cosimulation;
     to_start(c);
-    if (core_init_solver(c)) {
-        core_free(c);
-        return NULL;
-    }
+    if (core_init_solver(c)) return 1;
     core_init_events(c);
     init_loops(c);
-    return c;
+    return 0;
 }
 
-void core_free(core *c) {
-    if (!c) return;
-    free(c->name);
-    free((void *)c->arg);
-    free((void *)c->res);
-    free(c->iw);
-    free(c->w);
+void core_end(core *c) {
 #ifdef MODEL_TREE
     passage_free(c->passage);
 #endif
-    free(c);
+    (void)c;
 }
 
 core_status core_setup(core *c, double tolerance, double start, double stop) {

@@ -24,7 +24,7 @@ static int in_chart(const core *c) {
 }
 
 /* Where a reference has its seed; the kinds of variables follow each other, some of them empty. */
-static double *known_of(const core *c, tangents *d, unsigned ref) {
+static double *known_of(const core *c, tangents *d, core_reference ref) {
     if (ref == TIME_REFERENCE && c->timed) return &d->dt;
     if (ref < DERIVATIVES) return in_chart(c) ? NULL : d->dx + (ref - STATES);
     if (ref < INPUTS) return NULL;
@@ -35,7 +35,7 @@ static double *known_of(const core *c, tangents *d, unsigned ref) {
     return ref < RATES ? d->dslot + (ref - SLOTS) : NULL;
 }
 
-static double *unknown_of(tangents *d, unsigned ref) {
+static double *unknown_of(tangents *d, core_reference ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref < INPUTS) return d->dxdot + (ref - DERIVATIVES);
     if (ref < OUTPUTS) return NULL;
@@ -49,7 +49,7 @@ static double *unknown_of(tangents *d, unsigned ref) {
 }
 
 /* All references can be used, all seeds are finite, and the calculated values are up to date. */
-static core_status ready(core *c, const unsigned *unknown, size_t n_unknown, const unsigned *known,
+static core_status ready(core *c, const core_reference *unknown, size_t n_unknown, const core_reference *known,
                          size_t n_known, const double *seed, size_t n_seed) {
     tangents d;
     size_t i;
@@ -58,11 +58,11 @@ static core_status ready(core *c, const unsigned *unknown, size_t n_unknown, con
     for (i = 0; i < n_known; i++)
         if (!known_of(c, &d, known[i]))
             return core_refuse(c, "%s: no derivative with respect to value reference %u; use "
-                               "states, inputs and parameters", c->name, known[i]);
+                               "states, inputs and parameters", c->name, (unsigned)known[i]);
     for (i = 0; i < n_unknown; i++)
         if (!unknown_of(&d, unknown[i]))
             return core_refuse(c, "%s: value reference %u has no derivative; use outputs and "
-                               "derivatives of states", c->name, unknown[i]);
+                               "derivatives of states", c->name, (unsigned)unknown[i]);
     for (i = 0; i < n_seed; i++)
         if (!isfinite(seed[i]))
             return core_refuse(c, "%s: seed %g of a derivative is not finite", c->name, seed[i]);
@@ -73,7 +73,7 @@ static void point(core *c) {
     core_point(c, &c->m.time, c->m.values + STATES, c->m.values + DEPENDENTS);
 }
 
-static core_status finite_answer(core *c, unsigned ref, double value) {
+static core_status finite_answer(core *c, core_reference ref, double value) {
     if (isfinite(value)) return CORE_OK;
     return core_no_answer(c, "%s: the derivative of or by %s is not finite at time %.9g", c->name,
                           ref < N_VALUES ? MODEL_NAMES[ref] : "time", c->m.time);
@@ -122,8 +122,8 @@ static core_status move(core *c, tangents *d) {
     return CORE_OK;
 }
 
-core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
-                             const unsigned *known, size_t n_known, const double *seed,
+core_status core_directional(core *c, const core_reference *unknown, size_t n_unknown,
+                             const core_reference *known, size_t n_known, const double *seed,
                              double *answer) {
     tangents d;
     size_t i;
@@ -142,8 +142,8 @@ core_status core_directional(core *c, const unsigned *unknown, size_t n_unknown,
 #ifdef MODEL_ADJOINT
 
 /* The seeds times what each known moves. */
-static core_status transposed(core *c, const unsigned *unknown, size_t n_unknown,
-                              const unsigned *known, size_t n_known, const double *seed,
+static core_status transposed(core *c, const core_reference *unknown, size_t n_unknown,
+                              const core_reference *known, size_t n_known, const double *seed,
                               double *answer) {
     core_status status = CORE_OK;
     tangents d;
@@ -160,8 +160,8 @@ static core_status transposed(core *c, const unsigned *unknown, size_t n_unknown
     return status;
 }
 
-core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
-                         const unsigned *known, size_t n_known, const double *seed,
+core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknown,
+                         const core_reference *known, size_t n_known, const double *seed,
                          double *answer) {
     tangents w, g;
     size_t i;
@@ -197,7 +197,7 @@ core_status core_adjoint(core *c, const unsigned *unknown, size_t n_unknown,
 #endif
 
 /* Inputs follow what was given of their derivatives, else they are held. */
-core_status core_get_output_slopes(core *c, const unsigned *ref, size_t n, const int *order,
+core_status core_get_output_slopes(core *c, const core_reference *ref, size_t n, const core_integer *order,
                                    double *values) {
     core_status status;
     tangents d;
@@ -209,7 +209,7 @@ core_status core_get_output_slopes(core *c, const unsigned *ref, size_t n, const
     for (i = 0; i < n; i++)
         if (order[i] != 1)
             return core_refuse(c, "%s: derivative %d of %s is not known; use order 1", c->name,
-                               order[i], MODEL_NAMES[ref[i]]);
+                               (int)order[i], MODEL_NAMES[ref[i]]);
     memset(&d, 0, sizeof d);
     d.dt = 1.0;
     memcpy(d.dx, c->m.values + DERIVATIVES, sizeof d.dx - sizeof *d.dx);

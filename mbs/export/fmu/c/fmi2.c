@@ -1,19 +1,14 @@
 /* FMI 2.0, model exchange and co-simulation: a thin face over core.c. */
+#include "fmi2_face.h"
+
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "core.h"
-#include "fmi2Functions.h"
+#ifndef MODEL_BARE
+#include "memory.h"
+#endif
 
-typedef struct {
-    core *model;
-    fmi2CallbackLogger logger;
-    fmi2ComponentEnvironment environment;
-} face;
-
-#define MODEL(c) (((face *)(c))->model)
+#define MODEL(c) (&((face *)(c))->model)
 #define NEED(c) \
     if (!(c)) return fmi2Error
 
@@ -44,9 +39,40 @@ static fmi2Component no_instance(const fmi2CallbackFunctions *functions, const c
     return NULL;
 }
 
+#ifdef MODEL_BARE /* callbacks give all memory */
+
+static face *new_face(const fmi2CallbackFunctions *functions, size_t size) {
+    face *f = functions->allocateMemory(1, size);
+    if (!f) return NULL;
+    memset(f, 0, size);
+    f->allocate = functions->allocateMemory;
+    f->release = functions->freeMemory;
+    return f;
+}
+
+static void *take(void *owner, size_t size) { return ((face *)owner)->allocate(1, size); }
+static void drop(void *owner, void *memory) { ((face *)owner)->release(memory); }
+
+#else
+
+static face *new_face(const fmi2CallbackFunctions *functions, size_t size) {
+    face *f = mbs_allocate(functions ? functions->componentEnvironment : NULL, size);
+    if (f) memset(f, 0, size);
+    return f;
+}
+
+static void *take(void *owner, size_t size) {
+    return mbs_allocate(((face *)owner)->environment, size);
+}
+
+static void drop(void *owner, void *memory) { mbs_release(((face *)owner)->environment, memory); }
+
+#endif
+
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean logging) {
+    core_supply supply = {take, drop, NULL};
     face *f;
     (void)resources, (void)visible;
     if (!name || !*name) return no_instance(functions, "?", "the instance has no name");
@@ -55,25 +81,33 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                            "description and the library belong to different FMUs");
     if (type != fmi2ModelExchange && type != fmi2CoSimulation)
         return no_instance(functions, name, "the type of the instance is unknown");
-    f = calloc(1, sizeof *f);
+#ifdef MODEL_BARE
+    if (type != fmi2CoSimulation)
+        return no_instance(functions, name, "the model is for co-simulation alone");
+    if (!functions || !functions->allocateMemory || !functions->freeMemory)
+        return no_instance(functions, name, "the model has memory by callbacks alone; give it "
+                           "allocateMemory and freeMemory");
+#endif
+    f = new_face(functions, INSTANCE_SIZE(strlen(name)));
     if (!f) return no_instance(functions, name, "no memory is left");
+    strcpy(f->name, name);
     if (functions) {
         f->logger = functions->logger;
         f->environment = functions->componentEnvironment;
     }
-    f->model = core_new(name, type == fmi2CoSimulation, forward_log, f);
-    if (!f->model) {
-        free(f);
+    supply.owner = f;
+    if (core_init(&f->model, f->name, type == fmi2CoSimulation, forward_log, f, supply)) {
+        fmi2FreeInstance(f);
         return no_instance(functions, name, "no memory is left");
     }
-    f->model->discards = logging != fmi2False;
+    f->model.discards = logging != fmi2False;
     return f;
 }
 
 void fmi2FreeInstance(fmi2Component c) {
     if (!c) return;
-    core_free(MODEL(c));
-    free(c);
+    core_end(MODEL(c));
+    drop(c, c);
 }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
@@ -157,7 +191,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
     NEED(c);
     if (state) {
-        core_free_state(*state);
+        core_free_state(MODEL(c), *state);
         *state = NULL;
     }
     return fmi2OK;

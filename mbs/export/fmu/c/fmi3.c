@@ -1,9 +1,9 @@
 /* FMI 3.0, model exchange and co-simulation, a thin face over core.c: instances and values. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "fmi3_face.h"
+#include "memory.h"
 
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
@@ -19,24 +19,37 @@ static void *no_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCall
     return NULL;
 }
 
+static void *take(void *owner, size_t size) {
+    return mbs_allocate(((face *)owner)->environment, size);
+}
+
+static void drop(void *owner, void *memory) { mbs_release(((face *)owner)->environment, memory); }
+
 static face *instantiate(fmi3String name, fmi3String token, int cosimulation, fmi3Boolean logging,
                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger) {
+    core_supply supply = {take, drop, NULL};
     face *f;
     if (!name || !*name) return no_instance(environment, logger, "the instance has no name");
     if (!token || strcmp(token, MODEL_GUID))
         return no_instance(environment, logger, "the instantiation token is not the one of this "
                            "model: the model description and the library belong to different FMUs");
-    f = calloc(1, sizeof *f);
+#ifdef MODEL_BARE
+    if (!cosimulation)
+        return no_instance(environment, logger, "the model is for co-simulation alone");
+#endif
+    f = mbs_allocate(environment, INSTANCE_SIZE(strlen(name)));
     if (!f) return no_instance(environment, logger, "no memory is left");
+    memset(f, 0, sizeof *f);
+    strcpy(f->name, name);
     f->logger = logger;
     f->environment = environment;
-    f->model = core_new(name, cosimulation, forward_log, f);
-    if (!f->model) {
-        free(f);
+    supply.owner = f;
+    if (core_init(&f->model, f->name, cosimulation, forward_log, f, supply)) {
+        fmi3FreeInstance(f);
         return no_instance(environment, logger, "no memory is left");
     }
-    f->model->discards = logging;
-    f->model->timed = 1;
+    f->model.discards = logging;
+    f->model.timed = 1;
     return f;
 }
 
@@ -73,9 +86,9 @@ fmi3Instance fmi3InstantiateCoSimulation(
     f = instantiate(name, token, 1, logging, environment, logger);
     if (!f) return NULL;
     f->update = update;
-    f->model->watch = update ? tell : NULL;
-    f->model->event_mode = event_mode;
-    f->model->early_return = early_return;
+    f->model.watch = update ? tell : NULL;
+    f->model.event_mode = event_mode;
+    f->model.early_return = early_return;
     return f;
 }
 
@@ -92,8 +105,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 
 void fmi3FreeInstance(fmi3Instance c) {
     if (!c) return;
-    core_free(MODEL(c));
-    free(c);
+    core_end(MODEL(c));
+    drop(c, c);
 }
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n,
@@ -137,7 +150,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
         if (i < e.n && !status) value[i] = MODEL(c)->m.time;
         first = i + 1;
     }
-    elements_end(&e);
+    elements_end(c, &e);
     return status;
 }
 
@@ -148,7 +161,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     NEED(c);
     if (!elements_begin(c, &e, vr, n, NULL, n_values)) return fmi3Error;
     status = core_set(MODEL(c), e.ref, e.n, value);
-    elements_end(&e);
+    elements_end(c, &e);
     return as_fmi(status);
 }
 

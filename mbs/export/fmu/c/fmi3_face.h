@@ -6,13 +6,17 @@
 #include "fmi3Functions.h"
 
 typedef struct {
-    core *model;
+    core model;
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
     fmi3IntermediateUpdateCallback update;
+    char name[];
 } face;
 
-#define MODEL(c) (((face *)(c))->model)
+/* Bytes of an instance whose name has so many letters. */
+#define INSTANCE_SIZE(letters) (sizeof(face) + (letters) + 1)
+
+#define MODEL(c) (&((face *)(c))->model)
 #define NEED(c) \
     if (!(c)) return fmi3Error
 
@@ -34,8 +38,8 @@ static inline fmi3Status none(fmi3Instance c, size_t n, const char *message) {
 
 /* What a call is about, element by element: a variable may be an array. */
 typedef struct {
-    const unsigned *ref;
-    const int *order; /* of derivatives, or NULL */
+    const core_reference *ref;
+    const core_integer *order; /* of derivatives, or NULL */
     size_t n;
     void *own;
 } elements;
@@ -43,6 +47,6 @@ typedef struct {
 /* 1; or 0 after a message, where the values are not one for each element of the variables. */
 int elements_begin(fmi3Instance c, elements *e, const fmi3ValueReference vr[], size_t n,
                    const fmi3Int32 order[], size_t n_values);
-void elements_end(elements *e);
+void elements_end(fmi3Instance c, elements *e);
 
 #endif

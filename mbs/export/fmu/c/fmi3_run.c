@@ -14,7 +14,7 @@ fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
 fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
     NEED(c);
     if (state) {
-        core_free_state(*state);
+        core_free_state(MODEL(c), *state);
         *state = NULL;
     }
     return fmi3OK;
@@ -51,9 +51,9 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
         if (!elements_begin(c, &of, unknown, n_unknown, NULL, answers)) return fmi3Error;       \
         if (elements_begin(c, &by, known, n_known, NULL, seeds)) {                              \
             status = call(MODEL(c), of.ref, of.n, by.ref, by.n, seed, answer);                  \
-            elements_end(&by);                                                                  \
+            elements_end(c, &by);                                                                  \
         }                                                                                       \
-        elements_end(&of);                                                                      \
+        elements_end(c, &of);                                                                      \
         return as_fmi(status);                                                                  \
     }
 
@@ -153,6 +153,6 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[
     NEED(c);
     if (!elements_begin(c, &e, vr, n, orders, n_values)) return fmi3Error;
     status = core_get_output_slopes(MODEL(c), e.ref, e.n, e.order, values);
-    elements_end(&e);
+    elements_end(c, &e);
     return as_fmi(status);
 }

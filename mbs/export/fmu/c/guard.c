@@ -7,12 +7,11 @@
 #if NB > 0
 
 static core_status passed(core *c) {
-    char where[CORE_WHERE];
     return core_refuse(
         c, "%s: between time %.9g and %.9g the motion comes to a singular configuration, where the "
            "states do not determine the dependent coordinates (at its end %s); choose other "
            "independent joints (assemble(active=...)), start elsewhere, or end the run before",
-        c->name, c->m.watched.time, c->m.time, core_where(c, where));
+        c->name, c->m.watched.time, c->m.time, core_where(c));
 }
 
 /* The signs, velocities and accelerations at the present time. */

@@ -52,10 +52,10 @@ void core_end_inputs(core *c) {
     c->m.inputs = INPUTS_MOVED;
 }
 
-static core_status settable_slope(core *c, unsigned ref, int order, double value) {
+static core_status settable_slope(core *c, core_reference ref, int order, double value) {
     if (ref < INPUTS || ref >= OUTPUTS)
         return core_refuse(c, "%s: value reference %u is no input; only inputs are interpolated",
-                           c->name, ref);
+                           c->name, (unsigned)ref);
     if (order < 1 || order > INPUT_ORDERS)
         return core_refuse(c, "%s: derivative %d of %s is not followed; use orders 1 to %d",
                            c->name, order, MODEL_NAMES[ref], INPUT_ORDERS);
@@ -65,7 +65,7 @@ static core_status settable_slope(core *c, unsigned ref, int order, double value
     return CORE_OK;
 }
 
-core_status core_set_input_slopes(core *c, const unsigned *ref, size_t n, const int *order,
+core_status core_set_input_slopes(core *c, const core_reference *ref, size_t n, const core_integer *order,
                                   const double *values) {
     size_t i;
     if (!core_allowed(c, c->m.cosimulation ? INITIALIZATION | STEP : 0,
@@ -74,10 +74,10 @@ core_status core_set_input_slopes(core *c, const unsigned *ref, size_t n, const 
     if (n && (!ref || !order || !values))
         return core_refuse(c, "%s: the array is NULL", c->name);
     for (i = 0; i < n; i++)
-        if (settable_slope(c, ref[i], order[i], values[i])) return CORE_ERROR;
+        if (settable_slope(c, ref[i], (int)order[i], values[i])) return CORE_ERROR;
     if (!n) return CORE_OK;
     if (c->m.inputs == INPUTS_MOVED) hold(c);
-    for (i = 0; i < n; i++) slopes(c, order[i])[ref[i] - INPUTS] = values[i];
+    for (i = 0; i < n; i++) slopes(c, (int)order[i])[ref[i] - INPUTS] = values[i];
     c->m.inputs = INPUTS_MOVE;
     c->m.input_time = c->m.time;
     core_restart(c);

@@ -23,9 +23,8 @@ core_status core_before_stop(core *c, double time);
 core_status core_check_rules(core *c);
 core_status core_no_answer(core *c, const char *format, ...);
 
-/* The states in words, in the array. */
-#define CORE_WHERE 512
-const char *core_where(const core *c, char *where);
+/* The states in words. */
+const char *core_where(core *c);
 
 /* Make derivatives, outputs and dependents belong to time, states, inputs and parameters. */
 core_status core_refresh(core *c);

@@ -4,11 +4,10 @@
 #include "internal.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Changes with the meaning of core_memory. */
-#define FORMAT "mbs state 2"
+#define FORMAT "mbs state 3"
 
 struct core_state {
     unsigned checksum; /* of what follows; 0 where the state is not bytes */
@@ -35,8 +34,9 @@ static unsigned checksum(const char *bytes) {
 core_status core_save(core *c, core_state **state) {
     if (!core_allowed(c, ~INTERMEDIATE, "saving the state")) return CORE_ERROR;
     if (!state) return core_refuse(c, "%s: the place of the state is NULL", c->name);
-    if (!*state) *state = calloc(1, sizeof **state);
+    if (!*state) *state = c->supply.take(c->supply.owner, sizeof **state);
     if (!*state) return core_refuse(c, "%s: no memory is left to save the state", c->name);
+    memset(*state, 0, sizeof **state);
     memcpy((*state)->format, FORMAT, sizeof FORMAT);
     memcpy((*state)->guid, MODEL_GUID, sizeof MODEL_GUID);
     (*state)->size = sizeof **state;
@@ -67,7 +67,9 @@ core_status core_restore(core *c, const core_state *state) {
     return CORE_OK;
 }
 
-void core_free_state(core_state *state) { free(state); }
+void core_free_state(core *c, core_state *state) {
+    if (state) c->supply.drop(c->supply.owner, state);
+}
 
 size_t core_state_size(void) { return sizeof(core_state); }
 
@@ -122,11 +124,14 @@ static int sane_watch(const watched *w) {
 }
 
 static int sane_events(const core_memory *m) {
+#if NK > 0
     int i;
     for (i = 0; i < EVENTS_MEMORY(NK) - NK; i++) /* all but the rates */
         if (isnan(m->events[i])) return 0;
     for (i = 0; i < NK; i++)
         if (!isfinite(m->offset[i]) || m->offset[i] < 0.0) return 0;
+#endif
+    (void)m;
     return 1;
 }
 
@@ -174,7 +179,7 @@ core_status core_deserialize(core *c, const char *bytes, size_t size, core_state
         return core_refuse(c, "%s: %lu bytes are no state of this model, which has %lu; give all "
                            "that were written", c->name, (unsigned long)size,
                            (unsigned long)sizeof *s);
-    if (!(s = malloc(sizeof *s)))
+    if (!(s = c->supply.take(c->supply.owner, sizeof *s)))
         return core_refuse(c, "%s: no memory is left for the state", c->name);
     memcpy(s, bytes, sizeof *s);
     if (s->checksum != checksum(bytes))
@@ -187,7 +192,7 @@ core_status core_deserialize(core *c, const char *bytes, size_t size, core_state
                              "be; write one of its own", c->name);
     s->checksum = 0;
     if (status)
-        free(s);
+        core_free_state(c, s);
     else
         *state = s;
     return status;

@@ -2,10 +2,13 @@
 #ifndef MBS_SOLVER_H
 #define MBS_SOLVER_H
 
-#include "dopri5.h"
-#include "events.h"
-#include "passage.h"
 #include "model.h"
+#include "stepper.h"
+
+#ifdef MODEL_TREE
+#include "dopri5.h"
+#include "passage.h"
+#endif
 
 #if defined MODEL_RODAS
 #include "rodas.h"
@@ -14,6 +17,7 @@
 #include "rk4.h"
 #define SOLVER_WORK RK4_WORK
 #else
+#include "dopri5.h"
 #define SOLVER_WORK DOPRI5_WORK
 #endif
 

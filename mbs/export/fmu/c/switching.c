@@ -8,11 +8,11 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "closure.h"
 #include "guard.h"
+#include "message.h"
 
 /* Events that rounding of a time this long [s] cannot tell apart count as standing still. */
 #define CHATTER_SPAN 1e3
@@ -45,19 +45,24 @@ static core_status step_failed(core *c, int status) {
         "a jump has no solution", "its jumps do not come to an end",
         "chattering, events follow each other and time stands still"};
     const char *why = status < (int)(sizeof reason / sizeof *reason) ? reason[status] : "";
-    char names[512] = "", where[CORE_WHERE];
-    size_t used = 0;
+#if NK > 0
+    char names[512];
+    message m;
     int k;
-    SHOW_TREE(c); /* the last state that was accepted */
-    for (k = 0; k < NK && status >= EVENTS_JUMP_FAILED && used < sizeof names; k++)
-        if (events_fired(&c->events)[k] > 0.0)
-            used += (size_t)snprintf(names + used, sizeof names - used, "%s%s",
-                                     used ? ", " : "; it concerns ", MODEL_INDICATORS[k]);
+    message_begin(&m, names, sizeof names);
+    for (k = 0; k < NK && status >= EVENTS_JUMP_FAILED; k++)
+        if (events_fired(&c->events)[k] > 0.0) {
+            message_text(&m, m.length ? ", " : "; it concerns ");
+            message_text(&m, MODEL_INDICATORS[k]);
+        }
+    SHOW_TREE(c);
     if (status >= EVENTS_JUMP_FAILED)
         return core_no_answer(c, "%s: the event at time %.9g (%s) cannot be handled: %s%s", c->name,
-                              c->m.time, core_where(c, where), why, names);
+                              c->m.time, core_where(c), why, names);
+#endif
+    SHOW_TREE(c); /* the last state that was accepted */
     return core_no_answer(c, "%s: integration stopped at time %.9g (%s) with step %.3g: %s", c->name,
-                          c->m.time, core_where(c, where), stepper_wanted_step(&c->solver), why);
+                          c->m.time, core_where(c), stepper_wanted_step(&c->solver), why);
 }
 
 /* What moves: the coordinates of the tree, or the states. */
@@ -107,18 +112,19 @@ static core_status accept(core *c, int at_hand) {
 
 core_status core_step(core *c, double limit) {
     double *x = moving(c);
-    int status = tighten(c);
+    core_status status = tighten(c);
+    int stopped;
     if (!status && !ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
     if (status) return status;
 #if NK > 0
-    status = events_step(&c->events, x, limit);
+    stopped = events_step(&c->events, x, limit);
 #else
-    status = stepper_step(&c->solver, x, limit);
+    stopped = stepper_step(&c->solver, x, limit);
 #endif
     c->m.time = stepper_time(&c->solver);
     c->m.stale = 1;
-    status = status ? (int)step_failed(c, status) : (int)accept(c, ENDS_AT_HAND);
-    return status || ON_TREE(c) ? (core_status)status : guard_pass(c);
+    status = stopped ? step_failed(c, stopped) : accept(c, ENDS_AT_HAND);
+    return status || ON_TREE(c) ? status : guard_pass(c);
 }
 
 #if NK > 0
@@ -246,20 +252,19 @@ core_status core_settle(core *c, int *changed) {
 core_status core_show_indicators(core *c) {
     double *shown = c->m.values + INDICATORS;
     core_status status = core_refresh(c);
-    char where[CORE_WHERE];
     int k, tree = ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     if (status) return status;
     core_point(c, &c->m.time, tree ? moving(c) : c->m.values + STATES, c->m.values + DEPENDENTS);
     c->res[0] = shown;
     if (CALL(tree, indicators))
         return core_no_answer(c, "%s: the event indicators have no value at time %.9g (%s)", c->name,
-                              c->m.time, core_where(c, where));
+                              c->m.time, core_where(c));
     for (k = 0; k < NK; k++) {
         shown[k] += c->m.offset[k];
         if (shown[k] == 0.0) shown[k] = -DBL_MIN;
         if (!isfinite(shown[k]))
             return core_no_answer(c, "%s: %s is not finite at time %.9g (%s)", c->name,
-                                  MODEL_NAMES[INDICATORS + k], c->m.time, core_where(c, where));
+                                  MODEL_NAMES[INDICATORS + k], c->m.time, core_where(c));
     }
     return CORE_OK;
 }

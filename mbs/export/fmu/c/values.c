@@ -9,33 +9,33 @@
 #include <math.h>
 #include <string.h>
 
-static core_status known_reference(core *c, unsigned ref) {
+static core_status known_reference(core *c, core_reference ref) {
     if (ref < N_VALUES) return CORE_OK;
-    return core_refuse(c, "%s: value reference %u is unknown; the last one is %d", c->name, ref,
-                       (int)N_VALUES - 1);
+    return core_refuse(c, "%s: value reference %u is unknown; the last one is %d", c->name,
+                       (unsigned)ref, (int)N_VALUES - 1);
 }
 
 /* Whether a reference is one of a kind, of which there may be none. */
-static int among(unsigned ref, unsigned first, unsigned end) { return ref - first < end - first; }
+static int among(core_reference ref, core_reference first, core_reference end) { return ref - first < end - first; }
 
-static int is_mode(unsigned ref) { return among(ref, MODES, DEPENDENTS); }
+static int is_mode(core_reference ref) { return among(ref, MODES, DEPENDENTS); }
 
 /* 1 for what is there without calculation. */
-static int given(const core *c, unsigned ref) {
+static int given(const core *c, core_reference ref) {
     if (ref < DERIVATIVES) return !NS || (c->m.mode & (INSTANTIATED | INITIALIZATION)) != 0;
     if (among(ref, INPUTS, OUTPUTS)) return 1;
     if (among(ref, SLOTS, RATES)) return !(c->m.mode & (INSTANTIATED | INITIALIZATION));
     return ref >= PARAMETERS && ref < (c->m.mode == INITIALIZATION ? MODES : DEPENDENTS);
 }
 
-core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
+core_status core_get(core *c, const core_reference *ref, size_t n, double *values) {
     core_status status = CORE_OK;
     size_t i;
     if (!core_allowed(c, READABLE, "getting values")) return CORE_ERROR;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
     for (i = 0; i < n && !status; i++) status = known_reference(c, ref[i]);
     for (i = 0; i < n && !status; i++) {
-        unsigned r = ref[i];
+        core_reference r = ref[i];
         if (among(r, INDICATORS, SLOTS))
             status = core_show_indicators(c);
 #if MODEL_TREE_OUTSIDE
@@ -50,7 +50,7 @@ core_status core_get(core *c, const unsigned *ref, size_t n, double *values) {
     return status;
 }
 
-core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values) {
+core_status core_get_modes(core *c, const core_reference *ref, size_t n, core_integer *values) {
     core_status status = CORE_OK;
     size_t i;
     if (!core_allowed(c, READABLE, "getting values")) return CORE_ERROR;
@@ -58,7 +58,7 @@ core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values) 
     for (i = 0; i < n; i++)
         if (!is_mode(ref[i]))
             return core_refuse(c, "%s: value reference %u is no integer variable; those are modes",
-                               c->name, ref[i]);
+                               c->name, (unsigned)ref[i]);
     for (i = 0; i < n && !status; i++) {
         double value;
         if (!given(c, ref[i])) status = core_refresh(c);
@@ -72,7 +72,7 @@ core_status core_get_modes(core *c, const unsigned *ref, size_t n, int *values) 
 }
 
 /* Modes in which a variable may be set; 0: it is calculated. */
-static int settable(const core *c, unsigned ref) {
+static int settable(const core *c, core_reference ref) {
     int before = INSTANTIATED | INITIALIZATION;
     if (ref < DERIVATIVES && NS) return c->m.cosimulation ? before : before | EVENT;
     if (ref < DERIVATIVES || among(ref, SLOTS, RATES))
@@ -85,7 +85,7 @@ static int settable(const core *c, unsigned ref) {
 }
 
 /* The smallest normal number as a bound means more than zero. */
-static core_status within_bounds(core *c, unsigned ref, double value) {
+static core_status within_bounds(core *c, core_reference ref, double value) {
     double low = MODEL_MIN[ref], high = MODEL_MAX[ref];
     const char *name = MODEL_NAMES[ref];
     if (value >= low && value <= high) return CORE_OK;
@@ -99,7 +99,7 @@ static core_status within_bounds(core *c, unsigned ref, double value) {
     return core_refuse(c, "%s: parameter %s is %g; give %g or more", c->name, name, value, low);
 }
 
-static core_status settable_value(core *c, unsigned ref, double value) {
+static core_status settable_value(core *c, core_reference ref, double value) {
     const char *name;
     int modes;
     if (known_reference(c, ref)) return CORE_ERROR;
@@ -123,7 +123,7 @@ static void changed(core *c) {
 }
 
 /* A guess equal to the start value in the model description says nothing: many hosts write all. */
-static void set_guess(core *c, unsigned ref, double value) {
+static void set_guess(core *c, core_reference ref, double value) {
     if (c->m.guess[ref - DEPENDENTS] == value) return;
     c->m.guess[ref - DEPENDENTS] = value;
     changed(c);
@@ -131,7 +131,7 @@ static void set_guess(core *c, unsigned ref, double value) {
 
 /* States of the independent joints under their other names; before the start, one that is equal to
  * its value in the model description says nothing. */
-static void set_slot(core *c, unsigned ref, double value) {
+static void set_slot(core *c, core_reference ref, double value) {
     int before = (c->m.mode & (INSTANTIATED | INITIALIZATION)) != 0;
     double *at = c->m.values + (before ? ref - SLOTS + STATES : ref);
     if (*at == value || (before && value == MODEL_START[ref])) return;
@@ -140,7 +140,7 @@ static void set_slot(core *c, unsigned ref, double value) {
 }
 
 /* Where joints are no states in event mode, they become so before they, or lengths, are set. */
-static core_status joints_set(core *c, unsigned ref) {
+static core_status joints_set(core *c, core_reference ref) {
 #if MODEL_TREE_OUTSIDE
     int ours = ref < DERIVATIVES || ref >= PARAMETERS;
     if (ours && !c->m.cosimulation && c->m.mode == EVENT) return charts_set(c);
@@ -149,7 +149,7 @@ static core_status joints_set(core *c, unsigned ref) {
     return CORE_OK;
 }
 
-core_status core_set(core *c, const unsigned *ref, size_t n, const double *values) {
+core_status core_set(core *c, const core_reference *ref, size_t n, const double *values) {
     size_t i;
     if (n && (!ref || !values)) return core_refuse(c, "%s: the array is NULL", c->name);
     for (i = 0; i < n; i++)

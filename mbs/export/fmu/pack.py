@@ -280,7 +280,7 @@ def _binaries(
 ) -> dict[str, bytes]:
     """The libraries: name in the FMU to content."""
     flags = (*plain_flags(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
-    common = tuple(f"{name}.c" for name in _runtime(model.solver))
+    common = tuple(f"{name}.c" for name in _runtime(model.solver, model.target))
     libraries: dict[Platform, Path] = {}
     if goals is None:
         libraries[host_platform()] = cached_library(texts, flags, common=common)

@@ -24,7 +24,7 @@ os.environ.setdefault("MBS_TEST_SEED", str(datetime.date.today().toordinal()))
 def pytest_configure(config):
     """The markers of this project."""
     config.addinivalue_line(
-        "markers", "sweep: many cases of one rule; a part runs, all with MBS_TEST_ALL=1"
+        "markers", "sweep: many cases of one rule, of which a part runs unless MBS_TEST_ALL=1"
     )
 
 
@@ -35,18 +35,24 @@ def pytest_report_header(config):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of each sweep a seeded fifth, at least three cases."""
+    """Of each sweep a fifth, three at least; of a rule tried with several seeds one."""
     if EVERY_CASE:
         return
-    sweeps = defaultdict(list)
+    sweeps, seeds = defaultdict(list), defaultdict(list)
     for item in items:
+        name = item.nodeid.partition("[")[0]
+        given = item.callspec.indices if hasattr(item, "callspec") else {}
         if item.get_closest_marker("sweep"):
-            sweeps[item.nodeid.partition("[")[0]].append(item)
+            sweeps[name].append(item)
+        elif "seed" in given:
+            others = sorted((key, place) for key, place in given.items() if key != "seed")
+            seeds[f"{name} {others}"].append(item)
     left = set()
-    for name, cases in sweeps.items():
-        kept = max(3, math.ceil(len(cases) / 5))
-        chosen = random.Random(os.environ["MBS_TEST_SEED"] + name)
-        left.update(chosen.sample(cases, max(0, len(cases) - kept)))
+    for groups, least, part in ((sweeps, 3, 5), (seeds, 1, math.inf)):
+        for name, cases in groups.items():
+            kept = max(least, math.ceil(len(cases) / part))
+            chosen = random.Random(f"{os.environ['MBS_TEST_SEED']} {name}")
+            left.update(chosen.sample(cases, max(0, len(cases) - kept)))
     config.hook.pytest_deselected(items=[item for item in items if item in left])
     items[:] = [item for item in items if item not in left]
 

@@ -26,6 +26,7 @@ def two_links(axis=(0, 0, 1), rotation=None, kind=Revolute):
     return m.assemble()
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("default", [-0.5, 0.5, 0.0])
 @pytest.mark.parametrize("value", [-0.5, 0.5, 0.0, 2.5, -2.0])
 @pytest.mark.parametrize("axis", "xyz")

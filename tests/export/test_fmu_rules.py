@@ -41,6 +41,7 @@ def outcome(path, start, fmi_type="CoSimulation"):
     return ""
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("fmi_type", ["CoSimulation", "ModelExchange"])
 @pytest.mark.parametrize(
     ("start", "sentence"),

@@ -132,6 +132,7 @@ STRIPPED = {
 }
 
 
+@pytest.mark.sweep
 @names
 @pytest.mark.parametrize("language", TEXTS)
 def test_nothing_of_a_name_is_code(language, text, tmp_path):
@@ -176,6 +177,7 @@ def test_compilers_find_nothing_of_a_name(language, tmp_path):
     assert (answer.returncode, answer.stderr) == (0, "")
 
 
+@pytest.mark.sweep
 @names
 def test_c_library(text, tmp_path):
     folders = [
@@ -266,6 +268,7 @@ def strange(name):
     return Function("f", [x], [casadi.sin(x)], [f"x{name}"], [f"y{name}"])
 
 
+@pytest.mark.sweep
 @names
 @pytest.mark.parametrize("language", TEXTS)
 def test_arguments_are_identifiers(language, text):

@@ -23,6 +23,7 @@ def elbow(q, a=0.4, b=1.0, c=0.9, ground=0.8):
     return np.sign(across[0] * coupler[1] - across[1] * coupler[0])
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("angle", np.linspace(-6.2, 6.2, 25))
 def test_a_full_turn_stays_on_the_branch(angle):
     system = four_bar()

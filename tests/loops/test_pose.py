@@ -6,6 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.configurations import same
 from support.parallel_geometry import LEGS, rotation
+from support.sweeps import examples
 
 import mbs
 from mbs.components import Body, Mechanism, Revolute
@@ -53,7 +54,7 @@ def test_pose_is_reproduced(systems, name, seed):
     assert is_closed(system, q)
 
 
-@settings(max_examples=15, **COMMON)
+@settings(max_examples=examples(15), **COMMON)
 @given(seed=st.integers(0, 10**6))
 def test_stewart_legs_are_as_long_as_the_plain_formula_says(systems, seed):
     system = systems["stewart_platform"]

@@ -75,6 +75,7 @@ def algebraic(d, z):
     return np.concatenate([z, np.zeros(d.z.numel() - len(z))])
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("form", IMPLICIT)
 @pytest.mark.parametrize("name", [*CLOSED, *OPEN])
 def test_algebraic_equations_hold_where_the_equations_of_motion_do(name, form):
@@ -112,6 +113,7 @@ def test_reduced_equations_give_the_same_motion(name):
     np.testing.assert_allclose(gap, 0, atol=1e-10)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("form", IMPLICIT)
 @pytest.mark.parametrize("name", CLOSED)
 def test_index_is_the_number_of_differentiations_to_a_regular_jacobian(name, form):
@@ -137,6 +139,7 @@ def jacobian_at(d, rows, point):
     return J / np.where(lines > 0, lines, 1)[:, None]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("form", ["reduced", *IMPLICIT])
 @pytest.mark.parametrize("name", [*CLOSED, *OPEN])
 def test_invariants_do_not_change_along_a_motion(name, form):

@@ -50,6 +50,7 @@ def on_symbols(f, at, expected):
         same([value], [np.hstack([one, one])])
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("name", "builder"), PAIRS)
 def test_symbols_maps_and_expansion(name, builder):
     f = built(name, builder)

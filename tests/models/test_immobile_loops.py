@@ -107,6 +107,7 @@ ALIKE = {
 """Models whose outputs are the same numbers."""
 
 
+@pytest.mark.sweep
 @both
 @pytest.mark.parametrize("builder", ALIKE)
 def test_models_of_the_independent_joints(name, builder):

@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.closed_mechanisms import closed_chain
 from support.random_trees import ALL_KINDS, random_body, random_rotation, random_state, random_tree
+from support.sweeps import examples
 
 import mbs
 import mbs.loops
@@ -50,7 +51,7 @@ def rates(f, q, q_rate):
     return [np.array(o) for o in f.call([q])], [np.array(o) for o in moving.call([q])]
 
 
-@settings(max_examples=10, **COMMON)
+@settings(max_examples=examples(10), **COMMON)
 @given(st.integers(0, 10**6), st.integers(0, 4), st.integers(0, 4))
 def test_jacobian_in_any_axes_is_the_velocity_of_the_frame(seed, moved, axes):
     system = drawn_tree(seed)
@@ -69,6 +70,7 @@ def test_jacobian_in_any_axes_is_the_velocity_of_the_frame(seed, moved, axes):
     np.testing.assert_allclose(np.linalg.det(L), 1, rtol=0, atol=1e-12)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("intermediate", range(7))
 @pytest.mark.parametrize("reference", [None, 0, 2, 6])
 def test_renaud_with_any_frames(intermediate, reference):
@@ -91,7 +93,7 @@ def test_jacobian_of_the_base_is_zero():
     np.testing.assert_array_equal(np.array(L), np.eye(6))
 
 
-@settings(max_examples=8, **COMMON)
+@settings(max_examples=examples(8), **COMMON)
 @given(st.integers(0, 10**6))
 def test_link_velocities_and_accelerations(seed):
     system = drawn_tree(seed)
@@ -120,7 +122,7 @@ def twists_in_base(system):
     return casadi.Function("V", [q, v], [casadi.horzcat(*columns)])
 
 
-@settings(max_examples=8, **COMMON)
+@settings(max_examples=examples(8), **COMMON)
 @given(st.integers(0, 10**6), st.integers(0, 5))
 def test_jacobian_dot_velocity_is_the_derivative_of_the_jacobian(seed, axes):
     system = drawn_tree(seed)

@@ -12,6 +12,7 @@ from support.placed_trees import (
     transform,
 )
 from support.random_trees import random_rotation
+from support.sweeps import examples
 
 import mbs.models
 from mbs.loops import closure
@@ -103,7 +104,7 @@ A_SYMBOL = (
 )
 
 
-@settings(max_examples=80, **COMMON)
+@settings(max_examples=examples(80), **COMMON)
 @example(A_TILT, {"A": 0.5, "B": 0.5, "C": 0.5}, {"A": 0.5, "B": 0.5, "C": 0.5}, 0)
 @example(A_SYMBOL, {"A": 0.5, "B": 0.5, "C": 0.5}, {"A": -0.5, "B": 0.5, "C": 0.5}, 0)
 @example(A_SYMBOL, {"A": 0.0, "B": 0.5, "C": 0.5}, {"A": -0.5, "B": 0.5, "C": 0.5}, 0)
@@ -147,7 +148,7 @@ def test_symbols_numbers_and_pinocchio_agree(tree, defaults, p, seed):
             assert error < 1e-12 * np.linalg.cond(M) * max(1.0, np.abs(tau).max())
 
 
-@settings(max_examples=60, **COMMON)
+@settings(max_examples=examples(60), **COMMON)
 @given(trees(6), values)
 def test_no_frame_is_far_from_the_joint_that_was_described(tree, p):
     pin = pytest.importorskip("pinocchio")
@@ -173,7 +174,7 @@ def test_no_frame_is_far_from_the_joint_that_was_described(tree, p):
         assert np.linalg.norm(T[:3, 3] - described) <= 3 * size * (1 + 1e-9)
 
 
-@settings(max_examples=30, **COMMON)
+@settings(max_examples=examples(30), **COMMON)
 @given(trees(3), values, st.integers(0, 10**6))
 def test_numbers_and_mujoco_agree(tree, p, seed):
     mujoco = pytest.importorskip("mujoco")
@@ -196,7 +197,7 @@ def test_numbers_and_mujoco_agree(tree, p, seed):
             np.testing.assert_allclose(T[:3, 3], data.body(body.name).xpos, rtol=0, atol=1e-11)
 
 
-@settings(max_examples=40, **COMMON)
+@settings(max_examples=examples(40), **COMMON)
 @given(trees(3), values, values, steps, steps, st.integers(0, 10**6))
 def test_cut_joints_with_symbols_close_where_those_with_numbers_do(
     tree, defaults, p, first, second, seed

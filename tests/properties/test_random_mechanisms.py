@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.closed_mechanisms import CLOSING, closed_chain, planar_loop
 from support.random_trees import ALL_KINDS, random_state, random_tree
+from support.sweeps import examples
 
 import mbs.models
 import mbs.simulate
@@ -39,7 +40,7 @@ def closed(draw):
     return closed_chain(seed, draw(st.sampled_from(sorted(CLOSING))), draw(st.integers(7, 8)))
 
 
-@settings(max_examples=25, **COMMON)
+@settings(max_examples=examples(25), **COMMON)
 @given(trees(), st.integers(0, 10**6))
 def test_direct_and_inverse_dynamics_are_inverse(mechanism, seed):
     system = mechanism.assemble()
@@ -51,7 +52,7 @@ def test_direct_and_inverse_dynamics_are_inverse(mechanism, seed):
     assert error < 1e-14 * np.linalg.cond(A) * max(1.0, np.abs(tau).max()) + 1e-10
 
 
-@settings(max_examples=25, **COMMON)
+@settings(max_examples=examples(25), **COMMON)
 @given(trees(), st.integers(0, 10**6))
 def test_power_is_the_rate_of_energy(mechanism, seed):
     system = mechanism.assemble()
@@ -67,7 +68,7 @@ def test_power_is_the_rate_of_energy(mechanism, seed):
     assert abs(power - dE) < 1e-9 * max(1.0, np.abs(v * tau).sum())
 
 
-@settings(max_examples=20, **COMMON)
+@settings(max_examples=examples(20), **COMMON)
 @given(trees(), st.integers(0, 10**6))
 def test_lagrange_form_is_newton_euler(mechanism, seed):
     system = mechanism.assemble()
@@ -79,7 +80,7 @@ def test_lagrange_form_is_newton_euler(mechanism, seed):
     assert np.abs(difference).max() < 1e-10 * max(1.0, np.abs(tau).max())
 
 
-@settings(max_examples=20, **COMMON)
+@settings(max_examples=examples(20), **COMMON)
 @given(closed())
 def test_closed_mechanism_assembles_and_its_models_agree(drawn):
     mechanism, guess = drawn
@@ -95,7 +96,7 @@ def test_closed_mechanism_assembles_and_its_models_agree(drawn):
     assert np.abs(back - a_a).max() < 1e-13 * scale + 1e-9
 
 
-@settings(max_examples=12, **COMMON)
+@settings(max_examples=examples(12), **COMMON)
 @given(closed())
 def test_loops_stay_closed_along_a_motion(drawn):
     """Closure below 1e-12, and energy kept, over half a second from rest."""
@@ -125,7 +126,7 @@ def dissipated(system, result):
     return float(np.trapezoid(power, fine.time))
 
 
-@settings(max_examples=30, **COMMON)
+@settings(max_examples=examples(30), **COMMON)
 @given(st.text(max_size=20))
 def test_no_text_is_ever_run(text):
     """Any text is a number, an expression of symbols, or an error of ours."""

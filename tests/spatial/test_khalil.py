@@ -199,6 +199,7 @@ LAYOUTS = [
 ]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("layout", LAYOUTS, ids=range(len(LAYOUTS)))
 @pytest.mark.parametrize("values", [(0.7, 0.4), (0.7, -0.4), (-0.7, 0.4), (0.0, 0.4), (0.0, 0.0)])
 def test_symbolic_lengths_and_angles(layout, values):

@@ -56,6 +56,7 @@ def systems():
     return {name: mbs.load(SYMBOLIC if " " in name else name).assemble() for name in NAMES}
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("key", "name"),
     [(one.key, name) for one in entries() for name in NAMES if (one.key, name) not in LONG],

@@ -150,6 +150,7 @@ def test_special_arms_are_solved_completely(make, first):
     assert_complete(arm_of(make(first - 1, 0)), np.random.default_rng(first), 4)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kinds", SLIDING)
 def test_slides_anywhere(kinds):
     assert_complete(arm_of(slides_and_turns(kinds, 0)), np.random.default_rng(3), 3, oracle=0)

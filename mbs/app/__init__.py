@@ -1,1 +1,1 @@
-"""What people use without writing Python: the command line and the desk in the browser."""
+"""What people use without writing Python: the command line and the app in the browser."""

@@ -1,4 +1,4 @@
-"""A page with one panel of the desk, visited without a browser; its work is done at once."""
+"""A page with one panel of the app, visited without a browser; its work is done at once."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from contextlib import asynccontextmanager
 from nicegui import ui
 from nicegui.testing.user_simulation import user_simulation
 
-import mbs.app.desk.jobs as jobs
-from mbs.app.desk.desk import Desk
-from mbs.app.desk.document.document import Document
-from mbs.app.desk.session import Session
+import mbs.app.web.jobs as jobs
+from mbs.app.web.app import App
+from mbs.app.web.document.document import Document
+from mbs.app.web.session import Session
 
 PATIENT = 100
 """Attempts to see what takes a moment."""
@@ -48,34 +48,34 @@ async def _end_others():
 
 
 def visited(panel, robot, visit, monkeypatch):
-    """Open a panel on a robot of the catalogue, and let `visit(user, desk)` use it."""
+    """Open a panel on a robot of the catalogue, and let `visit(user, app)` use it."""
     monkeypatch.setattr(jobs, "run", _at_once)
 
     async def whole():
-        async with _page(panel, robot) as (user, desk):
-            await visit(user, desk)
+        async with _page(panel, robot) as (user, app):
+            await visit(user, app)
 
     run_visit(whole)
 
 
 @asynccontextmanager
 async def _page(panel, robot):
-    desks = []
+    apps = []
 
     async def page():
         await ui.context.client.connected(timeout=30)
-        desk = Desk(Session(Document.of_name(robot)))
-        desk.drawer.build(lambda filled: None)
-        desk.build_cards()
-        await desk.start()
-        panel(desk)
-        desks.append(desk)
+        app = App(Session(Document.of_name(robot)))
+        app.drawer.build(lambda filled: None)
+        app.build_cards()
+        await app.start()
+        panel(app)
+        apps.append(app)
         ui.label("the panel stands")
 
     async with user_simulation(root=page) as user:
         await user.open("/")
         await user.should_see("the panel stands", retries=PATIENT)
-        yield user, desks[0]
+        yield user, apps[0]
 
 
 async def _at_once(task, document, *args, progress=None):

@@ -9,7 +9,6 @@ import typer
 from mbs.app.cli import (
     convert,
     count,
-    desk,
     export,
     identify,
     model,
@@ -19,6 +18,7 @@ from mbs.app.cli import (
     simulate,
     solve_ik,
     sweep,
+    web,
 )
 from mbs.app.cli.arguments import examples, help_of
 from mbs.app.cli.group import Commands
@@ -75,4 +75,4 @@ for _name, _command, _examples in (
 ):
     application.command(_name, help=help_of(_command), epilog=_examples)(_command)
 application.add_typer(export.commands, name="export")
-application.command("app", help=help_of(desk.app), epilog=desk.EXAMPLES)(desk.app)
+application.command("app", help=help_of(web.app), epilog=web.EXAMPLES)(web.app)

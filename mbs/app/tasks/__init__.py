@@ -1,1 +1,1 @@
-"""What the command line and the desk do: functions of a System and plain options to plain data."""
+"""What the command line and the app do: functions of a System and plain options to plain data."""

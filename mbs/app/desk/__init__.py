@@ -1,1 +1,0 @@
-"""The desk: a page in the browser with a robot as a table, its picture and its equations."""

@@ -1,0 +1,387 @@
+"""A robot in the app: what was typed or opened, what is wrong in it, and its System."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from mbs.app.tasks.exporting import toml
+from mbs.app.web.document import rows as document_rows
+from mbs.app.web.document.reading import read_upload, shown_tables, table_of
+from mbs.app.web.document.tables import (
+    COLUMNS,
+    LONGEST_CELL,
+    Cell,
+    CellProblem,
+    Tables,
+    Texts,
+    number,
+    place_of,
+    reader_of,
+    require_cell,
+    robot_table,
+    tables_of,
+)
+from mbs.assembly import System
+from mbs.components import Mechanism
+from mbs.errors import DescriptionError, MbsError
+from mbs.expressions import Parameter
+from mbs.formats import RobotTable, to_mechanism, write_par, write_toml
+from mbs.robots import catalogue
+from mbs.text import did_you_mean
+
+# What is wrong in a robot's tables, and in which cell.
+
+
+_ROW = re.compile(r"(?:^|/)(frame|body|loop) (\d+)\b")
+_SHEET = {"frame": "geometry", "body": "inertia", "loop": "loops"}
+_WORD = re.compile(r"[A-Za-z_]+")
+_ALIASES = {"sigma": "joint", "cut": "frame", "motor": "actuated"}
+
+
+def unread(tables: Tables) -> Iterator[CellProblem]:
+    """Every cell whose text cannot be read."""
+    for cell, text in tables.cells():
+        try:
+            reader_of(*cell)(text, place_of(*cell))
+        except MbsError as error:
+            yield CellProblem(*cell, str(error))
+
+
+def placed(tables: Tables, error: MbsError) -> CellProblem:
+    """The cell that an error is about, as far as its sentence tells."""
+    sentence = str(error)
+    return (
+        _by_number(tables, sentence)
+        or _by_name(tables, sentence)
+        or _by_symbol(tables, sentence)
+        or CellProblem("", 0, "", sentence)
+    )
+
+
+def _by_number(tables: Tables, sentence: str) -> CellProblem | None:
+    found = _ROW.search(sentence)
+    if found is None:
+        return None
+    sheet, row = _SHEET[found[1]], int(found[2]) - 1
+    if not 0 <= row < len(tables.rows(sheet)):
+        return None
+    return CellProblem(sheet, row, _column(sheet, sentence[found.end() :]), sentence)
+
+
+def _by_name(tables: Tables, sentence: str) -> CellProblem | None:
+    """The row whose joint or body has the name that the sentence quotes or begins with.
+
+    Where there are two, it is the one that was named by hand, or the last one.
+    """
+    by_hand = [bool(g[-1].strip() or b[-1].strip()) for g, b in _pairs(tables)]
+    for row in sorted(range(len(by_hand)), key=lambda k: (by_hand[k], k), reverse=True):
+        joint, body = tables.joint_name(row), tables.body_name(row)
+        if _is_about(sentence, body):
+            column = _column("inertia", _after(sentence, body)) or "M"
+            return CellProblem("inertia", row, column, sentence)
+        if _is_about(sentence, joint):
+            rest = _after(sentence, joint)
+            column = _column("geometry", rest)
+            other = "" if column else _column("inertia", rest)
+            if other:
+                return CellProblem("inertia", row, other, sentence)
+            return CellProblem("geometry", row, column or "name", sentence)
+    return None
+
+
+def _pairs(tables: Tables) -> zip[tuple[Texts, Texts]]:
+    return zip(tables.geometry, tables.inertia, strict=True)
+
+
+def _by_symbol(tables: Tables, sentence: str) -> CellProblem | None:
+    for k, name in enumerate(tables.symbols):
+        if re.search(rf"\bparameter '?{re.escape(name)}'?(?![\w.])", sentence):
+            return CellProblem("symbols", k, "value", sentence)
+    return None
+
+
+def _is_about(sentence: str, name: str) -> bool:
+    return sentence.startswith((f"{name}:", f"{name},")) or f"'{name}'" in sentence
+
+
+def _after(sentence: str, name: str) -> str:
+    return sentence.partition(name)[2]
+
+
+def _column(sheet: str, words: str) -> str:
+    """The first word that is the name of a column."""
+    columns: Any = COLUMNS[sheet]
+    for word in _WORD.findall(words):
+        if (known := _ALIASES.get(word, word)) in columns:
+            return str(known)
+    return ""
+
+
+_UNSAFE = re.compile(r"[^A-Za-z0-9_-]+")
+_KEPT = 24
+"""Assembled systems that are kept; they are the same for every visitor."""
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentOrigin:
+    """Where a mechanism comes from that its tables do not say.
+
+    Attributes:
+        name: in the catalogue, or "" for a file.
+        content: of the file.
+        suffix: of the file's name.
+        reason: why no table of frames says it.
+    """
+
+    name: str
+    content: bytes = b""
+    suffix: str = ""
+    reason: str = ""
+
+    def mechanism(self) -> Mechanism:
+        """The mechanism, made anew."""
+        if self.name:
+            return catalogue()[self.name]()
+        made = read_upload(self.content, self.suffix)
+        return made if isinstance(made, Mechanism) else to_mechanism(made)
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A robot as texts: hashable, picklable, never changed.
+
+    Attributes:
+        tables: the cells; of a mechanism with an `origin` only its name, its source and the
+            values of its symbols.
+        origin: where a mechanism comes from that no table of frames can say; None for the others.
+    """
+
+    tables: Tables
+    origin: DocumentOrigin | None = None
+
+    @staticmethod
+    def of(table: RobotTable) -> Document:
+        """The document of a table of frames."""
+        return Document(tables_of(table))
+
+    @staticmethod
+    def blank() -> Document:
+        """A robot of one joint, to begin with."""
+        return Document(document_rows.blank())
+
+    @staticmethod
+    def of_name(name: str) -> Document:
+        """A mechanism of the catalogue.
+
+        Raises:
+            DescriptionError: there is none of this name.
+        """
+        if name not in catalogue():
+            raise DescriptionError(
+                f"there is no robot {name!r} in the catalogue; {did_you_mean(name, catalogue())}"
+            )
+        return _of_mechanism(catalogue()[name](), DocumentOrigin(name))
+
+    @staticmethod
+    def of_upload(content: bytes, suffix: str) -> Document:
+        """The robot in a file: .toml, .par, .urdf or .xml (MJCF).
+
+        Raises:
+            DescriptionError: the file is too large, of another kind, or malformed.
+        """
+        made = read_upload(content, suffix)
+        if isinstance(made, RobotTable):
+            return Document.of(made)
+        return _of_mechanism(made, DocumentOrigin("", content, suffix.lower()))
+
+    @property
+    def name(self) -> str:
+        """Of the robot."""
+        return self.tables.general[0].strip() or "robot"
+
+    @property
+    def is_table(self) -> bool:
+        """Whether the cells say the whole robot, so that they can be changed."""
+        return self.origin is None
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Names of its symbols."""
+        if self.origin is None:
+            return self.tables.symbols
+        return tuple(name for name, _ in self.tables.values)
+
+    def changed(self, cell: Cell, text: str) -> Document:
+        """The document with another text in a cell.
+
+        Raises:
+            DescriptionError: there is no such cell, or it cannot be changed.
+        """
+        if self.origin is not None:
+            if cell.sheet != "symbols" or not 0 <= cell.row < len(self.symbols):
+                raise DescriptionError(f"this cell cannot be changed: {self.origin.reason}")
+            values = {**dict(self.tables.values), self.symbols[cell.row]: text}
+            return replace(self, tables=replace(self.tables, values=tuple(values.items())))
+        require_cell(self.tables, cell)
+        return replace(self, tables=self.tables.changed(cell, text[: LONGEST_CELL + 1]))
+
+    def with_frame(self) -> Document:
+        """One more frame at the end."""
+        return self._edited(document_rows.with_frame)
+
+    def without_frame(self, row: int) -> Document:
+        """Frame row + 1 taken out; numbers of the others follow."""
+        return self._edited(lambda tables: document_rows.without_frame(tables, row))
+
+    def with_loop(self) -> Document:
+        """One more loop."""
+        return self._edited(document_rows.with_loop)
+
+    def without_loop(self, row: int) -> Document:
+        """Loop row + 1 taken out."""
+        return self._edited(lambda tables: document_rows.without_loop(tables, row))
+
+    @property
+    def problems(self) -> tuple[CellProblem, ...]:
+        """What is wrong in the tables, cell by cell; what only assembly finds is not among it."""
+        return _problems(self)
+
+    @property
+    def file_name(self) -> str:
+        """The name in safe characters, for files."""
+        return _UNSAFE.sub("_", self.name)[:60].strip("_") or "robot"
+
+    def as_table(self) -> Document:
+        """The table of frames with the links of the mechanism, for one that was composed.
+
+        Raises:
+            MbsError: no table of frames says it, or it cannot be assembled.
+        """
+        return self if self.origin is None else Document.of_upload(toml(self.system()), ".toml")
+
+    def table(self) -> RobotTable:
+        """The table of frames.
+
+        Raises:
+            DescriptionError: the cells do not say one, or the mechanism cannot be said by one.
+        """
+        if self.origin is not None:
+            raise DescriptionError(self.origin.reason)
+        return _table(self)
+
+    def mechanism(self) -> Mechanism:
+        """The mechanism, with the values of symbols as typed.
+
+        Raises:
+            MbsError: something is wrong in a cell.
+        """
+        if self.origin is None:
+            return to_mechanism(self.table())
+        mechanism = self.origin.mechanism()
+        for name, text in self.tables.values:
+            if text.strip():
+                mechanism.values[name] = Parameter(name, number(text, f"symbol {name}"))
+        return mechanism
+
+    def system(self) -> System:
+        """The assembled mechanism; the same System for equal documents.
+
+        Raises:
+            MbsError: a cell is wrong, or the mechanism cannot be assembled.
+        """
+        return _system(self)
+
+    def shown(self) -> Tables:
+        """The tables to look at: the cells, or what a composed mechanism was assembled into.
+
+        Raises:
+            MbsError: it cannot be assembled.
+        """
+        return self.tables if self.origin is None else _shown(self)
+
+    def toml(self) -> str:
+        """The text of a TOML file of the table.
+
+        Raises:
+            DescriptionError: as in `table`.
+        """
+        return self._written(write_toml, "robot.toml")
+
+    def par(self) -> str:
+        """The text of a .par file of the table.
+
+        Raises:
+            DescriptionError: as in `table`, or the format cannot say it.
+        """
+        return self._written(write_par, "robot.par")
+
+    def _edited(self, edit: Callable[[Tables], Tables]) -> Document:
+        if self.origin is not None:
+            raise DescriptionError(f"rows cannot be changed: {self.origin.reason}")
+        return replace(self, tables=edit(self.tables))
+
+    def _written(self, write: Callable[[RobotTable, Path], None], name: str) -> str:
+        table = self.table()
+        with tempfile.TemporaryDirectory(prefix="mbs-app-") as folder:
+            path = Path(folder) / name
+            write(table, path)
+            return path.read_text(encoding="utf-8")
+
+
+def _of_mechanism(mechanism: Mechanism, origin: DocumentOrigin) -> Document:
+    try:
+        return Document.of(table_of(mechanism))
+    except DescriptionError as error:
+        reason = str(error)
+    values = tuple(
+        (p.name, "" if p.default is None else f"{p.default!r}") for p in mechanism.parameters()
+    )
+    general = (mechanism.name, *map(str, mechanism.world.gravity), mechanism.source)
+    tables = Tables((), (), general=general, values=values)
+    return Document(tables, replace(origin, reason=reason))
+
+
+@lru_cache(maxsize=_KEPT)
+def _table(document: Document) -> RobotTable:
+    return robot_table(document.tables)
+
+
+@lru_cache(maxsize=_KEPT)
+def _system(document: Document) -> System:
+    return document.mechanism().assemble()
+
+
+@lru_cache(maxsize=_KEPT)
+def _shown(document: Document) -> Tables:
+    return shown_tables(document.system(), document.tables)
+
+
+@lru_cache(maxsize=_KEPT)
+def _problems(document: Document) -> tuple[CellProblem, ...]:
+    if document.origin is not None:
+        return tuple(_value_problems(document))
+    found = tuple(unread(document.tables))
+    if found:
+        return found
+    try:
+        document.mechanism()
+    except MbsError as error:
+        return (placed(document.tables, error),)
+    return ()
+
+
+def _value_problems(document: Document) -> list[CellProblem]:
+    problems = []
+    for row, (name, text) in enumerate(document.tables.values):
+        try:
+            if text.strip():
+                number(text, f"symbol {name}")
+        except MbsError as error:
+            problems.append(CellProblem("symbols", row, "value", str(error)))
+    return problems

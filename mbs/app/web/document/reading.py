@@ -1,0 +1,342 @@
+"""The table of frames of a mechanism that was made from one, and uploaded files."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from casadi import SX, Function
+
+from mbs.app.web.document.tables import GEOMETRY_COLUMNS, INERTIA_COLUMNS, Tables, Texts, written
+from mbs.assembly import System
+from mbs.assembly.tables import LinkRow
+from mbs.components import Joint, KhalilBody, Mechanism, Point, Prismatic, Revolute, RigidBody
+from mbs.components.component import KhalilStep
+from mbs.errors import DescriptionError
+from mbs.formats import (
+    CutRow,
+    FrameRow,
+    InertiaRow,
+    RobotTable,
+    read_mjcf,
+    read_par,
+    read_toml,
+    read_urdf,
+    to_mechanism,
+)
+from mbs.formats.table import DRIVE, GEOMETRY, LOOP_JOINTS
+from mbs.formats.urdf import parse_xml
+from mbs.spatial.inertia import TEN_PARAMETERS
+from mbs.text import did_you_mean, quoted
+
+# MJCF files that were sent: what MuJoCo would read from other files is refused beforehand.
+
+
+_PARTS = ("include", "model", "attach")
+"""Elements that stand for parts of the model in another file."""
+
+
+def close_mjcf(path: Path) -> None:
+    """Write the file anew as its parser understood it, once it is sure to name no other place.
+
+    MuJoCo reads XML in a way of its own; it gets what was checked. Meshes may be named by plain
+    relative paths: bodies whose inertia is given need none of them.
+
+    Args:
+        path: of the file, alone in its folder.
+
+    Raises:
+        DescriptionError: it is not XML, or names files at other places.
+    """
+    root = parse_xml(path)
+    for element in root.iter():
+        _check(path, element)
+    path.write_bytes(ElementTree.tostring(root, encoding="utf-8"))
+
+
+def _check(path: Path, element: Element) -> None:
+    for name, value in element.attrib.items():
+        is_path = name.startswith("file") or name.endswith("dir")
+        if is_path and (element.tag in _PARTS or not _is_inside(value)):
+            raise DescriptionError(
+                f"{path}: <{element.tag}> names other files, {quoted(value)}, which were not sent"
+                " with it; put the whole model in one file, with the inertias of its bodies"
+            )
+
+
+def _is_inside(value: str) -> bool:
+    """Whether a path stays in the folder of the file."""
+    plain = value.replace("\\", "/")
+    return not plain.startswith("/") and ":" not in plain and ".." not in plain.split("/")
+
+
+LARGEST_UPLOAD = 5_000_000
+"""Bytes that an uploaded file may have."""
+
+READERS: Mapping[str, Callable[[Path], RobotTable | Mechanism]] = MappingProxyType(
+    {".toml": read_toml, ".par": read_par, ".urdf": read_urdf, ".xml": read_mjcf}
+)
+"""Suffixes of files that are read."""
+
+_DRIVE = (*DRIVE, "Fs_width", "rest", "rotor")
+_SIGMA: Mapping[type[Joint], int] = MappingProxyType({Revolute: 0, Prismatic: 1})
+
+
+def read_upload(content: bytes, suffix: str) -> RobotTable | Mechanism:
+    """What a file says that somebody sent.
+
+    It is read under a name of our own in a folder of its own, where no other file is.
+
+    Args:
+        content: of the file.
+        suffix: the end of its name, such as ".par", which chooses the reader.
+
+    Raises:
+        DescriptionError: the file is too large, of another kind, or malformed.
+    """
+    kind = suffix.lower()
+    if kind not in READERS:
+        raise DescriptionError(f"files {suffix!r} are not read; {did_you_mean(kind, READERS)}")
+    if len(content) > LARGEST_UPLOAD:
+        raise DescriptionError(
+            f"the file has {len(content)} bytes; the app reads at most {LARGEST_UPLOAD}"
+        )
+    with tempfile.TemporaryDirectory(prefix="mbs-upload-") as folder:
+        path = Path(folder) / f"robot{kind}"
+        path.write_bytes(content)
+        try:
+            if kind == ".xml":
+                close_mjcf(path)
+            return READERS[kind](path)
+        except DescriptionError as error:
+            raise DescriptionError(str(error).replace(f"{folder}/", "")) from None
+
+
+def table_of(mechanism: Mechanism) -> RobotTable:
+    """The table of frames that a mechanism was made from.
+
+    Raises:
+        DescriptionError: it was made otherwise; the sentence names what no table can say.
+    """
+    _require_plain(mechanism)
+    table = _table(mechanism)
+    again = to_mechanism(table)
+    for name in ("components", "connections", "cuts", "values", "guess"):
+        if getattr(again, name) != getattr(mechanism, name):
+            raise DescriptionError(
+                f"{mechanism.name}: its {name} are not those of a table of frames"
+            )
+    return table
+
+
+def _require_plain(mechanism: Mechanism) -> None:
+    for component in mechanism.components.values():
+        if component is mechanism.world or isinstance(component, KhalilBody):
+            continue
+        if not isinstance(component, Joint):
+            raise DescriptionError(
+                f"{mechanism.name}: a table of frames cannot say {type(component).__name__}"
+                f" {component.name!r}"
+            )
+        if type(component) not in _SIGMA and component.name not in mechanism.cuts:
+            raise DescriptionError(
+                f"{mechanism.name}: a table of frames has no {type(component).__name__.lower()}"
+                f" joint {component.name!r} in its tree"
+            )
+    if mechanism.frames:
+        raise DescriptionError(
+            f"{mechanism.name}: a table of frames cannot say the named frame"
+            f" {next(iter(mechanism.frames))!r}"
+        )
+    if not mechanism.keep_order:
+        raise DescriptionError(f"{mechanism.name}: it was composed of components, not of frames")
+
+
+def _table(mechanism: Mechanism) -> RobotTable:
+    """The rows in the order of the bodies, the frames of cut joints last."""
+    bodies = [body for body in mechanism.bodies() if isinstance(body, KhalilBody)]
+    numbers = {mechanism.world.name: 0, **{body.name: j for j, body in enumerate(bodies, 1)}}
+    placed: dict[str, tuple[Point, Joint | None]] = {}
+    cuts: dict[str, list[Point]] = {name: [] for name in mechanism.cuts}
+    for a, b in mechanism.connections:
+        _sort(a, b, placed, cuts)
+    frames = [_frame(j, *placed[body.name], numbers) for j, body in enumerate(bodies, 1)]
+    rows = [_body(j, body, placed[body.name][1]) for j, body in enumerate(bodies, 1)]
+    first, B = len(frames) + 1, len(cuts)
+    loops = []
+    joints = {joint.name: joint for joint in mechanism.joints()}
+    for k, (name, points) in enumerate(cuts.items()):
+        joint, j = joints[name], first + k
+        frames.append(_cut_frame(j, points[0], joint, numbers))
+        drive = {key: getattr(joint, key) for key in _DRIVE}
+        rows.append(InertiaRow(j, **drive))
+        loops.append(CutRow((j, j + B), _cut_kind(joint)))
+    frames += [
+        FrameRow(numbers[points[1].owner.name], 2, **_step(points[1])) for points in cuts.values()
+    ]
+    return RobotTable(
+        name=mechanism.name,
+        frames=tuple(frames),
+        bodies=tuple(rows),
+        loops=tuple(loops),
+        gravity=mechanism.world.gravity,
+        parameters={
+            name: value.default
+            for name, value in mechanism.values.items()
+            if value.default is not None
+        },
+        source=mechanism.source,
+        guess=mechanism.guess,
+    )
+
+
+def _sort(
+    a: Point,
+    b: Point,
+    placed: dict[str, tuple[Point, Joint | None]],
+    cuts: dict[str, list[Point]],
+) -> None:
+    """Put one weld to what it belongs to: a body, a joint before a body, or a cut joint."""
+    for joint, other in ((a.owner, b), (b.owner, a)):
+        if isinstance(joint, Joint) and joint.name in cuts:
+            cuts[joint.name].append(other)
+            return
+    if isinstance(b.owner, Joint):
+        placed[b.owner.name] = (a, b.owner)
+    elif isinstance(a.owner, Joint):
+        placed[b.owner.name] = placed.pop(a.owner.name)
+    else:
+        placed[b.owner.name] = (a, None)
+
+
+def _frame(j: int, point: Point, joint: Joint | None, numbers: Mapping[str, int]) -> FrameRow:
+    antecedent = numbers[point.owner.name]
+    if joint is None:
+        return FrameRow(antecedent, 2, **_step(point))
+    return FrameRow(
+        antecedent,
+        _SIGMA[type(joint)],
+        joint.actuated,
+        **_ranges(joint),
+        name="" if joint.name == f"q{j}" else joint.name,
+        **_step(point),
+    )
+
+
+def _cut_frame(j: int, point: Point, joint: Joint, numbers: Mapping[str, int]) -> FrameRow:
+    sigma = _SIGMA.get(type(joint), 2)
+    return FrameRow(
+        numbers[point.owner.name],
+        sigma,
+        None if sigma == 2 else joint.actuated,
+        **({} if sigma == 2 else _ranges(joint)),
+        name="" if joint.name == f"q{j}" else joint.name,
+        **_step(point),
+    )
+
+
+def _body(j: int, body: RigidBody, joint: Joint | None) -> InertiaRow:
+    assert isinstance(body, KhalilBody)
+    values: dict[str, Any] = {name: getattr(body, name) for name in TEN_PARAMETERS}
+    if joint is not None:
+        values |= {name: getattr(joint, name) for name in _DRIVE}
+    name = "" if body.name == f"link{j}" else body.name
+    return InertiaRow(j, name=name, grouped=body.grouped, **values)
+
+
+def _step(point: Point) -> dict[str, Any]:
+    steps = point.placement.steps
+    if len(steps) != 1 or not isinstance(steps[0], KhalilStep):
+        raise DescriptionError(
+            f"{point.owner.name}: a point is not placed by the parameters of a frame"
+        )
+    return {key: getattr(steps[0], key) for key in GEOMETRY}
+
+
+def _ranges(joint: Joint) -> dict[str, Any]:
+    limits = joint.limits[0][1] if joint.limits else None
+    return {"limits": limits, "velocity": joint.velocity, "effort": joint.effort}
+
+
+def _cut_kind(joint: Joint) -> str:
+    kind = type(joint).__name__.lower()
+    if kind not in LOOP_JOINTS:
+        raise DescriptionError(f"{joint.name}: a table of frames closes no loop with a {kind}")
+    return kind
+
+
+# What the tables show of a mechanism that was composed: the links that it was assembled into.
+
+
+_DIGITS = 9
+
+
+def shown_tables(system: System, tables: Tables) -> Tables:
+    """The frames and inertias of the links, and the loops, as texts that are only read.
+
+    Args:
+        system: the assembled mechanism.
+        tables: with its name and the values of its symbols.
+    """
+    return Tables(
+        geometry=tuple(_geometry(system, row) for row in system.links),
+        inertia=tuple(_inertia(system, j) for j in range(len(system.links))),
+        loops=tuple((loop.name, "", loop.closing) for loop in system.loops),
+        general=tables.general,
+        values=tables.values,
+        attached=((None, False),) * len(system.links),
+    )
+
+
+def _geometry(system: System, row: LinkRow) -> Texts:
+    speeds = system.speeds[system.tree.links[row.number - 1].v]
+    places = system.coordinates[system.tree.links[row.number - 1].q]
+    cells = dict.fromkeys(GEOMETRY_COLUMNS, "")
+    cells |= {key: _text(getattr(row, key)) for key in GEOMETRY}
+    cells |= {
+        "antecedent": " + ".join((str(row.antecedent), *map(_fixed_frame, row.via))),
+        "joint": row.motion,
+        "actuated": "yes" if any(speed.actuated for speed in speeds) else "no",
+        "name": row.name,
+    }
+    if len(places) == 1 and places[0].limits is not None:
+        cells["limits"] = ", ".join(map(_text, places[0].limits))
+    return tuple(cells[column] for column in GEOMETRY_COLUMNS)
+
+
+def _fixed_frame(six: tuple[float | SX, ...]) -> str:
+    """A fixed frame on the way to a link, by its parameters that are not zero."""
+    values = (f"{k} {_text(x)}" for k, x in zip(GEOMETRY, six, strict=True) if not _is_zero(x))
+    return f"fixed frame ({', '.join(values)})"
+
+
+def _is_zero(value: float | SX) -> bool:
+    return not isinstance(value, SX) and value == 0
+
+
+def _inertia(system: System, j: int) -> Texts:
+    link = system.tree.links[j]
+    values = dict(zip(TEN_PARAMETERS, (link.inertia.parameters[k] for k in range(10)), strict=True))
+    cells = dict.fromkeys(INERTIA_COLUMNS, "")
+    cells |= {name: _number(system, value) for name, value in values.items()}
+    bodies = [body.name for body in system.bodies if body.link == j + 1]
+    cells["name"] = ", ".join(bodies)
+    return tuple(cells[column] for column in INERTIA_COLUMNS)
+
+
+def _number(system: System, value: SX) -> str:
+    """The number at the defaults of the symbols, or the expression where one has none."""
+    at = float(Function("value", [system.p], [value])(system.p_default))
+    return str(value) if at != at else _text(at)
+
+
+def _text(value: float | SX) -> str:
+    if isinstance(value, SX):
+        return str(value)
+    exact = written(float(value))
+    return exact if "pi" in exact else f"{float(value):.{_DIGITS}g}"

@@ -1,0 +1,101 @@
+"""Rows put into a robot's tables and taken out, with the numbers of frames kept right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mbs.app.web.document.tables import GEOMETRY_COLUMNS, RANGES, Tables, Texts
+from mbs.errors import DescriptionError
+from mbs.formats.table import BODY_SCALARS, InertiaRow
+
+_LAST = 200
+"""Frames that a table may have."""
+
+_NEW_FRAME = dict.fromkeys(GEOMETRY_COLUMNS, "0") | {
+    "joint": "revolute",
+    "actuated": "",
+    **dict.fromkeys(("limits", *RANGES, "guess", "name"), ""),
+}
+
+
+def with_frame(tables: Tables) -> Tables:
+    """The tables with one more frame, on the last one that no loop is cut at.
+
+    Raises:
+        DescriptionError: there are too many already.
+    """
+    count = len(tables.geometry)
+    if count >= _LAST:
+        raise DescriptionError(f"the table has {count} frames; the app takes no more")
+    cut = {text.strip() for row in tables.loops for text in row[:2]}
+    free = [str(j) for j in range(1, count + 1) if str(j) not in cut]
+    row = {**_NEW_FRAME, "antecedent": free[-1] if free else "0"}
+    usual = InertiaRow(count + 1)
+    body = (*(f"{getattr(usual, name):g}" for name in BODY_SCALARS), "")
+    return replace(
+        tables,
+        geometry=(*tables.geometry, tuple(row[column] for column in GEOMETRY_COLUMNS)),
+        inertia=(*tables.inertia, body),
+        attached=(*tables.attached, (None, False)),
+    )
+
+
+def without_frame(tables: Tables, row: int) -> Tables:
+    """The tables without frame row + 1; what stood on it stands on its antecedent then.
+
+    Raises:
+        DescriptionError: there is no such frame, or it is the only one.
+    """
+    _require_row(tables.geometry, row, "frame")
+    if len(tables.geometry) < 2:
+        raise DescriptionError("a robot has at least one frame; change this one instead")
+    gone, below = str(row + 1), tables.geometry[row][0].strip()
+    if not below.isdecimal() or int(below) > row:
+        below = "0"
+
+    def renumbered(text: str) -> str:
+        number = below if text.strip() == gone else text.strip()
+        return str(int(number) - 1) if number.isdecimal() and int(number) > row + 1 else number
+
+    return replace(
+        tables,
+        geometry=tuple((renumbered(r[0]), *r[1:]) for r in _without(tables.geometry, row)),
+        inertia=_without(tables.inertia, row),
+        attached=tables.attached[:row] + tables.attached[row + 1 :],
+        loops=tuple(
+            (renumbered(a), renumbered(b), joint)
+            for a, b, joint in tables.loops
+            if gone not in (a.strip(), b.strip())
+        ),
+    )
+
+
+def with_loop(tables: Tables) -> Tables:
+    """The tables with one more loop, cut at the last two frames."""
+    count = len(tables.geometry)
+    return replace(tables, loops=(*tables.loops, (str(max(count - 1, 1)), str(count), "revolute")))
+
+
+def without_loop(tables: Tables, row: int) -> Tables:
+    """The tables without a loop; its frames stay.
+
+    Raises:
+        DescriptionError: there is no such loop.
+    """
+    _require_row(tables.loops, row, "loop")
+    return replace(tables, loops=_without(tables.loops, row))
+
+
+def _require_row(rows: tuple[Texts, ...], row: int, what: str) -> None:
+    if not 0 <= row < len(rows):
+        raise DescriptionError(f"there is no {what} {row + 1} to remove; reload the page")
+
+
+def _without(rows: tuple[Texts, ...], row: int) -> tuple[Texts, ...]:
+    return rows[:row] + rows[row + 1 :]
+
+
+def blank() -> Tables:
+    """A robot of one revolute joint."""
+    empty = Tables((), (), general=("robot", "0", "0", "-9.81", ""))
+    return with_frame(empty)

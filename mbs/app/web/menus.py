@@ -1,0 +1,240 @@
+"""The menus of models, built from the catalogue, and those of the optimizer, runs and files."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import PurePath
+from typing import Any
+
+from nicegui import events, ui
+
+from mbs.app.tasks.equations import MENUS, entries
+from mbs.app.web.app import App
+from mbs.app.web.document.document import Document
+from mbs.app.web.document.reading import LARGEST_UPLOAD, READERS
+from mbs.app.web.panels import base as base_panel
+from mbs.app.web.panels import singular as singular_panel
+from mbs.app.web.panels.configurations import open_configurations
+from mbs.app.web.panels.equations import open_equations
+from mbs.app.web.panels.export import open_export
+from mbs.app.web.panels.identification import open_identification
+from mbs.app.web.panels.optimizer import open_optimizer, optimizer_switch
+from mbs.app.web.panels.simulation import open_simulation
+from mbs.errors import MbsError
+from mbs.models.catalogue import Entry
+from mbs.robots import catalogue
+
+Act = Callable[[], Awaitable[None] | None]
+
+
+def build_menus(app: App) -> None:
+    """The menus, where the slot is; entries that the robot does not have are greyed.
+
+    Args:
+        app: of the page.
+    """
+    items = dict[str, _Item]()
+    for menu in MENUS:
+        with _menu(menu):
+            for one in entries():
+                if one.menu == menu:
+                    items[one.key] = _Item(one, _act(app, one))
+            if menu == "Identification":
+                ui.separator()
+                _plain("From a record…", partial(open_identification, app))
+    with _menu("Optimizer"):
+        _plain("Passes and counts…", partial(open_optimizer, app)).mark("passes")
+        ui.separator()
+        switch = optimizer_switch(app.session, "Optimize the equations")
+        switch.style("padding: 4px 14px").mark("switch")
+    with _menu("Simulate"):
+        _plain("Motion…", partial(open_simulation, app))
+    with _menu("Export"):
+        _plain("Files…", partial(open_export, app))
+
+    def refresh() -> None:
+        system = app.session.system
+        for item in items.values():
+            item.refuse("" if system is None else item.entry.refusal(system))
+
+    app.on_robot(refresh)
+    refresh()
+
+
+class _Item:
+    """An entry of a menu that is greyed, with the reason, where the robot does not have it."""
+
+    def __init__(self, entry: Entry, act: Act) -> None:
+        self.entry = entry
+        self._item = _plain(entry.title, act).mark(f"menu {entry.key}")
+        with self._item:
+            self._why = ui.tooltip("")
+        self._why.set_visibility(False)
+
+    def refuse(self, reason: str) -> None:
+        """Grey it with a reason, or not with none."""
+        self._item.set_enabled(not reason)
+        self._why.set_text(reason)
+        self._why.set_visibility(bool(reason))
+
+
+def _act(app: App, one: Entry) -> Act:
+    if one.solver is not None:
+        return partial(open_configurations, app, one.key)
+    if one.key == singular_panel.KEY:
+        return partial(singular_panel.open_singular, app)
+    if one.key == base_panel.KEY:
+        return partial(base_panel.open_base, app)
+    return partial(open_equations, app, one.key)
+
+
+def _menu(title: str) -> Any:
+    with ui.button(title).props("flat no-caps dense").classes("app-menu"):
+        return ui.menu()
+
+
+def _plain(title: str, act: Act) -> ui.menu_item:
+    return ui.menu_item(title, on_click=act)
+
+
+# The menu Robot: new, open, save, undo.
+
+
+_SUFFIXES = ",".join(READERS)
+
+
+class FilesMenu:
+    """The menu Robot and its dialogs."""
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        with ui.button("Robot").props("flat no-caps dense").classes("app-menu"), ui.menu():
+            self._item("catalogue", "From the catalogue…", self.choose)
+            self._item("open", "Open a file…", self.upload)
+            self._item("new", "New, one joint", self._blank)
+            ui.separator()
+            self._item("toml", "Save as TOML", lambda: self._save("toml"))
+            self._item("par", "Save as SYMORO .par", lambda: self._save("par"))
+            self._convert = self._item("table", "Make it a table of frames", self._to_table)
+            ui.separator()
+            self._undo = self._item("undo", "Undo", app.undo, "Ctrl+Z")
+            self._redo = self._item("redo", "Redo", app.redo, "Ctrl+Shift+Z")
+            ui.separator()
+            self._item("report", "What was assembled", self._report)
+        app.on_document(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Grey what cannot be done now."""
+        session = self._app.session
+        self._undo.set_enabled(bool(session.past))
+        self._redo.set_enabled(bool(session.future))
+        self._convert.set_visibility(not session.document.is_table)
+
+    def choose(self) -> None:
+        """The catalogue as a list to choose from."""
+        with ui.dialog() as dialog, ui.card().style("width: 640px; max-width: 92vw"):
+            ui.label("From the catalogue").classes("app-robot")
+            field = ui.input(placeholder="Search").props("dense outlined autofocus clearable")
+            field.style("width: 100%")
+            rows: dict[str, ui.element] = {}
+            with ui.element("div").classes("app-list"):
+                for name, make in catalogue().items():
+                    rows[name] = self._row(dialog, name, _first_line(make))
+
+        def narrow() -> None:
+            text = str(field.value or "").lower()
+            for name, row in rows.items():
+                row.set_visibility(text in f"{name} {_first_line(catalogue()[name])}".lower())
+
+        field.on_value_change(narrow)
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+
+    def upload(self) -> None:
+        """A dialog that takes a file."""
+        with ui.dialog() as dialog, ui.card().style("width: 460px"):
+            ui.label("Open a robot file").classes("app-robot")
+            ui.label(
+                ".toml, SYMORO .par, .urdf, or MJCF .xml; at most"
+                f" {LARGEST_UPLOAD // 1_000_000} MB. Meshes are not needed."
+            ).classes("app-note")
+
+            async def take(event: events.UploadEventArguments) -> None:
+                dialog.close()
+                await self.open_upload(event.file.name, await event.file.read())
+
+            ui.upload(
+                label="Drop a file here, or press +",
+                auto_upload=True,
+                max_files=1,
+                max_file_size=LARGEST_UPLOAD,
+                on_upload=take,
+                on_rejected=lambda: self._app.complain(
+                    f"the file is of another kind than {_SUFFIXES}, or larger than"
+                    f" {LARGEST_UPLOAD} bytes; choose another one"
+                ),
+            ).props(f'accept="{_SUFFIXES}" flat bordered').style("width: 100%")
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+
+    async def open_upload(self, name: str, content: bytes) -> None:
+        """Show the robot in a file that was sent; of its name only the suffix is looked at."""
+        suffix = PurePath(name.replace("\\", "/")).suffix
+        if await self._app.open_robot(Document.of_upload, content, suffix):
+            self._app.tell(f"{self._app.document.name} is open")
+
+    def _row(self, dialog: ui.dialog, name: str, words: str) -> ui.element:
+        async def take() -> None:
+            dialog.close()
+            await self._app.open_robot(Document.of_name, name)
+
+        with ui.element("div").classes("app-list-row").mark(f"catalogue-{name}") as row:
+            ui.label(name).classes("app-list-name")
+            ui.label(words).classes("app-note")
+        row.on("click", take)
+        return row
+
+    def _item(self, key: str, title: str, act: Any, keys: str = "") -> ui.menu_item:
+        with ui.menu_item(on_click=act).mark(f"robot-{key}") as item:
+            ui.label(title)
+            if keys:
+                ui.element("div").classes("app-space")
+                ui.label(keys).classes("app-note").style("padding-left: 26px")
+        return item
+
+    async def _blank(self) -> None:
+        await self._app.open_robot(Document.blank)
+
+    async def _to_table(self) -> None:
+        if await self._app.open_robot(self._app.document.as_table):
+            self._app.tell("Its links are rows of a table now, and can be changed")
+
+    async def _save(self, kind: str) -> None:
+        document = self._app.document
+        try:
+            text = await self._app.aside(_text, document, kind)
+        except MbsError as error:
+            self._app.complain(error)
+            return
+        self._app.download(text.encode(), f"{document.file_name}.{kind}")
+
+    async def _report(self) -> None:
+        try:
+            system = self._app.system()
+        except MbsError as error:
+            self._app.complain(error)
+            return
+        text = await self._app.aside(system.report)
+        with self._app.open(f"{system.name}: assembled", "report"):
+            ui.label(text).classes("app-code")
+
+
+def _text(document: Document, kind: str) -> str:
+    table = document.as_table()
+    return table.toml() if kind == "toml" else table.par()
+
+
+def _first_line(make: Any) -> str:
+    return (make.__doc__ or "").strip().partition("\n")[0]

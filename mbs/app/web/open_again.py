@@ -1,0 +1,59 @@
+"""After a reload: the tabs that were open, opened again."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, cast
+
+from mbs.app.tasks.equations import entries
+from mbs.app.web.app import App
+from mbs.app.web.panels import base as base_panel
+from mbs.app.web.panels import configurations as configurations_panel
+from mbs.app.web.panels import singular as singular_panel
+from mbs.app.web.panels.equations import open_equations
+from mbs.app.web.panels.export import open_export
+from mbs.app.web.panels.identification import open_identification
+from mbs.app.web.panels.optimizer import open_optimizer
+from mbs.app.web.panels.simulation import open_simulation
+
+_NOTE = "tabs"
+_EQUATIONS = "equations "
+
+Opener = Callable[[App], Awaitable[None] | None]
+
+_OPENERS: Mapping[str, Opener] = {
+    "simulate": open_simulation,
+    "identify": open_identification,
+    "export": open_export,
+    "optimizer": open_optimizer,
+    base_panel.KEY: base_panel.open_base,
+    singular_panel.KEY: singular_panel.open_singular,
+    configurations_panel.KEY: configurations_panel.open_configurations,
+}
+
+
+async def open_again(app: App) -> None:
+    """Open what the session had open, the tab that was shown last; from now on it keeps track.
+
+    Args:
+        app: of the page, its robot assembled.
+    """
+    before = cast(tuple[str, ...], app.session.notes.get(_NOTE, ()))
+    app.drawer.on_tabs(lambda names: _note(app, names))
+    if app.session.refusal:
+        return
+    known = {one.key for one in entries()}
+    for name in before:
+        if name in _OPENERS:
+            await _finished(_OPENERS[name](app))
+        elif name.removeprefix(_EQUATIONS) in known:
+            await open_equations(app, name.removeprefix(_EQUATIONS))
+
+
+async def _finished(opening: Any) -> None:
+    if opening is not None:
+        await opening
+
+
+def _note(app: App, names: tuple[str, ...]) -> None:
+    app.session.notes[_NOTE] = names

@@ -1,0 +1,361 @@
+"""The panel of inverse geometry: a pose, and every configuration that takes a frame there."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+from nicegui import events, ui
+
+from mbs.app.tasks.configurations import (
+    Array,
+    Configuration,
+    ConfigurationList,
+    configurations,
+    pose_from,
+    pose_from_text,
+    pose_of,
+    rpy_of,
+)
+from mbs.app.tasks.equations import entry
+from mbs.app.web.app import App
+from mbs.app.web.panels.equations import open_equations
+from mbs.app.web.panels.form import FIELD, frame_label
+from mbs.app.web.panels.layout import (
+    Asking,
+    in_a_row,
+    main_button,
+    side_button,
+    tell_of_changes,
+    two_sides,
+    waiting_note,
+)
+from mbs.app.web.panels.text_view import column
+from mbs.assembly import System
+from mbs.errors import MbsError
+from mbs.models.geometry import terminal_frame
+
+# The configurations that solve the inverse geometry as a table whose rows move the picture.
+
+
+_PAGE = 32
+_DEGREES = 180 / math.pi
+RAD, DEG = "rad", "deg"
+
+
+def show_configurations(app: App, made: ConfigurationList) -> None:
+    """The configurations where the slot is, or why there are none.
+
+    Args:
+        app: of the page.
+        made: what was found.
+    """
+    ui.label(_headline(made)).style("font-weight: 600").mark("headline")
+    if not made.rows:
+        _nothing(app, made)
+        return
+    with in_a_row():
+        unit = ui.toggle([RAD, DEG], value=RAD).props("dense flat no-caps").mark("unit")
+        ui.button(
+            "CSV",
+            icon="download",
+            on_click=lambda: app.download(csv_of(made), f"{made.system}_configurations.csv"),
+        ).props("flat dense no-caps")
+        ui.label("Click a row to move the picture there.").classes("app-note")
+    table = ui.table(
+        columns=_columns(made),
+        rows=_rows(made, RAD),
+        row_key="number",
+        pagination=_PAGE if len(made.rows) > _PAGE else 0,
+    )
+    few = "" if len(made.rows) > _PAGE else "hide-bottom"
+    table.props(f"dense flat bordered {few}").classes("app-table").mark("configurations")
+    table.props(f':table-row-style-fn="{_ROW_STYLE}"')
+    table.add_slot("body-cell-limits", _LIMITS)
+
+    shown = [0]
+
+    def fill() -> None:
+        rows = _rows(made, str(unit.value))
+        table.update_rows([row | {"shown": row["number"] == shown[0]} for row in rows])
+
+    async def clicked(event: events.GenericEventArguments) -> None:
+        shown[0] = int(event.args[1]["number"])
+        fill()
+        await app.set_configuration(made.rows[shown[0] - 1].q)
+
+    table.on("rowClick", clicked)
+    unit.on_value_change(fill)
+    ui.label(_COLUMN_MEANINGS).classes("app-note")
+
+
+def csv_of(made: ConfigurationList) -> bytes:
+    """The configurations as comma-separated values, a header first; positions in rad and m."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    units = zip(made.names, made.units, strict=True)
+    writer.writerow(
+        [
+            "number",
+            *(f"{name} [{unit}]" for name, unit in units),
+            *("residual", "sigma", "roots", "within_limits", "label", "family"),
+        ]
+    )
+    for number, row in enumerate(made.rows, 1):
+        writer.writerow(
+            [
+                number,
+                *map(repr, row.q),
+                *(row.residual, row.sigma, row.multiplicity, row.within_limits),
+                *(row.label, row.family),
+            ]
+        )
+    return stream.getvalue().encode()
+
+
+_ROW_STYLE = "row => 'cursor: pointer' + (row.shown ? '; background: var(--d-accent-soft)' : '')"
+_COLUMN_MEANINGS = (
+    "Residual: of the pose [m or 1]. Sigma: smallest singular value of the Jacobian, 0 at a"
+    " singular configuration. Roots: how many solutions meet there, any along a self-motion."
+)
+_LIMITS = """
+<q-td :props="props" :class="props.row.inside ? '' : 'app-bad'">{{ props.value }}</q-td>
+"""
+
+
+def _headline(made: ConfigurationList) -> str:
+    count = len(made.rows)
+    if not count:
+        return f"{made.system}: no configuration takes frame {made.frame} there"
+    outside = sum(not row.within_limits for row in made.rows)
+    told = f"{made.system}, frame {made.frame}: {count} configuration{'s' if count > 1 else ''}"
+    told += f" by {made.method}"
+    if made.locked:
+        told += "; held: " + ", ".join(f"{name} = {x:.4g}" for name, x in made.locked)
+    return told + (f"; {outside} outside of limits" if outside else "")
+
+
+def _nothing(app: App, made: ConfigurationList) -> None:
+    ui.label(made.reason[:1].upper() + made.reason[1:] + ".").mark("reason")
+    near = made.nearest
+    if near is None:
+        return
+    angle = round(near.angle * _DEGREES, 6)
+    away = f"{round(near.distance, 9):.4g} m away and turned by {angle:.4g} degrees"
+    with in_a_row():
+        show = ui.button(
+            "Show the nearest configuration", on_click=lambda: app.set_configuration(near.q)
+        )
+        show.props("outline no-caps dense").style("padding: 2px 12px").mark("nearest")
+        ui.label(f"Its frame is {away}.").classes("app-note")
+
+
+def _columns(made: ConfigurationList) -> list[dict[str, Any]]:
+    heads = [("number", "", "right"), ("label", "which one", "left")]
+    heads += [(f"q{k}", name, "right") for k, name in enumerate(made.names)]
+    heads += [("residual", "residual", "right"), ("sigma", "sigma", "right")]
+    heads += [("roots", "roots", "right"), ("limits", "limits", "left")]
+    columns = [column(*head) | {"sortable": True} for head in heads]
+    columns[1]["style"] = "min-width: 210px; white-space: normal"
+    return columns
+
+
+def _rows(made: ConfigurationList, unit: str) -> list[dict[str, Any]]:
+    return [_row(made, number, row, unit) for number, row in enumerate(made.rows, 1)]
+
+
+def _row(made: ConfigurationList, number: int, row: Configuration, unit: str) -> dict[str, Any]:
+    factors = [_DEGREES if unit == DEG and u == "rad" else 1.0 for u in made.units]
+    digits = 2 if unit == DEG else 4
+    values = {
+        f"q{k}": f"{round(x * factor, digits) + 0.0:.{digits if factor != 1 else 4}f}"
+        for k, (x, factor) in enumerate(zip(row.q, factors, strict=True))
+    }
+    return {
+        "number": number,
+        "label": f"{row.label} ({row.family})" if row.family else row.label,
+        **values,
+        "residual": f"{row.residual:.1e}",
+        "sigma": f"{row.sigma:.2g}",
+        "roots": "any" if row.family else row.multiplicity,
+        "limits": "within" if row.within_limits else _outside(row),
+        "inside": row.within_limits,
+    }
+
+
+def _outside(row: Configuration) -> str:
+    return f"outside: {', '.join(row.outside)}" if row.outside else "outside"
+
+
+# Fields in which a visitor types a pose: a place and three angles, or a matrix.
+
+
+ANGLES, MATRIX = "place and angles", "matrix"
+_NAMES = ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]")
+_FORMS = "12 or 16 numbers row by row, or x y z roll pitch yaw; pi/2 and the like are read"
+_ROUNDED = 1e-12
+
+
+class PoseFields:
+    """The pose in two forms, of which one is shown; both say the same after `show`."""
+
+    def __init__(self) -> None:
+        self._form = ui.toggle([ANGLES, MATRIX], value=ANGLES, on_change=self._switch)
+        self._form.props("dense flat no-caps").mark("pose form")
+        grid = "display: grid; grid-template-columns: 1fr 1fr 1fr; gap: 8px; width: 100%"
+        with ui.element("div").style(grid) as self._angles:
+            self._fields = [_field(name) for name in _NAMES]
+        self._matrix = ui.textarea("rows of the pose in the base").props(f"{FIELD} rows=4")
+        self._matrix.style("width: 100%; font-family: var(--d-mono)").mark("matrix")
+        self._matrix.tooltip(_FORMS).set_visibility(False)
+
+    @property
+    def T(self) -> Array:
+        """(4, 4) the pose as typed.
+
+        Raises:
+            MbsError: a field has no value.
+        """
+        if self._form.value == MATRIX:
+            return pose_from_text(str(self._matrix.value or ""))
+        texts = [str(field.value or "0") for field in self._fields]
+        return pose_from(texts[:3], texts[3:])
+
+    def show(self, T: Array) -> None:
+        """Write a pose (4, 4) into the fields."""
+        values = [*np.asarray(T, dtype=float)[:3, 3].tolist(), *rpy_of(T)]
+        for field, value in zip(self._fields, values, strict=True):
+            field.set_value(_text(value))
+        self._matrix.set_value("\n".join(_line(row) for row in np.asarray(T).tolist()))
+
+    def _switch(self) -> None:
+        self._angles.set_visibility(self._form.value == ANGLES)
+        self._matrix.set_visibility(self._form.value == MATRIX)
+
+
+def _field(name: str) -> ui.input:
+    field = ui.input(name).props(FIELD)
+    if "rad" in name:
+        field.tooltip("R = Rz(yaw) Ry(pitch) Rx(roll)")
+    return field.mark(name.split(" ")[0])
+
+
+def _text(value: float) -> str:
+    """A number that reads back to the same double, zeros without noise."""
+    return "0" if abs(value) < _ROUNDED else repr(float(value))
+
+
+def _line(row: Sequence[float]) -> str:
+    return "  ".join(_text(value) for value in row)
+
+
+KEY = "configurations"
+
+_MEANINGS = {
+    "auto": "the cheapest that fits",
+    "pieper": "Pieper",
+    "paul": "Paul",
+    "general": "general (Raghavan and Roth)",
+    "search": "search from random starts",
+}
+
+
+async def open_configurations(app: App, key: str = "igm-general") -> None:
+    """Open the panel, with the pose that the frame has now.
+
+    Args:
+        app: of the page.
+        key: of the model whose method is chosen at first.
+    """
+    try:
+        panel = _ConfigurationsPanel(app, key)
+        await panel.take_present()
+    except MbsError as error:
+        app.complain(error)
+
+
+class _ConfigurationsPanel:
+    """Frame, method and pose above, the configurations below."""
+
+    def __init__(self, app: App, key: str) -> None:
+        self._app = app
+        system = app.system()
+        kept = cast(dict[str, Any], app.session.notes.setdefault(KEY, {}))
+        names = _frames(system)
+        frame = kept.get("frame")
+        with app.open("Inverse geometry", key=KEY):
+            left, self._shown = two_sides()
+        with left, ui.element("div").classes("app-form"):
+            self._frame = ui.select(
+                names,
+                label="frame",
+                value=frame if frame in names else terminal_frame(system),
+                on_change=self._framed,
+            )
+            self._frame.props(FIELD).style("flex: 1 1 90px").mark("frame")
+            self._method = ui.select(_MEANINGS, label="method", value=entry(key).solver or "auto")
+            self._method.props(FIELD).style("flex: 2 1 190px").mark("method")
+        with left:
+            self._pose = PoseFields()
+            with in_a_row():
+                self._button = main_button("Solve", self.solve)
+                side_button(
+                    "Present pose", self.take_present, "The pose of the frame in the picture"
+                )
+                side_button("Equations", partial(self._equations, key), "Of the method, as text")
+        with self._shown:
+            waiting_note("Every configuration that takes the frame to the pose appears here.")
+        tell_of_changes(app, self._shown)
+        app.on_robot(self._robot_changed)
+
+    def _robot_changed(self) -> None:
+        """Offer the frames of the new robot."""
+        if self._frame.is_deleted:
+            return
+        system = self._app.system()
+        names = _frames(system)
+        value = self._frame.value if self._frame.value in names else terminal_frame(system)
+        self._frame.set_options(names, value=value)
+
+    async def take_present(self) -> None:
+        """Write the pose that the frame has in the picture into the fields."""
+        try:
+            T = await self._app.aside(pose_of, self._app.system(), self._app.q, self._frame.value)
+        except MbsError as error:
+            self._app.complain(error)
+            return
+        self._pose.show(T)
+
+    async def solve(self) -> None:
+        """List every configuration that takes the frame to the pose."""
+        try:
+            T = self._pose.T
+        except MbsError as error:
+            self._app.complain(error)
+            return
+        task = partial(
+            configurations, frame=self._frame.value, method=self._method.value, seed=self._app.q
+        )
+        show = partial(show_configurations, self._app)
+        asking = Asking(self._app, self._button, self._shown, show)
+        await asking.run("Solving the inverse geometry", task, T)
+
+    async def _framed(self) -> None:
+        notes = cast(dict[str, Any], self._app.session.notes[KEY])
+        notes["frame"] = self._frame.value
+        await self.take_present()
+
+    async def _equations(self, key: str) -> None:
+        named = {"pieper": "igm-pieper", "paul": "igm-paul", "general": "igm-general"}
+        await open_equations(self._app, named.get(str(self._method.value), key))
+
+
+def _frames(system: System) -> dict[str | int, str]:
+    """The frames that can be asked for, with what the list calls them."""
+    frames = (*range(1, len(system.tree.links) + 1), *system.named_frames, terminal_frame(system))
+    return {frame: frame_label(system, frame) for frame in frames}

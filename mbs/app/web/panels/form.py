@@ -1,0 +1,120 @@
+"""The small form of a model: frames, choices, flags and lists, from the options of its entry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, MutableMapping
+from typing import Any
+
+from nicegui import background_tasks, ui
+from nicegui.events import ValueChangeEventArguments
+
+from mbs.app.tasks.equations import OptionRow, option_values
+from mbs.app.web.app import App
+from mbs.assembly import System
+from mbs.models.catalogue import Entry
+
+FIELD = "dense outlined options-dense hide-bottom-space"
+
+Given = MutableMapping[str, Any]
+
+
+class OptionForm:
+    """The options of an entry, for the robot in the app.
+
+    Options that nobody touched follow from the others: the rows of a Jacobian from its frame.
+    """
+
+    def __init__(
+        self, app: App, entry: Entry, given: Given, on_change: Callable[[], Any] | None = None
+    ) -> None:
+        """A form where the slot is; `fill` puts the options into it.
+
+        Args:
+            app: of the page.
+            entry: the model.
+            given: values that were chosen; it is changed as the user chooses others.
+            on_change: called after every change.
+        """
+        self._app, self._entry, self._given = app, entry, given
+        self._on_change = on_change or (lambda: None)
+        self._box = ui.element("div").classes("app-form")
+        self._box.set_visibility(bool(entry.options))
+        app.on_robot(self._robot_changed)
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The values that were chosen, by the names of options."""
+        return dict(self._given)
+
+    async def fill(self) -> None:
+        """Show the options of the present robot; what it does not offer is forgotten."""
+        try:
+            system = self._app.system()
+            rows = await self._app.aside(_rows, system, self._entry, self._given)
+        except Exception as error:
+            self._app.complain(error)
+            return
+        if self._box.is_deleted:
+            return
+        self._box.clear()
+        with self._box:
+            for row in rows:
+                self._field(system, row)
+        self._box.set_visibility(bool(rows))
+
+    def _robot_changed(self) -> None:
+        if not self._box.is_deleted:
+            background_tasks.create(self.fill(), name=f"options of {self._entry.key}")
+
+    def _field(self, system: System, row: OptionRow) -> None:
+        async def changed(event: ValueChangeEventArguments[Any]) -> None:
+            await self._take(row, event.value)
+
+        if row.kind == "flag":
+            ui.checkbox(row.title, value=row.chosen, on_change=changed).props("dense").mark(
+                f"option.{row.name}"
+            )
+            return
+        is_list = row.kind == "several"
+        labels = {value: frame_label(system, value) for value in row.values}
+        options = labels if row.kind == "frame" else list(row.values)
+        value = list(row.chosen) if is_list else row.chosen
+        field = ui.select(
+            options, label=row.title, value=value, multiple=is_list, on_change=changed
+        )
+        width = 300 if is_list else 130
+        field.props(FIELD).style(f"flex: 1 1 {width}px").mark(f"option.{row.name}")
+
+    async def _take(self, row: OptionRow, value: Any) -> None:
+        """Keep a value; lists that may follow from it are asked for anew."""
+        self._given[row.name] = tuple(value) if row.kind == "several" else value
+        names = [option.name for option in self._entry.options]
+        later = self._entry.options[names.index(row.name) + 1 :]
+        following = [option.name for option in later if option.kind == "several"]
+        for name in following:
+            self._given.pop(name, None)
+        if following:
+            await self.fill()
+        self._on_change()
+
+
+def frame_label(system: System, frame: object) -> str:
+    """What a form calls a frame: 0 (base), 3 (q3), tool."""
+    if frame == 0:
+        return "0 (base)"
+    if isinstance(frame, int) and frame <= len(system.links):
+        name = system.links[frame - 1].name
+        return str(frame) if name == f"q{frame}" else f"{frame} ({name})"
+    return str(frame)
+
+
+def _rows(system: System, entry: Entry, given: Given) -> tuple[OptionRow, ...]:
+    """The options of the entry, values that the system does not offer taken out of `given`."""
+    for option in entry.options:
+        if option.name in given:
+            offered = option.values(system, given)
+            value = given[option.name]
+            own = value if option.kind == "several" else (value,)
+            if any(one not in offered for one in own) or not own:
+                del given[option.name]
+    return option_values(system, entry, given)

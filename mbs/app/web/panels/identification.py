@@ -1,0 +1,327 @@
+"""The panel that identifies the robot from a record that its user uploads."""
+
+from __future__ import annotations
+
+import math
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, cast
+
+from nicegui import ui
+
+from mbs.app.tasks.identification import (
+    EQUATIONS,
+    LARGEST,
+    METHODS,
+    VELOCITIES,
+    EstimateRow,
+    IdentificationSettings,
+    Identified,
+    identify,
+    record_columns,
+)
+from mbs.app.web.app import App
+from mbs.app.web.panels.layout import Asking, tell_of_changes
+from mbs.app.web.panels.plots import (
+    FieldLook,
+    add_look,
+    choice_field,
+    come_into_view,
+    line_chart,
+    several_field,
+    text_field,
+)
+from mbs.app.web.panels.text_view import column
+from mbs.assembly import System
+from mbs.text import quoted
+
+# What an identification found: tables, residuals, and files to keep.
+
+
+_POOR = 30.0
+_NOTHING = 1000.0
+"""Deviation that says nothing about a value [%]."""
+_PARAMETERS = (
+    ("name", "Parameter", "left"),
+    ("value", "Value", "right"),
+    ("deviation", "Deviation", "right"),
+    ("percent", "%", "right"),
+    ("unit", "Unit", "left"),
+    ("essential", "Needed", "left"),
+    ("grouping", "Stands for", "left"),
+)
+_EFFORTS = (
+    ("name", "Effort", "left"),
+    ("rms", "Error, rms", "right"),
+    ("percent", "%", "right"),
+    ("held_out_rms", "Last quarter, rms", "right"),
+    ("held_out_percent", "%", "right"),
+    ("unit", "Unit", "left"),
+)
+
+
+def show_results(app: App, found: Identified) -> None:
+    """Fill the present place of the page.
+
+    Args:
+        app: of the page.
+        found: by the task.
+    """
+    with ui.element("div").classes("app-result-head"):
+        choice = (
+            ui.toggle(["Estimates", "Residuals", "Report"], value="Estimates")
+            .props("dense flat no-caps size=12.5px padding='3px 10px'")
+            .mark("found")
+        )
+        ui.space()
+        _files(app, found)
+    ui.label(
+        f"{len(found.rows)} base parameters; error {found.total_percent:.3g} % of all efforts,"
+        f" {found.held_out_percent:.3g} % in the last quarter of the record when the parameters"
+        " come from the rest"
+    ).classes("app-note").mark("identified")
+    place = ui.column().classes("full-width").style("gap: 10px")
+
+    def draw() -> None:
+        place.clear()
+        with place:
+            _VIEWS[str(choice.value)](found)
+
+    choice.on_value_change(draw)
+    draw()
+
+
+def _files(app: App, found: Identified) -> None:
+    stem = found.name
+    files = {
+        "Estimates": (lambda: found.csv(), f"{stem}_estimates.csv"),
+        "Residuals": (lambda: found.residuals_csv(), f"{stem}_residuals.csv"),
+        "Report": (lambda: found.text, f"{stem}_report.txt"),
+    }
+    for title, (text, name) in files.items():
+        button = (
+            ui.button(title, icon="download")
+            .props("flat dense no-caps")
+            .mark(f"file-{title.lower()}")
+        )
+        button.on_click(lambda text=text, name=name: app.download(text().encode(), name))
+
+
+def _estimates(found: Identified) -> None:
+    rows = [
+        {
+            "name": row.name,
+            "value": f"{row.value:.6g}",
+            "deviation": f"{row.deviation:.2g}",
+            "percent": f"{_percent(row.percent)}{' *' if row.percent > _POOR else ''}",
+            "unit": row.unit,
+            "essential": "yes" if row.essential else "no",
+            "grouping": _terms(row),
+        }
+        for row in found.rows
+    ]
+    _table(_PARAMETERS, rows)
+    ui.label(
+        f"* a deviation of more than {_POOR:g} %: the record does not show this parameter well"
+    ).classes("app-note")
+    errors = [
+        {
+            "name": e.name,
+            "rms": f"{e.rms:.4g}",
+            "percent": _percent(e.percent),
+            "held_out_rms": f"{e.held_out_rms:.4g}",
+            "held_out_percent": _percent(e.held_out_percent),
+            "unit": e.unit,
+        }
+        for e in found.efforts
+    ]
+    _table(_EFFORTS, errors)
+
+
+def _residuals(found: Identified) -> None:
+    with ui.element("div").classes("app-residuals"):
+        for k, effort in enumerate(found.efforts):
+            measured, predicted = found.measured[:, k], found.predicted[:, k]
+            both = {f"{effort.name} measured": measured, "predicted": predicted}
+            error = {f"{effort.name} measured - predicted": measured - predicted}
+            for series in (both, error):
+                chart = line_chart(found.time, series, effort.unit)
+                ui.echart(chart).style("width: 100%; height: 200px").mark("residual-chart")
+
+
+def _report(found: Identified) -> None:
+    ui.label(found.text).classes("app-code").style("max-height: 420px")
+
+
+_VIEWS = {"Estimates": _estimates, "Residuals": _residuals, "Report": _report}
+
+
+def _table(columns: tuple[tuple[str, str, str], ...], rows: list[dict[str, Any]]) -> None:
+    heads = [column(*one) for one in columns]
+    table = ui.table(rows=rows, columns=heads, row_key="name").props("dense flat hide-bottom")
+    table.classes("app-table")
+
+
+def _terms(row: EstimateRow) -> str:
+    """The sum that a grouped parameter stands for; empty for one that stands for itself."""
+    terms = row.grouping.partition(" = ")[2]
+    return "" if terms == row.name else terms
+
+
+def _percent(value: float) -> str:
+    if not math.isfinite(value) or value >= _NOTHING:
+        return "-"
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+
+
+_NOTE = "identification"
+_FOUND = "identified"
+"""Note of the document and what was found last, for a reload."""
+_LONGEST_LIST = 12
+_COLUMNS = {"rotors": "rotors", "offsets": "offsets"}
+
+
+@dataclass(slots=True)
+class _IdentificationAsked:
+    """What the form holds."""
+
+    content: bytes = b""
+    file: str = ""
+    bandwidth: str = "10"
+    method: str = "weighted"
+    equations: str = "dynamic"
+    velocities: str = "differences"
+    columns: list[str] = field(default_factory=lambda: ["rotors"])
+
+    def settings(self) -> IdentificationSettings:
+        return IdentificationSettings(
+            bandwidth=self.bandwidth,
+            method=self.method,
+            equations=self.equations,
+            rotors="rotors" in self.columns,
+            offsets="offsets" in self.columns,
+            velocities=self.velocities,
+        )
+
+
+def open_identification(app: App) -> None:
+    """Open the panel for the present robot.
+
+    Args:
+        app: of the page.
+    """
+    system = app.checked_system()
+    if system is None:
+        return
+    asked = deepcopy(
+        cast(_IdentificationAsked, app.session.notes.get(_NOTE, _IdentificationAsked()))
+    )
+    app.session.notes[_NOTE] = asked
+    add_look()
+    with app.open("Identify", key="identify"), ui.element("div").classes("app-halves"):
+        with ui.element("div").classes("app-half").style("flex: 0 0 350px"):
+            _explain(system)
+            _upload(app, asked)
+            _form(asked)
+            button = ui.button("Identify").props("unelevated no-caps dense").mark("identify")
+            button.style("padding: 2px 22px; align-self: start")
+        shown = ui.element("div").classes("app-half app-stays")
+        with shown:
+            kept = app.session.notes.get(_FOUND)
+            if isinstance(kept, tuple) and kept[0] == app.document:
+                show_results(app, kept[1])
+            else:
+                ui.label("Estimates and residuals appear here.").classes("app-note")
+
+    async def run() -> None:
+        await _run(app, asked, button, shown)
+
+    tell_of_changes(app, shown)
+    button.on_click(run)
+
+
+async def _run(app: App, asked: _IdentificationAsked, button: ui.button, shown: ui.element) -> None:
+    if not asked.content:
+        app.complain("there is no record yet; upload a file of comma-separated values first")
+        return
+    document = app.document
+
+    def show(found: Identified) -> None:
+        app.session.notes[_FOUND] = (document, found)
+        show_results(app, found)
+        come_into_view(shown)
+
+    task = partial(identify, quiet=True)
+    await Asking(app, button, shown, show).run("Identifying", task, asked.content, asked.settings())
+
+
+def _explain(system: System) -> None:
+    columns = record_columns(system)
+    names = [*columns["time"], *columns["q"], *columns["tau"]]
+    if system.is_closed:
+        names = ["time", *(f"{system.speeds[k].name}.q" for k in system.active), *columns["tau"]]
+    more = len(names) - _LONGEST_LIST
+    listed = ", ".join(names[:_LONGEST_LIST]) + (f" and {more} more" if more > 0 else "")
+    ui.label(
+        f"A record is a file of comma-separated values whose first line names the columns {listed};"
+        " in s, rad or m, N m or N, on the joints' side of the gears. Velocities such as"
+        f" {columns['v'][0]} may be there too. What a simulation writes is such a record."
+    ).classes("app-note")
+
+
+def _upload(app: App, asked: _IdentificationAsked) -> None:
+    async def uploaded(event: Any) -> None:
+        upload.reset()
+        if event.file.size() > LARGEST:
+            app.complain(f"the record has more than {LARGEST / 1e6:.0f} MB; cut it into pieces")
+            return
+        asked.content = await event.file.read()
+        asked.file = str(event.file.name)
+        told.set_text(_told(asked))
+
+    def rejected() -> None:
+        app.complain(
+            f"the file is not taken; upload one .csv file of at most {LARGEST / 1e6:.0f} MB"
+        )
+
+    upload = ui.upload(
+        max_file_size=LARGEST,
+        max_files=1,
+        auto_upload=True,
+        on_upload=uploaded,
+        on_rejected=rejected,
+    )
+    upload.props('accept=".csv,.txt"').classes("hidden").mark("upload")
+    with ui.element("div").classes("app-result-head"):
+        choose = ui.button("Upload a record…", icon="upload_file").props("outline no-caps dense")
+        choose.style("padding: 2px 12px").on_click(lambda: upload.run_method("pickFiles"))
+        told = ui.label(_told(asked)).classes("app-note").mark("record")
+
+
+def _told(asked: _IdentificationAsked) -> str:
+    if not asked.content:
+        return "No record yet."
+    return f"{quoted(asked.file)[1:-1]}, {len(asked.content) / 1e3:.0f} kB"
+
+
+def _form(asked: _IdentificationAsked) -> None:
+    with ui.element("div").classes("app-form"):
+        look = FieldLook("Bandwidth [Hz]", "120px", "bandwidth")
+        field = text_field(look, asked.bandwidth, partial(setattr, asked, "bandwidth"))
+        field.tooltip("of the filters; five to ten times the highest frequency of the motion")
+        _choice(asked, METHODS, FieldLook("Method", "190px", "method"))
+        _choice(asked, EQUATIONS, FieldLook("Equations", "120px", "equations"))
+        _choice(asked, VELOCITIES, FieldLook("Velocities", "190px", "velocities"))
+        several_field(
+            FieldLook("Beside bodies and friction", "324px", "columns"),
+            _COLUMNS,
+            asked.columns,
+            partial(setattr, asked, "columns"),
+        )
+
+
+def _choice(asked: _IdentificationAsked, names: tuple[str, ...], look: FieldLook) -> None:
+    options = {name: name.replace("_", " ") for name in names}
+    chosen = getattr(asked, look.marker)
+    choice_field(look, options, chosen, partial(setattr, asked, look.marker))

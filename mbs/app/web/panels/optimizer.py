@@ -1,0 +1,123 @@
+"""The panel of the optimizer: its passes, and what they save in every model."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from nicegui import ui
+
+from mbs.app.tasks.equations import EVERY_PASS, CountRow, counts
+from mbs.app.web.app import App
+from mbs.app.web.panels.layout import (
+    Asking,
+    in_a_row,
+    main_button,
+    tell_of_changes,
+    two_sides,
+    waiting_note,
+)
+from mbs.app.web.panels.text_view import BEFORE, column, plain_table
+from mbs.app.web.session import Session
+from mbs.operations import PASSES, Count
+
+# Which passes of the optimizer a visitor wants.
+
+
+_NOTE = "optimizer"
+
+
+def passes_of(session: Session) -> tuple[str, ...]:
+    """The passes that equations are written after, in the order in which they are made."""
+    settings = optimizer_settings(session)
+    return tuple(p for p in EVERY_PASS if p in settings["passes"]) if settings["on"] else ()
+
+
+def optimizer_settings(session: Session) -> dict[str, Any]:
+    """Whether the optimizer is on, "on", and the names of its passes, "passes"; both may be set."""
+    found = session.notes.setdefault(_NOTE, {"on": True, "passes": list(EVERY_PASS)})
+    return cast(dict[str, Any], found)
+
+
+def optimizer_switch(session: Session, title: str) -> ui.checkbox:
+    """A box that turns the optimizer on and off."""
+    settings = optimizer_settings(session)
+
+    def changed() -> None:
+        settings["on"] = bool(box.value)
+
+    box = ui.checkbox(title, value=settings["on"], on_change=changed).props("dense")
+    return box
+
+
+def open_optimizer(app: App) -> None:
+    """Open the panel.
+
+    Args:
+        app: of the page.
+    """
+    settings = optimizer_settings(app.session)
+    with app.open("Optimizer", key="optimizer"):
+        left, shown = two_sides("430px")
+    with left:
+        with in_a_row():
+            button = main_button("Count every model").mark("count")
+            optimizer_switch(app.session, "optimize the equations").mark("on")
+        for one in PASSES:
+            _pass(settings["passes"], one.name, one.meaning)
+    with shown:
+        waiting_note("What the passes save in every model appears here.")
+
+    tell_of_changes(app, shown)
+
+    async def count_all() -> None:
+        asking = Asking(app, button, shown, _show)
+        await asking.run("Counting operations", counts, (), passes_of(app.session))
+
+    button.on_click(count_all)
+
+
+def _pass(chosen: list[str], name: str, meaning: str) -> None:
+    def changed() -> None:
+        if name in chosen:
+            chosen.remove(name)
+        if box.value:
+            chosen.append(name)
+
+    with ui.element("div").style("display: flex; gap: 10px; align-items: center"):
+        box = ui.checkbox(name, value=name in chosen, on_change=changed).props("dense")
+        box.style("flex: 0 0 106px").mark(f"pass {name}")
+        ui.label(meaning).classes("app-note")
+
+
+def _show(made: tuple[CountRow, ...]) -> None:
+    heads = (
+        ("title", "model", "left"),
+        ("before", "before: mul/add", "right"),
+        ("all_before", "together", "right"),
+        ("after", "after: mul/add", "right"),
+        ("all_after", "together", "right"),
+        ("saved", "saved", "right"),
+    )
+    columns = [column(*head) for head in heads]
+    rows = [
+        _row(row, row.before, row.after)
+        for row in made
+        if row.before is not None and row.after is not None
+    ]
+    plain_table(columns, rows, "title").style("width: auto").mark("counts")
+    ui.label(BEFORE).classes("app-note")
+    for row in made:
+        if row.reason:
+            ui.label(row.reason).classes("app-note")
+
+
+def _row(row: CountRow, before: Count, after: Count) -> dict[str, object]:
+    saved = 100 * (1 - after.total / before.total) if before.total else 0
+    return {
+        "title": row.title,
+        "before": str(before),
+        "all_before": before.total,
+        "after": str(after),
+        "all_after": after.total,
+        "saved": f"{saved:.0f} %",
+    }

@@ -1,0 +1,400 @@
+"""The panel that simulates the robot, plots its motion and plays it in the picture."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import cast
+
+import numpy as np
+from nicegui import events, ui
+from numpy.typing import NDArray
+
+from mbs.app.tasks.exporting import file_stem
+from mbs.app.tasks.simulation import Film, SimulationSettings, csv_bytes, film
+from mbs.app.web.app import App
+from mbs.app.web.panels.layout import new_answer, tell_of_changes
+from mbs.app.web.panels.plots import (
+    FieldLook,
+    add_look,
+    choice_field,
+    come_into_view,
+    line_chart,
+    text_field,
+)
+from mbs.assembly import System
+from mbs.result import Result
+
+# What a visitor typed into the form of a simulation, and the settings that it stands for.
+
+
+Texts = dict[str, str]
+"""Fields of the form: "duration", "method" and so on, and "q0.j1", "law.j1", "kind.j1"."""
+
+Row = tuple[str, str, str, bool]
+"""Name of a joint, unit of its position ("" for several), unit of its rate, and motor or not."""
+
+KINDS = {"tau": "effort", "q": "position", "v": "velocity", "a": "acceleration"}
+"""What a law of a joint gives."""
+
+PICTURE = "the configuration of the picture"
+TYPED = "typed positions"
+
+_FIRST = {
+    "duration": "2",
+    "step": "0.01",
+    "tolerance": "1e-8",
+    "method": "dopri5",
+    "start": PICTURE,
+}
+
+
+def first_texts(texts: Mapping[str, str]) -> Texts:
+    """The fields at first: what was typed before, the others by default."""
+    return {**_FIRST, **texts}
+
+
+def chosen_rows(system: System) -> list[Row]:
+    """The joints that a start and laws are given for: in a closed system the independent ones."""
+    units = {c.name: c.unit for c in system.coordinates}
+    speeds = [system.speeds[k] for k in system.active]
+    return [(s.name, units.get(s.name, ""), s.unit, s.actuated) for s in speeds]
+
+
+def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) -> SimulationSettings:
+    """The settings of a form.
+
+    Args:
+        system: that moves; fields of joints that it does not have are left alone.
+        texts: of the form; empty ones are left out.
+        q: (nq,) configuration of the picture [rad or m].
+    """
+    rows = chosen_rows(system)
+    typed = texts["start"] == TYPED
+    laws = {name: texts.get(f"law.{name}", "").strip() for name, *_ in rows}
+    kinds = {name: texts.get(f"kind.{name}", "") for name in laws}
+    return SimulationSettings(
+        duration=texts["duration"],
+        step=texts["step"],
+        tolerance=texts["tolerance"],
+        method=texts["method"],
+        q0=_given(texts, "q0", [name for name, unit, *_ in rows if unit]) if typed else {},
+        configuration=() if typed else tuple(q),
+        v0=_given(texts, "v0", [name for name, *_ in rows]),
+        tau={n: law for n, law in laws.items() if law and kinds[n] in ("", "tau")},
+        motion={f"{n}.{kinds[n]}": x for n, x in laws.items() if x and kinds[n] in ("q", "v", "a")},
+        inputs=_given(texts, "u", [device.name for device in system.devices]),
+    )
+
+
+def _given(texts: Mapping[str, str], what: str, names: Sequence[str]) -> dict[str, str]:
+    found = {name: texts.get(f"{what}.{name}", "").strip() for name in names}
+    return {name: text for name, text in found.items() if text}
+
+
+# The form of a simulation: times, start, and what drives the joints.
+
+
+_METHODS = {"dopri5": "dopri5, explicit", "rodas": "rodas, for stiff systems"}
+_LAWS = (
+    "Laws are numbers, or texts of t, of positions and velocities such as {0}.q and {0}.v, and of"
+    " symbols: 5*sin(2*t) - 0.3*{0}.v"
+)
+
+
+def build_form(system: System, texts: Texts) -> ui.button:
+    """Fields that write into `texts` as they are typed, and the button that runs.
+
+    Args:
+        system: that is to move.
+        texts: of the form, at first and later.
+
+    Returns:
+        the button.
+    """
+    with ui.element("div").classes("app-form"):
+        _text(texts, "duration", "Duration [s]", "96px")
+        _text(texts, "step", "Row every [s]", "104px")
+        _text(texts, "tolerance", "Tolerance", "96px")
+        _choice(texts, "method", _METHODS, "Method", "214px")
+    with ui.element("div").classes("app-form").style("align-items: center"):
+        start = _choice(texts, "start", {x: x for x in (PICTURE, TYPED)}, "Starts at", "240px")
+        button = ui.button("Run").props("unelevated no-caps dense").mark("simulate")
+        button.style("padding: 3px 26px")
+    rows = chosen_rows(system)
+    kind = "Independent joints" if system.is_closed else "Joints"
+    ui.label(f"{kind}: start and drive; empty fields are zero").classes("app-note")
+    with ui.element("div").classes("app-laws app-small"):
+        for title in ("", "q at start", "v at start", "driven by", "law of time"):
+            ui.label(title).classes("app-note")
+        for row in rows:
+            _joint(texts, start, row)
+    for device in system.devices:
+        name, unit = device.input
+        _text(texts, f"u.{device.name}", f"{name} [{unit}]", "220px")
+    if rows:
+        ui.label(_LAWS.format(rows[0][0])).classes("app-note")
+    return button
+
+
+def _joint(texts: Texts, start: ui.select, row: Row) -> None:
+    name, unit, rate, actuated = row
+    ui.label(name).style("font-weight: 600").tooltip(f"position [{unit or 'none'}], rate [{rate}]")
+    position = _text(texts, f"q0.{name}")
+    if unit:
+        position.bind_enabled_from(start, "value", lambda chosen: chosen == TYPED)
+    else:
+        position.disable()
+    _text(texts, f"v0.{name}")
+    kinds = {key: word for key, word in KINDS.items() if actuated or key != "tau"}
+    if texts.get(f"kind.{name}") not in kinds:
+        texts[f"kind.{name}"] = next(iter(kinds))
+    _choice(texts, f"kind.{name}", kinds)
+    _text(texts, f"law.{name}")
+
+
+def _text(texts: Texts, key: str, label: str = "", width: str = "100%") -> ui.input:
+    look = FieldLook(label, width, key)
+    return text_field(look, texts.get(key, ""), partial(texts.__setitem__, key))
+
+
+def _choice(
+    texts: Texts, key: str, options: Mapping[str, str], label: str = "", width: str = "100%"
+) -> ui.select:
+    look = FieldLook(label, width, key)
+    return choice_field(look, options, texts[key], partial(texts.__setitem__, key))
+
+
+# The signals of a result in the groups that plots show.
+
+
+Array = NDArray[np.float64]
+Charts = dict[str, dict[str, Array]]
+"""Unit of a chart to its signals by name."""
+
+_ENERGIES = ("kinetic_energy", "potential_energy")
+_CLOSURE = "closure_residual"
+_KINDS = {"q": "Positions", "v": "Velocities", "a": "Accelerations", "tau": "Efforts"}
+
+
+def groups_of(system: System, result: Result) -> dict[str, Charts]:
+    """The charts of every group: positions, velocities, and so on; each unit has a chart.
+
+    Args:
+        system: that moved.
+        result: its motion.
+
+    Returns:
+        title of a group to its charts; groups without signals are left out.
+    """
+    joints = {f"{c.name}.{kind}" for c in (*system.coordinates, *system.speeds) for kind in _KINDS}
+    groups: dict[str, Charts] = {title: {} for title in _KINDS.values()}
+    groups |= {"Energy": {}, "Closure": {}, "Others": {}}
+    for name, unit in result.units.items():
+        title, label = _place(name, joints)
+        groups[title].setdefault(unit, {})[label] = result[name]
+    total = sum((result[name] for name in _ENERGIES), np.zeros(len(result)))
+    groups["Energy"].setdefault("J", {})["total"] = total
+    if not system.is_closed:
+        del groups["Closure"]
+    return {title: charts for title, charts in groups.items() if charts}
+
+
+def _place(name: str, joints: set[str]) -> tuple[str, str]:
+    """The group of a signal and what its line is called there."""
+    if name in joints:
+        stem, _, kind = name.rpartition(".")
+        return _KINDS[kind], stem
+    if name in _ENERGIES:
+        return "Energy", name.removesuffix("_energy")
+    return ("Closure", "largest row") if name == _CLOSURE else ("Others", name)
+
+
+# Buttons and a slider that play a motion in the picture.
+
+
+_SPEEDS = {
+    0.25: "1/4 speed",
+    0.5: "1/2 speed",
+    1.0: "real time",
+    2.0: "2 x speed",
+    5.0: "5 x speed",
+}
+
+
+class Player:
+    """Plays a film in the picture of the app: play, pause, and a slider over time."""
+
+    def __init__(self, app: App, film: Film) -> None:
+        self._app, self._film = app, film
+        self._playing = False
+        first, last = float(film.times[0]), float(film.times[-1])
+        with ui.element("div").classes("app-player app-small"):
+            self._button = ui.button(icon="play_arrow", on_click=self._toggle)
+            self._button.props('round dense unelevated size=sm aria-label="Play or pause"').mark(
+                "play"
+            )
+            self._slider = ui.slider(min=first, max=last, step=(last - first) / 1000, value=first)
+            self._slider.style("flex: 1").mark("scrub")
+            self._slider.on("update:model-value", self._scrub, throttle=0.05)
+            self._label = ui.label(_told(first)).classes("app-note")
+            self._label.style("width: 62px; text-align: right; font-variant-numeric: tabular-nums")
+            self._speed = ui.select(_SPEEDS, value=1.0, on_change=self._restart)
+            self._speed.props("dense options-dense borderless").style("width: 118px")
+        app.on_time(self._reached)
+
+    async def play(self) -> None:
+        """Play again and again, from the beginning."""
+        self._playing = True
+        self._button.props("icon=pause")
+        times, speed = self._film.times.tolist(), float(self._speed.value)
+        await self._app.play(times, self._film.configurations, speed)
+
+    def stop(self) -> None:
+        """Leave the picture where it is."""
+        if self._playing:
+            self._playing = False
+            self._app.pause()
+            self._button.props("icon=play_arrow")
+
+    async def _toggle(self) -> None:
+        if self._playing:
+            self.stop()
+            await self._keep(float(self._slider.value))
+        else:
+            await self.play()
+
+    async def _restart(self) -> None:
+        if self._playing:
+            await self.play()
+
+    async def _scrub(self, event: events.GenericEventArguments) -> None:
+        self.stop()
+        instant = float(event.args)
+        self._label.text = _told(instant)
+        await self._keep(instant)
+
+    async def _keep(self, instant: float) -> None:
+        """Make the configuration of this instant that of the app, its sliders included."""
+        row = int(np.abs(self._film.times - instant).argmin())
+        await self._app.set_configuration(self._film.configurations[row].tolist())
+
+    def _reached(self, instant: float) -> None:
+        """What the picture shows now, where it plays this film; a closed panel ends it."""
+        if self._slider.is_deleted:
+            self.stop()
+        elif self._playing:
+            self._slider.set_value(instant)
+            self._label.text = _told(instant)
+
+
+def _told(instant: float) -> str:
+    return f"{instant:.2f} s"
+
+
+_NOTE = "simulation"
+_FILM = "simulated"
+"""Note of the document and what was simulated last, for a reload."""
+
+
+def open_simulation(app: App) -> None:
+    """Open the panel for the present robot.
+
+    Args:
+        app: of the page.
+    """
+    system = app.checked_system()
+    if system is None:
+        return
+    texts = first_texts(cast(Texts, app.session.notes.get(_NOTE, {})))
+    app.session.notes[_NOTE] = texts
+    add_look()
+    with app.open("Simulate", key="simulate"), ui.element("div").classes("app-halves"):
+        with ui.element("div").classes("app-half").style("flex: 0 0 562px"):
+            button = build_form(system, texts)
+        shown = ui.element("div").classes("app-half app-stays")
+        with shown:
+            kept = app.session.notes.get(_FILM)
+            if isinstance(kept, tuple) and kept[0] == app.document:
+                _show(app, system, kept[1])
+            else:
+                ui.label("Plots of the motion appear here; the picture moves.").classes("app-note")
+
+    async def run() -> None:
+        button.disable()
+        try:
+            await _run(app, texts, shown)
+        finally:
+            button.enable()
+
+    tell_of_changes(app, shown)
+    button.on_click(run)
+
+
+async def _run(app: App, texts: Texts, shown: ui.element) -> None:
+    system = app.checked_system()
+    if system is None:
+        return
+    settings, document = settings_of(system, texts, app.q), app.document
+    made = await app.run(f"Simulating {system.name}", film, settings)
+    if made is None or shown.is_deleted:
+        return
+    app.session.notes[_FILM] = (document, made)
+    with new_answer(app, shown, document):
+        player = _show(app, system, made)
+        if document == app.document:
+            await player.play()
+    come_into_view(shown)
+
+
+def _show(app: App, system: System, made: Film) -> Player:
+    """Plots of a motion, and what plays it."""
+    result = made.result
+
+    async def download() -> None:
+        content = await asyncio.to_thread(csv_bytes, result)
+        app.download(content, f"{file_stem(system)}_motion.csv")
+
+    groups = groups_of(system, result)
+    with ui.element("div").classes("app-result-head"):
+        choice = ui.toggle(list(groups), value=next(iter(groups)))
+        choice.props("dense flat no-caps size=12.5px padding='3px 10px'").mark("plots")
+        ui.space()
+        table = ui.button("CSV", icon="download").props("flat dense no-caps")
+        table.tooltip("All signals as comma-separated values").mark("csv")
+        table.on_click(download)
+    player = Player(app, made)
+    charts = ui.element("div").style("width: 100%")
+    _facts(system, made)
+
+    def draw() -> None:
+        charts.clear()
+        with charts:
+            _draw(made, groups[str(choice.value)])
+
+    choice.on_value_change(draw)
+    draw()
+    return player
+
+
+def _draw(made: Film, charts: Charts) -> None:
+    height = 225 if len(charts) == 1 else 170
+    for unit, series in charts.items():
+        ui.echart(line_chart(made.result.time, series, unit)).style(
+            f"width: 100%; height: {height}px"
+        ).mark("chart")
+
+
+def _facts(system: System, made: Film) -> None:
+    """What the numbers say about the quality of the motion."""
+    result = made.result
+    energy = result["kinetic_energy"] + result["potential_energy"]
+    told = [
+        f"{len(result)} rows",
+        f"energy goes from {energy[0]:.6g} to {energy[-1]:.6g} J",
+    ]
+    if system.is_closed:
+        told.append(f"loops open by {result['closure_residual'].max():.1e} at most")
+    told += [f"{name}: {words} at {instant:.4g} s" for instant, name, words in result.events[:4]]
+    ui.label("; ".join(told)).classes("app-note").mark("facts")

@@ -1,0 +1,264 @@
+"""The mechanism in three dimensions: what is shown, from where, and joints to move by hand."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from nicegui import events, ui
+
+from mbs.app.web.app import App
+from mbs.app.web.document.tables import number
+from mbs.app.web.session import Handle, assembly_modes, handles, mode_of
+from mbs.app.web.style import VIEW
+from mbs.errors import MbsError
+from mbs.loops import Mode
+
+# Sliders for the coordinates that can be moved, the others as numbers, and the assembly modes.
+
+
+_PART = 1000
+_THROTTLE = 0.03
+_PAUSE = 0.2
+"""Seconds that a configuration stands before its assembly modes are looked for."""
+
+
+@dataclass(slots=True)
+class _Slider:
+    handle: Handle
+    slider: ui.slider
+    field: ui.input
+
+
+class JointSliders:
+    """The joints under the picture."""
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        self._sliders: list[_Slider] = []
+        self._follow: dict[int, ui.label] = {}
+        self._modes: tuple[Mode, ...] = ()
+        self._shape: tuple[object, ...] = ()
+        self._held: Handle | None = None
+        self._typed: Handle | None = None
+        self._turn = 0
+        self._shown_mode: int | None = None
+        with ui.element("div").classes("app-joints"):
+            with ui.element("div").classes("app-joints-head"):
+                ui.label("Joints").classes("app-joint-name")
+                self._kind = ui.label().classes("app-note")
+                ui.element("div").classes("app-space")
+                button = ui.button("Start configuration", on_click=self._home)
+                button.props("flat dense no-caps size=12px")
+                button.tooltip("Back to the configuration of assembly")
+            self._grid = ui.element("div").classes("app-joint-grid")
+            self._others = ui.element("div").classes("app-follow")
+            with ui.element("div").classes("app-modes") as self._mode_row:
+                ui.label("Assembly mode").classes("app-note")
+                self._mode = ui.select({}, on_change=self._choose_mode)
+                self._mode.props("dense options-dense borderless")
+                self._mode_note = ui.label().classes("app-note")
+        app.on_robot(self.rebuild)
+        app.on_configuration(self.refresh)
+        self.rebuild()
+
+    def rebuild(self) -> None:
+        """Make the sliders of the present mechanism, unless they are those already."""
+        system = self._app.session.system
+        found = () if system is None else handles(system)
+        names = () if system is None else tuple(c.name for c in system.coordinates)
+        if (found, names) == self._shape or system is None:
+            return
+        self._shape = (found, names)
+        self._sliders, self._follow = [], {}
+        self._grid.clear()
+        self._others.clear()
+        with self._grid:
+            for handle in found:
+                self._sliders.append(self._slider(handle))
+        held = {handle.place for handle in found}
+        with self._others:
+            for place, coordinate in enumerate(system.coordinates):
+                if place not in held:
+                    label = ui.label().tooltip(f"{coordinate.name} follows from the loops")
+                    self._follow[place] = label
+        self._kind.set_text(
+            "the active ones; the others follow from the loops" if system.is_closed else ""
+        )
+
+    async def refresh(self) -> None:
+        """Show the present configuration, except on what its user moves."""
+        system, q = self._app.session.system, self._app.q
+        if system is None or len(q) != system.nq:
+            return
+        for item in self._sliders:
+            value = q[item.handle.place]
+            if not (self._app.is_moving and item.handle == self._held):
+                item.slider.set_value(value)
+            if item.handle != self._typed:
+                item.field.set_value(f"{value:.4f}")
+        for place, label in self._follow.items():
+            label.set_text(f"{system.coordinates[place].name} = {q[place]:.4f}")
+        self._turn += 1
+        turn = self._turn
+        await asyncio.sleep(_PAUSE)
+        if turn == self._turn:
+            await self._refresh_modes()
+
+    async def _refresh_modes(self) -> None:
+        system, q = self._app.session.system, self._app.q
+        closed = system is not None and system.is_closed
+        self._mode_row.set_visibility(closed)
+        if system is None or not closed:
+            return
+        found = await self._app.aside(assembly_modes, system, q)
+        if (system, q) != (self._app.session.system, self._app.q):
+            return  # moved meanwhile; the next refresh is on its way
+        if isinstance(found, str):
+            self._modes = ()
+            self._mode.set_visibility(False)
+            self._mode_note.set_text(f"— {found}")
+            return
+        self._modes = found
+        now = self._shown_mode = mode_of(found, q)
+        options = {k: ", ".join(mode.branch) or "the only one" for k, mode in enumerate(found)}
+        self._mode.set_visibility(bool(found))
+        self._mode.set_options(options, value=now)
+        self._mode_note.set_text(f"{len(found)} with these joints" if found else "")
+
+    def _slider(self, handle: Handle) -> _Slider:
+        with ui.element("div").classes("app-joint"):
+            ui.label(handle.name).classes("app-joint-name").tooltip(_range(handle))
+            step = (handle.high - handle.low) / _PART
+            slider = ui.slider(min=handle.low, max=handle.high, step=step, value=0.0)
+            slider.props('dense thumb-size="14px" track-size="3px"')
+            field = ui.input().props("dense borderless")
+            ui.label(handle.unit if handle.unit != "1" else "").classes("app-note")
+        made = _Slider(handle, slider, field)
+        slider.on(
+            "update:model-value",
+            lambda event: self._slid(handle, event),
+            throttle=_THROTTLE,
+            leading_events=True,
+        )
+        field.on("update:model-value", lambda: self._type(handle), args=[])
+        field.on("blur", lambda: self._type(None), args=[])
+        field.on("change", lambda: self._written(made))
+        return made
+
+    def _type(self, handle: Handle | None) -> None:
+        """Remember in which field somebody types, so that nothing is written over it."""
+        self._typed = handle
+
+    async def _slid(self, handle: Handle, event: events.GenericEventArguments) -> None:
+        self._held = handle
+        await self._app.move(handle.place, float(event.args))
+
+    async def _written(self, item: _Slider) -> None:
+        self._typed = None
+        try:
+            value = number(str(item.field.value or ""), item.handle.name)
+        except MbsError as error:
+            self._app.complain(error)
+            return
+        await self._app.move(item.handle.place, value)
+
+    async def _choose_mode(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        k = event.value
+        if isinstance(k, int) and k < len(self._modes) and k != self._shown_mode:
+            await self._app.set_configuration(self._modes[k].q)
+
+    async def _home(self) -> None:
+        system = self._app.session.system
+        if system is not None:
+            await self._app.set_configuration(system.configuration)
+
+
+def _range(handle: Handle) -> str:
+    kind = "limits" if handle.limited else "no limits; the slider goes"
+    return f"{handle.name}: {kind} {handle.low:.4g} to {handle.high:.4g} {handle.unit}"
+
+
+_ROLES: Mapping[str, tuple[str, bool]] = MappingProxyType(
+    {
+        "link": ("Links", True),
+        "joint": ("Joints", True),
+        "axis": ("Axes", True),
+        "frame": ("Frames", True),
+        "link frame": ("All frames", False),
+        "loop": ("Loops", True),
+        "label": ("Names", False),
+        "grid": ("Ground", True),
+    }
+)
+_CAMERAS: Mapping[str, str] = MappingProxyType(
+    {"iso": "3-D", "front": "Front", "side": "Side", "top": "Top", "fit": "Fit"}
+)
+
+
+class PicturePanel:
+    """The right half of the app."""
+
+    def __init__(self, app: App) -> None:
+        self._app = app
+        with ui.element("div").classes("app-right"):
+            with ui.element("div").classes("app-view") as self._view:
+                ui.element("div").classes("app-canvas").props(f"id={VIEW}")
+                with ui.element("div").classes("app-over"):
+                    self._chips()
+                self._veil = ui.label().classes("app-veil")
+            JointSliders(app)
+        app.on_document(self.refresh)
+        app.on_configuration(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Say when the picture is not that of the table."""
+        session = self._app.session
+        stale = session.good is not None and session.good != session.document
+        why = session.refusal
+        if stale:
+            why = "The picture is of the last robot without a mistake."
+        self._veil.set_text(why)
+        self._veil.set_visibility(bool(why))
+        if stale:
+            self._view.classes(add="app-stale")
+        else:
+            self._view.classes(remove="app-stale")
+
+    def _chips(self) -> None:
+        with ui.element("div").classes("app-chips"):
+            for role, (title, usual) in _ROLES.items():
+                self._toggle(role, title, self._app.session.shown.get(role, usual))
+        with ui.element("div").classes("app-chips"):
+            for camera, title in _CAMERAS.items():
+                with ui.element("button").classes("app-chip") as chip:
+                    ui.label(title)
+                chip.on("click", lambda camera=camera: self._app.look(camera))
+            with ui.element("button").classes("app-chip") as chip:
+                ui.label("PNG").tooltip("Download the picture as it is")
+            chip.on("click", self._app.screenshot)
+
+    def _toggle(self, role: str, title: str, shown: bool) -> None:
+        with ui.element("button").classes("app-chip") as chip:
+            ui.label(title)
+        state = {"shown": shown}
+
+        def paint() -> None:
+            if state["shown"]:
+                chip.classes(add="app-chip-on")
+            else:
+                chip.classes(remove="app-chip-on")
+
+        def turn() -> None:
+            state["shown"] = not state["shown"]
+            self._app.show(role, state["shown"])
+            paint()
+
+        chip.on("click", turn)
+        paint()
+        if role in self._app.session.shown:
+            self._app.show(role, shown)

@@ -1,0 +1,156 @@
+"""The server of the app: on this machine only, for browsers of this machine only."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mbs.errors import MbsError
+from mbs.text import install_command, quoted
+
+if TYPE_CHECKING:
+    from mbs.app.web.document.document import Document
+
+HOST = "127.0.0.1"
+_PATIENCE = 60.0
+"""Seconds that a page may be without connection, on a busy machine, before it is loaded anew."""
+
+_DAY = 86400.0
+"""Seconds that the robot of a closed tab is kept."""
+
+_NAMES = ("127.0.0.1", "localhost", "[::1]")
+
+
+def serve(port: int | None = None, robot: str | None = None, open_browser: bool = True) -> None:
+    """Show the app in a browser until the process is interrupted.
+
+    The server listens on the loopback address and answers requests that name it so; anything
+    else is refused, so that pages of other sites cannot reach it under a name of their own.
+
+    Its address is printed as soon as it answers.
+
+    Args:
+        port: a free one when left out.
+        robot: a name of the catalogue, or a file, that new visitors find; the RX90 when left out.
+        open_browser: whether to open the browser of this machine at the page.
+
+    Raises:
+        MbsError: NiceGUI is not installed, the robot cannot be read, or the port is taken.
+    """
+    require_nicegui()
+    from nicegui import app, ui
+
+    from mbs.app.web.app import warm_up
+    from mbs.app.web.page import page_of
+    from mbs.app.web.style import serve_assets
+
+    first = robot_document(robot or "rx90")
+    number = free_port(port)
+    serve_assets()
+    app.storage.max_tab_storage_age = _DAY
+    app.add_middleware(Guard)
+    app.on_startup(warm_up)
+    address = f"http://{HOST}:{number}/"
+    app.on_startup(lambda: print(f"The app is at {address}; Ctrl+C ends it.", flush=True))
+    ui.run(
+        page_of(first),
+        host=HOST,
+        port=number,
+        title=f"mbs · {first.name}",
+        favicon="🦾",
+        dark=None,
+        tailwind=False,
+        reload=False,
+        reconnect_timeout=_PATIENCE,
+        show=open_browser,
+        show_welcome_message=False,
+    )
+
+
+class Guard:
+    """Refuses requests for another host than this machine, or from pages of another one."""
+
+    def __init__(self, app: Any) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Hand the request on, or answer 403."""
+        if scope["type"] not in ("http", "websocket") or is_local(scope["headers"]):
+            await self._app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            text = b"this server answers to 127.0.0.1 and localhost only"
+            headers = [(b"content-type", b"text/plain"), (b"content-length", b"%d" % len(text))]
+            await send({"type": "http.response.start", "status": 403, "headers": headers})
+            await send({"type": "http.response.body", "body": text})
+
+
+def is_local(headers: Iterable[tuple[bytes, bytes]]) -> bool:
+    """Whether host and origin of a request are this machine."""
+    found = {name.lower(): value.decode("latin-1") for name, value in headers}
+    origin = found.get(b"origin")
+    host = _host(found.get(b"host", ""))
+    return host in _NAMES and (origin is None or _host(origin.partition("://")[2]) in _NAMES)
+
+
+def _host(text: str) -> str:
+    """The name in name:port."""
+    name, colon, port = text.rpartition(":")
+    return name.lower() if colon and port.isdecimal() else text.lower()
+
+
+def robot_document(robot: str) -> Document:
+    """The document of a robot by its name in the catalogue, or in a file.
+
+    Raises:
+        MbsError: there is none, or it is malformed.
+    """
+    from mbs.app.web.document.document import Document
+    from mbs.robots import catalogue
+
+    path = Path(robot)
+    if robot in catalogue() or not path.suffix:
+        return Document.of_name(robot)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise MbsError(
+            f"{robot}: the file cannot be read ({error.strerror}); give a readable file"
+        ) from None
+    return Document.of_upload(content, path.suffix)
+
+
+def free_port(port: int | None) -> int:
+    """The port, or a free one.
+
+    Raises:
+        MbsError: it is no port, or taken.
+    """
+    if port is not None and not 0 < port < 65536:
+        raise MbsError(f"port {quoted(port)}: a port is a number from 1 to 65535; give another one")
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((HOST, port or 0))
+        except OSError as error:
+            raise MbsError(
+                f"port {port} cannot be used ({error.strerror}); give another one, or none"
+            ) from None
+        return int(trial.getsockname()[1])
+
+
+def require_nicegui() -> None:
+    """Refuse to go on without NiceGUI.
+
+    Raises:
+        MbsError: it is not installed.
+    """
+    try:
+        import nicegui  # noqa: F401
+    except ImportError:
+        raise MbsError(
+            "the app is shown by nicegui, which is not installed; run: " + install_command("app")
+        ) from None

@@ -409,8 +409,8 @@ class Attraction(LineForce):
 
 
 _HALF_TURN = 1e-12
-"""What 2 cos(theta / 2) is at least: at half a turn nothing is divided by zero, and off it the square,
-1e-24, is rounding."""
+"""What 2 cos(theta / 2) is at least: at half a turn nothing is divided by zero, and off it the
+square, 1e-24, is rounding."""
 _STRENGTHS = ("stiffness", "damping", "angular_stiffness", "angular_damping")
 
 

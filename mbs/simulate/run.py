@@ -787,7 +787,8 @@ def run(
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:
     """Relative and absolute tolerance of a step for that of a motion, kept above rounding."""
-    # steps add up: shares with which motions of the catalogue stay near the tolerance, to be measured
+    # errors of steps add up, and angles that count turns make no room for larger ones; below some
+    # ten roundings steps would only become shorter
     return max(1e-3 * tolerance, 1e-14), max(0.04 * tolerance, 1e-13)
 
 

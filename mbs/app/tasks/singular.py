@@ -68,8 +68,8 @@ _NUDGE = 1e-3
 """Of a position from the configuration at hand [rad or m]: there slopes that vanish by symmetry do
 not, and the nearest zero is still the nearest."""
 _OPEN = 1e-9
-"""Largest residual of the same configuration by whole turns: some roundings of angles more than where
-the iteration ended, 1e-12; across a gear it is another configuration, open by tenths."""
+"""Largest residual of the same configuration by whole turns: some roundings of angles more than
+where the iteration ended, 1e-12; across a gear it is another configuration, open by tenths."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from mbs.text import quoted
 
 NONZERO = 1e-300
-"""Stands for zero where one divides: zero over it is zero, numbers up to 1e8 over it are finite, and
-it is below the square of every length and speed that means anything."""
+"""Stands for zero where one divides: zero over it is zero, numbers up to 1e8 over it are finite,
+and it is below the square of every length and speed that means anything."""
 
 
 def doubles(value: Any) -> NDArray[np.float64] | str:

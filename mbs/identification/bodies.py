@@ -108,7 +108,7 @@ _OPTIONS = {
         "print_level": 0,
         "sb": "yes",
         "max_iter": _ROUNDS,
-        "tol": 1e-7,  # of the scaled slope; the misfit counts in deviations, of which this is nothing
+        "tol": 1e-7,  # of the scaled slope, where the misfit counts in deviations
         "bound_relax_factor": 0.0,
     },
     "print_time": False,
@@ -409,8 +409,8 @@ def _pose(system: System, frame: str | int) -> Array:
 
 
 _RANK = 1e-9
-"""Singular values of scaled columns below this part of the largest count as zero: those of dependent
-columns are rounding, 1e-15 times the root of the number of rows."""
+"""Singular values of scaled columns below this part of the largest count as zero: those of
+dependent columns are rounding, 1e-15 times the root of the number of rows."""
 _EXACT = 1e-3
 """Part of an effort below which its error is not believed: what simulations give fits too well
 for the search to end, and no sensor is that good."""

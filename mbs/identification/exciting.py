@@ -219,8 +219,8 @@ class SolverFollower(casadi.Callback):
 _STARTS = 30
 """Random motions of which the best is taken to begin with."""
 _FILLED = 0.9
-"""Part of the ranges that these fill at most, a half and a quarter of it as well: inside all limits,
-and with room for limits of models, such as efforts, that are met sooner."""
+"""Part of the ranges that these fill at most, a half and a quarter of it as well: inside all
+limits, and with room for limits of models, such as efforts, that are met sooner."""
 _ROUNDING = 1e-12
 """Part of the largest element of its column below which an element of the rates is zero: sines are
 rounded to 1e-16, and the least of those that are not zero is far above 1e-6."""
@@ -438,7 +438,8 @@ _ALLOWED = 1e-6
 """Part of a limit by which a motion may pass it: less than any drive tells, more than the search
 leaves."""
 _MORE = 1.2
-"""How much more than they are passed limits are narrowed by, so that the next search ends inside."""
+"""How much more than they are passed limits are narrowed by, so that the next search ends
+inside."""
 
 
 @dataclass(frozen=True, slots=True)

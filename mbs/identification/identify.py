@@ -46,7 +46,7 @@ _SURE = 3.0
 _UNFIT = 20.0
 """Error of all efforts that noise and friction laws do not explain [%]."""
 
-_MODEL, _EQUATIONS, _BODIES, _SOLVED = 0.1, 0.3, 0.7, 0.85
+_MODEL_DONE, _EQUATIONS_DONE, _BODIES_DONE, _SOLVED = 0.1, 0.3, 0.7, 0.85
 """Parts of the time after which these are there, for a robot of six joints: shown as progress."""
 
 
@@ -330,15 +330,15 @@ def identify(
     with progress(f"{system.name}: identification", 0.0, 1.0, quiet=quiet) as reached:
         D = regressor(system, **options)
         base = base_parameters(system, columns=D.columns)
-        reached(_MODEL)
+        reached(_MODEL_DONE)
         samples = tuple(with_led(D, smoothing(one, bandwidth)) for one in records)
         full = stacked([EQUATIONS[equations](system, s, bandwidth, options) for s in samples])
         grouped = full.grouped(base)
-        reached(_EQUATIONS)
+        reached(_EQUATIONS_DONE)
         physical = consistent if method == "least_squares" else consistent_weighted
-        watch = partial(_between, reached, _EQUATIONS, _BODIES)
+        watch = partial(_between, reached, _EQUATIONS_DONE, _BODIES_DONE)
         bodies, reason = _found_bodies(partial(physical, full, known, watch), method)
-        reached(_BODIES)
+        reached(_BODIES_DONE)
         estimator = METHODS[method](Setting(D, base, samples, full, bodies, known))
         estimate = estimator(grouped)
         reached(_SOLVED)

@@ -23,8 +23,8 @@ from mbs.identification.triangle import triangle, triangle_solved
 Array = npt.NDArray[np.float64]
 
 _ROUNDING = 1e-9
-"""Part of the largest effort below which a deviation is rounding of sums over a record, and weights of
-it would count nothing else; its square [N m or N] where all efforts are zero."""
+"""Part of the largest effort below which a deviation is rounding of sums over a record, and weights
+of it would count nothing else; its square [N m or N] where all efforts are zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

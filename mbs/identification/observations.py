@@ -475,8 +475,8 @@ def _integral(values: Array, rate: float) -> Array:
 
 
 _SETTLED_PERIODS = 15.0
-"""Time constants 1/a after which the filter has forgotten its start: 16 exp(-15), 5e-6 of it is left,
-less than the noise of any record."""
+"""Time constants 1/a after which the filter has forgotten its start: 16 exp(-15), 5e-6 of it is
+left, less than the noise of any record."""
 _ROWS = 2.0
 """Time constants between rows, over which errors that the filter has passed are alike."""
 
@@ -562,13 +562,14 @@ EQUATIONS: Mapping[str, Callable[[System, Samples, float, Any], Observations]] =
 
 
 _NOTHING = 1e-9
-"""Column below this part of the longest that the record does not show: rounding, 1e-15 of the largest
-motion, is below it, and what sensors tell, 1e-5, above."""
+"""Column below this part of the longest that the record does not show: rounding, 1e-15 of the
+largest motion, is below it, and what sensors tell, 1e-5, above."""
 _DEPENDENT = 1e-7
 """Singular values of columns of length one below this part of the largest count as zero: rounding
 makes 1e-15 of it, and directions that a record shows by less than 1e-7 are lost in any noise."""
 _SHARE = 0.05
-"""Part of a direction without effect from which on a parameter is named as one of those behind it."""
+"""Part of a direction without effect from which on a parameter is named as one of those behind
+it."""
 _LISTED = 8
 """Names in a sentence; more are counted."""
 

@@ -38,8 +38,8 @@ _RANGES = 3.0
 """Half ranges from the middle of a joint's range that a position is not beyond: overshoot and a
 range that is given too narrow stay within, degrees (57) and positions before a gear do not."""
 _SAME_MOTION = 0.9
-"""Correlation of a position with the integral of its velocity below which columns are exchanged or of
-opposite sign: noise and a late filter leave more, another joint's less."""
+"""Correlation of a position with the integral of its velocity below which columns are exchanged or
+of opposite sign: noise and a late filter leave more, another joint's less."""
 _SAME_RATE = 0.3
 """Relative difference of their sizes above which units differ, or sides of a gear: noise makes some
 percent, degrees a factor of 57 and gears of robots 3 and more."""

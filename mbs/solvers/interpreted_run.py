@@ -32,8 +32,8 @@ DEPARTURE = 1e-8
 """Part of a step that an indicator which rises may take to zero without asking for a jump: rounding
 and projections, 1e-12, may have left it below, and it is through sooner."""
 AT_ONCE = 1e3 * EPSILON
-"""Part of the time by which events differ that fall together: they are located to a few roundings of
-time, and arithmetic on times adds some more."""
+"""Part of the time by which events differ that fall together: they are located to a few roundings
+of time, and arithmetic on times adds some more."""
 LEAST_TIME = 1e-3
 """Part of the last step by which the rounding of times near zero is measured, not by time itself,
 which has none there."""
@@ -279,9 +279,11 @@ Progress = Callable[[float], None]
 
 TOLERANCE = 1e-12
 """Largest residual of the constraints where a projection ends, in parts of the largest state, or of
-one: roundings stay below it, and what Newton's method leaves before its last step, 1e-8, does not."""
+one: roundings stay below it, and what Newton's method leaves before its last step, 1e-8, does
+not."""
 ITERATIONS = 10
-"""Of a projection, each of which squares the error: more do not converge, and the step is shortened."""
+"""Of a projection, each of which squares the error: more do not converge, and the step is
+shortened."""
 _CHUNK = 50  # steps between two calls of progress
 
 

@@ -16,8 +16,8 @@ from mbs.solvers.stepper import Array, Stepper, combine
 Jacobian = Callable[[float, Array], tuple[Array, Array]]
 """(t, x) -> d rhs / d x (n, n), d rhs / d t (n,)."""
 
-# The coefficients of RODAS5P, Steinebach 2023, in the form of Hairer and Wanner 1996, IV.7; the tests
-# check the conditions of order on them.
+# The coefficients of RODAS5P, Steinebach 2023, in the form of Hairer and Wanner 1996, IV.7; the
+# tests check the conditions of order on them.
 
 GAMMA = 0.21193756319429014
 """The diagonal, which makes the method stiffly accurate and L-stable."""

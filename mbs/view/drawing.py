@@ -38,7 +38,8 @@ LETTERS = 3.2
 """Height of the letters, in units of the drawing."""
 
 _SIZE = 100.0
-"""Width or height of a drawing, the larger one; lengths and widths of lines below are in this unit."""
+"""Width or height of a drawing, the larger one; lengths and widths of lines below are in this
+unit."""
 _PARALLEL = 1e-6  # sine of the angle up to which axes are parallel: files hold six digits
 _ROUND = np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False)
 _CIRCLE = np.column_stack([np.cos(_ROUND), np.sin(_ROUND), np.zeros(32)])
@@ -246,7 +247,8 @@ def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
     rings = [eye.moved(item.link, end + item.radius * across) for end in (a, b)]
     heads = [ring[:, 2].mean() for ring in rings]
     near = int(heads[1] > heads[0])
-    # one end is seen unless they are turned from the eye to 3 degrees; it is lighter than the outline
+    # one end is seen unless they are turned from the eye to 3 degrees; it is lighter than the
+    # outline
     parts = [_area(item, hull(np.vstack(rings)[:, :2]))]
     if abs(heads[1] - heads[0]) > 0.05 * eye.scale * np.linalg.norm(b - a):
         parts.append(_area(item, rings[near][:, :2], bright=1.12))
@@ -262,7 +264,8 @@ def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
     local = BOX_CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
     corners = eye.moved(item.link, local)
     parts = []
-    # a side that is seen edge on is left out; colours are those of the outline, by a tenth darker
+    # a side that is seen edge on is left out; others are a tenth darker than bars,
+    # and lighter by the light on them
     for side in BOX_FACES:
         outside = np.cross(corners[side[2]] - corners[side[0]], corners[side[3]] - corners[side[1]])
         size = float(np.linalg.norm(outside))
@@ -290,7 +293,8 @@ def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
     """A zigzag; a line where its ends are one place on the drawing."""
     start, along = start[:2], (end - start)[:2]
     length = float(np.linalg.norm(along))
-    # no length but rounding, in hundredths of the drawing; straight ends of 3/20, eight turns between
+    # no length but rounding, in hundredths of the drawing; straight ends of 3/20, eight turns
+    # between
     if length < 1e-9:
         return Stroke(item.role, item.colour, _path(np.array([start, end[:2]])), width=0.8)
     across = np.array([-along[1], along[0]]) / length

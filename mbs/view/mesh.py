@@ -168,7 +168,8 @@ def _fan(points: Array) -> Array:
 
 
 def _dashes(a: Array, b: Array, size: float) -> Array:
-    # dashes and gaps, three hundredths of the size of the mechanism together, look the same on all axes
+    # dashes and gaps, three hundredths of the size of the mechanism together, look the same on all
+    # axes
     count = max(1, round(float(np.linalg.norm(b - a)) / (0.032 * size)))
     starts = np.arange(count) / count
     first = a + starts[:, None] * (b - a)

@@ -170,7 +170,8 @@ class Painter:
             corners, normal = corners[kept], normal[kept]
         else:
             normal = normal * np.sign(outside)[:, None]
-        # light from everywhere, from the sun and from the sky, of which a face away from all has half
+        # light from everywhere, from the sun and from the sky, of which a face away from all has
+        # half
         sun = _LIGHT / np.linalg.norm(_LIGHT) @ self.eye.axes
         bright = (
             0.58 + 0.5 * np.clip(normal @ sun, 0, 1) + 0.06 * (normal @ np.array(self.scene.up))

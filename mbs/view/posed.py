@@ -146,8 +146,8 @@ def position_of(system: System, q: Values) -> list[float]:
 _NICE = (1.0, 2.0, 5.0)
 """Widths of cells that people count with, times powers of ten."""
 SAME_POINT = 1e-6
-"""Distance, in parts of the size of a mechanism, below which two points are one in a picture: rounding
-is less, and a pixel a thousand times more."""
+"""Distance, in parts of the size of a mechanism, below which two points are one in a picture:
+rounding is less, and a pixel a thousand times more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +201,8 @@ def measures(scene: PosedLinks, solid_points: Array) -> Measures:
     lengths = [length for length in lengths if length > SAME_POINT * size]
     if size == 0:
         size = 4 * _gyration(scene)
-    # joints are seen at any size, and leave most of a usual link free; links are thinner than joints
+    # joints are seen at any size, and leave most of a usual link free; links are thinner than
+    # joints
     joint = min(0.028 * size, 0.2 * float(np.median(lengths))) if lengths else 0.028 * size
     return Measures(size, joint, 0.62 * joint, max(3.6 * joint, 0.07 * size))
 
@@ -247,8 +248,8 @@ def views(scene: PosedLinks) -> dict[str, Vector]:
     The front of a mechanism that moves in a plane is the side from which the plane is seen.
     """
     up = scene.up
-    # cosines that say which directions are about the same, and parts of front, right and up that show
-    # a plane almost from its front, what lies level from above, and all else from a corner
+    # cosines that say which directions are about the same, and parts of front, right and up that
+    # show a plane almost from its front, what lies level from above, and all else from a corner
     right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else _across(up))
     front = np.cross(right, up)
     normal = plane_normal(scene)

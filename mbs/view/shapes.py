@@ -90,8 +90,8 @@ def _joined(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterato
 def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
     role, colour = _look(scene, joint)
     carriers = _carriers(scene, joint)
-    # in radii of a joint: where there are several axes each is smaller, so that all are seen; a slide
-    # is a box of about the volume of the cylinder of a revolute joint
+    # in radii of a joint: where there are several axes each is smaller, so that all are seen; a
+    # slide is a box of about the volume of the cylinder of a revolute joint
     shrink = 1.0 if len(joint.axes) == 1 else 0.8
     for (link, column), axis in zip(carriers, joint.axes, strict=True):
         direction, center = scene.directions[axis.direction], scene.points[column]

@@ -59,8 +59,8 @@ Sampled = Callable[[list[SX]], NDArray[np.float64]]
 """(samples, n) values of n scalars at samples of the parameters of a system."""
 
 _CANCELLED = 1e-13
-"""What two coefficients may leave of each other, and symbols of a coefficient, when they cancel: some
-hundred roundings of factors of about one."""
+"""What two coefficients may leave of each other, and symbols of a coefficient, when they cancel:
+some hundred roundings of factors of about one."""
 _ZERO = 1e-9
 """Part of the largest coefficient of a relation below which one is no pivot: division by it would
 turn rounding, 1e-13, into coefficients that count."""
@@ -266,8 +266,8 @@ Array = NDArray[np.float64]
 
 _SEED = 20260411
 _SPREAD = 0.05
-"""Relative and absolute difference of samples from the defaults: far above rounding, and so near that
-loops that close with the defaults close with them."""
+"""Relative and absolute difference of samples from the defaults: far above rounding, and so near
+that loops that close with the defaults close with them."""
 _TRIES = 40
 
 

@@ -52,8 +52,9 @@ Relation = dict[Key, SX]
 """Coefficients of parameters whose effects cancel."""
 
 _SAME = 1e-9
-"""Difference of cosines, lengths [m] or rates of unit motions between configurations below which they
-are constant, or zero: closed configurations are open by 1e-13, and what moves moves by tenths."""
+"""Difference of cosines, lengths [m] or rates of unit motions between configurations below which
+they are constant, or zero: closed configurations are open by 1e-13, and what moves moves by
+tenths."""
 
 _TENSOR = TEN_PARAMETERS[:6]
 _SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))

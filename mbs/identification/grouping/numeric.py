@@ -291,8 +291,8 @@ def sampled_regressor(system: System, columns: Sequence[Column], states: States,
 
 
 _ZERO = 1e-8
-"""Factor of a dependent column below which it is rounding: those that count are ratios of lengths and
-squares of them, and whole numbers."""
+"""Factor of a dependent column below which it is rounding: those that count are ratios of lengths
+and squares of them, and whole numbers."""
 _EXACT = 1e-7
 """Largest error of a grouped regressor that is rounding, by the longest column."""
 _NARROW = 1e4

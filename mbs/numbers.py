@@ -1,4 +1,4 @@
-"""What counts as numbers in a call: one rule for lists, arrays and scalars of every kind."""
+"""What counts as numbers in a call, of lists, arrays and scalars, and what stands for zero."""
 
 from __future__ import annotations
 

@@ -1,9 +1,11 @@
 """Beside every number that was chosen stands why: what it separates, and why it is this size."""
 
 import ast
+import io
 import itertools
+import tokenize
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -81,32 +83,40 @@ def told_by_docstring(tree: ast.Module) -> set[int]:
     return found
 
 
-def in_comments(tree: ast.Module, lines: list[str]) -> set[int]:
-    """Lines of the simple statements that have a comment in them or above them."""
-    found: set[int] = set()
-    noted = {k for k, line in enumerate(lines, start=1) if "#" in line}
-    above = {k + 1 for k in noted if lines[k - 1].lstrip().startswith("#")}
-    found |= noted | above
+def comments_of(text: str) -> dict[int, bool]:
+    """Lines with a comment, and whether it has the line to itself; none that are for tools."""
+    return {
+        token.start[0]: not token.line[: token.start[1]].strip()
+        for token in tokenize.generate_tokens(io.StringIO(text).readline)
+        if token.type == tokenize.COMMENT
+        if not token.string.lstrip("# ").startswith(("noqa", "type:", "pragma", "fmt:"))
+    }
+
+
+def in_comments(tree: ast.Module, comments: Mapping[int, bool]) -> set[int]:
+    """Lines with a comment, lines below one, and the simple statements that begin there."""
+    above = {k + 1 for k, alone in comments.items() if alone}
+    found = set(comments) | above
     for node in ast.walk(tree):
         if isinstance(node, ast.stmt) and not hasattr(node, "body") and node.lineno in above:
             found.update(lines_of(node))
     return found
 
 
-def in_paragraphs(lines: list[str]) -> set[int]:
+def in_paragraphs(lines: list[str], comments: Mapping[int, bool]) -> set[int]:
     """Lines below a comment, as far as the next empty one."""
     found, told = set(), False
     for k, line in enumerate(lines, start=1):
-        told = bool(line.strip()) and (told or line.lstrip().startswith("#"))
+        told = bool(line.strip()) and (told or comments.get(k, False))
         found.update([k] if told else ())
     return found
 
 
 def unexplained(text: str, *, paragraphs: bool = False) -> list[int]:
     """Lines with a number that was chosen and no reason beside it."""
-    tree, lines = ast.parse(text), text.splitlines()
-    explained = with_docstring_below(tree) | told_by_docstring(tree) | in_comments(tree, lines)
-    explained |= in_paragraphs(lines) if paragraphs else set()
+    tree, comments = ast.parse(text), comments_of(text)
+    explained = with_docstring_below(tree) | told_by_docstring(tree) | in_comments(tree, comments)
+    explained |= in_paragraphs(text.splitlines(), comments) if paragraphs else set()
     # the unit of what is printed stands in the text
     for node in ast.walk(tree):
         explained.update(lines_of(node) if isinstance(node, ast.JoinedStr) else ())
@@ -151,6 +161,8 @@ def test_every_chosen_number_has_its_reason():
         ("# rounding\nA = (\n    1e-9,\n    1e-6,\n)\nB = 1e-3\n", [6]),
         ('A = 1e-9\n"""Rounding."""\nB = 1e-6\n', [3]),
         ("A = 2.0 * x\n", []),
+        ('A = f("#fff", 1e-9)\n', [1]),
+        ("A = 1e-9  # noqa: N806\n", [1]),
         ("# all of it\nif x:\n    y = 1e-9\n", [3]),
         ('def f(t=1e-9):\n    """F.\n\n    Args:\n        t: a tolerance.\n    """\n', []),
         ('def f(t=1e-9):\n    """F of t."""\n', [1]),

@@ -1,4 +1,4 @@
-"""What counts as numbers in a call: one rule for lists, arrays and scalars of every kind."""
+"""What counts as numbers in a call, of lists, arrays and scalars, and what stands for zero."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.text import quoted
+
+NONZERO = 1e-300
+"""Stands for zero where one divides: zero over it is zero, numbers up to 1e8 over it are finite,
+and it is below the square of every length and speed that means anything."""
 
 
 def doubles(value: Any) -> NDArray[np.float64] | str:

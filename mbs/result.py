@@ -252,7 +252,7 @@ class Result:
             for n in members:
                 axis.plot(self.time, self[n], label=n)
             axis.set_ylabel(_label(unit))
-            axis.grid(True, alpha=0.3)
+            axis.grid(True, alpha=0.3)  # fainter than lines
             axis.legend(loc="upper right", fontsize="small")
         axes[-1].set_xlabel("time [s]")
         if path is not None:
@@ -295,6 +295,7 @@ def optional_module(module: str, extra: str) -> Any:
 
 
 def _figure(rows: int, *, shown: bool) -> Any:
+    # inches: as wide as a page of text, flat panels, and room for the title and the axis of time
     size = (8.0, 1.0 + 2.5 * max(rows, 1))
     optional_module("matplotlib", "plot")
     if shown:

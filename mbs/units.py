@@ -26,7 +26,7 @@ class Unit:
     display_factor: float = 1.0
 
 
-_DEGREES = 57.29577951308232
+_DEGREES = 57.29577951308232  # 180 / pi
 
 _UNITS = (
     Unit("1"),

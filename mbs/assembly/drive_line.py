@@ -118,7 +118,10 @@ Key = tuple[str, str]
 
 _ZERO, _ONE = Number(0.0), Number(1.0)
 _ROUNDING = 1e-12
+"""Relative difference of two ratios that are equal: products of some ratios round by 1e-15, and no
+gear is given with twelve digits."""
 _GOLDEN = (5**0.5 - 1) / 2
+"""The golden ratio: multiples of it modulo one are irregular."""
 
 
 @dataclass(frozen=True, slots=True)

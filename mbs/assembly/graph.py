@@ -20,6 +20,8 @@ from mbs.errors import AssemblyError
 from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose
 
 _SAME_PLACE = 1e-8
+"""Distance [m] or angle [rad] by which welds on two ways around may differ: angles that files give
+with nine digits, far less than any clearance."""
 
 Port = tuple[str, str]
 """A component's name and which of its frames: "" of a body, "a" or "b" of a joint."""

@@ -111,6 +111,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
 def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
     """A number for every parameter; an irregular one where none is given."""
     return {
+        # irregular numbers of about one, so that no rule among the parameters holds by chance
         p.name: 0.731 + 0.217 * number if p.default is None else p.default
         for number, p in enumerate(parameters)
     }

@@ -24,7 +24,7 @@ Bounds = tuple[float | None, float | None]
 """The least and the greatest value; None where there is none."""
 
 _BELOW_ZERO = (-1.0, -1e-5)  # far, and nearer than a limit is to zero: refused for the sign
-_ABOVE_ONE = (1.1, 1e3)
+_ABOVE_ONE = (1.1, 1e3)  # near, and far: what is refused there is refused for being above one
 
 
 def parameter_bounds(

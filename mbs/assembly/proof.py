@@ -60,6 +60,7 @@ def prove(
         AssemblyError: names the body or joint, and the values of the symbols.
     """
     rng = np.random.default_rng(_SEED)
+    # of about one, so that no symbol drops out beside another, and none near zero
     some = rng.uniform(0.3, 1.7, len(symbols)) * rng.choice([-1.0, 1.0], len(symbols))
     # the defaults, numbers of both signs, and the same with all signs the other way
     rows = np.array(

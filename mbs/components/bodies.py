@@ -20,6 +20,11 @@ from mbs.text import quoted
 
 
 _TOLERANCE = 1e-6
+"""Part of the largest moment of inertia by which one may be negative, and relative difference of
+elements of a tensor that are equal: files give them with six or seven digits."""
+_ZERO = 1e-12
+"""Element of a tensor [kg m^2] that is the rounding of zero, as where a file of a symmetric tensor
+was turned: bodies that small are not described in kg and m."""
 
 
 def check_mass(name: str, mass: Scalar) -> None:
@@ -97,7 +102,7 @@ _TWINS = ((1, 3), (2, 6), (5, 7))
 def _equal(a: Expression, b: Expression) -> bool:
     """Whether two elements of a tensor are the same, up to the rounding of numbers."""
     if isinstance(a, Number) and isinstance(b, Number):
-        return math.isclose(a.value, b.value, rel_tol=_TOLERANCE, abs_tol=1e-12)
+        return math.isclose(a.value, b.value, rel_tol=_TOLERANCE, abs_tol=_ZERO)
     return a == b
 
 

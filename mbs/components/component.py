@@ -169,6 +169,7 @@ def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
         R = np.asarray(rotation, dtype=float)
     except (TypeError, ValueError):
         R = np.zeros(0)
+    # cosines as files give them, with six digits; what is kept is the nearest rotation
     if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
         raise DescriptionError(
             f"{where}: rotation {quoted(rotation)} is not a rotation; give ('z', angle), a sequence"
@@ -361,7 +362,7 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
         raise DescriptionError(
             f"{name}: axis {quoted(axis)} is not a direction; give three numbers"
         )
-    if math.hypot(*values) < 1e-9:
+    if math.hypot(*values) < 1e-9:  # rounding of zero: nobody gives directions that short
         raise DescriptionError(f"{name}: axis {quoted(axis)} has zero length; give a direction")
     return unit_vector(values.tolist())
 

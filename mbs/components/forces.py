@@ -409,6 +409,8 @@ class Attraction(LineForce):
 
 
 _HALF_TURN = 1e-12
+"""What 2 cos(theta / 2) is at least: at half a turn nothing is divided by zero, and off it the
+square, 1e-24, is rounding."""
 _STRENGTHS = ("stiffness", "damping", "angular_stiffness", "angular_damping")
 
 
@@ -567,6 +569,7 @@ def _ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
     beyond = casadi.fmax(depth - width, 0)
     slope = u**2 * (3 - 2 * u)
     ramp = width * u**3 * (1 - u / 2) + beyond
+    # u^4 / 4 - u^5 / 10, the integral of the ramp u^3 - u^4 / 2
     area = width**2 * u**4 * (0.25 - 0.1 * u) + 0.5 * beyond * (beyond + width)
     return slope, ramp, area
 

@@ -375,7 +375,7 @@ class Universal(Joint):
                 f"{self.name}: axes {quoted(self.axes)} are not two; give two orthogonal axes"
             ) from None
         first, second = unit_axis(self.name, first), unit_axis(self.name, second)
-        if abs(np.dot(first, second)) > 1e-9:
+        if abs(np.dot(first, second)) > 1e-9:  # unit vectors: beyond the rounding of their digits
             raise DescriptionError(
                 f"{self.name}: axes {quoted(self.axes)} are not orthogonal;"
                 " give two orthogonal axes"

@@ -635,6 +635,7 @@ def example_input(model: Function, k: int) -> np.ndarray[tuple[int, ...], np.dty
     """
     rows, columns = model.size_in(k)
     numbers = np.arange(rows * columns, dtype=float)
+    # between -0.2 and some units, other for every input and every element
     values = (0.1 + 0.2 * k + 0.3 * np.sin(1.0 + numbers)).reshape(rows, columns, order="F")
     if not isinstance(model, ModelFunction):
         return values

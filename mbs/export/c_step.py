@@ -220,7 +220,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
             nu=max(1, sizes["NU"]),
             nq=sizes["NQ"],
             nv=sizes["NV"],
-            step=literal(0.001, real),
+            step=literal(0.001, real),  # [s] as a controller at 1 kHz takes them
         ),
     )
 

@@ -18,6 +18,7 @@ from mbs.identification.exciting import SolverFollower, Watch
 from mbs.identification.observations import Observations, excitation_quality
 from mbs.identification.regressors import INERTIAL, Column
 from mbs.identification.triangle import compressed
+from mbs.numbers import NONZERO
 from mbs.spatial.inertia import Inertia, PseudoInertia
 from mbs.text import quoted
 
@@ -97,22 +98,25 @@ class Prior:
 FREE_KINDS = ("offset",)
 """Kinds that may be negative though they belong to a joint."""
 
-_MASS = 1.0
-_RADIUS = 0.1
+_MASS, _RADIUS = 1.0, 0.1
+"""Of the ball that every body is guessed to be [kg, m]: the middle of what links of robots are, by
+logarithms, in which the search moves."""
 _ROUNDS = 500
+"""Steps of the search at most: where it takes more, units or the record do not fit the model."""
 _OPTIONS = {
     "ipopt": {
         "print_level": 0,
         "sb": "yes",
         "max_iter": _ROUNDS,
-        "tol": 1e-7,
+        "tol": 1e-7,  # of the scaled slope, where the misfit counts in deviations
         "bound_relax_factor": 0.0,
     },
     "print_time": False,
     "error_on_fail": False,
 }
-_SMALLEST_ROOT = -7.0
-_LARGEST_ROOT = 7.0
+_SMALLEST_ROOT, _LARGEST_ROOT = -7.0, 7.0
+"""Logarithms of the factors on roots of the guess: masses and moments of inertia within a factor of
+1e6 of it, so that exponentials do not overflow on the way."""
 _OFF_DIAGONAL = tuple((r, c) for r in range(4) for c in range(r))
 
 
@@ -235,6 +239,7 @@ class _PhysicalProblem:
         upper = [_LARGEST_ROOT] * 4 + [np.inf] * 6
         least = [-np.inf if c.kind in FREE_KINDS else 0.0 for c in own]
         answer = solver(
+            # bodies start at the guess, what must not be negative a tenth of its scale above zero
             x0=[0.0] * (10 * links) + [0.0 if low < 0 else 0.1 for low in least],
             lbx=lower * links + least,
             ubx=upper * links + [np.inf] * len(own),
@@ -317,7 +322,7 @@ def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphas
         H[np.ix_(places, places)] += emphasis * np.array(
             [[np.trace(X @ Y) for Y in units] for X in units]
         )
-    size = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(H), NONZERO))
     covariance = np.linalg.pinv(H / np.outer(size, size), hermitian=True)
     return np.asarray(covariance / np.outer(size, size), dtype=float)
 
@@ -404,10 +409,13 @@ def _pose(system: System, frame: str | int) -> Array:
 
 
 _RANK = 1e-9
-
+"""Singular values of scaled columns below this part of the largest count as zero: those of
+dependent columns are rounding, 1e-15 times the root of the number of rows."""
 _EXACT = 1e-3
 """Part of an effort below which its error is not believed: what simulations give fits too well
 for the search to end, and no sensor is that good."""
+_NO_DEVIATION = 1e-12
+"""Deviation [N m or N] of an effort that is zero throughout, which is divided by."""
 
 
 def consistent(
@@ -466,7 +474,7 @@ def unconstrained_error(observations: Observations) -> Array:
 
 def _positive(deviation: float, efforts: Array) -> float:
     """The deviation, or a small part of the efforts where the equations fit exactly."""
-    return max(deviation, _EXACT * float(np.sqrt(np.mean(efforts**2))), 1e-12)
+    return max(deviation, _EXACT * float(np.sqrt(np.mean(efforts**2))), _NO_DEVIATION)
 
 
 def _with_weights(

@@ -265,7 +265,7 @@ def plot_residuals(
         share = f"{residuals.percent[k]:.1f} %"
         panel.set_title(f"{residuals.efforts[k]}: error {share}", fontsize="small")
         panel.set_ylabel(f"[{residuals.effort_units[k]}]")
-        panel.grid(True, alpha=0.3)
+        panel.grid(True, alpha=0.3)  # fainter than lines
     panels[0].legend(loc="upper right", fontsize="small")
     panels[-1].set_xlabel("time [s]")
     if path is not None:

@@ -32,6 +32,7 @@ from mbs.identification.trajectory import (
     limits_of,
     resting_coefficients,
 )
+from mbs.numbers import NONZERO
 from mbs.progress import progress
 from mbs.text import did_you_mean, quoted
 
@@ -51,7 +52,7 @@ _POWER = 8
 
 def log_det(G: Array) -> tuple[float, Array]:
     """-log det(W'W)/n: the mean logarithm of the variances, the same in all units but for a sum."""
-    size = np.sqrt(np.maximum(np.diag(G), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     values, vectors = np.linalg.eigh(G / np.outer(size, size))
     if values[0] <= 0:
         return np.nan, np.full(G.shape, np.nan)
@@ -76,7 +77,7 @@ def condition(G: Array) -> tuple[float, Array]:
 
 def scaled_condition(G: Array) -> tuple[float, Array]:
     """The same of W with columns of length one, which no choice of units moves."""
-    size = np.sqrt(np.maximum(np.diag(G), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     S = G / np.outer(size, size)
     value, slope = condition(S)
     gradient = slope / np.outer(size, size)
@@ -216,7 +217,10 @@ class SolverFollower(casadi.Callback):
 
 
 _STARTS = 30
+"""Random motions of which the best is taken to begin with."""
 _FILLED = 0.9
+"""Part of the ranges that these fill at most, a half and a quarter of it as well: inside all
+limits, and with room for limits of models, such as efforts, that are met sooner."""
 _ROUNDING = 1e-12
 """Part of the largest element of its column below which an element of the rates is zero: sines are
 rounded to 1e-16, and the least of those that are not zero is far above 1e-6."""
@@ -411,10 +415,10 @@ def _options(rounds: int) -> dict[str, Any]:
             "print_level": 0,
             "sb": "yes",
             "max_iter": rounds,
-            "tol": 1e-4,
+            "tol": 1e-4,  # a criterion is a mean logarithm: what is left changes no deviation
             "hessian_approximation": "limited-memory",
             "mu_strategy": "adaptive",
-            "constr_viol_tol": 1e-8,
+            "constr_viol_tol": 1e-8,  # in parts of a limit, below what is allowed in the end
         },
         "print_time": False,
         "error_on_fail": False,
@@ -428,7 +432,14 @@ _FINE = 8
 _TRIES = 4
 _FIRST_ROUNDS = 60
 _SIGN_PART = 0.02
+"""Part of the largest velocity over which Coulomb friction changes sign in the search: some samples
+of a motion see the change, and its slope is one that a search can follow."""
 _ALLOWED = 1e-6
+"""Part of a limit by which a motion may pass it: less than any drive tells, more than the search
+leaves."""
+_MORE = 1.2
+"""How much more than they are passed limits are narrowed by, so that the next search ends
+inside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -579,7 +590,7 @@ def _within(
         parts = np.array([margin.part for margin in trajectory.margins])
         if (parts >= -_ALLOWED).all():
             return replace(trajectory, status=answer.status, steps=answer.steps)
-        narrowed, x = narrowed + 1.2 * excess, answer.x
+        narrowed, x = narrowed + _MORE * excess, answer.x
     worst = min(trajectory.margins, key=lambda margin: margin.part)
     raise SolverError(
         f"{trajectory.system.name}: the {worst.limit.quantity} of {worst.limit.name} passes its"

@@ -38,10 +38,16 @@ from mbs.text import did_you_mean, quoted
 # A readable account of an identification.
 
 
-_POOR = 30.0
+POOR = 30.0
+"""Deviation of a parameter above which it is marked as not shown [%]: three of them reach zero, so
+that not even its sign is sure."""
 _SURE = 3.0
+"""Deviations below zero from which a value is surely negative: 99.9 % of normal errors are less."""
 _UNFIT = 20.0
 """Error of all efforts that noise and friction laws do not explain [%]."""
+
+_MODEL_DONE, _EQUATIONS_DONE, _BODIES_DONE, _SOLVED = 0.1, 0.3, 0.7, 0.85
+"""Parts of the time after which these are there, for a robot of six joints: shown as progress."""
 
 
 def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
@@ -105,7 +111,7 @@ def _parameters(estimate: Estimate) -> list[str]:
     )
     for column, value, deviation, percent in rows:
         share = f"{percent:.1f}" if percent < 1000 else "-"
-        mark = " *" if percent > _POOR else ""
+        mark = " *" if percent > POOR else ""
         lines.append(
             f"{column.name:<12}{value:>12.5g}{deviation:>12.2g}{share:>9}  {column.unit}{mark}"
         )
@@ -324,18 +330,18 @@ def identify(
     with progress(f"{system.name}: identification", 0.0, 1.0, quiet=quiet) as reached:
         D = regressor(system, **options)
         base = base_parameters(system, columns=D.columns)
-        reached(0.1)
+        reached(_MODEL_DONE)
         samples = tuple(with_led(D, smoothing(one, bandwidth)) for one in records)
         full = stacked([EQUATIONS[equations](system, s, bandwidth, options) for s in samples])
         grouped = full.grouped(base)
-        reached(0.3)
+        reached(_EQUATIONS_DONE)
         physical = consistent if method == "least_squares" else consistent_weighted
-        watch = partial(_between, reached, 0.3, 0.7)
+        watch = partial(_between, reached, _EQUATIONS_DONE, _BODIES_DONE)
         bodies, reason = _found_bodies(partial(physical, full, known, watch), method)
-        reached(0.7)
+        reached(_BODIES_DONE)
         estimator = METHODS[method](Setting(D, base, samples, full, bodies, known))
         estimate = estimator(grouped)
-        reached(0.85)
+        reached(_SOLVED)
         validation = held_out(estimator, grouped, TRAINED)
     return Identification(
         system, base, bandwidth, full, estimator, estimate, bodies, validation, reason

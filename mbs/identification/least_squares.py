@@ -23,6 +23,8 @@ from mbs.identification.triangle import triangle, triangle_solved
 Array = npt.NDArray[np.float64]
 
 _ROUNDING = 1e-9
+"""Part of the largest effort below which a deviation is rounding of sums over a record, and weights
+of it would count nothing else; its square [N m or N] where all efforts are zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -221,6 +223,7 @@ HUBER = 1.345
 """Bound at which 95 % of the efficiency of least squares is left for normal errors."""
 
 _MEDIAN_OF_NORMAL = 0.6745
+"""Median of the sizes of normal errors of deviation one."""
 
 
 def robust(

@@ -25,6 +25,7 @@ from mbs.identification.regressors import (
     regressor,
 )
 from mbs.identification.triangle import triangle
+from mbs.numbers import NONZERO
 from mbs.result import optional_module
 from mbs.text import did_you_mean
 
@@ -35,7 +36,10 @@ Array = npt.NDArray[np.float64]
 Chosen = npt.NDArray[np.bool_]
 
 _FEWEST = 0.5
+"""Part of a record that must be away from singular configurations: the rest is taken out."""
 _ROUNDING = 1e-9
+"""Part of a span of time that is added to it, so that an instant at its end belongs to it however
+times are rounded; samples are a thousand times further apart."""
 
 
 def led_rows(system: System, q: Array) -> Chosen:
@@ -471,7 +475,10 @@ def _integral(values: Array, rate: float) -> Array:
 
 
 _SETTLED_PERIODS = 15.0
+"""Time constants 1/a after which the filter has forgotten its start: 16 exp(-15), 5e-6 of it is
+left, less than the noise of any record."""
 _ROWS = 2.0
+"""Time constants between rows, over which errors that the filter has passed are alike."""
 
 
 def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observations:
@@ -555,9 +562,16 @@ EQUATIONS: Mapping[str, Callable[[System, Samples, float, Any], Observations]] =
 
 
 _NOTHING = 1e-9
+"""Column below this part of the longest that the record does not show: rounding, 1e-15 of the
+largest motion, is below it, and what sensors tell, 1e-5, above."""
 _DEPENDENT = 1e-7
+"""Singular values of columns of length one below this part of the largest count as zero: rounding
+makes 1e-15 of it, and directions that a record shows by less than 1e-7 are lost in any noise."""
 _SHARE = 0.05
+"""Part of a direction without effect from which on a parameter is named as one of those behind
+it."""
 _LISTED = 8
+"""Names in a sentence; more are counted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -601,7 +615,7 @@ def excitation_quality(observations: Observations) -> ExcitationQuality:
     R = triangle(observations.rows[0])
     names = np.array(observations.names)
     lengths = np.linalg.norm(R, axis=0)
-    seen = lengths > _NOTHING * max(float(lengths.max(initial=0.0)), 1e-300)
+    seen = lengths > _NOTHING * max(float(lengths.max(initial=0.0)), NONZERO)
     _, values, modes = np.linalg.svd(R[:, seen] / lengths[seen])
     values = np.concatenate([values, np.zeros(len(modes) - len(values))])
     null = modes[values <= _DEPENDENT * values.max(initial=0.0)]

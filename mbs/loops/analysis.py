@@ -24,10 +24,10 @@ from mbs.solvers.rank import independent_rows, null_space_of, rank
 
 Matrix = NDArray[np.float64]
 
-_CONFIGURATIONS = 5
-_TRIES = 25
-_SEED = 20260102
+_CONFIGURATIONS, _TRIES, _SEED = 5, 25, 20260102
+"""Closed configurations beside the assembled one that are compared, from so many random starts."""
 _REACH = 0.5
+"""Of a random start from the assembled configuration [rad or m]."""
 _GAP = 1e-5
 """Singular values below this part of the largest count as zero: Gauss-Newton ends about the square
 root of its tolerance, 1e-6, away from a singular configuration, where they are not smaller. At
@@ -35,6 +35,8 @@ regular configurations of the catalogue those that count are above 1e-2 and the 
 in lengths of the size of the mechanism. A loop that holds a motion by less than 1e-5 of it counts
 as free."""
 _SAME_SHARE = 1e-6
+"""Difference of the shares that kept rows have in a dropped one, above which they change with the
+configuration: closing leaves 1e-12 in rows, and singular values of `_GAP` make 1e-7 of it."""
 
 
 def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:

@@ -319,7 +319,7 @@ def followed_configuration(
             " configuration;"
             f" give one less than {_LONGEST_LINE:g} away"
         )
-    largest = min(1.0, _LARGEST_STEP / max(length, 1e-12))
+    largest = _LARGEST_STEP / length if length > _LARGEST_STEP else 1.0
     q, slope, done, part = start, np.zeros(len(free)), 0.0, largest
     while done < 1.0:
         to = min(1.0, done + part)

@@ -29,7 +29,10 @@ from mbs.solvers.rank import rank
 from mbs.text import quoted
 
 _SAME = 1e-9
+"""Difference of positions [rad or m] below which two modes are one: a formula gives the same mode
+again to some roundings, and modes that differ by less are one for every use."""
 _MOST = 4096
+"""Branches that are listed at most: each is evaluated and kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +110,11 @@ def _same(mode: Mode, other: Mode) -> bool:
 
 _TRIES, _LEAST, _SEED = 500, 60, 20260103
 _SAME_WORKING_MODE = 1e-6
+"""Difference of positions [rad or m] below which two ends of the search are one mode: closed to
+1e-12, they agree to that away from singular configurations and to its square root near them."""
 _LOOSE = 1e-5
+"""Singular values below this part of the largest let the joints move: closed to 1e-12, a mode that
+can move is found with an error of the square root, 1e-6, and its slope is as large."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +245,9 @@ def _require_isolated(wanted: Goal, q: Vector) -> None:
 
 _START_TRIES, _LEAST_STARTS, _START_SEED = 300, 40, 20260107
 _REACH = np.pi
+"""Of a random start from the given positions: all angles, and as many metres."""
 _SAME_START = 1e-6
+"""As `_SAME_WORKING_MODE`, with positions held in place of a pose."""
 
 
 def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:

@@ -68,6 +68,8 @@ from mbs.spatial import Pose
 
 
 _NEAR = 1e-5
+"""Difference of positions [rad or m] between a way and a configuration that it leads to: closed to
+1e-12, a configuration is known to the square root, 1e-6, where two ways meet."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,10 +184,11 @@ def _agree(system: System, places: Sequence[int], reached: Vector, q: Vector) ->
 # alone that may not be enough: such a plan is refused, and a way that never closes is left out.
 
 
-_SEED = 20260104
 _MOVE = 0.2
-_TRIES = 8
-_CHECKS = 3
+"""Of a random start from the assembled configuration [rad or m]: off alignments that it may have by
+accident, and mostly not across to another branch."""
+_CHECKS, _TRIES, _SEED = 3, 8, 20260104
+"""Configurations beside the assembled one that are compared, from so many random starts."""
 
 
 Start = Callable[[Vector], Vector]
@@ -450,7 +453,10 @@ def _require_all(system: System, known: set[int]) -> None:
 
 
 _LOOSE = 1e-6
-_REACH, _KNOWN_TRIES, _KNOWN_SEED = 0.2, 8, 20260106
+"""Rows of orthonormal directions of motion with singular values below this part of the largest do
+not move by themselves: closing leaves 1e-12 times the condition of the loops in them."""
+_KNOWN_TRIES, _KNOWN_SEED = 8, 20260106
+"""Random starts of `regular_configuration`, each `_MOVE` from the assembled one at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -530,7 +536,7 @@ def regular_configuration(system: System) -> Vector:
     """A closed configuration near the assembled one, where nothing is aligned by accident."""
     configuration = np.array(system.configuration)
     closing = Closing(system, closure_parameters(system))
-    return next(closing.nearby(configuration, _REACH, _KNOWN_TRIES, _KNOWN_SEED), configuration)
+    return next(closing.nearby(configuration, _MOVE, _KNOWN_TRIES, _KNOWN_SEED), configuration)
 
 
 def _raising(free: Vector, candidates: Sequence[int], first: tuple[int, ...]) -> tuple[int, ...]:

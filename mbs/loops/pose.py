@@ -131,7 +131,11 @@ ROWS = {"x": (0,), "y": (1,), "z": (2,), "orientation": tuple(range(3, 12)), "ax
 
 WHOLE = ("x", "y", "z", "orientation")
 _CLOSURE_WEIGHT = 1e2
+"""What closure rows count beside a pose that is not reached: loops open by less than 1e-4 of what
+the pose is missed by, near enough to be closed afterwards; more would slow the iteration."""
 _ITERATIONS = 50
+"""Of Gauss-Newton from one start: it squares its error near a root, and one that wanders for so
+long is better replaced by the next start."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

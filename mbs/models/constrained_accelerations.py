@@ -19,6 +19,8 @@ from mbs.recursions.composite_body import inertia_matrix
 from mbs.solvers.linear import solve_saddle
 
 _ROUNDING = 1e-9
+"""A moment of inertia negative by this part of the largest counts as zero: that of a thin rod, from
+parameters with nine digits and more."""
 
 
 def constrained_accelerations(

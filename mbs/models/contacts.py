@@ -312,6 +312,7 @@ def held_dynamics(system: System, prescribed: tuple[int, ...]) -> Function:
             system, s, tau, surroundings(system), prescribed, a_p, acting
         )
         A = inertia_matrix(system.tree, s.poses)
+        # a limited link may be massless: what a stop then counts on is a millionth of the others'
         least = SX(1e-6 * inertia_size(system, A, s))
         inertia = casadi.vertcat(*(casadi.fmax(A[n, n], least) for n in prescribed))
         inputs: Named = [("q", s.q), ("v", s.v), ("tau", tau), ("a_p", a_p), ("acting", acting)]

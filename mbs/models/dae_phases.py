@@ -399,6 +399,7 @@ class Standing:
         K = np.block([[A, -rows.T], [rows, np.zeros((r, r))]])
         right = np.concatenate([tau - H.ravel(), -slopes.ravel()])
         found: Array = np.linalg.lstsq(K, right, rcond=None)[0]
+        # contradictory equations leave parts of one, dependent ones that agree some roundings of K
         if not np.allclose(K @ found, right, rtol=1e-8, atol=1e-8 * np.abs(right).max(initial=1)):
             raise ModelError(
                 f"{self.system.name}: the forces on {self.names} are not determined at the start,"

@@ -38,6 +38,10 @@ _METHODS = ("auto", "articulated", "composite")
 _ARTICULATED = 260  # operations that articulated bodies take at most for one more velocity
 _SEED = 20260103
 _VANISHING = 1e-12
+"""Inertia left, in parts of what it is with the links behind locked, that counts as none: rounding
+of as many terms as there are links leaves 1e-15 of it."""
+_NO_INERTIA = 1e-30
+"""Stands for an inertia of zero where one divides [kg m^2 or kg]; no body has so little."""
 
 
 def inertia_matrix(system: System, coordinates: str = "independent") -> Function:
@@ -231,14 +235,14 @@ def _loose_in_tree(system: System) -> int | None:
     rng = np.random.default_rng(_SEED)
     configuration = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
     free, locked = np.array(pivots(configuration, system.p_default)).T
-    moves = free > _VANISHING * np.maximum(locked, 1e-30)
+    moves = free > _VANISHING * np.maximum(locked, _NO_INERTIA)
     return None if moves.all() else int(np.max(np.flatnonzero(~moves)))
 
 
 def _loose_in_loops(system: System) -> int | None:
     """An independent velocity of a closed system that moves no inertia."""
     A = np.array(inertia_matrix(system)(list(system.configuration)))
-    size = 1 / np.sqrt(np.maximum(np.diag(A), 1e-30))
+    size = 1 / np.sqrt(np.maximum(np.diag(A), _NO_INERTIA))
     A = A * np.outer(size, size)
     return None if rank(A) == len(A) else first_best(np.abs(np.linalg.svd(A)[2][-1]))
 

@@ -33,10 +33,12 @@ Monomial = tuple[tuple[Atom, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
 _ROUNDING = Fraction(1, 10**13)
+"""Part of two terms that they may leave when they cancel: some roundings of doubles, 1e-16 each."""
 _CONSTANT_ROUNDING = 1e-15
-_MOST_NODES = 200
-_MOST_TERMS = 80
-_MOST_FACTORED = 30
+"""Part of the largest constant below which one is the rounding of zero, such as cos(pi / 2)."""
+_MOST_NODES, _MOST_TERMS, _MOST_FACTORED = 200, 80, 30
+"""Of an expression, of a polynomial, and of one that is factored: longer ones take too long, and
+nobody reads them."""
 _OTHER = {"s": "c", "c": "s"}
 
 
@@ -383,6 +385,8 @@ class Writer:
 _FACTORED = 3
 """Largest block whose determinant is factored."""
 _SAME = 1e-9
+"""Part of the largest value by which factors multiplied may differ from the determinant: roundings
+of all their terms are below it, a wrong factor is off by parts of one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,10 +11,17 @@ from casadi import DM, Function
 from mbs.errors import ModelError
 
 _POINTS = 3
+"""Points at which Functions are compared: where an error hides at one it shows at another."""
 _BOXES = ((0.1, 0.9), (-1.0, 1.0), (-3.0, 3.0), (0.5, 2.0), (1.0, 30.0), (-100.0, 100.0))
+"""Ranges of the inputs, tried in this order until a Function has values: within the domain of
+arcsines, roots and logarithms first, then what needs larger or negative numbers."""
 _TRIES = 4
 _OF_THE_LARGEST, _OF_ALL = 1e-9, 1e-12
+"""Parts of the largest element of an output, and of all outputs, by which passes may change it:
+other orders of sums round by 1e-15 times their condition, a wrong term is off by parts of one."""
 _NUDGES, _NUDGE, _MARGIN = 16, 1e-12, 10.0
+"""Where that is passed, as by an output that is zero but for rounding: how often and by which part
+the inputs are changed, some thousand roundings, and how many times what that makes is allowed."""
 
 Values = tuple[np.ndarray, ...]
 

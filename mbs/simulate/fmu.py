@@ -380,6 +380,7 @@ class _Steps:
             raise (self.lost[0] if self.lost else error) from error
         self.lost.clear()  # what was discarded was tried again
         reached = float(reached)
+        # some roundings of the time that the solver was given
         near = abs(reached - until) <= 1e-14 * max(1.0, abs(until))
         return np.flatnonzero(roots).tolist(), until if near else reached
 

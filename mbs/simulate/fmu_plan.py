@@ -379,6 +379,7 @@ def require_equal_steps(plan: Plan, where: str) -> None:
         ModelError: says which step to give.
     """
     steps = np.diff(plan.times)
+    # in parts of a step: rounding of times is less, and a shorter last step is one by intent
     if len(steps) > 1 and abs(steps[-1] - steps[0]) > 1e-6 * steps[0]:
         count = len(steps)
         span = plan.end - plan.begin

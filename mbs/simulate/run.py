@@ -598,6 +598,7 @@ def started(
 
 
 def _put(system: System, values: dict[str, float], name: str, value: float, what: str) -> None:
+    # both are given with the digits that people and files write, not computed
     if name in values and abs(values[name] - value) > 1e-9 * max(1.0, abs(value)):
         raise ModelError(
             f"{system.name}: {what} gives {name} = {values[name]:g}, but its motion starts at"
@@ -786,6 +787,8 @@ def run(
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:
     """Relative and absolute tolerance of a step for that of a motion, kept above rounding."""
+    # errors of steps add up, and angles that count turns make no room for larger ones; below some
+    # ten roundings steps would only become shorter
     return max(1e-3 * tolerance, 1e-14), max(0.04 * tolerance, 1e-13)
 
 

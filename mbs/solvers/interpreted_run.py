@@ -26,7 +26,17 @@ Look = tuple[Array, Array]
 """Indicators and how fast they rise."""
 
 LOOKS, TANGENTS, SECANTS, MAX_JUMPS, MAX_IDLE = 2, 30, 20, 20, 100
+"""Looks at the indicators in a step, tangents drawn to find a dip, secants before halving, jumps at
+one event, and events at one time: what comes to an end takes a few of each."""
 DEPARTURE = 1e-8
+"""Part of a step that an indicator which rises may take to zero without asking for a jump: rounding
+and projections, 1e-12, may have left it below, and it is through sooner."""
+AT_ONCE = 1e3 * EPSILON
+"""Part of the time by which events differ that fall together: they are located to a few roundings
+of time, and arithmetic on times adds some more."""
+LEAST_TIME = 1e-3
+"""Part of the last step by which the rounding of times near zero is measured, not by time itself,
+which has none there."""
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -135,7 +145,7 @@ class EventStepper:
         alone may have made it positive.
         """
         t, step, zero = self.solver.t, self.solver.last_step, self.solver.atol
-        slack = max(1e3 * EPSILON * abs(t), DEPARTURE * step)
+        slack = max(AT_ONCE * abs(t), DEPARTURE * step)
         value, rise = self.left = self._look(t)
         waits = (value >= -np.fmax(zero, rise * slack)) & ~(rise * step < -zero)
         self.armed = value > np.where(rise > 0, zero, 0.0)
@@ -167,7 +177,7 @@ class EventStepper:
         """What has just left zero may be back at the first look: look earlier."""
         right = self._look(end)
         while np.any(~self.armed & (right[0] <= 0)):
-            if end - start <= 4 * EPSILON * max(abs(end), 1e-3 * self.solver.last_step):
+            if end - start <= 4 * EPSILON * max(abs(end), LEAST_TIME * self.solver.last_step):
                 self.left = np.where(self.armed, self.left[0], _TINY), self.left[1]
                 self.armed[:] = True
                 break
@@ -221,9 +231,9 @@ class EventStepper:
         step = self.solver.last_step
         count = side = 0
         while True:
-            margin = 2 * EPSILON * max(abs(a), abs(b), 1e-3 * step)
+            margin = 2 * EPSILON * max(abs(a), abs(b), LEAST_TIME * step)
             t = _next_guess(a, b, low, high, margin) if count < SECANTS else a + 0.5 * (b - a)
-            if not a < t < b or b - a <= 1e-3 * EPSILON * step:
+            if not a < t < b or b - a <= LEAST_TIME * EPSILON * step:
                 return b, right
             values = self._values(t, self.solver.state(t))
             value = self._least(values)
@@ -248,7 +258,7 @@ class EventStepper:
             solver.restart(self.jump(t, solver.x, self.due))
             self._judge()
             jumps += 1
-        still = t - self.last <= 1e3 * EPSILON * max(abs(t), abs(limit))
+        still = t - self.last <= AT_ONCE * max(abs(t), abs(limit))
         self.idle = self.idle + 1 if still else 0
         self.last = t
         if self.idle > MAX_IDLE:
@@ -268,7 +278,12 @@ def _next_guess(a: float, b: float, low: float, high: float, margin: float) -> f
 Progress = Callable[[float], None]
 
 TOLERANCE = 1e-12
+"""Largest residual of the constraints where a projection ends, in parts of the largest state, or of
+one: roundings stay below it, and what Newton's method leaves before its last step, 1e-8, does
+not."""
 ITERATIONS = 10
+"""Of a projection, each of which squares the error: more do not converge, and the step is
+shortened."""
 _CHUNK = 50  # steps between two calls of progress
 
 

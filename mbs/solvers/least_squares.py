@@ -178,7 +178,11 @@ def _finite(r: Vector, J: Vector) -> bool:
 
 
 _FIRST, _EASED, _STIFFENED, _STIFFEST = 1e-3, 3.0, 4.0, 1e12
+"""The damping mu at the start, nearly a Gauss-Newton step for Jacobians of size one; what divides
+it after a step that led down and multiplies it after another, unlike so that no cycle arises; and
+the largest, where steps are too short to change the digits of r' r."""
 _SETTLED = 1e-16
+"""Part of r' r below which a gain is the rounding of it."""
 
 
 def levenberg_marquardt(function: Residual, start: Vector, *, iterations: int = 300) -> Root:

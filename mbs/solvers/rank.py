@@ -46,7 +46,7 @@ def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
     if matrix.size == 0:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > gap * max(values[0], 1e-30)))
+    return int(np.sum(values > gap * values[0]))
 
 
 def null_space(matrix: Matrix, gap: float = RELATIVE_GAP) -> Matrix:

@@ -16,7 +16,11 @@ from mbs.solvers.stepper import Array, Stepper, combine
 Jacobian = Callable[[float, Array], tuple[Array, Array]]
 """(t, x) -> d rhs / d x (n, n), d rhs / d t (n,)."""
 
+# The coefficients of RODAS5P, Steinebach 2023, in the form of Hairer and Wanner 1996, IV.7; the
+# tests check the conditions of order on them.
+
 GAMMA = 0.21193756319429014
+"""The diagonal, which makes the method stiffly accurate and L-stable."""
 _LAST = (
     -7.502846399306121,
     2.561846144803919,
@@ -24,6 +28,7 @@ _LAST = (
     -0.18268767659942256,
     0.030198172008377946,
 )
+"""Row of stage six: what is added to the state, on which the last two stages build."""
 A: tuple[tuple[float, ...], ...] = (
     (),
     (3.0,),
@@ -34,6 +39,7 @@ A: tuple[tuple[float, ...], ...] = (
     (*_LAST, 1.0),
     (*_LAST, 1.0, 1.0),
 )
+"""Weights of earlier stages in the state at which a stage is taken, a_ij."""
 C: tuple[tuple[float, ...], ...] = (
     (),
     (-14.155112264123755,),
@@ -65,6 +71,7 @@ C: tuple[tuple[float, ...], ...] = (
         -9.48861652309627,
     ),
 )
+"""Weights of earlier stages in the right-hand side of a stage, c_ij, divided by the step."""
 TIME = (
     0.0,
     0.6358126895828704,
@@ -75,6 +82,7 @@ TIME = (
     1.0,
     1.0,
 )
+"""Time of every stage, alpha_i, in steps."""
 TIME_SLOPE = (
     0.21193756319429014,
     -0.42387512638858027,
@@ -85,6 +93,7 @@ TIME_SLOPE = (
     0.0,
     0.0,
 )
+"""Weight of the slope by time in every stage, gamma_i."""
 DENSE: tuple[tuple[float, ...], ...] = (
     (
         25.948786856663858,
@@ -117,6 +126,7 @@ DENSE: tuple[tuple[float, ...], ...] = (
         4.883087185713722,
     ),
 )
+"""Weights of all stages in the three terms that bend the dense output, lowest power first."""
 
 
 @dataclass(slots=True)

@@ -22,8 +22,18 @@ Projection = Callable[[float, Array], Array]
 
 EPSILON = float(np.finfo(float).eps)
 SAFETY, SHRINK, GROW, BETA = 0.9, 0.2, 10.0, 0.04
+"""Step control of the code DOPRI5: the part of the step that the error asks for, its least and its
+greatest change (Hairer, Norsett and Wanner 1993, II.4, eq. 4.13), and the share of the error before
+it, which calms the sequence of steps where stability limits them (Hairer and Wanner 1996, IV.2)."""
+LEAST_ERROR = 1e-4
+"""What the share of the error before counts at least, likewise, so that an accident of no error
+does not shorten the next step; a first step is taken to have come from it."""
 NEAR_ZERO = 1e-10
+"""Part of the limit below which time counts as zero: a step is too small by its own rounding there,
+not by that of times later on."""
 UNMOVED = 0.01
+"""Part of the tolerances by which a projection may move the state and leave the slope that the
+method ends with: its error is then a hundredth of the one that is allowed."""
 
 
 @dataclass(slots=True)
@@ -81,7 +91,7 @@ class Stepper(ABC):
     atol: float
     max_step: float = math.inf
     h: float = 0.0
-    error: float = 1e-4
+    error: float = LEAST_ERROR
     since_output: int = 0
     last_step: float = 0.0
     last_end: float = 0.0
@@ -150,7 +160,7 @@ class Stepper(ABC):
 
     def restart(self, x: Array) -> None:
         """Go on from another state at the present time, with a new first step."""
-        self.x, self.slope, self.h, self.error = x, None, 0.0, 1e-4
+        self.x, self.slope, self.h, self.error = x, None, 0.0, LEAST_ERROR
 
     def step(self, limit: float) -> int:
         """Try steps towards limit until one is accepted.
@@ -182,6 +192,7 @@ class Stepper(ABC):
         return self.slope
 
     def _try_step(self, slope: Array, limit: float) -> bool:
+        # a rest of a hundredth of a step is taken along, as in DOPRI5
         cut = self.t + 1.01 * self.h >= limit
         h = limit - self.t if cut else self.h
         reason = ""
@@ -197,6 +208,7 @@ class Stepper(ABC):
                 return True
         except Failure as failure:
             reason = str(failure)
+        # the root of the order of the error, 5; where there is no error, a quarter: two halvings
         self.h = h * (0.25 if reason else max(SHRINK, SAFETY / error**0.2))
         if self.h <= 4 * EPSILON * max(abs(self.t), NEAR_ZERO * abs(limit)):
             raise Failure(reason or "small")
@@ -213,11 +225,12 @@ class Stepper(ABC):
         self.t, self.x, self.last_step, self.last_end = t_new, y, h, t_new
 
     def _lengthen(self, h: float, error: float, cut: bool) -> None:
+        # exponents of DOPRI5 for order 5; GROW is reached long before an error of 1e-10
         factor = SAFETY * self.error**BETA / max(error, 1e-10) ** (0.2 - 0.75 * BETA)
         h *= min(GROW, max(SHRINK, factor))
         self.h = max(h, self.h) if cut else h
         if not cut:
-            self.error = max(error, 1e-4)
+            self.error = max(error, LEAST_ERROR)
 
     def _slope(self, t: float, x: Array) -> Array:
         if not np.isfinite(x).all():
@@ -237,14 +250,17 @@ class Stepper(ABC):
 
     def _first_step(self, slope: Array, span: float) -> float:
         """A step that an explicit Euler step and its curvature suggest (Hairer 1993, II.4)."""
+        # the numbers are those of the book
         d0, d1 = self._norm(self.x, self.x), self._norm(slope, self.x)
+        # a step by a hundredth of the state, or 1e-6 s where state or slope are too small to tell
         h0 = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, span)
         try:
             k2 = self._slope(self.t + h0, self.x + h0 * slope)
         except Failure:
-            return h0 * 1e-3
+            return h0 * 1e-3  # without a curvature, as where it is zero
         d2 = self._norm(k2 - slope, self.x) / h0
         top = max(d1, d2)
+        # an error of a hundredth of the tolerance, order 5; a thousandth of h0 where nothing bends
         h1 = max(1e-6, h0 * 1e-3) if top <= 1e-15 else (0.01 / top) ** 0.2
         return float(min(100 * h0, h1, span))
 

@@ -339,9 +339,9 @@ def _samples(*lengths: SX) -> list[tuple[float, ...]]:
     """Values of lengths at a few values of the symbols in them, of both signs."""
     symbols = casadi.symvar(casadi.vertcat(*lengths))
     at = Function("lengths", [casadi.vertcat(*symbols)], [casadi.densify(casadi.vertcat(*lengths))])
-    # irregular numbers between 0.3 and 1.7, each sign pattern another one
     rows = [
         [
+            # irregular between 0.3 and 1.7 by the golden ratio, each sign pattern another one
             (-1) ** (k * (m + 1) // 2) * (0.3 + 1.4 * ((0.618034 * (5 * k + m + 1)) % 1))
             for m in range(len(symbols))
         ]

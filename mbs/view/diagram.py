@@ -123,8 +123,11 @@ LINE, LETTER = 15.0, 6.9
 """Height of a line of text and width of a letter [px]."""
 
 LEVEL = 104.0
+"""Distance of the middles of two boxes above each other [px]: three lines each, a pill between."""
 PILL = 21.0
+"""Height of the pill that names a joint [px]: a line of text and a little."""
 _PAD, _GAP = 11.0, 18.0
+"""Beside a text in its box, and between two boxes [px]."""
 _LONGEST = 8
 """A chain of more links than this goes on beside itself."""
 
@@ -225,6 +228,7 @@ def pill_width(edge: ConnectionEdge) -> float:
 
 def _box_size(node: ConnectionNode) -> tuple[float, float]:
     width = max(_text_width(line) for line in node.lines)
+    # no narrower than the word "base" looks well in, and 7 above and below the lines [px]
     return max(width, 56.0), LINE * len(node.lines) + 14
 
 
@@ -294,6 +298,9 @@ class _DiagramSoFar:
 
 
 _MARGIN, _TITLE, _FOOT = 26.0, 46.0, 40.0
+"""Around a diagram, above it for its title, and below it for the key [px]."""
+_ASIDE = 14.0
+"""Between two lines that lead around a diagram [px]."""
 _KEY = (("passive", "passive joint"), ("active", "driven joint"), ("loop", "cut to open a loop"))
 
 
@@ -331,14 +338,16 @@ def diagram(system: System) -> Diagram:
     graph = connections(system)
     placed = layout(graph)
     aside = sum(_rises(placed, pill) for pill in placed.cuts)
+    # no narrower than the key below it [px]
     width = max(
-        placed.width + 14.0 * aside, 440.0, LETTER * max(map(len, graph.remarks), default=0)
+        placed.width + _ASIDE * aside, 440.0, LETTER * max(map(len, graph.remarks), default=0)
     )
     total = width + 2 * _MARGIN
     top = _ascent(placed)
+    # below the boxes, for the lines of joints that were cut [px]
     room = 34.0 + 3.0 * len(graph.cuts) if graph.cuts else 14.0
     height = placed.height + top + _TITLE + _FOOT + room + LINE * len(graph.remarks)
-    shift = (width - placed.width - 14.0 * aside) / 2 + _MARGIN
+    shift = (width - placed.width - _ASIDE * aside) / 2 + _MARGIN
     body = [
         f'<text class="title" x="{_MARGIN}" y="28">{escape(_title(system))}</text>',
         f'<g transform="translate({shift:.1f} {_TITLE + top:.1f})">',
@@ -417,6 +426,7 @@ def _box(placed: PlacedNode) -> str:
         f'<rect class="body{" base" if base else ""}" x="{left:.1f}" y="{top:.1f}"'
         f' width="{placed.width:.1f}" height="{placed.height:.1f}" rx="7"/>'
     )
+    # 4.3 px take the middle of letters down to the line on which they stand
     start = placed.y - LINE * (len(placed.node.lines) - 1) / 2 + 4.3
     kind = ' class="onbase"' if base else ""
     texts = (
@@ -453,7 +463,7 @@ def _wires(placed: Layout) -> Iterator[str]:
         yield _wire(_descent(owner, pill), " open")
         if _rises(placed, pill):
             risen += 1
-            yield _wire(_round(pill, other, placed.width + 14.0 * risen), " open")
+            yield _wire(_round(pill, other, placed.width + _ASIDE * risen), " open")
         else:
             entered[other.node.number] += 1
             yield _wire(_across(pill, other, entered[other.node.number], placed), " open")
@@ -507,6 +517,7 @@ def _across(pill: PlacedEdge, other: PlacedNode, turn: int, placed: Layout) -> s
             f"M{start:.1f} {pill.y:.1f}H{lane + bend:.1f}q{-bend} 0 {-bend} {-6 * up}"
             f"V{y + 6 * up:.1f}q0 {-6 * up} {-bend} {-6 * up}H{x:.1f}"
         )
+    # several lines enter a box left and right of its middle, 7 px apart, and not at its corners
     side = -1 if turn % 2 else 1
     x = other.x + side * min(7.0 * (turn // 2), 0.42 * other.width)
     y = other.y + other.height / 2

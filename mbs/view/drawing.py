@@ -38,6 +38,8 @@ LETTERS = 3.2
 """Height of the letters, in units of the drawing."""
 
 _SIZE = 100.0
+"""Width or height of a drawing, the larger one; lengths and widths of lines below are in this
+unit."""
 _PARALLEL = 1e-6  # sine of the angle up to which axes are parallel: files hold six digits
 _ROUND = np.linspace(0.0, 2.0 * math.pi, 32, endpoint=False)
 _CIRCLE = np.column_stack([np.cos(_ROUND), np.sin(_ROUND), np.zeros(32)])
@@ -223,8 +225,9 @@ def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
         return _tripod(item, eye)
     assert isinstance(item, AxisShape), f"{type(item).__name__} has no strokes"
     ends = list(eye.moved(item.link, (item.a, item.b)))
+    # thin, and none of an axis that is seen end on, in units of the drawing
     line = Stroke(item.role, item.colour, _path(np.array(ends)), width=0.3)
-    long = math.dist(*line.points) > 0.01 * _SIZE  # none of an axis that is seen end on
+    long = math.dist(*line.points) > 0.01 * _SIZE
     return [line] * long, float((ends[0] + ends[1])[2]) / 2
 
 
@@ -244,6 +247,8 @@ def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
     rings = [eye.moved(item.link, end + item.radius * across) for end in (a, b)]
     heads = [ring[:, 2].mean() for ring in rings]
     near = int(heads[1] > heads[0])
+    # one end is seen unless they are turned from the eye to 3 degrees; it is lighter than the
+    # outline
     parts = [_area(item, hull(np.vstack(rings)[:, :2]))]
     if abs(heads[1] - heads[0]) > 0.05 * eye.scale * np.linalg.norm(b - a):
         parts.append(_area(item, rings[near][:, :2], bright=1.12))
@@ -259,6 +264,8 @@ def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
     local = BOX_CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
     corners = eye.moved(item.link, local)
     parts = []
+    # a side that is seen edge on is left out; others are a tenth darker than bars,
+    # and lighter by the light on them
     for side in BOX_FACES:
         outside = np.cross(corners[side[2]] - corners[side[0]], corners[side[3]] - corners[side[1]])
         size = float(np.linalg.norm(outside))
@@ -273,6 +280,7 @@ def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
     pose = np.array(item.pose).reshape(3, 4)
     ends = pose[:, 3] + item.length * pose[:, :3].T
     points = eye.moved(item.link, np.vstack([pose[:, 3], ends]))
+    # an axis that points at the eye to 3 degrees would be a dot
     lines = [
         Stroke(item.role, f"{item.colour}.{k}", _path(points[[0, k + 1]]), width=0.6)
         for k in range(3)
@@ -285,6 +293,8 @@ def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
     """A zigzag; a line where its ends are one place on the drawing."""
     start, along = start[:2], (end - start)[:2]
     length = float(np.linalg.norm(along))
+    # no length but rounding, in hundredths of the drawing; straight ends of 3/20, eight turns
+    # between
     if length < 1e-9:
         return Stroke(item.role, item.colour, _path(np.array([start, end[:2]])), width=0.8)
     across = np.array([-along[1], along[0]]) / length
@@ -296,6 +306,7 @@ def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
 
 def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
     """A line with hatches under every end of a force element on the base."""
+    # lengths in hundredths of the drawing
     for force in at.parts.forces:
         for link, column in zip(force.links, force.points, strict=True):
             if link == 0:
@@ -308,6 +319,7 @@ def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
 def _masses(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
     for link in at.parts.links:
         if link.mass_centre is not None:
+            # a dot of 1.6 hundredths of the drawing
             dot = eye.seen(at.points[link.mass_centre])[:2] + 0.8 * _CIRCLE[:, :2]
             yield Stroke("mass", "text", _path(dot), closed=True, opacity=1.0)
 
@@ -338,7 +350,9 @@ def _names(at: PosedLinks, eye: _Eye) -> Iterator[Name]:
 _WIDTH = 0.58  # of a letter, in heights
 _Room = tuple[float, float, float, float]
 _SHIFTS = ((4.0, 2.4), (4.0, -5.0), (-4.0, 2.4), (-4.0, -5.0), (0.0, 5.4), (0.0, -8.0))
+"""Where a name is tried beside its point, in units of the drawing: clear of the sign of a joint."""
 _FURTHER = (1.0, 1.8, 2.8)
+"""Times these shifts, where it has no room nearer."""
 _SIGN = 3.0  # half the side of a square about a joint
 
 

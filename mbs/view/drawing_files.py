@@ -101,6 +101,7 @@ def _room(drawing: Drawing) -> tuple[float, float, float, float]:
     left, lower, right, upper = drawing.bounds()
     for name in drawing.names:
         x, y = name.point
+        # below the line letters reach by a third of their height
         left, lower = min(left, x), min(lower, y - 0.3 * LETTERS)
         right, upper = max(right, x + _LETTER * LETTERS * len(name.text)), max(upper, y + LETTERS)
     wide = max(_MARGIN, (_LEAST[0] - right + left) / 2)
@@ -130,7 +131,7 @@ def _path(stroke: Stroke, left: float, upper: float) -> str:
 
 # The PNG picture: areas and lines laid over each other, with smooth edges.
 
-_SPACE = 12.0
+_SPACE = 12.0  # around the drawing [pixels]
 _THIN = 1.5  # the least width of a line [pixels]
 _LEFT_OUT = ("axis", "frame", "mass")
 _GRID = np.stack(np.meshgrid(np.arange(SIZE) + 0.5, np.arange(SIZE) + 0.5), axis=-1)
@@ -142,6 +143,7 @@ def icon(drawing: Drawing) -> bytes:
     image = np.zeros((SIZE, SIZE, 4))
     shown = Drawing(tuple(s for s in drawing.strokes if s.role not in _LEFT_OUT))
     left, lower, right, upper = shown.bounds()
+    # a drawing that is one point has no scale: any one will do
     scale = (SIZE - 2 * _SPACE) / max(right - left, upper - lower, 1e-9)
     middle = np.array([left + right, lower + upper]) / 2
     for stroke in shown.strokes:

@@ -153,6 +153,7 @@ def _cuboid(size: Array) -> Array:
 
 
 def _arrow(length: float) -> Array:
+    # in parts of the length: a shaft of three hundredths, a head of a fifth
     profile = [[0, 0], [0.03, 0], [0.03, 0.4], [0.03, 0.8], [0.08, 0.8], [0, 1]]
     return revolved(length * np.array(profile), 8)
 
@@ -167,6 +168,8 @@ def _fan(points: Array) -> Array:
 
 
 def _dashes(a: Array, b: Array, size: float) -> Array:
+    # dashes and gaps, three hundredths of the size of the mechanism together, look the same on all
+    # axes
     count = max(1, round(float(np.linalg.norm(b - a)) / (0.032 * size)))
     starts = np.arange(count) / count
     first = a + starts[:, None] * (b - a)

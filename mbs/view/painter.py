@@ -65,6 +65,7 @@ def camera(scene: Scene, view: str) -> Camera:
     out, up = np.array(scene.views[view]), np.array(scene.up)
     right = np.cross(up, out)
     right = right / np.linalg.norm(right)
+    # the ball around the mechanism, and a little room, fill the height
     away = 1.06 * scene.bounds.radius / float(np.sin(FIELD / 2))
     axes = np.vstack([right, np.cross(out, right), out])
     return Camera(np.array(scene.bounds.center) + away * out, axes, away)
@@ -74,7 +75,9 @@ _LIGHT = np.array([0.35, 0.85, 0.55])
 """Towards the light: right, up, towards the eye."""
 
 _INCHES = (8.0, 5.5)
+"""Width and height of a picture: as wide as a page of text."""
 _LINE = 1.1
+"""Width of a line [points]."""
 _SEAM = 0.35
 """Width of the edge that closes the seam between two faces [points]."""
 
@@ -111,6 +114,7 @@ class Painter:
         width, height = _INCHES
         axes.set_xlim(-width / height, width / height)
         axes.set_ylim(-1, 1)
+        # widths in points: the ground stays behind, the seams of its shadow are closed
         segments, tints = self._grid()
         axes.add_collection(
             matplotlib.LineCollection(segments, colors=tints, linewidths=0.6, zorder=0)
@@ -166,6 +170,8 @@ class Painter:
             corners, normal = corners[kept], normal[kept]
         else:
             normal = normal * np.sign(outside)[:, None]
+        # light from everywhere, from the sun and from the sky, of which a face away from all has
+        # half
         sun = _LIGHT / np.linalg.norm(_LIGHT) @ self.eye.axes
         bright = (
             0.58 + 0.5 * np.clip(normal @ sun, 0, 1) + 0.06 * (normal @ np.array(self.scene.up))
@@ -178,6 +184,7 @@ class Painter:
     def _shadow(self, corners: Array) -> Array:
         """Faces where the light throws them on the ground."""
         up, center = np.array(self.scene.up), np.array(self.scene.floor.center)
+        # from high up, a little from the right and from behind, so that shadows stay short
         sun = up + 0.25 * self.eye.axes[0] - 0.1 * self.eye.axes[2]
         height = (corners - center) @ up / float(sun @ up)
         flat: Array = self.eye.seen(corners - height[..., None] * sun)[0]
@@ -195,6 +202,7 @@ class Painter:
         middle = np.linalg.norm(lines.mean(axis=1), axis=1)
         points = np.array(floor.center) + lines @ np.vstack([right, np.cross(up, right)])
         flat, depth = self.eye.seen(points)
+        # what is beside the eye or behind it is not seen; lines fade out with the distance
         kept = (depth < -0.05 * self.eye.away).all(axis=1) & (middle < floor.reach)
         part = np.clip(1 - middle[kept] / floor.reach, 0, 1) ** 1.4
         far, near_colour = self._colour("background"), self._colour("grid")
@@ -202,6 +210,7 @@ class Painter:
 
     def _labels(self, places: Array) -> None:
         effects = optional_module("matplotlib.patheffects", "plot")
+        # in points, then in half heights of the picture: beside the point, one above the other
         halo = [effects.withStroke(linewidth=2.5, foreground=self._colour("background"))]
         for item in self.scene.primitives:
             if isinstance(item, LabelShape) and item.role in self.shown:
@@ -219,6 +228,7 @@ class Painter:
         return float(value) if isinstance(value, (int, float)) else 0.0
 
     def _mixed(self, first: Array, second: Array, part: float) -> Array:
+        # the theme says how dark shadows are on the page; here they are somewhat lighter
         return np.array(first + 0.6 * part * (second - first))
 
 
@@ -254,9 +264,8 @@ def painter(scene: Scene, view: str, theme: Theme, shown: Collection[str] = ()) 
 
 Image = npt.NDArray[np.uint8]
 
-_DOTS = 110.0
-_FILM_DOTS = 80.0
-"""Dots an inch."""
+_DOTS, _FILM_DOTS = 110.0, 80.0
+"""Dots an inch: 880 and 640 pixels of width, of which films have many pictures."""
 
 _COLOURS = 256
 

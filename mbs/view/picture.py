@@ -24,6 +24,8 @@ from mbs.view.scene import Scene, scene
 _ENDINGS = (".html", ".png", ".svg", ".gif", ".mp4")
 _MOST_FRAMES = 5000
 _GIF_FPS = 20.0
+"""Pictures a second of a GIF, about: its times are in hundredths of a second, and its files
+large."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -144,6 +144,10 @@ def position_of(system: System, q: Values) -> list[float]:
 
 
 _NICE = (1.0, 2.0, 5.0)
+"""Widths of cells that people count with, times powers of ten."""
+SAME_POINT = 1e-6
+"""Distance, in parts of the size of a mechanism, below which two points are one in a picture:
+rounding is less, and a pixel a thousand times more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,9 +198,11 @@ def measures(scene: PosedLinks, solid_points: Array) -> Measures:
         for link in scene.parts.links
         for a, b in link.segments
     ]
-    lengths = [length for length in lengths if length > 1e-6 * size]
+    lengths = [length for length in lengths if length > SAME_POINT * size]
     if size == 0:
         size = 4 * _gyration(scene)
+    # joints are seen at any size, and leave most of a usual link free; links are thinner than
+    # joints
     joint = min(0.028 * size, 0.2 * float(np.median(lengths))) if lengths else 0.028 * size
     return Measures(size, joint, 0.62 * joint, max(3.6 * joint, 0.07 * size))
 
@@ -227,6 +233,7 @@ def floor_of(points: Array, up: Array, bounds: BoundingBall, gap: float = 0.0) -
     center = np.array(bounds.center)
     center = center + (lowest - float(center @ up)) * up
     step = _nice(bounds.radius / 5)
+    # so far that its end fades out behind the mechanism
     return Floor(three(center), step, 3.2 * bounds.radius)
 
 
@@ -241,6 +248,8 @@ def views(scene: PosedLinks) -> dict[str, Vector]:
     The front of a mechanism that moves in a plane is the side from which the plane is seen.
     """
     up = scene.up
+    # cosines that say which directions are about the same, and parts of front, right and up that
+    # show a plane almost from its front, what lies level from above, and all else from a corner
     right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else _across(up))
     front = np.cross(right, up)
     normal = plane_normal(scene)
@@ -258,6 +267,7 @@ def views(scene: PosedLinks) -> dict[str, Vector]:
 
 def _is_level(scene: PosedLinks) -> bool:
     """Whether everything lies near a level plane."""
+    # in parts of how far it extends: links of some thickness above each other
     heights = scene.points @ scene.up
     spread = float(np.linalg.norm(np.ptp(scene.points, axis=0)))
     return bool(np.ptp(heights) < 0.12 * spread) and plane_normal(scene) is not None
@@ -280,6 +290,7 @@ def plane_normal(scene: PosedLinks) -> Array | None:
     kinds = {joint.kind for joint in scene.parts.joints}
     if not axes or kinds & {"free", "spherical"}:
         return None
+    # parallel to a thousandth of a radian, as a drawing tells
     same = all(abs(float(axis @ axes[0])) > 1 - 1e-6 for axis in axes)
     return np.array(axes[0]) if same else None
 

@@ -178,7 +178,7 @@ _LIGHT: Colours = {
     "text": "#1f2933",
     "grid": "#aab4c0",
     "bounce": "#c9d2de",
-    "shadow": 0.2,
+    "shadow": 0.2,  # part of black over the ground
     "base": "#454f5b",
     "link0": "#5288c1",
     "link1": "#56a38f",
@@ -198,7 +198,7 @@ _DARK: Colours = {
     "text": "#e6eaf0",
     "grid": "#49525f",
     "bounce": "#3b4450",
-    "shadow": 0.45,
+    "shadow": 0.45,  # on a dark ground more
     "base": "#6d7887",
     "link0": "#6ba3dc",
     "link1": "#69bda6",

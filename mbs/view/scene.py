@@ -48,7 +48,7 @@ from mbs.view.shapes import (
 HIDDEN = ("link frame", "label")
 """Roles that are not shown until asked for."""
 
-_MARGIN = 0.6
+_MARGIN = 0.6  # of the length of the axes of frames, which reach beyond what they stand on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,6 +107,7 @@ class Scene:
         poses = self.motion(q).reshape(len(q), -1, 3, 4)
         points = np.vstack([poses[:, k, :, :3] @ at + poses[:, k, :, 3] for k, at in marks])
         up, radius = np.array(self.up), self.bounds.radius
+        # room for what is drawn around points, in parts of the radius
         bounds = bounds_of(points, 0.08 * radius)
         ground = float(np.array(self.floor.center) @ up) * up
         return replace(self, bounds=bounds, floor=floor_of(np.vstack([points, ground]), up, bounds))

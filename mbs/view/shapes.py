@@ -13,7 +13,7 @@ from mbs.components.joints import Motion
 from mbs.expressions import Scalar, to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint, SkeletonLink, link_outline
 from mbs.view.mesh import turned_to
-from mbs.view.posed import Array, Measures, PosedLinks, rows, three
+from mbs.view.posed import SAME_POINT, Array, Measures, PosedLinks, rows, three
 from mbs.view.primitives import (
     AxisShape,
     BallShape,
@@ -77,8 +77,9 @@ def _joined(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterato
     role, colour = _look(scene, joint)
     a, b = (scene.points[k] for k in joint.points)
     ends = scene.local(joint.links[0], a), scene.local(joint.links[1], b)
+    # thinner than links, balls a little larger than joints with axes
     slides = any(axis.motion == "prismatic" for axis in joint.axes)
-    if slides or np.linalg.norm(a - b) > 1e-6 * sizes.size or joint.cut:
+    if slides or np.linalg.norm(a - b) > SAME_POINT * sizes.size or joint.cut:
         paint = colour if joint.cut or not slides else "joint"
         yield SpanShape(role, joint.links, paint, ends, 0.45 * sizes.bar)
     if not joint.axes:
@@ -89,6 +90,8 @@ def _joined(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterato
 def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
     role, colour = _look(scene, joint)
     carriers = _carriers(scene, joint)
+    # in radii of a joint: where there are several axes each is smaller, so that all are seen; a
+    # slide is a box of about the volume of the cylinder of a revolute joint
     shrink = 1.0 if len(joint.axes) == 1 else 0.8
     for (link, column), axis in zip(carriers, joint.axes, strict=True):
         direction, center = scene.directions[axis.direction], scene.points[column]
@@ -126,6 +129,7 @@ def _seat(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: flo
     """Where a slide sits, seen from frame_b: beside a ball that is there too."""
     a, b = (scene.points[k] for k in joint.points)
     back = float((a - b) @ direction)
+    # in lengths of the box: on the way to frame_a where that is far, beside a ball that is near
     if abs(back) > 2.5 * length:
         return np.array(np.sign(back) * 1.1 * length * direction)
     crowded = any(
@@ -145,6 +149,7 @@ def _wheel(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator
         return
     link, center = joint.links[1], scene.points[joint.points[1]]
     axis = scene.poses[link, :, :3] @ _rotation(scene, cut) @ np.array(disc.axis, dtype=float)
+    # a tire, no thicker than joints are
     tube = min(0.06 * radius, 0.7 * sizes.joint)
     direction, at = scene.local_direction(link, axis), scene.local(link, center)
     yield RingShape("loop", link, "loop", at, direction, radius - tube, tube)
@@ -168,6 +173,7 @@ def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
 def _element(
     force: SkeletonForce, ends: tuple[Vector, Vector], length: float, sizes: Measures
 ) -> SpringShape | SpanShape:
+    # springs as wide as joints, other elements thin
     if force.kind in _COILED:
         nominal = max(length, 4 * sizes.joint)
         return SpringShape("force", force.links, "force", ends, 0.8 * sizes.joint, nominal)
@@ -178,6 +184,7 @@ def _element(
 
 
 _THIN = 0.35
+"""Opacity of a plate between the joints of a link, through which its bars are seen."""
 
 
 def solid_shapes(scene: PosedLinks) -> Iterator[BoxShape | CylinderShape]:
@@ -248,7 +255,7 @@ def link_shapes(
 
 def _holds(solid: BoxShape | CylinderShape, point: tuple[float, ...], sizes: Measures) -> bool:
     """Whether a point of the link lies in a solid."""
-    slack, at = 1e-6 * sizes.size, np.array(point)
+    slack, at = SAME_POINT * sizes.size, np.array(point)
     if isinstance(solid, BoxShape):
         pose = np.array(solid.pose).reshape(3, 4)
         inside = np.abs(pose[:, :3].T @ (at - pose[:, 3])) <= np.array(solid.size) / 2 + slack
@@ -281,6 +288,7 @@ def _point_link(
         if side == number and joint.kind != "free"
     ]
     frames = [f for f in scene.parts.frames if f.link == number]
+    # a ball for a body that nothing holds, a stub that is seen beside the one joint
     if link.mass_centre is not None and not held:
         at = scene.local(number, scene.points[link.mass_centre])
         yield BallShape("link", number, colour, at, 2.5 * sizes.bar)
@@ -300,6 +308,7 @@ def base_shapes(scene: PosedLinks, sizes: Measures, floor: float) -> Iterator[Pr
     if not points:
         return
     held = np.array(points)
+    # somewhat thicker than links; a column where all joints are at one point, but for rounding
     for a, b in link_outline(held, len(held)):
         yield BarShape("base", 0, "base", three(held[a]), three(held[b]), 1.1 * sizes.bar)
     if np.ptp(held, axis=0).max() <= 1e-9 * sizes.size:
@@ -310,6 +319,7 @@ def _column(
     scene: PosedLinks, sizes: Measures, top: Array, floor: float
 ) -> Iterator[CylinderShape]:
     foot = top + (floor - float(top @ scene.up)) * scene.up
+    # as thick as a joint, on a foot three times as wide; none where the joint is on the ground
     pad = foot + 0.5 * sizes.joint * scene.up
     if np.linalg.norm(top - foot) > 1e-9 * sizes.size:
         yield CylinderShape("base", 0, "base", three(foot), three(top), 0.8 * sizes.joint)
@@ -324,5 +334,6 @@ def frame_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[FrameShape]:
         R = scene.directions[list(frame.directions)].T
         pose = scene.local_pose(frame.link, R, scene.points[frame.origin])
         yield FrameShape("frame", frame.link, pose, sizes.frame)
+    # shorter than the frames that have a name
     for number in range(1, len(scene.poses)):
         yield FrameShape("link frame", number, identity, 0.75 * sizes.frame)

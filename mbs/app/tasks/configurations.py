@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 _LONGEST = 2000
 _UPRIGHT = 1e-9
+"""Cosine between the x axis and the ground below which roll and yaw are one angle: rounding of
+poses turns them by 1e-16 over it."""
 _FORMS = (
     "write x y z roll pitch yaw, or the 12 or 16 numbers of the matrix row by row, with blanks or"
     " commas between them"

@@ -65,7 +65,11 @@ _TRIES, _SEED = 12, 20260111
 _REACH = 1.0
 """Largest difference of a position between a start and the configuration at hand [rad or m]."""
 _NUDGE = 1e-3
+"""Of a position from the configuration at hand [rad or m]: there slopes that vanish by symmetry do
+not, and the nearest zero is still the nearest."""
 _OPEN = 1e-9
+"""Largest residual of the same configuration by whole turns: some roundings of angles more than
+where the iteration ended, 1e-12; across a gear it is another configuration, open by tenths."""
 
 
 @dataclass(frozen=True, slots=True)

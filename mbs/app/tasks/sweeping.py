@@ -119,6 +119,7 @@ def _values(text: str, name: str) -> list[float]:
             f"grid of {name}: {quoted(text)} has no end or more than {_MOST_VALUES} values; give a"
             " step that leads from the first to the last value"
         )
+    # steps of decimal fractions, of which many thousands may add up to the last value
     whole = round(count) if abs(count - round(count)) < 1e-9 * max(1.0, count) else int(count)
     return [float(f"{start + k * step:.14g}") for k in range(whole + 1)]
 

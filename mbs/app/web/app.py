@@ -419,6 +419,7 @@ async def warm_up() -> None:
         system = Document.of_name("rx90").system()
         _drawn(system, system.configuration)
         loop = Document.of_name("four_bar").system()
+        # any small step along the branch [rad]
         moved(loop, loop.configuration, handles(loop)[0].place, loop.configuration[0] + 0.01)
 
     await aside(once)

@@ -175,7 +175,7 @@ class _Teller:
 def _end(process: BaseProcess, folder: str) -> None:
     """Stop the child if it still runs, and take away what it leaves behind."""
     if process.pid is not None:
-        process.join(0.05)
+        process.join(0.05)  # [s] one that has sent its answer is about to end by itself
         if process.is_alive():
             _signal(process, "SIGTERM")
             process.join(_PATIENCE)

@@ -22,6 +22,7 @@ from mbs.loops import Mode
 
 _PART = 1000
 _THROTTLE = 0.03
+"""Seconds between two messages of a slider that is moved: some thirty pictures a second."""
 _PAUSE = 0.2
 """Seconds that a configuration stands before its assembly modes are looked for."""
 

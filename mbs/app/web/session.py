@@ -27,6 +27,8 @@ Vector = tuple[float, ...]
 
 _FULL_TURN = math.pi
 _SAME = 1e-6
+"""Difference of positions [rad or m] below which two configurations are one, and length of a part
+of a quaternion that has no direction: sliders move in steps a thousand times as large."""
 _MOST_MODES = 64
 
 

@@ -59,7 +59,11 @@ Sampled = Callable[[list[SX]], NDArray[np.float64]]
 """(samples, n) values of n scalars at samples of the parameters of a system."""
 
 _CANCELLED = 1e-13
+"""What two coefficients may leave of each other, and symbols of a coefficient, when they cancel:
+some hundred roundings of factors of about one."""
 _ZERO = 1e-9
+"""Part of the largest coefficient of a relation below which one is no pivot: division by it would
+turn rounding, 1e-13, into coefficients that count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -262,11 +266,14 @@ Array = NDArray[np.float64]
 
 _SEED = 20260411
 _SPREAD = 0.05
+"""Relative and absolute difference of samples from the defaults: far above rounding, and so near
+that loops that close with the defaults close with them."""
 _TRIES = 40
 
 
 def default_parameters(system: System) -> Array:
     """(np,) values of the parameters, an irregular number for each that has none."""
+    # between 0.4 and 1: lengths and masses as of a robot, none near zero
     free = 0.4 + 0.6 * np.random.default_rng(_SEED).random(len(system.parameters))
     defaults = np.array(system.p_default, dtype=float)
     return np.where(np.isnan(defaults), free, defaults)

@@ -52,6 +52,9 @@ Relation = dict[Key, SX]
 """Coefficients of parameters whose effects cancel."""
 
 _SAME = 1e-9
+"""Difference of cosines, lengths [m] or rates of unit motions between configurations below which
+they are constant, or zero: closed configurations are open by 1e-13, and what moves moves by
+tenths."""
 
 _TENSOR = TEN_PARAMETERS[:6]
 _SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))
@@ -120,7 +123,8 @@ def pair_relations(
 
 def _rotation(R: Array) -> SX:
     """A constant rotation as measured at closed configurations, which are open by some 1e-13."""
-    return SX(DM(nearest_rotation(R.tolist(), noise=1e-12)))
+    noise = 1e-12  # ten times that: smaller elements are zeros
+    return SX(DM(nearest_rotation(R.tolist(), noise=noise)))
 
 
 def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:

@@ -20,6 +20,7 @@ from mbs.identification.regressors import Column, every_column, numbers_among, r
 from mbs.loops.closing import Closing
 from mbs.loops.examine import examine
 from mbs.loops.reduction import reduction_matrix
+from mbs.numbers import NONZERO
 
 # Which columns of sampled regressors are independent, and how the others follow from them.
 #
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 _NO_EFFECT = 1e-9
 """A column shorter than this part of the longest has no effect."""
 _FLOOR = 1e-16
+"""Part of the largest singular value that the others are taken to be at least: ratios of what is
+rounding alone would look like gaps."""
 _LARGEST_ZERO = 1e-6
 """A singular value above this part of the largest is not rounding."""
 _ROUNDING = 1e-8
@@ -245,6 +248,7 @@ class _ConfigurationWalk:
         arguments = (q, p) if p.size else (q,)
         G = np.array(self.G(*arguments))
         rate = np.array(self.system.qdot(q, G @ direction)).ravel()
+        # a direction that moves no position, to rounding, leads nowhere
         ahead = q + rate * (_STEP / max(float(np.max(np.abs(rate))), 1e-9))
         found = self.closing.nearest(ahead)
         if not found.is_closed or np.max(np.abs(found.q - ahead)) > _STEP:
@@ -287,6 +291,8 @@ def sampled_regressor(system: System, columns: Sequence[Column], states: States,
 
 
 _ZERO = 1e-8
+"""Factor of a dependent column below which it is rounding: those that count are ratios of lengths
+and squares of them, and whole numbers."""
 _EXACT = 1e-7
 """Largest error of a grouped regressor that is rounding, by the longest column."""
 _NARROW = 1e4
@@ -371,7 +377,7 @@ def checked(
         order: of preference.
     """
     kept, W = grouping.kept, sample.W
-    longest = float(np.max(np.linalg.norm(W, axis=0), initial=1e-300))
+    longest = float(np.max(np.linalg.norm(W, axis=0), initial=NONZERO))
     errors = np.linalg.norm(W - W[:, kept] @ beta, axis=0) / longest
     error = float(np.max(errors, initial=0.0))
     full = dependence(W, order)

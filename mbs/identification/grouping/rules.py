@@ -34,6 +34,8 @@ from mbs.spatial.inertia import TEN_PARAMETERS
 Array = NDArray[np.float64]
 
 _SAME = 1e-9
+"""Cosine, sine or length [m] below which one is zero for a sample: poses have roundings of 1e-15,
+and axes that a file leaves parallel to six digits only are taken as it has them."""
 _TURNING = (Motion.REVOLUTE, Motion.SPHERICAL, Motion.FREE)
 
 

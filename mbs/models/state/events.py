@@ -19,6 +19,7 @@ from mbs.assembly.tree import position_rate
 from mbs.models.contacts import KINDS, ContactEquations, Contacts, impact, jump
 from mbs.models.state.drive import TreeMotion
 from mbs.models.symbols import dense_function, outputs_of
+from mbs.numbers import NONZERO
 
 # What keeps dependent joints at rest that rigid stops or Coulomb friction hold.
 #
@@ -75,8 +76,6 @@ def standstill(
 
 # What states and modes are after an event, where nothing projects the motion later.
 
-
-_SMALL = 1e-300
 
 States = tuple[Sequence[int], Sequence[int]]
 """Numbers in q and in v of the positions and velocities that a state begins with."""
@@ -144,8 +143,8 @@ def _at_impact(contact: ContactEquations, motion: TreeMotion, wall: SX) -> SX:
     square = speed**2 - 2 * rise * depth
     since = casadi.if_else(
         square > 0,
-        2 * depth / casadi.fmax(speed + casadi.sqrt(casadi.fmax(square, 0)), _SMALL),
-        speed / casadi.fmax(rise, _SMALL),
+        2 * depth / casadi.fmax(speed + casadi.sqrt(casadi.fmax(square, 0)), NONZERO),
+        speed / casadi.fmax(rise, NONZERO),
     )
     return motion.v - casadi.mmax(casadi.if_else(depth > 0, since, 0)) * contact.a
 

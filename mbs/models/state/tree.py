@@ -59,6 +59,7 @@ _ASLEEP = 1e-6
 _SHARED = 1e-4
 """Square that is added to rows of contacts, which may depend on others: they converge as fast."""
 _NEVER = 1e300
+"""Pivot of a row that is left alone: what it would move, divided by this, is zero."""
 
 
 def projected(

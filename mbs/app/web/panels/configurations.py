@@ -199,6 +199,7 @@ ANGLES, MATRIX = "place and angles", "matrix"
 _NAMES = ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]")
 _FORMS = "12 or 16 numbers row by row, or x y z roll pitch yaw; pi/2 and the like are read"
 _ROUNDED = 1e-12
+"""Element of a pose [m or cosine] that is shown as zero: rounding, such as sin(pi)."""
 
 
 class PoseFields:

@@ -34,12 +34,12 @@ from mbs.app.web.panels.plots import (
 )
 from mbs.app.web.panels.text_view import column
 from mbs.assembly import System
+from mbs.identification.identify import POOR
 from mbs.text import quoted
 
 # What an identification found: tables, residuals, and files to keep.
 
 
-_POOR = 30.0
 _NOTHING = 1000.0
 """Deviation that says nothing about a value [%]."""
 _PARAMETERS = (
@@ -114,7 +114,7 @@ def _estimates(found: Identified) -> None:
             "name": row.name,
             "value": f"{row.value:.6g}",
             "deviation": f"{row.deviation:.2g}",
-            "percent": f"{_percent(row.percent)}{' *' if row.percent > _POOR else ''}",
+            "percent": f"{_percent(row.percent)}{' *' if row.percent > POOR else ''}",
             "unit": row.unit,
             "essential": "yes" if row.essential else "no",
             "grouping": _terms(row),
@@ -123,7 +123,7 @@ def _estimates(found: Identified) -> None:
     ]
     _table(_PARAMETERS, rows)
     ui.label(
-        f"* a deviation of more than {_POOR:g} %: the record does not show this parameter well"
+        f"* a deviation of more than {POOR:g} %: the record does not show this parameter well"
     ).classes("app-note")
     errors = [
         {

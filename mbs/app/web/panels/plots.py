@@ -99,7 +99,7 @@ def _line(name: str, x: Array, y: Array) -> dict[str, Any]:
         "name": name,
         "type": "line",
         "showSymbol": False,
-        "lineStyle": {"width": 1.6},
+        "lineStyle": {"width": 1.6},  # [px] thinner than the usual 2: many lines stay apart
         "emphasis": {"disabled": True},
         "data": points,
     }

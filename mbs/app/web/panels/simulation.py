@@ -221,6 +221,7 @@ _SPEEDS = {
     2.0: "2 x speed",
     5.0: "5 x speed",
 }
+"""Seconds of the motion in one of play."""
 
 
 class Player:
@@ -237,7 +238,7 @@ class Player:
             )
             self._slider = ui.slider(min=first, max=last, step=(last - first) / 1000, value=first)
             self._slider.style("flex: 1").mark("scrub")
-            self._slider.on("update:model-value", self._scrub, throttle=0.05)
+            self._slider.on("update:model-value", self._scrub, throttle=0.05)  # [s] 20 pictures
             self._label = ui.label(_told(first)).classes("app-note")
             self._label.style("width: 62px; text-align: right; font-variant-numeric: tabular-nums")
             self._speed = ui.select(_SPEEDS, value=1.0, on_change=self._restart)

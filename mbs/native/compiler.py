@@ -1,6 +1,8 @@
 """The C compiler: which one there is, libraries for here and elsewhere, and their cache."""
 
 import atexit
+import contextlib
+import errno
 import functools
 import hashlib
 import importlib.util
@@ -9,9 +11,11 @@ import platform
 import re
 import shlex
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
@@ -179,17 +183,68 @@ def compile_library(
     libm = [] if output.suffix == ".dll" else ["-lm"]
     files = [str(source) for source in sources]
     _compile(compiler, [*flags, *includes, *files, "-o", str(output), *libm], sources)
+    if not _is_library(output):
+        raise CompilerError(
+            f"{compiler.command[0]} wrote no library; name another compiler by the environment"
+            " variable CC"
+        )
     return output
 
 
+_MAGIC = (b"\x7fELF", b"MZ", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe")
+"""How shared libraries begin: of Linux, Windows and macOS, for one processor or several."""
+
+
+def _is_library(file: Path) -> bool:
+    try:
+        with file.open("rb") as stream:
+            return stream.read(4).startswith(_MAGIC)
+    except FileNotFoundError:
+        return False
+
+
+_LONGEST = 1800.0
+"""Of one call of the compiler [s]: the longest models take minutes; one that hangs ends here."""
+
+
 def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Path]) -> None:
-    answer = subprocess.run(
-        [*compiler.command, *arguments], capture_output=True, text=True, check=False
-    )
+    """Run the compiler.
+
+    Raises:
+        CompilerError: it does not start or end, is killed, or refuses the code.
+        OSError: the disk is full.
+    """
+    program, names = compiler.command[0], ", ".join(source.name for source in sources)
+    try:
+        answer = subprocess.run(
+            [*compiler.command, *arguments],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+            stdin=subprocess.DEVNULL,
+            timeout=_LONGEST,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise CompilerError(
+            f"{program} did not end within {_LONGEST:.0f} s at {names}; take shorter models, or"
+            " another compiler by the environment variable CC"
+        ) from error
+    except OSError as error:
+        raise CompilerError(
+            f"{program} does not start ({error.strerror or error}); name another compiler by the"
+            " environment variable CC"
+        ) from error
+    if answer.returncode < 0:
+        raise CompilerError(
+            f"{program} was ended by signal {-answer.returncode} at {names}; where memory was"
+            " short, take shorter models"
+        )
     if answer.returncode != 0:
+        if os.strerror(errno.ENOSPC) in answer.stderr:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         complaint = _complaint(answer.stderr)
-        names = ", ".join(source.name for source in sources)
-        raise CompilerError(f"{compiler.command[0]} refused {names}: {complaint.strip()[:500]}")
+        raise CompilerError(f"{program} refused {names}: {complaint.strip()[:500]}")
 
 
 def _complaint(stderr: str) -> str:
@@ -278,12 +333,16 @@ def cross_compiler(goal: Platform) -> Compiler:
 def cache_dir() -> Path:
     """The folder of built libraries: MBS_CACHE_DIR, else the cache folder of the user.
 
+    Code that others could have put there would run here: the folder must belong to the user of
+    this process, and nobody else may write into it.
+
     Returns:
         a folder that exists and can be written: one that lasts as long as this process when the
-        usual one cannot.
+        usual one cannot, or is not the user's own.
     """
     wanted = _wanted_dir()
-    if wanted is not None and _writable(wanted):
+    if wanted is not None and _writable(wanted) and _is_own(wanted):
+        _remove_orphans(wanted)
         return wanted
     return _process_dir()
 
@@ -314,22 +373,43 @@ def cached_library(
     Raises:
         CompilerError: there is no compiler, or it refused the code.
     """
-    folder, chosen, flags = cache_dir(), compiler or find_compiler(), at_chosen_level(flags)
-    key = _key(files, flags, chosen)
+    chosen, flags = compiler or find_compiler(), at_chosen_level(flags)
+    try:
+        return _library_in(cache_dir(), files, flags, chosen, suffix, common)
+    except OSError:  # the disk of the cache is full, or a file in it belongs to somebody else
+        folder = _process_dir()
+        try:
+            return _library_in(folder, files, flags, chosen, suffix, common)
+        except OSError as error:
+            raise CompilerError(
+                f"a library could not be built in {folder} ({error.strerror or error}); free space"
+                " on its disk, or set MBS_CACHE_DIR to a folder on another one"
+            ) from error
+
+
+def _library_in(
+    folder: Path,
+    files: Mapping[str, str],
+    flags: Sequence[str],
+    compiler: Compiler,
+    suffix: str,
+    common: Collection[str],
+) -> Path:
+    key = _key(files, flags, compiler)
     known = _known(folder, key, suffix)
     if known is not None:
         return known
-    with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as name:
+    with tempfile.TemporaryDirectory(dir=folder, prefix=BUILD, ignore_cleanup_errors=True) as name:
         build = Path(name)
         for file, text in files.items():
             (build / file).write_text(text, encoding="utf-8")
         parts = [
-            _common_object(file, files, flags, chosen, build) if file in common else build / file
+            _common_object(file, files, flags, compiler, build) if file in common else build / file
             for file in files
             if file.endswith(".c")
         ]
         output = build / f"library{suffix}"
-        library = compile_library(parts, [build], flags, output, compiler=chosen)
+        library = compile_library(parts, [build], flags, output, compiler=compiler)
         return _installed(library, folder / f"{key}-{_sum_of(library)}{suffix}")
 
 
@@ -391,12 +471,9 @@ def _installed(library: Path, target: Path) -> Path:
     """The target; where another user keeps one of its name to himself, a copy for this process."""
     try:
         os.replace(library, target)
-    except OSError as error:
+    except OSError:
         if not target.exists():
-            raise CompilerError(
-                f"library {target} could not be stored ({error}); set MBS_CACHE_DIR to a folder "
-                "that you may write"
-            ) from error
+            raise
         if not is_whole(target):  # else another process holds it open, which some systems protect
             return Path(shutil.copy(library, _process_dir() / target.name))
     return target
@@ -424,6 +501,33 @@ def _writable(folder: Path) -> bool:
             return True
     except OSError:
         return False
+
+
+def _is_own(folder: Path) -> bool:
+    """Whether it belongs to the user of this process; then nobody else can write any longer."""
+    if os.name != "posix":
+        return True  # folders of users are closed to others by default
+    facts = folder.stat()
+    if facts.st_uid != os.geteuid():
+        return False
+    if facts.st_mode & _OTHERS_WRITE:
+        folder.chmod(facts.st_mode & ~_OTHERS_WRITE & 0o7777)
+    return True
+
+
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+BUILD = "build-"
+"""How the names of folders begin in which something is made."""
+_ORPHAN = 86_400.0
+"""Age [s] of a build folder that a killed process left: no compiler takes a day."""
+
+
+@functools.cache
+def _remove_orphans(folder: Path) -> None:
+    for left in folder.glob(f"{BUILD}*"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > _ORPHAN:
+                shutil.rmtree(left, ignore_errors=True)
 
 
 @functools.cache

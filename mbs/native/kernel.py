@@ -33,6 +33,7 @@ from mbs.native.c_code import (
     slots,
 )
 from mbs.native.compiler import (
+    BUILD,
     at_chosen_level,
     cache_dir,
     cached_library,
@@ -426,7 +427,7 @@ def _entry(entry: Path) -> Path | None:
 def _write(entry: Path, name: str) -> None:
     """Keep the name; where that fails, the next call writes the text of the Function again."""
     try:
-        with tempfile.TemporaryDirectory(dir=entry.parent, prefix="build-") as folder:
+        with tempfile.TemporaryDirectory(dir=entry.parent, prefix=BUILD) as folder:
             written = Path(folder) / entry.name
             written.write_text(name, encoding="utf-8")
             os.replace(written, entry)

@@ -10,6 +10,7 @@ read.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -450,7 +451,7 @@ class Joints:
         first = int(model.body_jntadr[k])
         joints = range(first, first + int(model.body_jntnum[k]))
         if not joints and self.base == "free" and _is_root(mjcf, k):
-            name = unused_name(mechanism, f"{mjcf.bodies[k]}_joint")
+            name = unused_name(mechanism, FREE_JOINT)
             mechanism.connect(parent, Free(name), body)
             return
         if not joints:
@@ -995,7 +996,13 @@ def _any(model: Any, field: str, k: int) -> bool:
 # Reading.
 
 
+_LONGEST_REASON = 400
+"""Letters of a message of MuJoCo that are repeated: it quotes names of any length."""
+
 Base = Literal["fixed", "free"] | None
+
+FREE_JOINT = "root_joint"
+"""Name of the joint of a root that is freed; it has coordinates root_joint.x, root_joint.qw ..."""
 
 
 def read_mjcf(path: str | Path, base: Base = None, strict: bool = False) -> Mechanism:
@@ -1019,8 +1026,8 @@ def read_mjcf(path: str | Path, base: Base = None, strict: bool = False) -> Mech
 
     Args:
         path: of the file.
-        base: "free" gives every root body without a joint a Free joint `<body>_joint`, "fixed"
-            welds roots with a free joint to the world where they are drawn.
+        base: "free" gives every root body without a joint a Free joint, `root_joint` and so on,
+            "fixed" welds roots with a free joint to the world where they are drawn.
         strict: refuse what would be noted.
 
     Returns:
@@ -1091,14 +1098,26 @@ def _mujoco() -> Any:
 
 def _compiled(mujoco: Any, path: str, notes: Notes) -> Any:
     """The model without what has no part in the motion; the whole of it where that fails."""
-    try:
-        return _spec(mujoco, path, stripped=True).compile()
-    except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).removeprefix("Error: ").split())
-    try:
-        return _spec(mujoco, path, stripped=False).compile()
-    except (ValueError, RuntimeError):
-        raise DescriptionError(f"{path}: mujoco refuses the file: {reason}; correct it") from None
+    reasons: list[str] = []
+    for stripped in (True, False):
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            try:
+                model = _spec(mujoco, path, stripped).compile()
+            except (ValueError, RuntimeError) as error:
+                reasons.append(_sentence(error))
+                continue
+        for text in dict.fromkeys(_sentence(warning.message) for warning in heard):
+            notes.add("doubted", "the model", f"mujoco says: {text}")
+        return model
+    raise DescriptionError(f"{path}: mujoco refuses the file: {reasons[0]}; correct it")
+
+
+def _sentence(said: object) -> str:
+    """What MuJoCo says, on one line, its middle left out where it is long."""
+    text = " ".join(str(said).removeprefix("Error: ").split())
+    half = _LONGEST_REASON // 2
+    return text if len(text) <= _LONGEST_REASON else f"{text[:half]} ... {text[-half:]}"
 
 
 def _spec(mujoco: Any, path: str, stripped: bool) -> Any:
@@ -1144,12 +1163,17 @@ def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
 
 
 def _body(mjcf: MjcfModel, k: int) -> Body:
-    model = mjcf.data
-    R = matrix_of(model.body_iquat[k])
+    model, kinds = mjcf.data, mjcf.mujoco.mjtSameFrame
+    # MuJoCo takes frames that differ by 1e-8 as one, and computes so
+    same = int(model.body_sameframe[k])
+    turned = same not in (int(kinds.mjSAMEFRAME_BODY), int(kinds.mjSAMEFRAME_BODYROT))
+    R = matrix_of(model.body_iquat[k]) if turned else np.eye(3)
     tensor = R @ np.diag(model.body_inertia[k]) @ R.T
+    at_origin = same == int(kinds.mjSAMEFRAME_BODY)
+    com = (0.0, 0.0, 0.0) if at_origin else tuple(float(value) for value in model.body_ipos[k])
     return Body(
         mjcf.bodies[k],
         mass=float(model.body_mass[k]),
-        com=tuple(float(value) for value in model.body_ipos[k]),
+        com=com,
         inertia=((tensor + tensor.T) / 2).tolist(),
     )

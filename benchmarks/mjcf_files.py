@@ -98,6 +98,7 @@ def compared(path: Path) -> Outcome:
 def _opened(mechanism: mbs.Mechanism) -> mbs.Mechanism:
     """The mechanism with its loops open and its couplings gone."""
     gone = {*mechanism.cuts, *(c.name for c in mechanism.couplings())}
+    gone |= {joint.name for joint in mechanism.joints() if not joint.places}
     for name in gone:
         del mechanism.components[name]
     mechanism.cuts.clear()
@@ -245,9 +246,7 @@ class Twin:
     def closed_differences(self, system: Any) -> dict[str, float]:
         """What differs of the closed system at its assembled configuration."""
         names = {loop.name for loop in system.loops}
-        self.ignored = {
-            k for k, name in enumerate(self.names.equalities) if name not in names
-        }
+        self.ignored = {k for k, name in enumerate(self.names.equalities) if name not in names}
         if [c.name for c in system.coordinates] != [c.name for c in self.system.coordinates]:
             return {"coordinates": float("nan")}
         q = np.array(system.configuration)

@@ -168,9 +168,7 @@ def _loop_rows(mechanism: Mechanism, framed: Framed) -> tuple[LoopRow, ...]:
         )
         for cut in framed.cuts
     ]
-    couplings = [
-        LoopRow(c.name, "coupling", c.coordinates, ()) for c in mechanism.couplings()
-    ]
+    couplings = [LoopRow(c.name, "coupling", c.coordinates, ()) for c in mechanism.couplings()]
     return (*loops, *couplings)
 
 

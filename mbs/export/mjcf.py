@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.tables import AttachedForce
-from mbs.assembly.tree import Frame, Link
+from mbs.assembly.tree import Frame, Link, quaternion_slices
 from mbs.components import (
     Damper,
     Fixed,
     FixedTendon,
     Mechanism,
     Revolute,
+    Rod,
     Spherical,
     Spring,
 )
@@ -31,6 +32,7 @@ from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.expressions import to_sx
 from mbs.files import path_of, write_text
+from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose
 from mbs.text import quoted
 
@@ -105,7 +107,12 @@ class _Writer:
         self.bodies: list[tuple[Element, Pose]] = []
         self.tendons = Element("tendon")
         self.sites = 0
-        self._names = {row.name for row in system.bodies} | {link.name for link in system.tree.links}
+        self._symbols = dict(
+            zip((p.name for p in system.parameters), casadi.vertsplit(system.p), strict=True)
+        )
+        self._names = {row.name for row in system.bodies} | {
+            link.name for link in system.tree.links
+        }
 
     def model(self) -> Element:
         """The root element."""
@@ -139,9 +146,9 @@ class _Writer:
     def _check(self) -> None:
         """Refuse what the format cannot say."""
         system = self.system
-        for row in (*system.shafts, *system.devices):
+        for part in [*(row.name for row in system.shafts), *(row.name for row in system.devices)]:
             raise self._refuse(
-                f"{row.name}: an MJCF file has no drive lines", "give Ia and effort to the joint"
+                f"{part}: an MJCF file has no drive lines", "give Ia and effort to the joint"
             )
         for link in system.tree.links:
             if link.rotor is not None:
@@ -154,6 +161,13 @@ class _Writer:
                     f"{link.name}: in an MJCF file a free joint is on the world",
                     "connect it from the world",
                 )
+
+    def _zero(self) -> SX:
+        """(nq, 1) the configuration qpos0 of the file."""
+        q = SX.zeros(self.system.nq)
+        for part in quaternion_slices(self.system.tree):
+            q[part.start] = 1
+        return q
 
     # Numbers: symbols at their values.
 
@@ -171,9 +185,7 @@ class _Writer:
         """Numbers separated by blanks, which MuJoCo reads back to the last bit."""
         flat = self._number(values).ravel(order="F")
         if not np.all(np.isfinite(flat)):
-            raise self._refuse(
-                "a number of the file is not finite", "give every parameter a value"
-            )
+            raise self._refuse("a number of the file is not finite", "give every parameter a value")
         return " ".join(repr(float(value) + 0.0) for value in flat)
 
     def _place(self, pose: Pose) -> dict[str, str]:
@@ -216,7 +228,7 @@ class _Writer:
         for name in carried:
             if name != main:
                 pose = own.inverse() @ system.frames[name][1]
-                SubElement(body, "body", name=name, **self._place(pose))
+                SubElement(body, "body", {"name": name, **self._place(pose)})
 
     def _is_identity(self, pose: Pose) -> bool:
         p, R = self._number(pose.p), self._number(pose.R)
@@ -262,17 +274,14 @@ class _Writer:
         moments = np.maximum(moments, _LEAST)
         # rounding may break the triangle inequality of a flat body, and MuJoCo knows no tolerance
         moments[2] = min(moments[2], moments[0] + moments[1])
-        turned = {} if np.allclose(axes, np.eye(3), atol=_SAME) else {
-            "quat": self._text(_quaternion(axes))
+        given = {
+            "pos": self._text(R.T @ (com - p)),
+            "mass": repr(max(mass, _LEAST)),
+            "diaginertia": self._text(moments),
         }
-        SubElement(
-            body,
-            "inertial",
-            pos=self._text(R.T @ (com - p)),
-            mass=repr(max(mass, _LEAST)),
-            diaginertia=self._text(moments),
-            **turned,
-        )
+        if not np.allclose(axes, np.eye(3), rtol=0, atol=_SAME):
+            given["quat"] = self._text(_quaternion(axes))
+        SubElement(body, "inertial", given)
 
     def _add_joint(self, body: Element, link: Link, own: Pose) -> None:
         system, motion = self.system, link.motion
@@ -297,7 +306,7 @@ class _Writer:
             given["range"] = self._text(DM(coordinate.limits))
         if speed.effort is not None and all(map(math.isfinite, speed.effort)):
             given["actuatorfrcrange"] = self._text(DM(speed.effort))
-        SubElement(body, "joint", **given)
+        SubElement(body, "joint", given)
 
     def _add_static_bodies(self) -> None:
         """Bodies that are welded to the world."""
@@ -306,7 +315,7 @@ class _Writer:
         for name, (number, pose) in self.system.frames.items():
             known = name in moving or name in self.system.named_frames or name == "base"
             if number < 0 and not known and name not in self._joint_names:
-                SubElement(world, "body", name=name, **self._place(pose))
+                SubElement(world, "body", {"name": name, **self._place(pose)})
 
     @property
     def _joint_names(self) -> set[str]:
@@ -315,7 +324,7 @@ class _Writer:
     def _add_site(self, name: str, frame: Frame) -> str:
         number, pose = frame
         body, own = self.bodies[number + 1]
-        SubElement(body, "site", name=name, **self._place(own.inverse() @ pose))
+        SubElement(body, "site", {"name": name, **self._place(own.inverse() @ pose)})
         return name
 
     def _new_site(self, frame: Frame) -> str:
@@ -331,6 +340,20 @@ class _Writer:
             self._equality(equalities, "weld", joint.name, frame_a, frame_b)
         elif isinstance(joint, Spherical):
             self._equality(equalities, "connect", joint.name, frame_a, frame_b)
+        elif isinstance(joint, Rod):
+            tendon = SubElement(self.tendons, "spatial", name=self._unused(f"{joint.name}_line"))
+            for frame in cut.frames:
+                SubElement(tendon, "site", site=self._new_site(frame))
+            # MuJoCo counts from the length at qpos = 0
+            at_zero = relative_pose(self.system.tree, self._zero(), *cut.frames).p
+            longer = casadi.SX(to_sx(joint.length, self._symbols)) - casadi.norm_2(at_zero)
+            SubElement(
+                equalities,
+                "tendon",
+                name=joint.name,
+                tendon1=tendon.get("name", ""),
+                polycoef=self._text(casadi.vertcat(longer, SX.zeros(4))),
+            )
         elif isinstance(joint, Revolute):
             # two points of the axis
             for k, along in enumerate((-_APART / 2, _APART / 2)):
@@ -341,7 +364,7 @@ class _Writer:
         else:
             raise self._refuse(
                 f"{joint.name}: in an MJCF file a loop is closed by a fixed, spherical or revolute"
-                f" joint, not by a {type(joint).__name__}",
+                f" joint or by a rod, not by a {type(joint).__name__}",
                 "cut the loop at another joint with m.cut(joint)",
             )
 
@@ -385,7 +408,7 @@ class _Writer:
             )
 
     def _fixed_tendon(self, name: str, levers: Mapping[str, float], given: dict[str, str]) -> None:
-        tendon = SubElement(self.tendons, "fixed", name=name, **given)
+        tendon = SubElement(self.tendons, "fixed", {"name": name, **given})
         for joint, factor in levers.items():
             if factor:
                 SubElement(tendon, "joint", joint=joint, coef=repr(factor))
@@ -403,7 +426,7 @@ class _Writer:
             if isinstance(element, Spring):
                 given |= {"stiffness": text(element.stiffness)}
                 given |= {"springlength": text(element.length)}
-            tendon = SubElement(self.tendons, "spatial", name=element.name, **given)
+            tendon = SubElement(self.tendons, "spatial", {"name": element.name, **given})
             for frame in force.frames:
                 SubElement(tendon, "site", site=self._new_site(frame))
         elif isinstance(element, FixedTendon):
@@ -454,4 +477,5 @@ def _quaternion(R: Vector) -> Vector:
         q[1 + x] = 1 + 2 * R[x, x] - trace
         q[1 + y] = R[y, x] + R[x, y]
         q[1 + z] = R[z, x] + R[x, z]
-    return q / np.linalg.norm(q)
+    unit: Vector = q / np.linalg.norm(q)
+    return unit

@@ -32,6 +32,7 @@ from mbs.components import (
     Prismatic,
     Revolute,
     RigidBody,
+    Rod,
     Spherical,
     Spring,
 )
@@ -338,7 +339,8 @@ def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
 def _between_bodies(mjcf: MjcfModel, bodies: Sequence[int]) -> set[int]:
     """The joints that move some of the bodies and not all of them."""
     above = [mjcf.joints_above(k) for k in bodies]
-    return set().union(*above) - set.intersection(*above) if above else set()
+    some: set[int] = set()
+    return some.union(*above) - above[0].intersection(*above) if above else some
 
 
 def _note_actuator(mjcf: MjcfModel, k: int, joints: Sequence[int]) -> None:
@@ -453,6 +455,11 @@ class Joints:
         if not joints and self.base == "free" and _is_root(mjcf, k):
             name = unused_name(mechanism, FREE_JOINT)
             mechanism.connect(parent, Free(name), body)
+            drawn = [*model.body_pos[k], *model.body_quat[k]]
+            suffixes = (*"xyz", *_QUATERNION)
+            mechanism.guess |= {
+                f"{name}.{x}": float(value) for x, value in zip(suffixes, drawn, strict=True)
+            }
             return
         if not joints:
             mechanism.connect(point, body)
@@ -653,11 +660,10 @@ def add_closures(
         elif kind in (kinds.mjEQ_JOINT, kinds.mjEQ_TENDON):
             row = _linear(mjcf, k, kind)
             if row is None:
-                mjcf.refuse(
-                    f"equality {mjcf.equalities[k]!r} is one of spatial tendons or not linear,"
-                    " which mbs does not model"
-                )
-            if row.terms.keys() - mjcf.locked.keys():
+                a, rod, b = _rod(mjcf, k, sites)
+                mechanism.connect(a, rod, b)
+                taken.append(k)
+            elif row.terms.keys() - mjcf.locked.keys():
                 mechanism.add(_linear_coupling(mjcf, k, row))
                 taken.append(k)
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
@@ -670,6 +676,22 @@ def add_closures(
                 " joint and tendon are read"
             )
     return taken
+
+
+def _rod(mjcf: MjcfModel, k: int, sites: Sequence[Point]) -> tuple[Point, Rod, Point]:
+    """The two ends and the rod that an equality makes of a spatial tendon between two sites."""
+    model, name = mjcf.data, mjcf.equalities[k]
+    tendon = int(model.eq_obj1id[k])
+    ends = _two_sites(mjcf, tendon) if mjcf.terms(tendon) is None else None
+    if int(model.eq_obj2id[k]) >= 0 or ends is None:
+        mjcf.refuse(
+            f"equality {name!r} is not linear, or ties spatial tendons that are more than a line"
+            " between two sites, which mbs does not model"
+        )
+    length = float(model.tendon_length0[tendon]) + float(model.eq_data[k, 0])
+    if length <= 0:
+        mjcf.refuse(f"equality {name!r} keeps a tendon at the length {length:g} m")
+    return sites[ends[0]], Rod(name, length=length), sites[ends[1]]
 
 
 def _close(
@@ -797,12 +819,15 @@ def _add_tendon(
     low, high = (float(value) for value in model.tendon_lengthspring[k])
     terms = mjcf.terms(k)
     if terms is None:
-        a, b = _two_sites(mjcf, k, name)
-        if friction or (stiffness and low != high):
-            mjcf.refuse(f"spatial tendon {name!r} has friction or goes slack")
-        mechanism.add(
-            Spring(name, sites[a], sites[b], stiffness=stiffness, length=low, damping=damping)
-        )
+        ends = _two_sites(mjcf, k)
+        if ends is None or friction or (stiffness and low != high):
+            mjcf.refuse(
+                f"spatial tendon {name!r} pulls (stiffness, damping or frictionloss), and is more"
+                " than a line between two sites or goes slack, which mbs does not model"
+            )
+        a, b = (sites[end] for end in ends)
+        if a.owner is not b.owner:
+            mechanism.add(Spring(name, a, b, stiffness=stiffness, length=low, damping=damping))
         return
     slack = sum(c * mjcf.locked[j] for j, c in terms.items() if j in mjcf.locked)
     moving = {mjcf.joints[j]: c for j, c in terms.items() if c and j not in mjcf.locked}
@@ -819,16 +844,13 @@ def _add_tendon(
         )
 
 
-def _two_sites(mjcf: MjcfModel, k: int, name: str) -> tuple[int, int]:
-    """The ends of a spatial tendon that is a line between two bodies."""
+def _two_sites(mjcf: MjcfModel, k: int) -> tuple[int, int] | None:
+    """The ends of a spatial tendon that is a line between two sites; None for the others."""
     model, site = mjcf.data, int(mjcf.mujoco.mjtWrap.mjWRAP_SITE)
     first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
     kinds = [int(model.wrap_type[w]) for w in range(first, first + count)]
     if kinds != [site, site]:
-        mjcf.refuse(
-            f"spatial tendon {name!r} pulls (stiffness, damping or frictionloss) and is more than"
-            " a line between two sites, which mbs does not model"
-        )
+        return None
     return int(model.wrap_objid[first]), int(model.wrap_objid[first + 1])
 
 
@@ -1056,8 +1078,9 @@ def read_mjcf(path: str | Path, base: Base = None, strict: bool = False) -> Mech
     for k in range(1, model.nbody):
         if int(model.body_mocapid[k]) >= 0:
             notes.add(
-                "ignored", f"body {mjcf.bodies[k]!r}", "it is moved from outside (mocap); here it"
-                " stands still where it is drawn"
+                "ignored",
+                f"body {mjcf.bodies[k]!r}",
+                "it is moved from outside (mocap); here it stands still where it is drawn",
             )
         body = mechanism.add(_body(mjcf, k))
         joints.connect(k, points[model.body_parentid[k]])
@@ -1134,16 +1157,8 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for kind in ("sensors", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
         for element in list(getattr(spec, kind)):
             spec.delete(element)
-    from_geoms = spec.compiler.inertiafromgeom
-    always = int(from_geoms) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
-    kinds = mujoco.mjtGeom
-    with_assets = (kinds.mjGEOM_MESH, kinds.mjGEOM_HFIELD, kinds.mjGEOM_SDF)
-    for body in spec.bodies:
-        is_world = body.name == "world" and body.parent is None
-        if is_world or (body.explicitinertial and not always):
-            for geom in list(body.geoms):
-                if geom.type in with_assets or geom.meshname:
-                    spec.delete(geom)
+    for geom in list(_without_part(mujoco, spec)):
+        spec.delete(geom)
     meshes = {geom.meshname for geom in spec.geoms}
     fields = {geom.hfieldname for geom in spec.geoms}
     for kind in ("geoms", "sites", "tendons", "flexes"):
@@ -1154,6 +1169,20 @@ def _strip(mujoco: Any, spec: Any) -> None:
     unused += [hfield for hfield in spec.hfields if hfield.name not in fields]
     for asset in [*unused, *spec.materials, *spec.textures]:
         spec.delete(asset)
+
+
+def _without_part(mujoco: Any, spec: Any) -> Iterator[Any]:
+    """Geoms with assets that give no inertia."""
+    always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    kinds = mujoco.mjtGeom
+    with_assets = (kinds.mjGEOM_MESH, kinds.mjGEOM_HFIELD, kinds.mjGEOM_SDF)
+    from_geoms = int(spec.compiler.inertiafromgeom) == int(always)
+    for body in spec.bodies:
+        is_world = body.name == "world" and body.parent is None
+        if is_world or (body.explicitinertial and not from_geoms):
+            for geom in body.geoms:
+                if geom.type in with_assets or geom.meshname:
+                    yield geom
 
 
 def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:

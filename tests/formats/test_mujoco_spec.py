@@ -275,13 +275,15 @@ BAD = {
         )
         + '<tendon><spatial name="t" stiffness="2"><site site="o"/><site site="s"/>'
         '<site site="p"/></spatial></tendon>',
-        "spatial tendon 't' pulls (stiffness, damping or frictionloss) and is more than a line",
+        "spatial tendon 't' pulls (stiffness, damping or frictionloss), and is more than a line",
     ),
     "spatial equality": (
-        BODY.format("", '<site name="s"/>').replace("<worldbody>", '<worldbody><site name="o"/>')
-        + '<tendon><spatial name="t"><site site="o"/><site site="s"/></spatial></tendon>'
-        '<equality><tendon name="e" tendon1="t"/></equality>',
-        "equality 'e' is one of spatial tendons or not linear",
+        BODY.format("", '<site name="s"/><site name="p" pos="1 0 0"/>').replace(
+            "<worldbody>", '<worldbody><site name="o"/>'
+        )
+        + '<tendon><spatial name="t"><site site="o"/><site site="s"/><site site="p"/></spatial>'
+        '</tendon><equality><tendon name="e" tendon1="t"/></equality>',
+        "equality 'e' is not linear, or ties spatial tendons",
     ),
     "unmet": (
         '<worldbody><body><joint name="j"/><geom size=".1"/><body><joint name="k"/>'

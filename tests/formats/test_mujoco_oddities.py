@@ -1,12 +1,15 @@
 """MJCF files as people write them: what was refused before is read, equal to MuJoCo, with notes."""
 
+import random
+
 import numpy as np
 import pytest
-from formats.test_mujoco_spec import Twin, assert_equal_motion
+from formats.test_mujoco_spec import LOOP, TREE, Twin, assert_equal_motion
+from support.xml_mutants import mutated
 
 import mbs
 from mbs.components import FixedTendon, Force, Free, Rod, Spherical, Spring
-from mbs.errors import DescriptionError
+from mbs.errors import DescriptionError, MbsError
 from mbs.expressions import to_float
 from mbs.formats import read_mjcf
 
@@ -408,3 +411,35 @@ def test_what_mujoco_doubts_is_noted(read):
     mechanism = read(text)
     assert all(note.kind == "doubted" for note in mechanism.notes)
     assert sum(to_float(body.mass) for body in mechanism.bodies()) == pytest.approx(3)
+
+
+# Mutants: a sentence or a mechanism, whatever stands in the file.
+
+
+SEEDS = (
+    TREE,
+    LOOP,
+    SPRUNG.format(keys=""),
+    ASSETS.replace('<contact><pair geom1="g" geom2="g2"/></contact>', ""),
+    arm(TENDONS.format('tendon2="u"') + KEYS, world=MOCAP),
+)
+LONGEST_SENTENCE = 1000
+"""Letters: names of others are quoted in part, and one of MuJoCo's messages is 400 of them."""
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("seed", range(4))
+def test_mutants_are_read_or_refused_in_a_sentence(read, seed, capfd):
+    rng = random.Random(seed)
+    outcomes = []
+    for _ in range(75):
+        text = mutated(rng, rng.choice(SEEDS))
+        try:
+            mechanism = read(text)
+            outcomes.append("read")
+            mechanism.assemble()
+        except MbsError as error:
+            outcomes.append("refused")
+            assert "\n" not in str(error)
+            assert len(str(error)) < LONGEST_SENTENCE
+    assert outcomes.count("read") > 10

@@ -1161,13 +1161,11 @@ def _strip(mujoco: Any, spec: Any) -> None:
         spec.delete(geom)
     meshes = {geom.meshname for geom in spec.geoms}
     fields = {geom.hfieldname for geom in spec.geoms}
-    for kind in ("geoms", "sites", "tendons", "flexes"):
-        for element in getattr(spec, kind, ()):
-            if element.material:
-                element.material = ""
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
     unused = [mesh for mesh in spec.meshes if mesh.name not in meshes]
     unused += [hfield for hfield in spec.hfields if hfield.name not in fields]
-    for asset in [*unused, *spec.materials, *spec.textures]:
+    for asset in [*unused, *spec.textures]:
         spec.delete(asset)
 
 
@@ -1178,8 +1176,7 @@ def _without_part(mujoco: Any, spec: Any) -> Iterator[Any]:
     with_assets = (kinds.mjGEOM_MESH, kinds.mjGEOM_HFIELD, kinds.mjGEOM_SDF)
     from_geoms = int(spec.compiler.inertiafromgeom) == int(always)
     for body in spec.bodies:
-        is_world = body.name == "world" and body.parent is None
-        if is_world or (body.explicitinertial and not from_geoms):
+        if body.name == "world" or (body.explicitinertial and not from_geoms):
             for geom in body.geoms:
                 if geom.type in with_assets or geom.meshname:
                     yield geom

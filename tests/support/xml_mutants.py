@@ -30,7 +30,9 @@ def _value(rng: random.Random, text: str) -> str:
         alike = [m.group(1) for m in found if len(m.group(1).split()) == count]
         new = rng.choice(alike)
     elif chance < 0.7:
-        new = " ".join(f"{rng.choice((-1, 0, 1e-9, 1, 1e6)) * rng.random():.3g}" for _ in range(count))
+        new = " ".join(
+            f"{rng.choice((-1, 0, 1e-9, 1, 1e6)) * rng.random():.3g}" for _ in range(count)
+        )
     else:
         new = rng.choice(_ODD)
     return f'{text[: spot.start()]}="{new}"{text[spot.end() :]}'

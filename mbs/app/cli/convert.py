@@ -32,10 +32,9 @@ def convert(
     target: Annotated[
         Path,
         typer.Argument(
-            metavar="TARGET", 
+            metavar="TARGET",
             help="File to write: .par (SYMORO), .toml or .xml (MJCF).",
             show_default=False,
-
         ),
     ],
     *,

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from mbs.components.component import Component
+from mbs.components.component import Component, named_scalars
 from mbs.components.joints import Motion
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, to_float
@@ -42,10 +42,14 @@ class Coupling(Component):
         terms = tuple(expression(c, f"{self.name}, coefficients") for c in self.coefficients)
         object.__setattr__(self, "coefficients", terms)
         object.__setattr__(self, "others", self._checked_others())
+        if self.driven in self.coordinates[1:]:
+            raise DescriptionError(
+                f"{self.name}: the coordinate {self.driven!r} cannot follow itself; name two"
+            )
         if len(set(self.coordinates)) < len(self.coordinates):
             raise DescriptionError(
-                f"{self.name}: the coordinate {self.driven!r} cannot follow itself, nor another"
-                " one twice; name each of them once"
+                f"{self.name}: {self.driven!r} follows a coordinate of"
+                f" {quoted(self.coordinates[1:])} twice; name each of them once"
             )
 
     @property
@@ -55,13 +59,12 @@ class Coupling(Component):
 
     def _checked_others(self) -> tuple[tuple[str, Expression], ...]:
         """Name and factor of the other coordinates, factors as expressions."""
-        try:
-            pairs = [(str(name), factor) for name, factor in self.others]
-        except (TypeError, ValueError):
+        pairs = named_scalars(self.others)
+        if pairs is None:
             raise DescriptionError(
                 f"{self.name}: others {quoted(self.others)} are not pairs of a coordinate and a"
                 " factor; give them such as (('j3', -0.5),)"
-            ) from None
+            )
         return tuple((n, expression(c, f"{self.name}, factor of {n}")) for n, c in pairs)
 
     def scoped(self, prefix: str) -> Coupling:

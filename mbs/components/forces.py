@@ -13,7 +13,7 @@ import casadi
 from casadi import SX
 
 from mbs.components.bodies import three
-from mbs.components.component import Component, Point, SymbolTable
+from mbs.components.component import Component, Point, SymbolTable, named_scalars
 from mbs.components.on_points import OnPair, OnPoints
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -693,13 +693,8 @@ class FixedTendon(CoordinateForce):
 
     def _checked_levers(self) -> tuple[tuple[str, Expression], ...]:
         """The levers as expressions, each coordinate once."""
-        try:
-            pairs = [(name, lever) for name, lever in self.levers]
-        except (TypeError, ValueError):
-            pairs = []
-        names = [name for name, _ in pairs]
-        named = all(isinstance(name, str) and name for name in names)
-        if not (pairs and named and len(set(names)) == len(names)):
+        pairs = named_scalars(self.levers) or []
+        if not pairs or len({name for name, _ in pairs}) < len(pairs):
             raise DescriptionError(
                 f"{self.name}: levers {quoted(self.levers)} are not pairs of a coordinate and a"
                 " lever, each coordinate once; give them such as (('j1', 0.02), ('j2', -0.01))"

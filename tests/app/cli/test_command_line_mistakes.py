@@ -25,7 +25,7 @@ MISTAKES = [
     ("identify rx90 none.csv", "record 'none.csv' cannot be read (No such file or directory)"),
     (
         "convert sr400 a.urdf",
-        "a.urdf: files of this kind are not written; use one of .par, .toml, .xml",
+        "files of this kind are not written; use one of .par, .toml, .xml",
     ),
     ("convert stewart_platform a.par", "a .par file"),
     ("export fmu four_bar none/x.fmu", "folder none does not exist; create it"),

@@ -149,7 +149,8 @@ class MjcfModel:
         bodies, joints, sites, equalities, tendons: names, by MuJoCo's numbers.
         acting: numbers of the actuators that are not switched off.
         flags: what acts in the model.
-        locked: positions of the joints that equalities lock [rad or m].
+        locked: positions of the joints that do not move, since equalities lock them [rad or m],
+            or since their roots are fixed.
     """
 
     mujoco: Any
@@ -530,6 +531,11 @@ def unused_name(mechanism: Mechanism, name: str) -> str:
     while found in mechanism.components or found in mechanism.frames:
         found, number = f"{name}{number}", number + 1
     return found
+
+
+def _free_joints(mjcf: MjcfModel) -> list[int]:
+    free = int(mjcf.mujoco.mjtJoint.mjJNT_FREE)
+    return [j for j in range(mjcf.data.njnt) if int(mjcf.data.jnt_type[j]) == free]
 
 
 def _is_root(mjcf: MjcfModel, k: int) -> bool:
@@ -1067,6 +1073,8 @@ def read_mjcf(path: str | Path, base: Base = None, strict: bool = False) -> Mech
     notes = Notes(str(path), strict)
     model = _compiled(mujoco, str(path), notes)
     mjcf = MjcfModel.of(mujoco, model, notes)
+    if base == "fixed":
+        mjcf = replace(mjcf, locked={**mjcf.locked, **dict.fromkeys(_free_joints(mjcf), 0.0)})
     check_supported(mjcf)
     mechanism = Mechanism(
         name,

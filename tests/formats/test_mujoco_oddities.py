@@ -392,6 +392,9 @@ def test_a_root_is_freed_or_fixed(read):
     fixed = read(theirs, base="fixed")
     assert [joint.name for joint in fixed.joints()] == ["j1", "j2", "j3"]
     assert_same(fixed, text)
+    held = theirs.replace("</mujoco>", '<equality><weld body1="root"/></equality></mujoco>')
+    assert read(held).assemble().is_closed
+    assert not read(held, base="fixed").assemble().is_closed
     with pytest.raises(DescriptionError, match="base is 'floating'; give 'fixed', 'free' or None"):
         read(text, base="floating")
 

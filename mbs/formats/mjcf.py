@@ -454,7 +454,7 @@ class Joints:
         first = int(model.body_jntadr[k])
         joints = range(first, first + int(model.body_jntnum[k]))
         if not joints and self.base == "free" and _is_root(mjcf, k):
-            name = unused_name(mechanism, FREE_JOINT)
+            name = unused_name(mechanism, mjcf, FREE_JOINT)
             mechanism.connect(parent, Free(name), body)
             drawn = [*model.body_pos[k], *model.body_quat[k]]
             suffixes = (*"xyz", *_QUATERNION)
@@ -467,7 +467,7 @@ class Joints:
         for j in joints:
             moved = body
             if j != joints[-1]:
-                name = unused_name(mechanism, f"{mjcf.bodies[k]}_{mjcf.joints[j]}")
+                name = unused_name(mechanism, mjcf, f"{mjcf.bodies[k]}_{mjcf.joints[j]}")
                 moved = mechanism.add(Body(name))
             self._connect(j, parent, point, moved)
             point = moved.frame
@@ -525,10 +525,11 @@ class Joints:
         return one_axis(axis=axis, **common)
 
 
-def unused_name(mechanism: Mechanism, name: str) -> str:
-    """The name, with a number where a component or frame has it."""
+def unused_name(mechanism: Mechanism, mjcf: MjcfModel, name: str) -> str:
+    """The name, with a number where something of the mechanism or of the file has it."""
+    known = {*mjcf.bodies, *mjcf.joints, *mjcf.sites, *mjcf.equalities, *mjcf.tendons}
     found, number = name, 2
-    while found in mechanism.components or found in mechanism.frames:
+    while found in known or found in mechanism.components:
         found, number = f"{name}{number}", number + 1
     return found
 
@@ -880,7 +881,7 @@ def _add_compensation(mechanism: Mechanism, mjcf: MjcfModel, k: int, body: Point
         )
     scale = -share * float(model.body_mass[k])
     x, y, z = (float(value) for value in model.body_ipos[k])
-    name = unused_name(mechanism, f"{mjcf.bodies[k]}_gravcomp")
+    name = unused_name(mechanism, mjcf, f"{mjcf.bodies[k]}_gravcomp")
     mechanism.add(Force(name, body.at(x, y, z), force=tuple(scale * g for g in gravity)))
 
 

@@ -380,6 +380,18 @@ def test_names_that_collide_are_made_different_and_noted(read):
         read(text, strict=True)
 
 
+def test_bodies_between_joints_leave_the_names_of_the_file_alone(read):
+    text = """<mujoco><worldbody><site name="a_j2"/><body name="a" gravcomp="1">
+      <joint name="j1"/><joint name="j2" axis="1 0 0"/><joint name="root_joint" axis="0 1 0"/>
+      <geom size=".1"/><site name="a_j1"/><site name="a_gravcomp"/></body></worldbody></mujoco>"""
+    mechanism = read(text)
+    assert mechanism.notes == []
+    assert set(mechanism.frames) == {"a_j1", "a_j2", "a_gravcomp"}
+    assert [body.name for body in mechanism.bodies()] == ["a", "a_j12", "a_j22"]
+    assert "a_gravcomp2" in mechanism.components
+    assert_same(mechanism, text)
+
+
 def test_a_root_is_freed_or_fixed(read):
     text = arm().replace('<body name="a"', '<body name="root" pos="1 2 3"><body name="a"')
     text = text.replace("</worldbody>", '<geom size=".2"/></body></worldbody>')

@@ -54,7 +54,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     mechanism = line.mechanism
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
-    coupled = [name for c in mechanism.couplings() for name in (c.driven, c.driver)]
+    coupled = [name for c in mechanism.couplings() for name in c.coordinates]
     pushed = [name for force in force_elements(mechanism) for name, _ in force.levers]
     spanning = spanning_tree(
         mechanism.name,
@@ -169,9 +169,7 @@ def _loop_rows(mechanism: Mechanism, framed: Framed) -> tuple[LoopRow, ...]:
         )
         for cut in framed.cuts
     ]
-    couplings = [
-        LoopRow(c.name, "coupling", (c.driven, c.driver), ()) for c in mechanism.couplings()
-    ]
+    couplings = [LoopRow(c.name, "coupling", c.coordinates, ()) for c in mechanism.couplings()]
     return (*loops, *couplings)
 
 
@@ -246,16 +244,14 @@ def _couplings(
     numbers = {coordinate.name: number for number, coordinate in enumerate(coordinates)}
     result = []
     for coupling in mechanism.couplings():
-        for name in (coupling.driven, coupling.driver):
+        for name in coupling.coordinates:
             if name not in numbers:
                 raise AssemblyError(
                     f"{coupling.name}: there is no coordinate {name!r} in the tree; the coordinates"
                     f" are {', '.join(numbers)}"
                 )
+        driven, driver, *_ = (numbers[name] for name in coupling.coordinates)
         terms = tuple(to_sx(c, symbols) for c in coupling.coefficients)
-        result.append(
-            CoordinateCoupling(
-                coupling.name, numbers[coupling.driven], numbers[coupling.driver], terms
-            )
-        )
+        others = tuple((numbers[name], to_sx(c, symbols)) for name, c in coupling.others)
+        result.append(CoordinateCoupling(coupling.name, driven, driver, terms, others))
     return tuple(result)

@@ -114,6 +114,12 @@ def _tree(system: System) -> list[str]:
     return lines
 
 
+def followed(joints: Sequence[str]) -> str:
+    """Which coordinate follows which others, in words."""
+    driven, *others = joints
+    return f"{driven} follows {' and '.join(others)}"
+
+
 def _loops(system: System) -> list[str]:
     if system.closure is None:
         return ["No loop: every coordinate is independent."]
@@ -121,7 +127,7 @@ def _loops(system: System) -> list[str]:
     lines = []
     for loop in system.loops:
         if loop.closing == "coupling":
-            lines.append(f"Coupling {loop.name}: {' follows '.join(loop.joints)}.")
+            lines.append(f"Coupling {loop.name}: {followed(loop.joints)}.")
             continue
         kept = len(loop.rows) - len(loop.dropped)
         lines.append(

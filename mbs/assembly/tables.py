@@ -346,27 +346,40 @@ def _neighbours(mechanism: Mechanism, without: Joint, port: Port) -> Iterator[Po
         yield joint.name, "b" if port[1] == "a" else "a"
 
 
-# A relation between two coordinates, such as a gear makes.
+# A relation between coordinates, such as a gear makes.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateCoupling:
-    """driven = sum of c_k driver^k between two elements of q.
+    """driven = sum of c_k driver^k + sum of the others, each times its factor, in elements of q.
 
     Attributes:
         name: of the coupling.
         driven, driver: numbers in q.
         coefficients: c_0, c_1, ...
+        others: number in q and factor of each further coordinate.
     """
 
     name: str
     driven: int
     driver: int
     coefficients: tuple[SX, ...]
+    others: tuple[tuple[int, SX], ...] = ()
 
-    def value(self, driver: SX) -> SX:
-        """The driven coordinate for a position of the driver."""
-        return sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
+    @property
+    def coordinates(self) -> tuple[int, ...]:
+        """The numbers of all that it relates, the driven one first."""
+        return (self.driven, self.driver, *(number for number, _ in self.others))
+
+    def value(self, q: SX) -> SX:
+        """The driven coordinate for positions of the others."""
+        driver = q[self.driver]
+        led = sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
+        return led + self.shift(q)
+
+    def shift(self, q: SX) -> SX:
+        """What the coordinates beside the driver add to the driven one."""
+        return sum((factor * q[number] for number, factor in self.others), SX(0))
 
 
 # What acts on the tree and constrains nothing: force elements on points and on coordinates.

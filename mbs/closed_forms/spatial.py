@@ -262,7 +262,7 @@ def _brought(ring: Ring, normal: SX) -> Root:
 
 
 def coupled(coupling: CoordinateCoupling, known: Container[int], q: SX) -> Root | str:
-    """The unknown one of two coupled coordinates, or why it does not follow.
+    """The unknown one of coupled coordinates, or why it does not follow.
 
     Args:
         coupling: one of whose coordinates is known.
@@ -270,13 +270,18 @@ def coupled(coupling: CoordinateCoupling, known: Container[int], q: SX) -> Root 
         q: (nq, 1) symbols of positions.
     """
     terms = coupling.coefficients
-    if coupling.driver in known:
-        return Root({"": {coupling.driven: coupling.value(q[coupling.driver])}})
-    if coupling.driven not in known:
-        return "both of its coordinates are unknown"
-    if len(terms) != 2:
+    unknown = [number for number in coupling.coordinates if number not in known]
+    if len(unknown) > 1:
+        return "more than one of its coordinates are unknown"
+    (number,) = unknown
+    if number == coupling.driven:
+        return Root({"": {number: coupling.value(q)}})
+    if number == coupling.driver and len(terms) != 2:
         return "its driver follows from a polynomial that is not of degree one"
-    return Root({"": {coupling.driver: (q[coupling.driven] - terms[0]) / terms[1]}})
+    # linear in the unknown one, whose factor is its slope
+    slope = terms[1] if number == coupling.driver else dict(coupling.others)[number]
+    rest = casadi.substitute(coupling.value(q), q[number], SX(0))
+    return Root({"": {number: (q[coupling.driven] - rest) / slope}})
 
 
 # One joint that brings two centres of a loop to the distance that a rigid link between them

@@ -338,6 +338,20 @@ def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
     return value
 
 
+# Coordinates with a number each, as users write them.
+
+
+def named_scalars(given: Any) -> list[tuple[str, Any]] | None:
+    """The pairs of a name and a scalar that a user wrote; None where they are something else."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        return None
+    pairs = list(given)
+    for pair in pairs:
+        if not (isinstance(pair, (tuple, list)) and len(pair) == 2 and isinstance(pair[0], str)):
+            return None
+    return [(name, value) for name, value in pairs]
+
+
 # Axes as users write them.
 
 

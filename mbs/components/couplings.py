@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from mbs.components.component import Component
+from mbs.components.component import Component, named_scalars
 from mbs.components.joints import Motion
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, to_float
@@ -15,19 +15,22 @@ from mbs.text import quoted
 
 @dataclass(frozen=True, slots=True)
 class Coupling(Component):
-    """A relation between the positions of two joints: driven = sum of c_k driver^k.
+    """A relation between positions of joints: driven = sum of c_k driver^k.
 
-    Gears, mimic joints and joint equalities; one row on the coordinates.
+    Gears, mimic joints and joint equalities; one row on the coordinates. Others may be added, each
+    times a factor, as in a planetary gear.
 
     Attributes:
         driven: name of the coordinate that follows.
         driver: name of the coordinate that leads.
         coefficients: c_0, c_1, ... of the polynomial.
+        others: name and factor of each further coordinate that is added to it.
     """
 
     driven: str = ""
     driver: str = ""
     coefficients: tuple[Scalar, ...] = (0.0, 1.0)
+    others: tuple[tuple[str, Scalar], ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
@@ -38,15 +41,41 @@ class Coupling(Component):
             )
         terms = tuple(expression(c, f"{self.name}, coefficients") for c in self.coefficients)
         object.__setattr__(self, "coefficients", terms)
-        if self.driven == self.driver:
+        object.__setattr__(self, "others", self._checked_others())
+        if self.driven in self.coordinates[1:]:
             raise DescriptionError(
                 f"{self.name}: the coordinate {self.driven!r} cannot follow itself; name two"
             )
+        if len(set(self.coordinates)) < len(self.coordinates):
+            raise DescriptionError(
+                f"{self.name}: {self.driven!r} follows a coordinate of"
+                f" {quoted(self.coordinates[1:])} twice; name each of them once"
+            )
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """The names of all that it relates, the driven one first."""
+        return (self.driven, self.driver, *(name for name, _ in self.others))
+
+    def _checked_others(self) -> tuple[tuple[str, Expression], ...]:
+        """Name and factor of the other coordinates, factors as expressions."""
+        pairs = named_scalars(self.others)
+        if pairs is None:
+            raise DescriptionError(
+                f"{self.name}: others {quoted(self.others)} are not pairs of a coordinate and a"
+                " factor; give them such as (('j3', -0.5),)"
+            )
+        return tuple((n, expression(c, f"{self.name}, factor of {n}")) for n, c in pairs)
 
     def scoped(self, prefix: str) -> Coupling:
         """The same relation inside a mechanism that is placed in another one."""
         inner = Component.scoped(self, prefix)
-        return replace(inner, driven=f"{prefix}.{self.driven}", driver=f"{prefix}.{self.driver}")
+        return replace(
+            inner,
+            driven=f"{prefix}.{self.driven}",
+            driver=f"{prefix}.{self.driver}",
+            others=tuple((f"{prefix}.{name}", factor) for name, factor in inner.others),
+        )
 
 
 # Gears, racks and screws: couplings of coordinates, with the ratio that their names suggest.

@@ -13,10 +13,10 @@ import casadi
 from casadi import SX
 
 from mbs.components.bodies import three
-from mbs.components.component import Component, Point, SymbolTable
+from mbs.components.component import Component, Point, SymbolTable, named_scalars
 from mbs.components.on_points import OnPair, OnPoints
 from mbs.errors import DescriptionError
-from mbs.expressions import Expression, Number, Scalar, to_float, to_sx
+from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
 from mbs.spatial import cross, vector, zeros
 from mbs.text import quoted
 
@@ -613,6 +613,96 @@ class JointFriction(JointForce):
     def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
         """Friction stores nothing."""
         return SX(0)
+
+
+# Tendons that are led over joints without a path in space.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixedTendon(CoordinateForce):
+    """A tendon whose length is x, a sum of joint positions, each times its lever.
+
+    It pulls and pushes: stiffness (x - length) + damping dx/dt + friction tanh(dx/dt / width),
+    and every joint feels its lever times that. With two lengths the spring is slack between them.
+
+    Attributes:
+        levers: name of each coordinate and its lever [m/rad or 1].
+        stiffness: [N/m].
+        length: at which the spring is at rest [m], or (lower, upper) where it is slack between.
+        damping: [N s/m].
+        friction: Coulomb friction [N].
+        width: rate of the length over which Coulomb friction changes sign [m/s].
+    """
+
+    levers: tuple[tuple[str, Scalar], ...]
+    stiffness: Scalar = 0.0
+    length: Any = 0.0
+    damping: Scalar = 0.0
+    friction: Scalar = 0.0
+    width: Scalar = 1e-3
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        object.__setattr__(self, "levers", self._checked_levers())
+        alike = isinstance(self.length, str) or not hasattr(self.length, "__iter__")
+        given = (self.length,) * 2 if alike else tuple(self.length)
+        if len(given) != 2:
+            raise DescriptionError(
+                f"{self.name}: length {quoted(self.length)} is neither one length nor two; give a"
+                " number or (lower, upper)"
+            )
+        ends = tuple(expression(value, f"{self.name}, length") for value in given)
+        low, high = (to_float(end) for end in ends)
+        if low is not None and high is not None and low > high:
+            raise DescriptionError(
+                f"{self.name}: length is ({low:g}, {high:g}); give the smaller one first"
+            )
+        object.__setattr__(self, "length", ends)
+        self._normalise("stiffness", "damping", "friction", "width")
+        self._require_magnitudes("stiffness", "damping", "friction")
+        self._require_positive("width")
+        self._require_effect("stiffness", "damping", "friction")
+
+    @property
+    def needs_position(self) -> bool:
+        """A length is one of positions."""
+        return True
+
+    def scoped(self, prefix: str) -> FixedTendon:
+        """The same tendon inside a mechanism that is placed in another one."""
+        inner = Component.scoped(self, prefix)
+        return replace(inner, levers=tuple((f"{prefix}.{n}", c) for n, c in inner.levers))
+
+    def effort(self, x: SX | None, rate: SX, symbols: SymbolTable) -> SX:
+        """The tension."""
+        assert x is not None
+        total = to_sx(self.stiffness, symbols) * self._stretch(x, symbols)
+        total += to_sx(self.damping, symbols) * rate
+        if self.friction != Number(0.0):
+            width = to_sx(self.width, symbols)
+            total += to_sx(self.friction, symbols) * smooth_sign(rate, width)
+        return total
+
+    def energy(self, x: SX | None, symbols: SymbolTable) -> SX:
+        """Half the stiffness times the square of the stretch."""
+        assert x is not None
+        return 0.5 * to_sx(self.stiffness, symbols) * self._stretch(x, symbols) ** 2
+
+    def _stretch(self, x: SX, symbols: SymbolTable) -> SX:
+        low, high = (to_sx(end, symbols) for end in self.length)
+        if self.length[0] == self.length[1]:
+            return x - low
+        return casadi.fmax(x - high, 0) + casadi.fmin(x - low, 0)
+
+    def _checked_levers(self) -> tuple[tuple[str, Expression], ...]:
+        """The levers as expressions, each coordinate once."""
+        pairs = named_scalars(self.levers) or []
+        if not pairs or len({name for name, _ in pairs}) < len(pairs):
+            raise DescriptionError(
+                f"{self.name}: levers {quoted(self.levers)} are not pairs of a coordinate and a"
+                " lever, each coordinate once; give them such as (('j1', 0.02), ('j2', -0.01))"
+            )
+        return tuple((n, expression(c, f"{self.name}, lever of {n}")) for n, c in pairs)
 
 
 # Contacts along a coordinate of a joint: rigid stops and Coulomb friction that really sticks.

@@ -4,7 +4,8 @@ from mbs.export.c_library import c_library
 from mbs.export.code import code
 from mbs.export.fmu.controller import CController
 from mbs.export.fmu.system_fmu import fmu
+from mbs.export.mjcf import mjcf
 from mbs.export.par import par
 from mbs.export.ssp import ssp
 
-__all__ = ["CController", "c_library", "code", "fmu", "par", "ssp"]
+__all__ = ["CController", "c_library", "code", "fmu", "mjcf", "par", "ssp"]

@@ -1,18 +1,20 @@
 """MJCF model files, read through MuJoCo as mechanisms.
 
 The file is compiled by MuJoCo, so that defaults, frames, angle units, orientations and inertias
-from geoms are what MuJoCo makes of them; the mechanism is built from the compiled model. Geoms of
-bodies whose inertia is given are taken out before, with the assets they use, so that meshes may
-be missing. Contacts, cameras, sensors and keyframes are not read.
+from geoms are what MuJoCo makes of them; the mechanism is built from the compiled model. What has
+no part in the motion, such as meshes of bodies whose inertia is given, textures and sensors, is
+taken out before with all that refers to it, so that its files may be missing. Contacts are not
+read.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -21,6 +23,8 @@ from mbs.components import (
     Body,
     Coupling,
     Fixed,
+    FixedTendon,
+    Force,
     Free,
     Joint,
     Mechanism,
@@ -28,12 +32,15 @@ from mbs.components import (
     Prismatic,
     Revolute,
     RigidBody,
+    Rod,
     Spherical,
+    Spring,
 )
 from mbs.errors import DescriptionError
 from mbs.formats.files import component_name
+from mbs.formats.notes import Notes
 from mbs.formats.urdf import parse_xml
-from mbs.text import install_command
+from mbs.text import install_command, quoted
 
 # What the flags of an MJCF file switch off.
 #
@@ -138,60 +145,117 @@ class MjcfModel:
     Attributes:
         mujoco: the module.
         data: the mujoco.MjModel.
-        path: of the file, for messages.
-        bodies, joints, sites, equalities: names, by MuJoCo's numbers.
-        acting: numbers of the actuators that are not switched off and act on a joint.
+        notes: what is said of the file; `notes.path` is its path.
+        bodies, joints, sites, equalities, tendons: names, by MuJoCo's numbers.
+        acting: numbers of the actuators that are not switched off.
         flags: what acts in the model.
+        locked: positions of the joints that do not move, since equalities lock them [rad or m],
+            or since their roots are fixed.
     """
 
     mujoco: Any
     data: Any
-    path: str
+    notes: Notes
     bodies: tuple[str, ...]
     joints: tuple[str, ...]
     sites: tuple[str, ...]
     equalities: tuple[str, ...]
+    tendons: tuple[str, ...]
     acting: tuple[int, ...]
     flags: Flags
+    locked: Mapping[int, float]
 
     @staticmethod
-    def of(mujoco: Any, model: Any, path: str) -> MjcfModel:
+    def of(mujoco: Any, model: Any, notes: Notes) -> MjcfModel:
         """The model with its names made fit for components, each of them used once."""
-        bodies = _names((model.body(k).name for k in range(model.nbody)), "body")
-        joints = tuple(
-            component_name(model.joint(j).name) or _joint_name(model, j, bodies)
-            for j in range(model.njnt)
+        taken = {"base", "world"}
+        plain = _names((model.body(k).name for k in range(model.nbody)), "body")
+
+        def distinct(kind: str, given: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
+            found = tuple(_apart(name, taken, kind) for name in wanted)
+            for old, new in zip(given, found, strict=True):
+                if old and old != new:
+                    notes.add("renamed", f"{kind} {quoted(old)}", f"its name here is {new!r}")
+            return found
+
+        def of_kind(kind: str, count: int, entry: Any) -> tuple[str, ...]:
+            given = [entry(k).name for k in range(count)]
+            return distinct(kind, given, _names(given, kind))
+
+        given = [model.joint(j).name for j in range(model.njnt)]
+        joints = distinct(
+            "joint",
+            given,
+            [component_name(name) or _joint_name(model, j, plain) for j, name in enumerate(given)],
         )
-        bodies = tuple(_apart(name, {*joints, "base"}, "body") for name in bodies)
-        sites = _names((model.site(k).name for k in range(model.nsite)), "site")
-        taken = {*bodies, *joints, "base"}
+        given = [model.body(k).name for k in range(1, model.nbody)]
+        bodies = ("world", *distinct("body", given, plain[1:]))
         flags = Flags.of(mujoco, model)
-        return MjcfModel(
+        mjcf = MjcfModel(
             mujoco,
             model,
-            path,
+            notes,
             bodies,
             joints,
-            tuple(_apart(name, taken, "site") for name in sites),
-            _names((model.eq(k).name for k in range(model.neq)), "equality"),
-            tuple(
-                k
-                for k in range(model.nu)
-                if int(model.actuator_trntype[k]) in joint_transmissions(mujoco)
-                and flags.drives(int(model.actuator_group[k]))
-            ),
+            of_kind("site", model.nsite, model.site),
+            of_kind("equality", model.neq, model.eq),
+            of_kind("tendon", model.ntendon, model.tendon),
+            tuple(k for k in range(model.nu) if flags.drives(int(model.actuator_group[k]))),
             flags,
+            {},
         )
+        return replace(mjcf, locked=_locked(mjcf))
 
-    def actuators_of(self, j: int) -> list[int]:
-        """Numbers of the actuators that act on joint j."""
-        return [k for k in self.acting if int(self.data.actuator_trnid[k, 0]) == j]
+    @property
+    def path(self) -> str:
+        """Of the file, for messages."""
+        return self.notes.path
 
+    def refuse(self, what: str, remedy: str = "take it out of the file") -> NoReturn:
+        """Refuse the file for something of it."""
+        raise DescriptionError(f"{self.path}: {what}; {remedy}")
 
-def joint_transmissions(mujoco: Any) -> tuple[int, ...]:
-    """The ways in which an actuator acts on a joint."""
-    kinds = mujoco.mjtTrn
-    return int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)
+    def has_one_axis(self, j: int) -> bool:
+        """Whether joint j is a hinge or slide."""
+        kinds = self.mujoco.mjtJoint
+        return int(self.data.jnt_type[j]) in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE))
+
+    def drawn(self, j: int) -> float:
+        """The position of a hinge or slide as the file draws it [rad or m]."""
+        return float(self.data.qpos0[self.data.jnt_qposadr[j]])
+
+    def terms(self, k: int) -> dict[int, float] | None:
+        """The factor of every joint in the length of a fixed tendon; None for a spatial one."""
+        found: dict[int, float] = {}
+        first = int(self.data.tendon_adr[k])
+        for w in range(first, first + int(self.data.tendon_num[k])):
+            if int(self.data.wrap_type[w]) != int(self.mujoco.mjtWrap.mjWRAP_JOINT):
+                return None
+            j = int(self.data.wrap_objid[w])
+            found[j] = found.get(j, 0.0) + float(self.data.wrap_prm[w])
+        return found
+
+    def path_bodies(self, k: int) -> list[int]:
+        """The bodies that a spatial tendon is led over."""
+        kinds = self.mujoco.mjtWrap
+        first = int(self.data.tendon_adr[k])
+        found = []
+        for w in range(first, first + int(self.data.tendon_num[k])):
+            kind, number = int(self.data.wrap_type[w]), int(self.data.wrap_objid[w])
+            if kind == int(kinds.mjWRAP_SITE):
+                found.append(int(self.data.site_bodyid[number]))
+            elif kind in (int(kinds.mjWRAP_SPHERE), int(kinds.mjWRAP_CYLINDER)):
+                found.append(int(self.data.geom_bodyid[number]))
+        return found
+
+    def joints_above(self, k: int) -> set[int]:
+        """The joints that move body k."""
+        found: set[int] = set()
+        while k:
+            first = int(self.data.body_jntadr[k])
+            found |= set(range(first, first + int(self.data.body_jntnum[k])))
+            k = int(self.data.body_parentid[k])
+        return found - self.locked.keys()
 
 
 def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:
@@ -224,17 +288,92 @@ def _joint_name(model: Any, j: int, bodies: tuple[str, ...]) -> str:
     return f"{bodies[k]}_joint" if alone else f"{bodies[k]}_joint{j - model.body_jntadr[k] + 1}"
 
 
-def _apart(name: str, taken: Iterable[str], kind: str) -> str:
-    return f"{name}_{kind}" if name in taken else name
+def _apart(name: str, taken: set[str], kind: str) -> str:
+    """The name, made different from those taken, which it joins."""
+    if name in taken:
+        name = f"{name}_{kind}"
+    found, number = name, 2
+    while found in taken:
+        found, number = f"{name}{number}", number + 1
+    taken.add(found)
+    return found
 
 
-# What the actuators of a compiled MuJoCo model can give a joint.
+# The actuators of a compiled MuJoCo model: what they drive, and what they can give a joint.
 
 
 _Range = tuple[float, float]
 
 
-def effort_range(mjcf: MjcfModel, j: int) -> _Range | None:
+def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
+    """For each joint the actuators that drive it, and how much effort it gets of a unit of force.
+
+    A fixed tendon drives its joints by its coefficients; a spatial one, and the rod of a
+    slider-crank, all joints between the bodies that it is led over, by factors that depend on the
+    configuration and are None here. Forces on sites and bodies drive no joint.
+    """
+    model, kinds = mjcf.data, mjcf.mujoco.mjtTrn
+    found: dict[int, dict[int, float | None]] = {}
+    for k in mjcf.acting:
+        kind, number = int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])
+        gear = float(model.actuator_gear[k, 0])
+        shares: dict[int, float | None] = {}
+        if kind in (int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)):
+            shares = {number: gear}
+        elif kind == int(kinds.mjTRN_TENDON):
+            terms = mjcf.terms(number)
+            if terms is None:
+                shares = dict.fromkeys(_between_bodies(mjcf, mjcf.path_bodies(number)))
+            else:
+                shares = {j: gear * factor for j, factor in terms.items()}
+        elif kind == int(kinds.mjTRN_SLIDERCRANK):
+            sites = (int(site) for site in model.actuator_trnid[k])
+            shares = dict.fromkeys(
+                _between_bodies(mjcf, [int(model.site_bodyid[site]) for site in sites])
+            )
+        for j, share in shares.items():
+            found.setdefault(j, {})[k] = share
+        _note_actuator(mjcf, k, sorted(shares))
+    return found
+
+
+def _between_bodies(mjcf: MjcfModel, bodies: Sequence[int]) -> set[int]:
+    """The joints that move some of the bodies and not all of them."""
+    above = [mjcf.joints_above(k) for k in bodies]
+    some: set[int] = set()
+    return some.union(*above) - above[0].intersection(*above) if above else some
+
+
+def _note_actuator(mjcf: MjcfModel, k: int, joints: Sequence[int]) -> None:
+    """Say what of an actuator is not in the mechanism."""
+    model, kinds = mjcf.data, mjcf.mujoco.mjtTrn
+    element = f"actuator {quoted(model.actuator(k).name or k)}"
+    kind = int(model.actuator_trntype[k])
+    names = ", ".join(repr(mjcf.joints[j]) for j in joints)
+    if kind in (int(kinds.mjTRN_TENDON), int(kinds.mjTRN_SLIDERCRANK)):
+        mjcf.notes.add(
+            "ignored",
+            element,
+            f"it drives the joints {names} together; each of them has an effort of its own here",
+        )
+    elif not joints:
+        mjcf.notes.add(
+            "ignored",
+            element,
+            "it acts on a site or a body, not on a joint; give its force as f_ext of the models",
+        )
+    if not _is_plain(mjcf, k):
+        mjcf.notes.add(
+            "ignored",
+            element,
+            "its gain, bias and dynamics say how a command becomes an effort, which is the input"
+            " here; write its law as tau of a simulation",
+        )
+
+
+def effort_range(
+    mjcf: MjcfModel, j: int, acting: Mapping[int, float | None]
+) -> tuple[float, float] | None:
     """(lower, upper) of the effort of joint j [N m or N], None where it is not limited.
 
     The sum of the forcerange of its actuators times their gear, within the actuatorfrcrange of the
@@ -244,16 +383,16 @@ def effort_range(mjcf: MjcfModel, j: int) -> _Range | None:
     Args:
         mjcf: the model.
         j: number of a hinge or slide.
+        acting: the actuators that drive it, and their shares.
     """
     model = mjcf.data
-    lower, upper = 0.0, 0.0
-    acting = mjcf.actuators_of(j)
-    for k in acting:
-        gear = float(model.actuator_gear[k, 0])
-        ends = sorted(gear * end for end in _force(mjcf, k)) if gear else (0.0, 0.0)
+    lower, upper = (0.0, 0.0) if acting else (-math.inf, math.inf)
+    for k, share in acting.items():
+        if share is None:
+            ends = [-math.inf, math.inf]
+        else:
+            ends = sorted(share * end for end in _force(mjcf, k)) if share else [0.0, 0.0]
         lower, upper = lower + ends[0], upper + ends[1]
-    if not acting:
-        lower, upper = -math.inf, math.inf
     if model.jnt_actfrclimited[j]:
         least, largest = (float(end) for end in model.jnt_actfrcrange[j])
         lower, upper = max(lower, least), min(upper, largest)
@@ -261,18 +400,23 @@ def effort_range(mjcf: MjcfModel, j: int) -> _Range | None:
     return (lower, upper) if limited and lower <= 0 <= upper and lower < upper else None
 
 
-def _force(mjcf: MjcfModel, k: int) -> _Range:
-    """What actuator k gives before its gear."""
+def _is_plain(mjcf: MjcfModel, k: int) -> bool:
+    """Whether actuator k is a motor: its force is a multiple of its control."""
     model, kinds = mjcf.data, mjcf.mujoco
-    low, high = -math.inf, math.inf
-    if model.actuator_forcelimited[k]:
-        low, high = (float(end) for end in model.actuator_forcerange[k])
-    plain = (
+    return (
         int(model.actuator_gaintype[k]) == int(kinds.mjtGain.mjGAIN_FIXED)
         and int(model.actuator_biastype[k]) == int(kinds.mjtBias.mjBIAS_NONE)
         and int(model.actuator_dyntype[k]) == int(kinds.mjtDyn.mjDYN_NONE)
     )
-    if plain and model.actuator_ctrllimited[k] and mjcf.flags.control_ranges:
+
+
+def _force(mjcf: MjcfModel, k: int) -> _Range:
+    """What actuator k gives before its gear."""
+    model = mjcf.data
+    low, high = -math.inf, math.inf
+    if model.actuator_forcelimited[k]:
+        low, high = (float(end) for end in model.actuator_forcerange[k])
+    if _is_plain(mjcf, k) and model.actuator_ctrllimited[k] and mjcf.flags.control_ranges:
         gain = float(model.actuator_gainprm[k, 0])
         ends = sorted(gain * float(end) for end in model.actuator_ctrlrange[k])
         low, high = max(low, ends[0]), min(high, ends[1])
@@ -282,85 +426,223 @@ def _force(mjcf: MjcfModel, k: int) -> _Range:
 # Joints of a compiled MuJoCo model.
 
 
-def add_joints(mechanism: Mechanism, mjcf: MjcfModel, k: int, parent: Point) -> None:
-    """Connect body k, which the mechanism has already, to its parent by its joints.
+class Joints:
+    """Adds the joints of a model to a mechanism.
 
-    A body without joints is welded. Several joints follow one another from the parent to the
-    body, with a body without mass between any two of them.
+    Attributes:
+        mechanism: that they join.
+        mjcf: the model.
+        base: "fixed" welds free roots to the world, "free" frees those without joints.
+        acting: for each joint the actuators that drive it.
     """
-    model = mjcf.data
-    body = mechanism.components[mjcf.bodies[k]]
-    assert isinstance(body, RigidBody)
-    point = placed(parent, model.body_pos[k], model.body_quat[k])
-    first = int(model.body_jntadr[k])
-    joints = range(first, first + int(model.body_jntnum[k]))
-    if not joints:
-        mechanism.connect(point, body)
-    for j in joints:
-        moved = body if j == joints[-1] else mechanism.add(_between(mjcf, k, j))
-        joint = _joint(mjcf, j)
-        if isinstance(joint, Free):
-            mechanism.connect(parent, joint, moved)
+
+    def __init__(self, mechanism: Mechanism, mjcf: MjcfModel, base: Base) -> None:
+        self.mechanism, self.mjcf, self.base = mechanism, mjcf, base
+        self.acting = drives(mjcf)
+
+    def connect(self, k: int, parent: Point) -> None:
+        """Connect body k, which the mechanism has already, to its parent by its joints.
+
+        A body without joints is welded. Several joints follow one another from the parent to the
+        body, with a body without mass between any two of them.
+        """
+        mjcf, mechanism = self.mjcf, self.mechanism
+        model = mjcf.data
+        body = mechanism.components[mjcf.bodies[k]]
+        assert isinstance(body, RigidBody)
+        point = placed(parent, model.body_pos[k], model.body_quat[k])
+        first = int(model.body_jntadr[k])
+        joints = range(first, first + int(model.body_jntnum[k]))
+        if not joints and self.base == "free" and _is_root(mjcf, k):
+            name = unused_name(mechanism, mjcf, FREE_JOINT)
+            mechanism.connect(parent, Free(name), body)
+            drawn = [*model.body_pos[k], *model.body_quat[k]]
+            suffixes = (*"xyz", *_QUATERNION)
+            mechanism.guess |= {
+                f"{name}.{x}": float(value) for x, value in zip(suffixes, drawn, strict=True)
+            }
+            return
+        if not joints:
+            mechanism.connect(point, body)
+        for j in joints:
+            moved = body
+            if j != joints[-1]:
+                name = unused_name(mechanism, mjcf, f"{mjcf.bodies[k]}_{mjcf.joints[j]}")
+                moved = mechanism.add(Body(name))
+            self._connect(j, parent, point, moved)
+            point = moved.frame
+
+    def _connect(self, j: int, parent: Point, point: Point, moved: RigidBody) -> None:
+        """Put joint j between the frame of its parent as it is drawn and the body it moves."""
+        mjcf, mechanism = self.mjcf, self.mechanism
+        if mjcf.mujoco.mjtJoint(int(mjcf.data.jnt_type[j])) == mjcf.mujoco.mjtJoint.mjJNT_FREE:
+            if self.base == "fixed":
+                mechanism.connect(point, moved)
+            else:
+                mechanism.connect(parent, self._joint(j), moved)
+            return
+        x, y, z = (float(value) for value in mjcf.data.jnt_pos[j])
+        at, anchor = point.at(x, y, z), moved.at(x, y, z)
+        if j in mjcf.locked:
+            mechanism.connect(_displaced(mjcf, j, at, mjcf.locked[j] - mjcf.drawn(j)), anchor)
+        elif mjcf.has_one_axis(j):
+            joint = self._joint(j)
+            mechanism.connect(_displaced(mjcf, j, at, -mjcf.drawn(j)), joint, anchor)
         else:
-            x, y, z = (float(value) for value in model.jnt_pos[j])
-            mechanism.connect(_referred(mjcf, j, point.at(x, y, z)), joint, moved.at(x, y, z))
-        point = moved.frame
+            mechanism.connect(at, self._joint(j), anchor)
+
+    def _joint(self, j: int) -> Joint:
+        mjcf = self.mjcf
+        model, kinds, flags = mjcf.data, mjcf.mujoco.mjtJoint, mjcf.flags
+        kind, dof = kinds(int(model.jnt_type[j])), int(model.jnt_dofadr[j])
+        acting = self.acting.get(j, {})
+        common: dict[str, Any] = {
+            "name": mjcf.joints[j],
+            "actuated": bool(acting) if model.nu else None,
+            "Ia": float(model.dof_armature[dof]),
+            "Fv": float(model.dof_damping[dof]) if flags.dampers else 0.0,
+            "Fs": float(model.dof_frictionloss[dof]) if flags.friction else 0.0,
+        }
+        if kind == kinds.mjJNT_FREE:
+            return Free(**{**common, "actuated": bool(acting)})
+        limited = model.jnt_limited[j] and flags.limits
+        if kind == kinds.mjJNT_BALL:
+            if limited:
+                mjcf.notes.add(
+                    "ignored",
+                    f"joint {common['name']!r}",
+                    "it has a range, and a ball joint has not one position that it could limit",
+                )
+            return Spherical(**common)
+        if limited:
+            common["limits"] = tuple(float(value) for value in model.jnt_range[j])
+        common["effort"] = effort_range(mjcf, j, acting)
+        if model.jnt_stiffness[j] and flags.springs:
+            common["stiffness"] = float(model.jnt_stiffness[j])
+            common["rest"] = float(model.qpos_spring[model.jnt_qposadr[j]])
+        axis = tuple(float(value) for value in model.jnt_axis[j])
+        one_axis = Revolute if kind == kinds.mjJNT_HINGE else Prismatic
+        return one_axis(axis=axis, **common)
 
 
-def _between(mjcf: MjcfModel, k: int, j: int) -> Body:
-    return Body(f"{mjcf.bodies[k]}_{mjcf.joints[j]}")
+def unused_name(mechanism: Mechanism, mjcf: MjcfModel, name: str) -> str:
+    """The name, with a number where something of the mechanism or of the file has it."""
+    known = {*mjcf.bodies, *mjcf.joints, *mjcf.sites, *mjcf.equalities, *mjcf.tendons}
+    found, number = name, 2
+    while found in known or found in mechanism.components:
+        found, number = f"{name}{number}", number + 1
+    return found
 
 
-def _joint(mjcf: MjcfModel, j: int) -> Joint:
-    model, kinds, flags = mjcf.data, mjcf.mujoco.mjtJoint, mjcf.flags
-    kind, dof = kinds(int(model.jnt_type[j])), int(model.jnt_dofadr[j])
-    driven = bool(mjcf.actuators_of(j))
-    common: dict[str, Any] = {
-        "name": mjcf.joints[j],
-        "actuated": driven if model.nu else None,
-        "Ia": float(model.dof_armature[dof]),
-        "Fv": float(model.dof_damping[dof]) if flags.dampers else 0.0,
-        "Fs": float(model.dof_frictionloss[dof]) if flags.friction else 0.0,
-    }
-    if kind == kinds.mjJNT_FREE:
-        return Free(**{**common, "actuated": driven})
-    if kind == kinds.mjJNT_BALL:
-        return Spherical(**common)
-    if model.jnt_limited[j] and flags.limits:
-        common["limits"] = tuple(float(value) for value in model.jnt_range[j])
-    common["effort"] = effort_range(mjcf, j)
-    if model.jnt_stiffness[j] and flags.springs:
-        common["stiffness"] = float(model.jnt_stiffness[j])
-        common["rest"] = float(model.qpos_spring[model.jnt_qposadr[j]])
-    axis = tuple(float(value) for value in model.jnt_axis[j])
-    one_axis = Revolute if kind == kinds.mjJNT_HINGE else Prismatic
-    return one_axis(axis=axis, **common)
+def _free_joints(mjcf: MjcfModel) -> list[int]:
+    free = int(mjcf.mujoco.mjtJoint.mjJNT_FREE)
+    return [j for j in range(mjcf.data.njnt) if int(mjcf.data.jnt_type[j]) == free]
 
 
-def _referred(mjcf: MjcfModel, j: int, point: Point) -> Point:
-    """The frame moved back by `ref`, the position that the joint has as it is drawn."""
-    model, kinds = mjcf.data, mjcf.mujoco.mjtJoint
-    kind = kinds(int(model.jnt_type[j]))
-    if kind == kinds.mjJNT_BALL:
+def _is_root(mjcf: MjcfModel, k: int) -> bool:
+    """Whether body k stands in the world and is moved by nobody."""
+    return int(mjcf.data.body_parentid[k]) == 0 and int(mjcf.data.body_mocapid[k]) < 0
+
+
+def _displaced(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
+    """The frame moved along or about the axis of a hinge or slide [rad or m]."""
+    if position == 0:
         return point
-    ref = float(model.qpos0[model.jnt_qposadr[j]])
-    axis = np.array(model.jnt_axis[j], dtype=float)
-    if ref == 0:
-        return point
-    if kind == kinds.mjJNT_SLIDE:
-        x, y, z = (float(value) for value in -ref * axis)
+    axis = np.array(mjcf.data.jnt_axis[j], dtype=float)
+    kinds = mjcf.mujoco.mjtJoint
+    if kinds(int(mjcf.data.jnt_type[j])) == kinds.mjJNT_SLIDE:
+        x, y, z = (float(value) for value in position * axis)
         return point.at(x, y, z)
-    half = -ref / 2
+    half = position / 2
     turn = matrix_of([math.cos(half), *(math.sin(half) * axis)])
     return point.at(rotation=turn.tolist())
 
 
-# Equality constraints of a compiled MuJoCo model: closing joints and couplings.
+# Equality constraints of a compiled MuJoCo model: closing joints, couplings, locked joints.
+
+
+def _equalities(mjcf: MjcfModel) -> Iterator[tuple[int, Any]]:
+    """Number and kind of the equalities that act."""
+    kinds = mjcf.mujoco.mjtEq
+    for k in range(mjcf.data.neq if mjcf.flags.equalities else 0):
+        if mjcf.data.eq_active0[k]:
+            yield k, kinds(int(mjcf.data.eq_type[k]))
+
+
+def _locked(mjcf: MjcfModel) -> dict[int, float]:
+    """Positions of the joints that equalities lock, and of those that these lead [rad or m]."""
+    kinds = mjcf.mujoco.mjtEq
+    found: dict[int, float] = {}
+    linear = [_linear(mjcf, k, kind) for k, kind in _equalities(mjcf)]
+    couplings = [
+        (mjcf.equalities[k], _polynomial(mjcf, k), *_joints_of(mjcf, k))
+        for k, kind in _equalities(mjcf)
+        if kind == kinds.mjEQ_JOINT and int(mjcf.data.eq_obj2id[k]) >= 0
+    ]
+    changed = True
+    while changed:
+        before = len(found)
+        for row in linear:
+            left = {j: c for j, c in (row.terms if row else {}).items() if j not in found}
+            if row and len(left) == 1:
+                ((j, factor),) = left.items()
+                known = sum(c * found[i] for i, c in row.terms.items() if i in found)
+                found[j] = (row.value - known) / factor
+        for _, polynomial, driven, driver in couplings:
+            if driver in found and driven not in found:
+                found[driven] = float(polynomial(found[driver]))
+        changed = len(found) > before
+    for name, polynomial, driven, driver in couplings:
+        if driven in found and driver not in found:
+            near = mjcf.drawn(driver)
+            roots = (polynomial - found[driven]).roots()
+            real = [float(root.real) for root in roots if abs(root.imag) < _REAL]
+            if not real:
+                mjcf.refuse(f"equality {name!r} is met at no position of {mjcf.joints[driver]!r}")
+            found[driver] = min(real, key=lambda root: abs(root - near))
+    for j, value in found.items():
+        mjcf.notes.add(
+            "ignored",
+            f"joint {mjcf.joints[j]!r}",
+            f"an equality locks it at {value:.6g}; its two bodies are welded together there",
+        )
+    return found
+
+
+_REAL = 1e-9
+"""Imaginary part [rad or m] of a root that is real but for rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """Sum of factors times positions of hinges and slides = value."""
+
+    terms: dict[int, float]
+    value: float
+
+
+def _linear(mjcf: MjcfModel, k: int, kind: Any) -> _Row | None:
+    """What an equality says, where that is linear; None for the others, and for two joints."""
+    model, kinds = mjcf.data, mjcf.mujoco.mjtEq
+    one, two = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+    constant, slope, *higher = (float(value) for value in model.eq_data[k, :5])
+    if kind == kinds.mjEQ_JOINT and two < 0:
+        return _Row({one: 1.0}, constant + mjcf.drawn(one))
+    if kind != kinds.mjEQ_TENDON:
+        return None
+    lengths = [float(value) for value in model.tendon_length0]
+    terms, others = mjcf.terms(one), {} if two < 0 else mjcf.terms(two)
+    if terms is None or others is None or (two >= 0 and any(higher)):
+        return None
+    for j, factor in others.items():
+        terms[j] = terms.get(j, 0.0) - slope * factor
+    value = lengths[one] + constant - (slope * lengths[two] if two >= 0 else 0.0)
+    return _Row({j: factor for j, factor in terms.items() if factor}, value)
 
 
 def add_closures(
     mechanism: Mechanism, mjcf: MjcfModel, bodies: Sequence[Point], sites: Sequence[Point]
-) -> None:
+) -> list[int]:
     """Add what the active equalities say, and open the loops there.
 
     Args:
@@ -369,23 +651,54 @@ def add_closures(
         bodies: the frames of the bodies, the world first.
         sites: the frames of the sites.
 
+    Returns:
+        the equalities that are there now.
+
     Raises:
         DescriptionError: an equality is of a kind that mbs does not model.
     """
-    model, kinds = mjcf.data, mjcf.mujoco.mjtEq
-    if not mjcf.flags.equalities:
-        return
-    for k in range(model.neq):
-        kind = kinds(int(model.eq_type[k]))
-        if not model.eq_active0[k]:
-            continue
-        if kind == kinds.mjEQ_JOINT:
-            mechanism.add(_coupling(mjcf, k))
+    kinds = mjcf.mujoco.mjtEq
+    taken = []
+    for k, kind in _equalities(mjcf):
+        if kind == kinds.mjEQ_JOINT and int(mjcf.data.eq_obj2id[k]) >= 0:
+            if not mjcf.locked.keys() & set(_joints_of(mjcf, k)):
+                mechanism.add(_coupling(mjcf, k))
+                taken.append(k)
+        elif kind in (kinds.mjEQ_JOINT, kinds.mjEQ_TENDON):
+            row = _linear(mjcf, k, kind)
+            if row is None:
+                a, rod, b = _rod(mjcf, k, sites)
+                mechanism.connect(a, rod, b)
+                taken.append(k)
+            elif row.terms.keys() - mjcf.locked.keys():
+                mechanism.add(_linear_coupling(mjcf, k, row))
+                taken.append(k)
         elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
-            _close(mechanism, mjcf, k, bodies, sites)
+            if _close(mechanism, mjcf, k, bodies, sites):
+                taken.append(k)
         else:
             name = kind.name.removeprefix("mjEQ_").lower()
-            _refuse(mjcf, k, f"it is of the kind {name}; only connect, weld and joint are read")
+            mjcf.refuse(
+                f"equality {mjcf.equalities[k]!r}: it is of the kind {name}; only connect, weld,"
+                " joint and tendon are read"
+            )
+    return taken
+
+
+def _rod(mjcf: MjcfModel, k: int, sites: Sequence[Point]) -> tuple[Point, Rod, Point]:
+    """The two ends and the rod that an equality makes of a spatial tendon between two sites."""
+    model, name = mjcf.data, mjcf.equalities[k]
+    tendon = int(model.eq_obj1id[k])
+    ends = _two_sites(mjcf, tendon) if mjcf.terms(tendon) is None else None
+    if int(model.eq_obj2id[k]) >= 0 or ends is None:
+        mjcf.refuse(
+            f"equality {name!r} is not linear, or ties spatial tendons that are more than a line"
+            " between two sites, which mbs does not model"
+        )
+    length = float(model.tendon_length0[tendon]) + float(model.eq_data[k, 0])
+    if length <= 0:
+        mjcf.refuse(f"equality {name!r} keeps a tendon at the length {length:g} m")
+    return sites[ends[0]], Rod(name, length=length), sites[ends[1]]
 
 
 def _close(
@@ -394,57 +707,272 @@ def _close(
     k: int,
     bodies: Sequence[Point],
     sites: Sequence[Point],
-) -> None:
+) -> bool:
+    """Close a loop by a connect or a weld; whether there is one to close."""
     model, mujoco = mjcf.data, mjcf.mujoco
     one, two = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
     values = [float(value) for value in model.eq_data[k]]
-    spherical = mujoco.mjtEq(int(model.eq_type[k])) == mujoco.mjtEq.mjEQ_CONNECT
-    if int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE):
+    of_sites = int(model.eq_objtype[k]) == int(mujoco.mjtObj.mjOBJ_SITE)
+    joined = [int(model.site_bodyid[i]) if of_sites else i for i in (one, two)]
+    is_weld = mujoco.mjtEq(int(model.eq_type[k])) == mujoco.mjtEq.mjEQ_WELD
+    element = f"equality {mjcf.equalities[k]!r}"
+    for i in joined:
+        if _is_moved(mjcf, i):
+            mjcf.notes.add(
+                "ignored",
+                element,
+                f"it ties a body to {mjcf.bodies[i]!r}, which is moved from outside (mocap)",
+            )
+            return False
+    if not set.symmetric_difference(*(mjcf.joints_above(i) for i in joined)):
+        mjcf.notes.add("ignored", element, "it joins two bodies that never move apart")
+        return False
+    # a weld whose torquescale is zero has no rows for the rotation
+    spherical = not is_weld or values[10] == 0
+    if of_sites:
         a, b = sites[one], sites[two]
-    elif spherical:
-        a, b = bodies[one].at(*values[:3]), bodies[two].at(*values[3:6])
-    else:
+    elif is_weld:
         a, b = placed(bodies[one], values[3:6], values[6:10]), bodies[two].at(*values[:3])
+        if spherical:
+            a = bodies[one].at(*values[3:6])
+    else:
+        a, b = bodies[one].at(*values[:3]), bodies[two].at(*values[3:6])
     joint = (Spherical if spherical else Fixed)(mjcf.equalities[k], actuated=False)
     mechanism.connect(a, joint, b)
     mechanism.cut(joint)
+    return True
+
+
+def _is_moved(mjcf: MjcfModel, k: int) -> bool:
+    """Whether body k or one that carries it is a mocap body."""
+    return int(mjcf.data.body_mocapid[mjcf.data.body_rootid[k]]) >= 0 and k > 0
+
+
+def _joints_of(mjcf: MjcfModel, k: int) -> tuple[int, int]:
+    """The driven and the driving joint of an equality of joints."""
+    return int(mjcf.data.eq_obj1id[k]), int(mjcf.data.eq_obj2id[k])
+
+
+def _polynomial(mjcf: MjcfModel, k: int) -> Polynomial:
+    """Position of the driven joint of an equality by that of the driving one [rad or m].
+
+    Y - y0 = sum of a_k (x - x0)^k, about the positions in which the joints are drawn.
+    """
+    y0, x0 = (mjcf.drawn(j) for j in _joints_of(mjcf, k))
+    return Polynomial(mjcf.data.eq_data[k, :5])(Polynomial([-x0, 1.0])) + y0
 
 
 def _coupling(mjcf: MjcfModel, k: int) -> Coupling:
-    """Y - y0 = sum of a_k (x - x0)^k, about the positions in which the joints are drawn."""
-    model, kinds = mjcf.data, mjcf.mujoco.mjtJoint
-    driven, driver = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-    if driver < 0:
-        _refuse(mjcf, k, f"it locks joint {mjcf.joints[driven]!r}; leave the joint out instead")
-    for j in (driven, driver):
-        if kinds(int(model.jnt_type[j])) not in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE):
-            _refuse(mjcf, k, f"joint {mjcf.joints[j]!r} has not one axis; couple hinges and slides")
-    y0, x0 = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (driven, driver))
-    polynomial = Polynomial(model.eq_data[k, :5])(Polynomial([-x0, 1.0])) + y0
-    coefficients = [float(c) for c in polynomial.trim().coef]
+    driven, driver = (mjcf.joints[j] for j in _joints_of(mjcf, k))
+    coefficients = tuple(float(c) for c in _polynomial(mjcf, k).trim().coef)
+    return Coupling(mjcf.equalities[k], driven, driver, coefficients)
+
+
+def _linear_coupling(mjcf: MjcfModel, k: int, row: _Row) -> Coupling:
+    """The joint of the largest factor follows the others."""
+    value = row.value - sum(c * mjcf.locked[j] for j, c in row.terms.items() if j in mjcf.locked)
+    moving = {j: c for j, c in row.terms.items() if j not in mjcf.locked}
+    driven = max(moving, key=lambda j: abs(moving[j]))
+    scale = moving.pop(driven)
+    ratios = [(mjcf.joints[j], -factor / scale) for j, factor in moving.items()]
+    (driver, ratio), *others = ratios
     return Coupling(
-        mjcf.equalities[k], mjcf.joints[driven], mjcf.joints[driver], tuple(coefficients)
+        mjcf.equalities[k],
+        mjcf.joints[driven],
+        driver,
+        (value / scale, ratio),
+        others=tuple(others),
     )
 
 
-def _refuse(mjcf: MjcfModel, k: int, reason: str) -> None:
-    raise DescriptionError(f"{mjcf.path}: equality {mjcf.equalities[k]!r}: {reason}")
+# Forces of a compiled MuJoCo model: tendons and gravity compensation.
+
+
+def add_forces(
+    mechanism: Mechanism, mjcf: MjcfModel, bodies: Sequence[Point], sites: Sequence[Point]
+) -> None:
+    """Add tendons that pull, and the forces that compensate the weight of bodies.
+
+    Args:
+        mechanism: with all bodies and joints of the model.
+        mjcf: the model.
+        bodies: the frames of the bodies, the world first.
+        sites: the frames of the sites.
+
+    Raises:
+        DescriptionError: a spatial tendon that pulls is more than a line between two sites.
+    """
+    for k, name in enumerate(mjcf.tendons):
+        _add_tendon(mechanism, mjcf, k, name, sites)
+    if mjcf.flags.passive and mjcf.flags.gravity:
+        for k in range(1, mjcf.data.nbody):
+            _add_compensation(mechanism, mjcf, k, bodies[k])
+
+
+def _add_tendon(
+    mechanism: Mechanism, mjcf: MjcfModel, k: int, name: str, sites: Sequence[Point]
+) -> None:
+    model, flags = mjcf.data, mjcf.flags
+    if model.tendon_limited[k] and flags.limits:
+        mjcf.notes.add(
+            "ignored", f"tendon {name!r}", "it has a range, and only joints have limits here"
+        )
+    stiffness = float(model.tendon_stiffness[k]) if flags.springs else 0.0
+    # a number before MuJoCo 3.7, the first of a polynomial since
+    damping = float(np.ravel(model.tendon_damping[k])[0]) if flags.dampers else 0.0
+    friction = float(model.tendon_frictionloss[k]) if flags.friction else 0.0
+    if not (stiffness or damping or friction):
+        return
+    low, high = (float(value) for value in model.tendon_lengthspring[k])
+    terms = mjcf.terms(k)
+    if terms is None:
+        ends = _two_sites(mjcf, k)
+        if ends is None or friction or (stiffness and low != high):
+            mjcf.refuse(
+                f"spatial tendon {name!r} pulls (stiffness, damping or frictionloss), and is more"
+                " than a line between two sites or goes slack, which mbs does not model"
+            )
+        a, b = (sites[end] for end in ends)
+        if a.owner is not b.owner:
+            mechanism.add(Spring(name, a, b, stiffness=stiffness, length=low, damping=damping))
+        return
+    slack = sum(c * mjcf.locked[j] for j, c in terms.items() if j in mjcf.locked)
+    moving = {mjcf.joints[j]: c for j, c in terms.items() if c and j not in mjcf.locked}
+    if moving:
+        mechanism.add(
+            FixedTendon(
+                name,
+                levers=tuple(moving.items()),
+                stiffness=stiffness,
+                length=(low - slack, high - slack),
+                damping=damping,
+                friction=friction,
+            )
+        )
+
+
+def _two_sites(mjcf: MjcfModel, k: int) -> tuple[int, int] | None:
+    """The ends of a spatial tendon that is a line between two sites; None for the others."""
+    model, site = mjcf.data, int(mjcf.mujoco.mjtWrap.mjWRAP_SITE)
+    first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
+    kinds = [int(model.wrap_type[w]) for w in range(first, first + count)]
+    if kinds != [site, site]:
+        return None
+    return int(model.wrap_objid[first]), int(model.wrap_objid[first + 1])
+
+
+def _add_compensation(mechanism: Mechanism, mjcf: MjcfModel, k: int, body: Point) -> None:
+    """A force against the weight of a body, at its centre of mass."""
+    model = mjcf.data
+    share, joints = float(model.body_gravcomp[k]), mjcf.joints_above(k)
+    gravity = [float(value) for value in model.opt.gravity]
+    if not (share and joints and any(gravity) and model.body_mass[k]):
+        return
+    by_motors = {j for j in joints if model.jnt_actgravcomp[j]}
+    element = f"body {mjcf.bodies[k]!r}"
+    if by_motors == joints:
+        mjcf.notes.add(
+            "ignored", element, "its gravcomp is a part of what its actuators give, the input here"
+        )
+        return
+    if by_motors:
+        mjcf.refuse(
+            f"{element} has gravity compensation by some of its joints' actuators and not by others"
+        )
+    scale = -share * float(model.body_mass[k])
+    x, y, z = (float(value) for value in model.body_ipos[k])
+    name = unused_name(mechanism, mjcf, f"{mjcf.bodies[k]}_gravcomp")
+    mechanism.add(Force(name, body.at(x, y, z), force=tuple(scale * g for g in gravity)))
+
+
+# Where a motion starts: the keyframes and the configuration that the file draws.
+
+
+_CLOSED_AS_WRITTEN = 1e-2
+"""Opening [m or rad] up to which a configuration of the file is meant to close the loops: keyframes
+are written with few digits, and are states of soft constraints."""
+
+
+def starting_configuration(mechanism: Mechanism, mjcf: MjcfModel, closures: Sequence[int]) -> None:
+    """Let the mechanism start where the file does.
+
+    That is the first of the keyframe `home`, the first keyframe and the configuration that the
+    file draws, which closes the loops; the one that closes them best where none does.
+
+    Args:
+        mechanism: with all joints of the model; its guess is set.
+        mjcf: the model.
+        closures: the equalities that are in the mechanism.
+    """
+    model = mjcf.data
+    keys = [model.key(k) for k in range(model.nkey)]
+    named = [key for key in keys if key.name.lower() == "home"]
+    candidates = [np.array(key.qpos, dtype=float).ravel() for key in (*named, *keys)[:2]]
+    candidates.append(np.array(model.qpos0, dtype=float))
+    openings = [_opening(mjcf, qpos, closures) for qpos in candidates]
+    closed = [k for k, opening in enumerate(openings) if opening < _CLOSED_AS_WRITTEN]
+    qpos = candidates[closed[0] if closed else int(np.argmin(openings))]
+    for j, joint in enumerate(mjcf.joints):
+        component = mechanism.components.get(joint)
+        if isinstance(component, Joint):
+            mechanism.guess |= _positions(mjcf, j, qpos, bool(closures))
+
+
+def _opening(mjcf: MjcfModel, qpos: Any, closures: Sequence[int]) -> float:
+    """How far the equalities are from being met at a configuration [m or rad]."""
+    if not closures or not np.all(np.isfinite(qpos)):
+        return 0.0 if np.all(np.isfinite(qpos)) else math.inf
+    mujoco, model = mjcf.mujoco, mjcf.data
+    flags = int(model.opt.disableflags)
+    try:
+        model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        data = mujoco.MjData(model)
+        data.qpos[:] = qpos
+        mujoco.mj_fwdPosition(model, data)
+    finally:
+        model.opt.disableflags = flags
+    equality = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    rows = (np.array(data.efc_type) == equality) & np.isin(data.efc_id, list(closures))
+    return float(np.max(np.abs(np.array(data.efc_pos)[rows]), initial=0.0))
+
+
+_QUATERNION = ("qw", "qx", "qy", "qz")
+
+
+def _positions(mjcf: MjcfModel, j: int, qpos: Any, all_of_them: bool) -> dict[str, float]:
+    """Positions of joint j by coordinate; those where it starts anyway only if wanted."""
+    kinds = mjcf.mujoco.mjtJoint
+    kind, at = kinds(int(mjcf.data.jnt_type[j])), int(mjcf.data.jnt_qposadr[j])
+    name = mjcf.joints[j]
+    if mjcf.has_one_axis(j):
+        values = {name: float(qpos[at])}
+    else:
+        shift = {}
+        if kind == kinds.mjJNT_FREE:
+            shift = {f"{name}.{x}": float(qpos[at + i]) for i, x in enumerate("xyz")}
+            at += 3
+        quaternion = np.array(qpos[at : at + 4], dtype=float)
+        length = float(np.linalg.norm(quaternion))
+        quaternion = quaternion / length if length else np.array([1.0, 0, 0, 0])
+        turn = {f"{name}.{x}": float(v) for x, v in zip(_QUATERNION, quaternion, strict=True)}
+        values = shift | turn
+    return values if all_of_them or any(values.values()) else {}
 
 
 # What a compiled MuJoCo model may have that changes the motion and that mbs does not model.
 
 
 def check_supported(mjcf: MjcfModel) -> None:
-    """Refuse fluids, tendons that pull, springs that are not linear, and the like.
+    """Refuse fluids, flexible bodies, springs that are not linear, and the like.
 
     What the flags of the file switch off may be there.
 
     Raises:
         DescriptionError: the first such thing, by its name.
     """
-    for checks in (_model, _bodies, _joints, _tendons, _actuators):
+    for checks in (_model, _joints, _tendons, _actuators):
         for complaint in checks(mjcf):
-            raise DescriptionError(f"{mjcf.path}: {complaint}; take it out of the file")
+            mjcf.refuse(complaint)
 
 
 def _model(mjcf: MjcfModel) -> Iterator[str]:
@@ -459,22 +987,11 @@ def _model(mjcf: MjcfModel) -> Iterator[str]:
         yield "it has plugins, which mbs does not model"
 
 
-def _bodies(mjcf: MjcfModel) -> Iterator[str]:
-    model = mjcf.data
-    compensated = mjcf.flags.passive and mjcf.flags.gravity
-    for k, name in enumerate(mjcf.bodies):
-        if model.body_gravcomp[k] and compensated:
-            yield f"body {name!r} has gravity compensation, which mbs does not model"
-        if model.body_mocapid[k] >= 0:
-            yield f"body {name!r} is moved from outside (mocap), which mbs does not model"
-
-
 def _joints(mjcf: MjcfModel) -> Iterator[str]:
-    model, kinds = mjcf.data, mjcf.mujoco.mjtJoint
-    on_axes = (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE))
+    model = mjcf.data
     springs, dampers = mjcf.flags.springs, mjcf.flags.dampers
     for j, name in enumerate(mjcf.joints):
-        if springs and model.jnt_stiffness[j] and int(model.jnt_type[j]) not in on_axes:
+        if springs and model.jnt_stiffness[j] and not mjcf.has_one_axis(j):
             yield f"ball or free joint {name!r} has a spring (stiffness), which mbs does not model"
         if springs and _any(model, "jnt_stiffnesspoly", j):
             yield f"joint {name!r} has a spring that is not linear, which mbs does not model"
@@ -484,26 +1001,19 @@ def _joints(mjcf: MjcfModel) -> Iterator[str]:
 
 def _tendons(mjcf: MjcfModel) -> Iterator[str]:
     model, flags = mjcf.data, mjcf.flags
-    acting = {"stiffness": flags.springs, "stiffnesspoly": flags.springs}
-    acting |= {"damping": flags.dampers, "dampingpoly": flags.dampers}
-    acting |= {"frictionloss": flags.friction}
-    for k in range(model.ntendon):
+    acting = {"stiffnesspoly": flags.springs, "dampingpoly": flags.dampers, "armature": True}
+    for k, name in enumerate(mjcf.tendons):
         for what, acts in acting.items():
             if acts and _any(model, f"tendon_{what}", k):
-                yield f"tendon {model.tendon(k).name!r} has {what}, which mbs does not model"
-        if _any(model, "tendon_armature", k):
-            yield f"tendon {model.tendon(k).name!r} has armature, which mbs does not model"
+                yield f"tendon {name!r} has {what}, which mbs does not model"
 
 
 def _actuators(mjcf: MjcfModel) -> Iterator[str]:
     model = mjcf.data
-    for k in range(model.nu):
-        name = model.actuator(k).name
-        if int(model.actuator_trntype[k]) not in joint_transmissions(mjcf.mujoco):
-            yield f"actuator {name!r} does not act on a joint, which mbs does not model"
+    for k in mjcf.acting:
         for what in ("armature", "damping", "dampingpoly"):
             if _any(model, f"actuator_{what}", k):
-                yield f"actuator {name!r} has {what}; give it to the joint"
+                yield f"actuator {model.actuator(k).name!r} has {what}; give it to the joint"
 
 
 def _any(model: Any, field: str, k: int) -> bool:
@@ -512,14 +1022,29 @@ def _any(model: Any, field: str, k: int) -> bool:
     return values is not None and bool(np.any(values[k]))
 
 
-def read_mjcf(path: str | Path) -> Mechanism:
+# Reading.
+
+
+_LONGEST_REASON = 400
+"""Letters of a message of MuJoCo that are repeated: it quotes names of any length."""
+
+Base = Literal["fixed", "free"] | None
+
+FREE_JOINT = "root_joint"
+"""Name of the joint of a root that is freed; it has coordinates root_joint.x, root_joint.qw ..."""
+
+
+def read_mjcf(path: str | Path, base: Base = None, strict: bool = False) -> Mechanism:
     """The mechanism in an MJCF file.
 
     Bodies, joints and sites keep their names, with blanks, dots and quotes replaced by
-    underscores; joints without a name are called after their body. Several joints in a body
-    become a chain over bodies without mass. A closing `connect` becomes a spherical joint and a
-    `weld` a fixed one, where the loop is then opened; an equality of joints becomes a coupling.
-    Joint positions are MuJoCo's qpos: `ref` is taken into account.
+    underscores; joints without a name are called after their body, and a name that is taken gets
+    the kind of its element at its end. Several joints in a body become a chain over bodies without
+    mass. A closing `connect` becomes a spherical joint and a `weld` a fixed one, where the loop is
+    then opened; an equality of joints or of fixed tendons becomes a coupling, and one that locks a
+    joint welds its bodies. Joint positions are MuJoCo's qpos: `ref` is taken into account. The
+    mechanism starts (its `guess`) at the keyframe `home`, at the first keyframe or as it is drawn,
+    whichever comes first and closes the loops.
 
     Of actuators only the joints that they drive are read, those without one are passive then. The
     inputs of the models are joint efforts; gear, kp, ctrlrange and the dynamics of an actuator
@@ -528,14 +1053,29 @@ def read_mjcf(path: str | Path) -> Mechanism:
     What the flags of the file and its groups of actuators switch off is left out: springs, dampers,
     Coulomb friction, gravity, equalities, ranges of joints and of controls, actuators.
 
+    Args:
+        path: of the file.
+        base: "free" gives every root body without a joint a Free joint, `root_joint` and so on,
+            "fixed" welds roots with a free joint to the world where they are drawn.
+        strict: refuse what would be noted.
+
+    Returns:
+        the mechanism; its `notes` say what of the file is not in it, or under another name.
+
     Raises:
         DescriptionError: mujoco is not installed, the file is missing or malformed, or it has
-            something that changes the motion and that mbs does not model.
+            something that changes the motion and that mbs does not model; in strict reading,
+            whatever would be a note.
     """
+    if base not in (None, "fixed", "free"):
+        raise DescriptionError(f"{path}: base is {quoted(base)}; give 'fixed', 'free' or None")
     name = _model_name(path)
     mujoco = _mujoco()
-    model = _compiled(mujoco, str(path))
-    mjcf = MjcfModel.of(mujoco, model, str(path))
+    notes = Notes(str(path), strict)
+    model = _compiled(mujoco, str(path), notes)
+    mjcf = MjcfModel.of(mujoco, model, notes)
+    if base == "fixed":
+        mjcf = replace(mjcf, locked={**mjcf.locked, **dict.fromkeys(_free_joints(mjcf), 0.0)})
     check_supported(mjcf)
     mechanism = Mechanism(
         name,
@@ -543,9 +1083,16 @@ def read_mjcf(path: str | Path) -> Mechanism:
         source=f"MJCF file {Path(path).name}",
     )
     points: list[Point] = [mechanism.world.frame]
+    joints = Joints(mechanism, mjcf, base)
     for k in range(1, model.nbody):
+        if int(model.body_mocapid[k]) >= 0:
+            notes.add(
+                "ignored",
+                f"body {mjcf.bodies[k]!r}",
+                "it is moved from outside (mocap); here it stands still where it is drawn",
+            )
         body = mechanism.add(_body(mjcf, k))
-        add_joints(mechanism, mjcf, k, points[model.body_parentid[k]])
+        joints.connect(k, points[model.body_parentid[k]])
         points.append(body.frame)
     sites = [
         placed(points[model.site_bodyid[k]], model.site_pos[k], model.site_quat[k])
@@ -553,7 +1100,10 @@ def read_mjcf(path: str | Path) -> Mechanism:
     ]
     for name, point in zip(mjcf.sites, sites, strict=True):
         mechanism.add_frame(name, point)
-    add_closures(mechanism, mjcf, points, sites)
+    closures = add_closures(mechanism, mjcf, points, sites)
+    add_forces(mechanism, mjcf, points, sites)
+    starting_configuration(mechanism, mjcf, closures)
+    mechanism.notes.extend(notes.taken)
     return mechanism
 
 
@@ -578,38 +1128,67 @@ def _mujoco() -> Any:
     return mujoco
 
 
-def _compiled(mujoco: Any, path: str) -> Any:
-    try:
-        spec = mujoco.MjSpec.from_file(path)
-        spec.compiler.fusestatic = False
-        spec.compiler.discardvisual = False
+def _compiled(mujoco: Any, path: str, notes: Notes) -> Any:
+    """The model without what has no part in the motion; the whole of it where that fails."""
+    reasons: list[str] = []
+    for stripped in (True, False):
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            try:
+                model = _spec(mujoco, path, stripped).compile()
+            except (ValueError, RuntimeError) as error:
+                reasons.append(_sentence(error))
+                continue
+        for text in dict.fromkeys(_sentence(warning.message) for warning in heard):
+            notes.add("doubted", "the model", f"mujoco says: {text}")
+        return model
+    raise DescriptionError(f"{path}: mujoco refuses the file: {reasons[0]}; correct it")
+
+
+def _sentence(said: object) -> str:
+    """What MuJoCo says, on one line, its middle left out where it is long."""
+    text = " ".join(str(said).removeprefix("Error: ").split())
+    half = _LONGEST_REASON // 2
+    return text if len(text) <= _LONGEST_REASON else f"{text[:half]} ... {text[-half:]}"
+
+
+def _spec(mujoco: Any, path: str, stripped: bool) -> Any:
+    spec = mujoco.MjSpec.from_file(path)
+    spec.compiler.fusestatic = False
+    spec.compiler.discardvisual = False
+    if stripped:
         _strip(mujoco, spec)
-        return spec.compile()
-    except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).removeprefix("Error: ").split())
-        raise DescriptionError(f"{path}: mujoco refuses the file: {reason}; correct it") from None
+    return spec
 
 
 def _strip(mujoco: Any, spec: Any) -> None:
     """Take out what has no part in the motion, and may name files that are missing."""
-    for kind in ("sensors", "keys", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
+    for kind in ("sensors", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
         for element in list(getattr(spec, kind)):
             spec.delete(element)
-    from_geoms = spec.compiler.inertiafromgeom
-    always = int(from_geoms) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
-    for body in spec.bodies:
-        is_world = body.name == "world" and body.parent is None
-        if is_world or (body.explicitinertial and not always):
-            for geom in list(body.geoms):
-                spec.delete(geom)
+    for geom in list(_without_part(mujoco, spec)):
+        spec.delete(geom)
     meshes = {geom.meshname for geom in spec.geoms}
     fields = {geom.hfieldname for geom in spec.geoms}
-    for geom in spec.geoms:
-        geom.material = ""
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
     unused = [mesh for mesh in spec.meshes if mesh.name not in meshes]
     unused += [hfield for hfield in spec.hfields if hfield.name not in fields]
-    for asset in [*unused, *spec.materials, *spec.textures]:
+    for asset in [*unused, *spec.textures]:
         spec.delete(asset)
+
+
+def _without_part(mujoco: Any, spec: Any) -> Iterator[Any]:
+    """Geoms with assets that give no inertia."""
+    always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    kinds = mujoco.mjtGeom
+    with_assets = (kinds.mjGEOM_MESH, kinds.mjGEOM_HFIELD, kinds.mjGEOM_SDF)
+    from_geoms = int(spec.compiler.inertiafromgeom) == int(always)
+    for body in spec.bodies:
+        if body.name == "world" or (body.explicitinertial and not from_geoms):
+            for geom in body.geoms:
+                if geom.type in with_assets or geom.meshname:
+                    yield geom
 
 
 def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
@@ -619,12 +1198,17 @@ def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
 
 
 def _body(mjcf: MjcfModel, k: int) -> Body:
-    model = mjcf.data
-    R = matrix_of(model.body_iquat[k])
+    model, kinds = mjcf.data, mjcf.mujoco.mjtSameFrame
+    # MuJoCo takes frames that differ by 1e-8 as one, and computes so
+    same = int(model.body_sameframe[k])
+    turned = same not in (int(kinds.mjSAMEFRAME_BODY), int(kinds.mjSAMEFRAME_BODYROT))
+    R = matrix_of(model.body_iquat[k]) if turned else np.eye(3)
     tensor = R @ np.diag(model.body_inertia[k]) @ R.T
+    at_origin = same == int(kinds.mjSAMEFRAME_BODY)
+    com = (0.0, 0.0, 0.0) if at_origin else tuple(float(value) for value in model.body_ipos[k])
     return Body(
         mjcf.bodies[k],
         mass=float(model.body_mass[k]),
-        com=tuple(float(value) for value in model.body_ipos[k]),
+        com=com,
         inertia=((tensor + tensor.T) / 2).tolist(),
     )

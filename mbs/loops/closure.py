@@ -230,7 +230,7 @@ def _equations(system: System) -> _Equations:
             loops.append((cut.edge.joint.name, _cut_rows(system, q, cut, pose)))
             cosines.extend(_facing(cut, pose))
         for coupling in system.couplings:
-            value = q[coupling.driven] - coupling.value(q[coupling.driver])
+            value = q[coupling.driven] - coupling.value(q)
             loops.append((coupling.name, [("coordinate", value)]))
         labels = [(name, [label for label, _ in rows]) for name, rows in loops]
         values = [value for _, rows in loops for _, value in rows]

@@ -413,7 +413,7 @@ def _is_bound(system: System, number: int) -> bool:
 
 
 def _coupling_stage(work: _Work, coupling: CoordinateCoupling) -> Stage | str | None:
-    if {coupling.driven, coupling.driver} <= work.known:
+    if work.known.issuperset(coupling.coordinates):
         return None
     root = coupled(coupling, work.known, work.q)
     return root if isinstance(root, str) else _stage(work, coupling.name, root)

@@ -479,7 +479,8 @@ def _winds(system: System) -> bool:
         efforts = own_efforts(system, s, SX.zeros(system.nv))
         felt = casadi.which_depends(efforts, s.q, 1, False)
         for coupling in system.couplings:
-            felt[coupling.driver] = True
+            for k in coupling.coordinates[1:]:
+                felt[k] = True
         active = [system.speeds[k].name for k in system.active]
         return any(
             felt[k] and c.unit == "rad" and c.name not in active

@@ -9,6 +9,7 @@ from html import escape
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
+from mbs.assembly.system import followed
 from mbs.errors import ExportError
 from mbs.files import PathLike, path_of, write_text
 from mbs.view.primitives import PALETTE, Theme
@@ -108,7 +109,7 @@ def _names(system: System, number: int) -> tuple[str, ...]:
 
 def _remarks(system: System) -> tuple[str, ...]:
     return tuple(
-        f"{loop.name}: {' follows '.join(loop.joints)}"
+        f"{loop.name}: {followed(loop.joints)}"
         for loop in system.loops
         if loop.closing == "coupling"
     )

@@ -17,6 +17,7 @@ from mbs.components import (
     Body,
     Bushing,
     Damper,
+    FixedTendon,
     Force,
     Free,
     JointFriction,
@@ -363,3 +364,62 @@ def test_report_tells_of_elements():
         "JointStop p acts on x.",
         "Force f acts on b.",
     ]
+
+
+# Fixed tendons.
+
+
+def two_sliders(**options):
+    m = mbs.Mechanism("sliders", gravity=(0, 0, 0))
+    before = m.world
+    for name in ("s1", "s2"):
+        body = m.add(Body(name + "_body", mass=1.0, inertia=(1, 1, 1)))
+        m.connect(before, Prismatic(name, axis="x"), body)
+        before = body
+    m.add(FixedTendon("t", levers=(("s1", 2.0), ("s2", "-c")), **options))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("q", "stretch"), [((1.0, 0.2), 1.3), ((-1.0, 0.2), -1.9), ((0.1, 0.2), 0.0)]
+)
+def test_a_fixed_tendon_pulls_by_its_levers_and_is_slack_between(q, stretch):
+    m = two_sliders(stiffness=10, length=(-0.5, 0.3), damping=3)
+    m.values["c"] = mbs.Parameter("c", 2.0)
+    system = m.assemble()
+    x, rate = 2 * q[0] - 2 * q[1], 2 * 0.5 - 2 * 0.1
+    assert x - 0.3 == pytest.approx(stretch) or stretch <= 0
+    tension = 10 * stretch + 3 * rate
+    tau = np.array(mbs.models.inverse_dynamics(system)(q, (0.5, 0.1), 0)).ravel()
+    np.testing.assert_allclose(tau, [2 * tension, -2 * tension], atol=1e-13)
+    _, U = mbs.models.energy(system)(q, 0)
+    assert float(U) == pytest.approx(5 * stretch**2, abs=1e-14)
+
+
+def test_friction_of_a_fixed_tendon_and_its_scope():
+    inner = two_sliders(friction=4, width=0.1)
+    inner.values["c"] = mbs.Parameter("c", 1.0)
+    m = mbs.Mechanism("outer", gravity=(0, 0, 0))
+    m.connect(m.world, m.add(inner, name="in").base)
+    system = m.assemble()
+    tau = np.array(mbs.models.inverse_dynamics(system)(0, (0.1, 0.1), 0)).ravel()
+    force = 4 * np.tanh(0.1 / 0.1)
+    np.testing.assert_allclose(tau, [2 * force, -force], atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"levers": ()}, "t: levers .. are not pairs of a coordinate and a lever"),
+        ({"levers": (("a", 1), ("a", 2))}, "each coordinate once"),
+        ({"levers": 3}, "t: levers 3 are not pairs"),
+        ({"length": (1, 0)}, r"t: length is .1, 0.; give the smaller one first"),
+        ({"length": (1, 2, 3)}, "is neither one length nor two"),
+        ({"stiffness": -1}, "t: stiffness is -1; give zero or more"),
+        ({"stiffness": 0}, "the FixedTendon does nothing"),
+    ],
+)
+def test_a_fixed_tendon_that_is_none_is_refused(options, message):
+    given = {"levers": (("a", 1.0),), "stiffness": 1.0, **options}
+    with pytest.raises(DescriptionError, match=message):
+        FixedTendon("t", **given)

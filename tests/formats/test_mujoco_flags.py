@@ -202,8 +202,6 @@ def test_actuators_and_what_they_can_give(tmp_path, flags, groups, actuated, eff
 
 
 REFUSED = [
-    ({"body": 'gravcomp="0.5"'}, NOTHING_PASSIVE, "gravity compensation"),
-    ({"body": 'gravcomp="0.5"'}, 'gravity="disable"', "gravity compensation"),
     ({"option": 'density="1000" viscosity="3"'}, NOTHING_PASSIVE, "the medium"),
     ({"third": "ball", "ball": 'stiffness="3"'}, NO_SPRINGS or NOTHING_PASSIVE, "has a spring"),
 ]
@@ -217,29 +215,45 @@ def test_what_would_be_refused_is_read_where_it_is_switched_off(tmp_path, change
         read(tmp_path, text_of(**changes))
 
 
+@pytest.mark.parametrize("flags", ["", NO_SPRINGS, NO_DAMPERS, NOTHING_PASSIVE])
+def test_gravity_compensation(tmp_path, flags):
+    text = text_of(flags=flags, body='gravcomp="0.5"')
+    assert equal(read(tmp_path, text), text)
+    acts = NOTHING_PASSIVE not in flags
+    assert ("a_gravcomp" in read(tmp_path, text).components) == acts
+    weightless = text_of(flags='gravity="disable"', body='gravcomp="0.5"')
+    assert equal(read(tmp_path, weightless), weightless)
+
+
 @pytest.mark.parametrize(
     ("what", "flags"),
     [
         ('stiffness="5" springlength="0.2"', NO_SPRINGS or NOTHING_PASSIVE),
+        ('stiffness="5" springlength="-0.1 0.2"', NO_SPRINGS or NOTHING_PASSIVE),
         ('damping="5"', NO_DAMPERS or NOTHING_PASSIVE),
         ('frictionloss="5"', 'frictionloss="disable"'),
         ('frictionloss="5"', 'constraint="disable"'),
     ],
 )
-def test_tendons_that_do_not_pull(tmp_path, what, flags):
-    tendon = f'<tendon><fixed name="t" {what}><joint joint="j1" coef="1"/></fixed></tendon>'
+def test_fixed_tendons_pull_unless_they_are_switched_off(tmp_path, what, flags):
+    joints = '<joint joint="j1" coef="1.5"/><joint joint="j2" coef="-0.7"/>'
+    tendon = f'<tendon><fixed name="t" {what}>{joints}</fixed></tendon>'
     text = text_of(flags=flags, more=tendon)
     assert equal(read(tmp_path, text), text)
-    with pytest.raises(DescriptionError, match="tendon 't' has"):
-        read(tmp_path, text_of(more=tendon))
+    assert "t" not in read(tmp_path, text).components
+    acting = text_of(more=tendon)
+    mechanism = read(tmp_path, acting)
+    if "friction" in what:
+        assert to_float(mechanism.components["t"].friction) == 5
+    else:
+        assert equal(mechanism, acting)
 
 
 @two_flags
 @pytest.mark.parametrize("flags", [NO_SPRINGS, NO_DAMPERS])
 def test_one_of_two_flags_does_not_stop_the_medium(tmp_path, flags):
-    for changes in ({"body": 'gravcomp="0.5"'}, {"option": 'density="1000"'}):
-        with pytest.raises(DescriptionError, match="mbs does not model"):
-            read(tmp_path, text_of(flags=flags, **changes))
+    with pytest.raises(DescriptionError, match="mbs does not model"):
+        read(tmp_path, text_of(flags=flags, option='density="1000"'))
 
 
 def names(kinds, prefix):

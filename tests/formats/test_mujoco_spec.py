@@ -268,19 +268,29 @@ BAD = {
         BODY.format('type="ball" stiffness="3"', ""),
         "ball or free joint 'j' has a spring (stiffness)",
     ),
-    "tendon spring": (PLAIN + TENDON.format('stiffness="1"'), "tendon 't' has stiffness"),
-    "tendon friction": (PLAIN + TENDON.format('frictionloss="1"'), "tendon 't' has frictionloss"),
-    "tendon equality": (
-        PLAIN + TENDON.format("") + '<equality><tendon name="e" tendon1="t"/></equality>',
-        "equality 'e': it is of the kind tendon",
+    "tendon armature": (PLAIN + TENDON.format('armature="1"'), "tendon 't' has armature"),
+    "path that pulls": (
+        BODY.format("", '<site name="s"/><site name="p" pos="1 0 0"/>').replace(
+            "<worldbody>", '<worldbody><site name="o"/>'
+        )
+        + '<tendon><spatial name="t" stiffness="2"><site site="o"/><site site="s"/>'
+        '<site site="p"/></spatial></tendon>',
+        "spatial tendon 't' pulls (stiffness, damping or frictionloss), and is more than a line",
     ),
-    "tendon motor": (
-        PLAIN + TENDON.format("") + '<actuator><motor name="m" tendon="t"/></actuator>',
-        "actuator 'm' does not act on a joint",
+    "spatial equality": (
+        BODY.format("", '<site name="s"/><site name="p" pos="1 0 0"/>').replace(
+            "<worldbody>", '<worldbody><site name="o"/>'
+        )
+        + '<tendon><spatial name="t"><site site="o"/><site site="s"/><site site="p"/></spatial>'
+        '</tendon><equality><tendon name="e" tendon1="t"/></equality>',
+        "equality 'e' is not linear, or ties spatial tendons",
     ),
-    "lock": (PLAIN + '<equality><joint joint1="j"/></equality>', "it locks joint 'j'"),
-    "gravcomp": (PLAIN.replace('name="b"', 'name="b" gravcomp="1"'), "body 'b' has gravity comp"),
-    "mocap": ('<worldbody><body name="b" mocap="true"/></worldbody>', "moved from outside (mocap)"),
+    "unmet": (
+        '<worldbody><body><joint name="j"/><geom size=".1"/><body><joint name="k"/>'
+        '<geom size=".1"/></body></body></worldbody><equality><joint joint1="j" polycoef="-1"/>'
+        '<joint name="e" joint1="j" joint2="k" polycoef="0 0 1 0 0"/></equality>',
+        "equality 'e' is met at no position of 'k'",
+    ),
     "fluid": ('<option density="1.2"/>' + PLAIN, "the medium has a density or viscosity"),
     "no mass": ("<worldbody><body><joint/></body></worldbody>", "mujoco refuses the file: "),
     "mesh": (

@@ -19,6 +19,7 @@ from mbs.components import (
     Rod,
     Screw,
 )
+from mbs.errors import DescriptionError
 from mbs.loops import closure, reduction_matrix, solve
 
 J, M, GRAVITY = 0.3, 2.0, 9.81
@@ -161,3 +162,65 @@ def test_fmu_follows_the_simulation(tmp_path):
         assert np.ptp(run["rocker_axis.q"]) > 0.01
         for name in ("pinion.q", "slide.q", "rocker_axis.q", "rocker_axis.v"):
             np.testing.assert_allclose(fmu[name], run[name], rtol=0, atol=1e-6)
+
+
+# Couplings of more than two coordinates.
+
+
+def planetary(**options):
+    """Sun, carrier and ring about one axis; carrier = 0.1 + 0.25 sun + 0.75 ring."""
+    m = mbs.Mechanism("planetary", gravity=(0, 0, 0))
+    for name, inertia in (("sun", 0.02), ("ring", 0.3), ("carrier", 0.1)):
+        body = m.add(Body(name, 1.0, inertia=(inertia, inertia, inertia)))
+        m.connect(m.world, Revolute(f"{name}_axis", actuated=name != "carrier"), body)
+    others = (("ring_axis", options.pop("ring", 0.75)),)
+    m.add(Coupling("mesh", "carrier_axis", "sun_axis", (0.1, 0.25), others=others))
+    return m
+
+
+def test_a_planetary_gear_adds_two_coordinates():
+    """The inertia matrix is J_s + k_s^2 J_c and so on, with k_s k_r J_c beside the diagonal."""
+    system = planetary().assemble()
+    assert system.closure.mobility == 2
+    q = solve(system, {"sun_axis": 0.4, "ring_axis": -0.2})
+    names = [c.name for c in system.coordinates]
+    assert q[names.index("carrier_axis")] == pytest.approx(0.1 + 0.25 * 0.4 - 0.75 * 0.2, abs=1e-14)
+    active = [system.speeds[k].name for k in system.active]
+    factors = np.array([{"sun_axis": 0.25, "ring_axis": 0.75}[name] for name in active])
+    own = np.array([{"sun_axis": 0.02, "ring_axis": 0.3}[name] for name in active])
+    A = np.array(mbs.models.inertia_matrix(system)(q))
+    np.testing.assert_allclose(A, np.diag(own) + 0.1 * np.outer(factors, factors), atol=1e-15)
+    assert "Coupling mesh: carrier_axis follows sun_axis and ring_axis." in system.report()
+
+
+@pytest.mark.parametrize("given", [("sun_axis", "ring_axis"), ("carrier_axis", "sun_axis")])
+def test_the_third_coordinate_follows_in_closed_form(given):
+    m = planetary()
+    system = m.assemble(active=given)
+    wanted = dict(zip(given, (0.4, -0.3), strict=True))
+    (mode,) = mbs.loops.modes(system, wanted)
+    assert mode.branch == ()
+    q = solve(system, wanted, branch=())
+    np.testing.assert_allclose(q, solve(system, wanted), atol=1e-12)
+
+
+def test_couplings_of_a_placed_mechanism_keep_their_others():
+    outer = mbs.Mechanism("outer", gravity=(0, 0, 0))
+    outer.connect(outer.world, outer.add(planetary(), name="gear").base)
+    (coupling,) = outer.couplings()
+    assert coupling.coordinates == ("gear.carrier_axis", "gear.sun_axis", "gear.ring_axis")
+    assert outer.assemble().closure.mobility == 2
+
+
+@pytest.mark.parametrize(
+    ("others", "message"),
+    [
+        ((("j1", 1.0),), "'j2' follows a coordinate of .* twice"),
+        ((("j2", 1.0),), "the coordinate 'j2' cannot follow itself"),
+        (("j3",), "others .* are not pairs of a coordinate and a factor"),
+        (3, "others 3 are not pairs"),
+    ],
+)
+def test_others_that_are_none_are_refused(others, message):
+    with pytest.raises(DescriptionError, match=message):
+        Coupling("c", "j2", "j1", others=others)

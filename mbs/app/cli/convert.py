@@ -20,9 +20,11 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "mbs convert robot.urdf robot.par",
     "mbs convert robot.par robot.toml",
+    "mbs convert robot.urdf robot.xml",
     "mbs convert sr400 sr400.toml",
 )
-_WRITTEN = (".par", ".toml")
+_TABLES = (".par", ".toml")
+_WRITTEN = (*_TABLES, ".xml")
 
 
 def convert(
@@ -30,24 +32,30 @@ def convert(
     target: Annotated[
         Path,
         typer.Argument(
-            metavar="TARGET", help="File to write, .par (SYMORO) or .toml.", show_default=False
+            metavar="TARGET",
+            help="File to write: .par (SYMORO), .toml or .xml (MJCF).",
+            show_default=False,
         ),
     ],
     *,
     parameter: Parameters = None,
 ) -> None:
-    """Convert a robot to a .par or .toml file.
+    """Convert a robot to a .par, .toml or .xml (MJCF) file.
 
-    From .par and .toml the table of frames is written as it was read, symbols and all. From URDF,
-    MJCF and the catalogue, link j of the assembled robot is frame j.
+    From .par and .toml to one of them the table of frames is written as it was read, symbols and
+    all. From URDF, MJCF and the catalogue, link j of the assembled robot is frame j.
     """
     suffix = target.suffix.lower()
     if suffix not in _WRITTEN:
         raise ExportError(
             f"{target}: files of this kind are not written; {did_you_mean(suffix, _WRITTEN)}"
         )
-    table = _table(source, parameter)
-    if table is not None:
+    table = _table(source, parameter) if suffix in _TABLES else None
+    if suffix == ".xml":
+        from mbs.export import mjcf
+
+        mjcf(mechanism(source, parameter), target)
+    elif table is not None:
         from mbs.formats import write_par, write_toml
 
         (write_par if suffix == ".par" else write_toml)(table, target)
@@ -67,7 +75,7 @@ def _table(source: str, parameters: list[str] | None) -> RobotTable | None:
     from mbs.robots import catalogue
 
     suffix = Path(source).suffix.lower()
-    if source in catalogue() or suffix not in _WRITTEN:
+    if source in catalogue() or suffix not in _TABLES:
         return None
     table = read_par(source) if suffix == ".par" else read_toml(source)
     given = numbers(parameters, "--parameter")

@@ -121,6 +121,6 @@ def _wishes(
             near[list(way.places)] = 0.0
         near[held] = list(way.locked.values())
     turning = None if way is None or system.is_closed else way.places
-    coupled = [k for c in system.couplings for k in (c.driven, c.driver)]
+    coupled = [k for c in system.couplings for k in c.coordinates]
     limited = bounds(system, limits, set(turning or range(system.nq)) - {*held, *coupled})
     return Wishes(system, near, limited, leaves_out(limits), seed is not None)

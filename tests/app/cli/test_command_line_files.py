@@ -77,6 +77,13 @@ def test_a_closed_robot_of_the_catalogue_is_converted(command) -> None:
     np.testing.assert_allclose(efforts("four_bar.par"), efforts("four_bar"), rtol=1e-9)
 
 
+def test_a_model_file_of_mujoco_is_written(command) -> None:
+    pytest.importorskip("mujoco")
+    answer = command("convert", "puma560", "puma.xml")
+    assert (answer.code, answer.err) == (0, "wrote puma.xml\n")
+    np.testing.assert_allclose(efforts("puma.xml"), efforts("puma560"), rtol=1e-12, atol=1e-12)
+
+
 def test_an_exported_fmu_runs_as_the_system_does(command) -> None:
     words = ("planar_2r", "planar_2r.fmu", "--output", "energy", "--stop-time", "0.2")
     answer = command("export", "fmu", *words)

@@ -23,7 +23,10 @@ MISTAKES = [
     ("solve-ik rx90", "solve-ik: say the pose in one way: --pose, --xyz"),
     ("solve-ik rx90 --xyz 0 0 a", "--xyz: 'a' is not a number; write one, such as 0.3 or pi/2"),
     ("identify rx90 none.csv", "record 'none.csv' cannot be read (No such file or directory)"),
-    ("convert sr400 a.urdf", "a.urdf: files of this kind are not written; use one of .par, .toml"),
+    (
+        "convert sr400 a.urdf",
+        "files of this kind are not written; use one of .par, .toml, .xml",
+    ),
     ("convert stewart_platform a.par", "a .par file"),
     ("export fmu four_bar none/x.fmu", "folder none does not exist; create it"),
     ("export c planar_2r x --model closure", "with closed loops; planar_2r has none"),

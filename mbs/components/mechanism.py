@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mbs.components.bodies import Mount, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.couplings import Coupling
 from mbs.components.drives import Flange, flange_pair
 from mbs.components.joints import Joint
+from mbs.components.locking import lock
 from mbs.components.notes import Note
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
@@ -254,6 +255,23 @@ class Mechanism:
                 f"{self.name}: joint {joint.name!r} is not connected; connect it before the cut"
             )
         self.cuts.append(joint.name)
+
+    def lock(self, positions: Mapping[str, Any]) -> None:
+        """Weld joints at positions, in loops too; what couplings tie to them is locked with them.
+
+        Each becomes a Fixed joint of its name. Its motor, friction, spring and rotor go with its
+        motion, as do forces along its coordinates and their guess.
+
+        Args:
+            positions: of joints by name: a number or an expression [rad or m]; as many numbers as
+                it has positions for a joint with several, those of a Spherical or Free joint of
+                its frame_b in frame_a.
+
+        Raises:
+            DescriptionError: there is no such joint, a position is of another length, couplings
+                contradict the positions, or a sensor or a drive line is on the joint.
+        """
+        lock(self, positions)
 
     def assemble(
         self, guess: Mapping[str, float] | None = None, active: Sequence[str] = ()

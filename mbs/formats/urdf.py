@@ -648,6 +648,8 @@ class _Building:
         tree: of the file.
         names: of its elements.
         rotors: Ia of joints by their names in the file.
+        inertials: of the links.
+        leaders: of the joints that mimic another one.
     """
 
     mechanism: Mechanism
@@ -655,11 +657,13 @@ class _Building:
     names: Named
     rotors: Mapping[str, float]
     inertials: dict[str, Inertial] = field(default_factory=dict)
+    leaders: dict[str, str] = field(default_factory=dict)
 
     def build(self, base: Base | None) -> None:
         tree = self.tree
         for link in tree.links:
             self.inertials[link] = read_inertial(tree.link(link))
+        self.leaders = _leaders(tree)
         points = {tree.root: self._root(base)}
         for joint in tree.joints:
             points[joint.child] = self._add(joint, points[joint.parent])
@@ -722,7 +726,7 @@ class _Building:
         return _ONE_AXIS[kind](
             name,
             axis=axis,
-            actuated=joint.element.find("mimic") is None,
+            actuated=joint.name not in self.leaders,
             limits=None if kind == "continuous" else _limits(reader),
             velocity=_largest(reader, "velocity"),
             effort=_largest(reader, "effort"),
@@ -745,28 +749,38 @@ class _Building:
             tree.link(tree.root).note("doubted", "nothing of the free robot has inertia")
 
     def _add_mimics(self) -> None:
-        leaders: dict[str, str] = {}
         taken = {*self.mechanism.components, *self.mechanism.frames}
-        kinds = {joint.name: joint.kind for joint in self.tree.joints}
         for joint in self.tree.joints:
             mimic = joint.element.find("mimic")
-            if mimic is None:
+            if mimic is None or joint.name not in self.leaders:
                 continue
             reader = self.tree.joint(joint)
-            leader = (mimic.get("joint") or "").strip()
-            wrong = _mimic_fault(joint, leader, kinds, leaders)
-            if wrong:
-                reader.note("ignored", f"it mimics {quoted(leader)}, {wrong}", mimic)
-                continue
-            leaders[joint.name] = leader
-            driven, driver = (self.names.joints[name] for name in (joint.name, leader))
             offset = reader.number(mimic, "offset", 0.0)
             factor = reader.number(mimic, "multiplier", 1.0)
+            driven, driver = (self.names.joints[n] for n in (joint.name, self.leaders[joint.name]))
             name = f"{driven}_mimic"
             while name in taken:
                 name += "_"
             taken.add(name)
             self.mechanism.add(Coupling(name, driven, driver, (offset, factor)))
+
+
+def _leaders(tree: UrdfTree) -> dict[str, str]:
+    """What each joint mimics; notes of those that cannot."""
+    found: dict[str, str] = {}
+    last: dict[str, str] = {}
+    kinds = {joint.name: joint.kind for joint in tree.joints}
+    for joint in tree.joints:
+        mimic = joint.element.find("mimic")
+        if mimic is not None:
+            leader = (mimic.get("joint") or "").strip()
+            wrong = _mimic_fault(joint, leader, kinds, last)
+            if wrong:
+                text = f"it mimics {quoted(leader)}, {wrong}; left out"
+                tree.joint(joint).note("ignored", text, mimic)
+            else:
+                found[joint.name] = last[joint.name] = leader
+    return found
 
 
 def _mimic_fault(
@@ -778,7 +792,7 @@ def _mimic_fault(
         joint: that mimics.
         leader: what it mimics.
         kinds: of all joints.
-        leaders: of the joints before it, or those that lead these.
+        leaders: of the joints before it, or those that lead these; changed.
     """
     if joint.kind not in _ONE_AXIS:
         return f"but is {joint.kind} and has not one position"

@@ -63,6 +63,8 @@ def parse_content(path: str, content: bytes, notes: Notes | None = None) -> Elem
     """
     try:
         return _Builder(path).parse(content)
+    except DescriptionError:
+        raise
     except (expat.ExpatError, LookupError, ValueError):
         pass  # an encoding that expat does not know raises the last two
     notes = Notes(path) if notes is None else notes
@@ -75,6 +77,8 @@ def parse_content(path: str, content: bytes, notes: Notes | None = None) -> Elem
             notes.add("ignored", "the text behind the root element", "left out", error.lineno)
             return builder.root
         raise DescriptionError(f"{path}: the file is not XML: {error}; correct it") from None
+    except DescriptionError:
+        raise
     except ValueError as error:
         raise DescriptionError(f"{path}: the file is not XML: {error}; correct it") from None
 
@@ -159,7 +163,8 @@ def _mended(content: bytes, notes: Notes) -> str:
         text = decoded(content)
     if "\ufffd" in text:
         line = text[: text.index("\ufffd")].count("\n") + 1
-        notes.add("doubted", "the text", f"bytes that are not {known} were replaced", line)
+        notes.add("doubted", "the text", f"not all is {known}; read as Latin-1", line)
+        text = content.decode("latin-1")
     text = _without_comments(text)
     first = _DECLARATION.match(text)
     if first is not None:  # it has been read, for the encoding

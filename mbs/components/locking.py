@@ -247,7 +247,8 @@ def _turn(axis: Sequence[float], angle: Expression) -> list[Step]:
     for letter, part in zip("xyz", axis, strict=True):
         if abs(part) == 1:
             return [Turned(letter, angle if part > 0 else -angle)]
-    R = [[float(x) for x in row] for row in np.array(align_z((axis[0], axis[1], axis[2])))]
+    turn = align_z((axis[0], axis[1], axis[2]))
+    R = [[float(turn[row, column]) for column in range(3)] for row in range(3)]
     back = [list(column) for column in zip(*R, strict=True)]
     return [Oriented(nearest_rotation(R)), Turned("z", angle), Oriented(nearest_rotation(back))]
 

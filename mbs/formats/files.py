@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import io
 import re
 import stat
 from pathlib import Path
@@ -32,12 +33,8 @@ def read_bytes(path: str | Path) -> bytes:
     """
     try:
         place = Path(path)
-        if not stat.S_ISREG(place.stat().st_mode):  # a pipe or a device may never end
-            raise DescriptionError(
-                f"{path}: it is no plain file (a folder, a pipe or a device); give the path of a"
-                " readable file"
-            )
-        with place.open("rb") as file:
+        plain = stat.S_ISREG(place.stat().st_mode)  # a pipe or a device may never end
+        with place.open("rb") if plain else io.BytesIO() as file:
             content = file.read(LARGEST_FILE + 1)
     except (TypeError, ValueError):
         raise DescriptionError(
@@ -47,6 +44,11 @@ def read_bytes(path: str | Path) -> bytes:
         raise DescriptionError(
             f"{path}: the file cannot be read ({error.strerror}); give the path of a readable file"
         ) from None
+    if not plain:
+        raise DescriptionError(
+            f"{path}: it is no plain file (a folder, a pipe or a device); give the path of a"
+            " readable file"
+        )
     if len(content) > LARGEST_FILE:
         raise DescriptionError(
             f"{path}: the file has more than {LARGEST_FILE} bytes; give the description of a robot"

@@ -428,6 +428,16 @@ def element_names(tree: UrdfTree, base: Base | None) -> Named:
     return Named(of_link, of_joint, free)
 
 
+def _floats(tree: UrdfTree) -> bool:
+    """Whether the root is a place in the world alone, from which a floating joint leads."""
+    held = {tree.root}
+    for joint in tree.joints:
+        if joint.parent in held and joint.kind == "fixed":
+            held.add(joint.child)
+    massless = all(tree.links[link].find("inertial") is None for link in held)
+    return massless and any(j.parent in held and j.kind == "floating" for j in tree.joints)
+
+
 def _at_world(tree: UrdfTree) -> set[str]:
     """The links whose frame is that of the world, where the root is welded to it."""
     found = {tree.root}
@@ -484,6 +494,7 @@ def read_urdf(
         notes.add("completed", "<robot>", f"it has no name; named {quoted(name)}", line_of(root))
     mechanism = Mechanism(name, source=f"URDF file {Path(path).name}")
     mechanism.notes = notes.taken
+    base = "free" if base == "free" and not _floats(tree) else None
     _Building(mechanism, tree, element_names(tree, base), _rotors(root, tree)).build(base)
     return mechanism
 

@@ -46,8 +46,8 @@ def read_bytes(path: str | Path) -> bytes:
         ) from None
     if not plain:
         raise DescriptionError(
-            f"{path}: it is no plain file (a folder, a pipe or a device); give the path of a"
-            " readable file"
+            f"{path}: the file cannot be read (it is a folder, a pipe or a device); give the path"
+            " of a readable file"
         )
     if len(content) > LARGEST_FILE:
         raise DescriptionError(

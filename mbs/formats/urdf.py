@@ -51,6 +51,9 @@ FREE_JOINT = "root_joint"
 
 Vector = tuple[float, ...]
 
+_LARGEST = 1e30
+"""Of lengths, masses and the like in SI units: their products stay finite in double precision."""
+
 
 @dataclass(frozen=True, slots=True)
 class Reader:
@@ -80,18 +83,25 @@ class Reader:
         """The element in messages."""
         return f"{self.notes.path}: {self.what}"
 
-    def number(self, element: Element | None, key: str, default: float) -> float:
+    def number(
+        self, element: Element | None, key: str, default: float, largest: float = _LARGEST
+    ) -> float:
         """One number of an element that may be missing."""
-        return self.vector(element, key, (default,))[0]
+        return self.vector(element, key, (default,), largest)[0]
 
-    def vector(self, element: Element | None, key: str, default: Vector) -> Vector:
+    def vector(
+        self, element: Element | None, key: str, default: Vector, largest: float = _LARGEST
+    ) -> Vector:
         """As many numbers as the default has."""
         text = None if element is None else element.get(key)
         if text is None:
             return default
         if "${" in text or "$(" in text:
             self.fail(f"{key} is {quoted(text)}, which xacro has not expanded; {_EXPAND}")
-        return plain_numbers(text, len(default), f"{self.where}: {key}")
+        values = plain_numbers(text, len(default), f"{self.where}: {key}")
+        if not max(map(abs, values)) <= largest:
+            self.fail(f"{key} is {quoted(text)}; give numbers of at most {largest:g}")
+        return values
 
 
 _EXPAND = "load the .xacro file itself, or expand it first"
@@ -479,7 +489,7 @@ def read_urdf(
     notes = Notes(str(path), strict)
     content = read_bytes(path)
     if Path(path).suffix.lower() == ".xacro" or xacro is not None:
-        content = expanded(path, xacro or {}, packages or {})
+        content, notes.lines = expanded(path, xacro or {}, packages or {}), False
     root = parse_content(str(path), content, notes)
     if root.tag != "robot":
         raise DescriptionError(
@@ -835,7 +845,7 @@ def _limit(reader: Reader, limit: Element | None, key: str) -> float:
     text = ("" if limit is None else limit.get(key, "")).strip().lower()
     if text.lstrip("+-") in _INFINITE:
         return _INFINITE[text.lstrip("+-")] * (-1 if text.startswith("-") else 1)
-    return reader.number(limit, key, 0.0)
+    return reader.number(limit, key, 0.0, math.inf)  # files write the largest double for infinity
 
 
 def _limits(reader: Reader) -> tuple[float, float] | None:

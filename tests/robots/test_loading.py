@@ -122,7 +122,7 @@ def test_pipes_folders_and_devices_are_refused(tmp_path, suffix):
     folder = tmp_path / f"folder{suffix}"
     folder.mkdir()
     for path in (pipe, device, folder):
-        with pytest.raises(DescriptionError, match="it is no plain file"):
+        with pytest.raises(DescriptionError, match="it is a folder, a pipe or a device"):
             mbs.load(path)
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -98,12 +99,25 @@ class Reader:
             return default
         if "${" in text or "$(" in text:
             self.fail(f"{key} is {quoted(text)}, which xacro has not expanded; {_EXPAND}")
+        if "," in text:
+            text = self._without_commas(element, key, text)
         values = plain_numbers(text, len(default), f"{self.where}: {key}")
         if not max(map(abs, values)) <= largest:
             self.fail(f"{key} is {quoted(text)}; give numbers of at most {largest:g}")
         return values
 
+    def _without_commas(self, element: Element | None, key: str, text: str) -> str:
+        """The text with blanks for commas between numbers, not for those that are in numbers."""
+        bare = len(text.split()) == 1 and text.count(",") > 1  # 1,2,3 are three numbers
+        spaced = text.replace(",", " ") if bare else _COMMA.sub(" ", text)
+        if spaced != text:
+            self.note(
+                "doubted", f"{key} is {quoted(text)}, with commas between its numbers", element
+            )
+        return spaced
 
+
+_COMMA = re.compile(r",(?=\s)")
 _EXPAND = "load the .xacro file itself, or expand it first"
 
 
@@ -261,6 +275,10 @@ def _links(root: Element, notes: Notes) -> dict[str, Element]:
                 f"{notes.path}: two links are named {quoted(name)} and differ; rename one"
             )
     if not links:
+        if any(element.tag.startswith("xacro:") for element in root):
+            raise DescriptionError(
+                f"{notes.path}: there is no <link> but macros of xacro; load it with xacro={{}}"
+            )
         raise DescriptionError(f"{notes.path}: there is no <link>; give a URDF file with links")
     return links
 
@@ -352,7 +370,7 @@ def _ordered(
 
 
 @dataclass(slots=True)
-class Names:
+class KeptNames:
     """Gives every element a name of its own: that of the file, changed where it cannot be kept.
 
     Attributes:
@@ -402,7 +420,7 @@ def element_names(tree: UrdfTree, base: Base | None) -> Named:
     """What the elements are called in the mechanism; changed names are noted."""
     moving = [joint for joint in tree.joints if joint.kind != "fixed"]
     wanted = {component_name(name) for name in (*tree.links, *(j.name for j in moving))}
-    names = Names({"world"}, wanted)
+    names = KeptNames({"world"}, wanted)
     of_joint = {
         joint.name: names.give(
             tree.joint(joint),

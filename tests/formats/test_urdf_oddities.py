@@ -128,6 +128,10 @@ NOTED = {
             ("ignored", 4, "its largest effort is -3; taken as unlimited"),
         ],
     ),
+    "commas between numbers": (
+        limited(LIMIT).replace('rpy=".3 0 .2"', 'rpy=".3, 0 .2"'),
+        [("doubted", 4, "rpy is '.3, 0 .2', with commas between its numbers")],
+    ),
     "no limit": (limited(""), [("completed", 4, "it has no <limit>; taken as unlimited")]),
     "negative friction": (
         limited(LIMIT + '<dynamics damping="-1" friction=".2"/>'),
@@ -274,7 +278,7 @@ def test_strict_reading_refuses_what_would_be_noted(urdf, case):
 # 1e-16 kg to divide by, and no part of an inertia that is not complete.
 ALONE = {
     *("infinite limits", "one infinite limit", "negative velocity", "a late declaration"),
-    *("negative mass",),
+    *("negative mass", "commas between numbers"),
     *("limits that are not numbers", "no limit", "a bare &", "UTF-16", "the same twice"),
     *("two joints of one name", "missing names", "an inertia that is not complete"),
     *("Latin-1 that is not declared", "Latin-1 that is declared"),  # names differ there
@@ -350,6 +354,9 @@ def test_rotors_of_transmissions(urdf):
         ('<link name="a"/><link name="a"><inertial/></link>', "two links are named 'a' and differ"),
         (link("b") + link("a") + joint("j", "b", "a", content='<limit lower="${x}" upper="2"/>'),
          "lower is '${x}', which xacro has not expanded"),
+        (link("b") + link("a") + joint("j", "b", "a").replace("0 .1 .3", "0,1 .1"),
+         "xyz: '0,1 .1' is not 3 finite number(s)"),
+        ('<xacro:include filename="x"/>', "no <link> but macros of xacro; load it with xacro={}"),
         (f'<link name="{"n" * 1000}"/><link name="b"/>', "the links have the roots 'nnn"),
     ],
 )  # fmt: skip
@@ -358,6 +365,14 @@ def test_what_has_no_meaning_is_refused(urdf, content, message):
         read_urdf(urdf(robot(content)))
     assert message in str(error.value)
     assert len(str(error.value)) < 400
+
+
+def test_commas_between_numbers(urdf):
+    plain = mbs.load(urdf(limited(LIMIT))).assemble()
+    commas = limited(LIMIT).replace('rpy=".3 0 .2"', 'rpy=".3, 0 .2"').replace("0 .1 .3", "0,.1,.3")
+    other = mbs.load(urdf(commas, "other.urdf")).assemble()
+    poses = [np.array(mbs.models.transform(s, "a")([0.4])) for s in (plain, other)]
+    assert np.array_equal(*poses)
 
 
 def test_long_names_are_shortened(urdf):

@@ -6,5 +6,6 @@ from mbs.export.fmu.controller import CController
 from mbs.export.fmu.system_fmu import fmu
 from mbs.export.par import par
 from mbs.export.ssp import ssp
+from mbs.export.urdf import urdf
 
-__all__ = ["CController", "c_library", "code", "fmu", "par", "ssp"]
+__all__ = ["CController", "c_library", "code", "fmu", "par", "ssp", "urdf"]

@@ -52,6 +52,9 @@ FREE_JOINT = "root_joint"
 
 Vector = tuple[float, ...]
 
+UNLIMITED = 1e30
+"""A limit from which on there is none, in a format that has no infinity."""
+
 _LARGEST = 1e30
 """Of lengths, masses and the like in SI units: their products stay finite in double precision."""
 
@@ -863,7 +866,8 @@ def _limit(reader: Reader, limit: Element | None, key: str) -> float:
     text = ("" if limit is None else limit.get(key, "")).strip().lower()
     if text.lstrip("+-") in _INFINITE:
         return _INFINITE[text.lstrip("+-")] * (-1 if text.startswith("-") else 1)
-    return reader.number(limit, key, 0.0, math.inf)  # files write the largest double for infinity
+    value = reader.number(limit, key, 0.0, math.inf)
+    return value if abs(value) < UNLIMITED else math.copysign(math.inf, value)
 
 
 def _limits(reader: Reader) -> tuple[float, float] | None:

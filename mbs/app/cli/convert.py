@@ -21,8 +21,10 @@ EXAMPLES = examples(
     "mbs convert robot.urdf robot.par",
     "mbs convert robot.par robot.toml",
     "mbs convert sr400 sr400.toml",
+    "mbs convert puma560 puma560.urdf",
 )
-_WRITTEN = (".par", ".toml")
+_TABLES = (".par", ".toml")
+_WRITTEN = (*_TABLES, ".urdf")
 
 
 def convert(
@@ -30,23 +32,26 @@ def convert(
     target: Annotated[
         Path,
         typer.Argument(
-            metavar="TARGET", help="File to write, .par (SYMORO) or .toml.", show_default=False
+            metavar="TARGET",
+            help="File to write, .par (SYMORO), .toml or .urdf.",
+            show_default=False,
         ),
     ],
     *,
     parameter: Parameters = None,
 ) -> None:
-    """Convert a robot to a .par or .toml file.
+    """Convert a robot to a .par, .toml or .urdf file.
 
-    From .par and .toml the table of frames is written as it was read, symbols and all. From URDF,
-    MJCF and the catalogue, link j of the assembled robot is frame j.
+    From .par and .toml to these the table of frames is written as it was read, symbols and all.
+    From URDF, MJCF and the catalogue, link j of the assembled robot is frame j. A URDF file has
+    numbers alone, and no loops.
     """
     suffix = target.suffix.lower()
     if suffix not in _WRITTEN:
         raise ExportError(
             f"{target}: files of this kind are not written; {did_you_mean(suffix, _WRITTEN)}"
         )
-    table = _table(source, parameter)
+    table = _table(source, parameter) if suffix in _TABLES else None
     if table is not None:
         from mbs.formats import write_par, write_toml
 
@@ -56,7 +61,8 @@ def convert(
         from mbs.files import write_bytes
 
         assembled = mechanism(source, parameter).assemble()
-        content = (exporting.par if suffix == ".par" else exporting.toml)(assembled)
+        writers = {".par": exporting.par, ".toml": exporting.toml, ".urdf": exporting.urdf}
+        content = writers[suffix](assembled)
         write_bytes(content, target)
     note(f"wrote {target}")
 
@@ -67,7 +73,7 @@ def _table(source: str, parameters: list[str] | None) -> RobotTable | None:
     from mbs.robots import catalogue
 
     suffix = Path(source).suffix.lower()
-    if source in catalogue() or suffix not in _WRITTEN:
+    if source in catalogue() or suffix not in _TABLES:
         return None
     table = read_par(source) if suffix == ".par" else read_toml(source)
     given = numbers(parameters, "--parameter")

@@ -150,6 +150,8 @@ class Mechanism:
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
         self.connections: list[tuple[Point, Point]] = []
+        self._ports: set[tuple[str, str]] = set()  # of the first `_counted` connections
+        self._counted = 0
         self.shafts: list[tuple[Flange, Flange]] = []
         self.frames: dict[str, Point] = {}
         self.values: dict[str, Parameter] = {}
@@ -399,11 +401,14 @@ class Mechanism:
         self.shafts.append(flanges)
 
     def _is_used(self, point: Point) -> bool:
-        return any(
-            p.owner is point.owner and p.port == point.port
-            for pair in self.connections
-            for p in pair
-        )
+        """Whether a frame of a joint is connected; each connection is looked at once."""
+        if self._counted > len(self.connections):
+            self._ports.clear()
+            self._counted = 0
+        for pair in self.connections[self._counted :]:
+            self._ports.update((p.owner.name, p.port) for p in pair)
+        self._counted = len(self.connections)
+        return (point.owner.name, point.port) in self._ports
 
 
 def _what(value: object) -> str:

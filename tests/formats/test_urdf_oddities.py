@@ -379,3 +379,22 @@ def test_long_names_are_shortened(urdf):
     mechanism = read_urdf(urdf(robot(link("b"), link("n" * 500), joint("j", "b", "n" * 500))))
     assert [body.name for body in mechanism.bodies()] == ["b", "n" * 80]
     assert [note.kind for note in mechanism.notes] == ["renamed"]
+
+
+def test_files_have_limits(urdf, monkeypatch):
+    def refused(text, message):
+        with pytest.raises(DescriptionError) as error:
+            read_urdf(urdf(text))
+        assert message in str(error.value)
+        assert len(str(error.value)) < 300
+
+    refused("<a>" * 300, "the file has elements in elements, 200 deep")
+    entities = "".join(
+        f'<!ENTITY e{k + 1} "{f"&e{k};" * 10}">' for k in range(9)
+    )  # a billion letters
+    text = f'<!DOCTYPE r [<!ENTITY e0 "{"x" * 50}">{entities}]><robot name="&e9;"/>'
+    refused(text, "the file is not XML: limit on input amplification")
+    monkeypatch.setattr("mbs.formats.xml._MOST_ELEMENTS", 100)
+    refused(robot("<link/>" * 101), "the file has more than 100 elements")
+    monkeypatch.setattr("mbs.formats.files.LARGEST_FILE", 1000)
+    refused(robot(" " * 1000), "the file has more than 1000 bytes")

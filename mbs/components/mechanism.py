@@ -130,6 +130,7 @@ class Mechanism:
 
     Attributes:
         notes: what the reader of a file renamed, ignored, doubted or completed; print them.
+        numbered: the body of each frame of the table that it was made from, by its number.
     """
 
     def __init__(
@@ -147,6 +148,7 @@ class Mechanism:
         self.cuts: list[str] = []
         self.guess = dict(guess or {})
         self.notes: list[Note] = []
+        self.numbered: dict[int, str] = {}
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
         self.connections: list[tuple[Point, Point]] = []

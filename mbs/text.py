@@ -11,6 +11,7 @@ DISTRIBUTION = "casadi-mbs"
 """Name of the package on an index, where `mbs`, the name of the import, is another project."""
 _LONGEST_QUOTE = 80
 _LONGEST_LIST = 20
+_MOST_COMPARED = 1000
 
 
 def quoted(value: object) -> str:
@@ -19,6 +20,11 @@ def quoted(value: object) -> str:
         text = " ".join(repr(value).split())
     except ValueError:  # an integer of more digits than Python converts
         text = f"a {type(value).__name__} of more digits than can be read"
+    return shortened(text)
+
+
+def shortened(text: str) -> str:
+    """The text, its middle left out when it is long."""
     half = _LONGEST_QUOTE // 2
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:half]}...{text[-half:]}"
 
@@ -42,8 +48,8 @@ def did_you_mean(name: object, known: Iterable[str]) -> str:
     Returns:
         the nearest known names, then the others, the first 20 of them.
     """
-    names = list(dict.fromkeys(known))
-    near = get_close_matches(str(name), names, n=3)
+    names = list(dict.fromkeys(shortened(str(one)) for one in known))
+    near = get_close_matches(shortened(str(name)), names[:_MOST_COMPARED], n=3)
     hint = f"did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
     if near and len(near) == len(names):
         return hint

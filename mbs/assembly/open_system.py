@@ -78,6 +78,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     _check_names(mechanism, coordinates)
     speeds = velocity_coordinates(moved, actuated)
     cut = _cut_coordinates(framed.cuts)
+    frames = _frames(mechanism, places, symbols)
     joints_found = joint_rows(mechanism, places, framed.cuts, symbols)
     return System(
         name=mechanism.name,
@@ -94,8 +95,9 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         speeds=speeds,
         cut_coordinates=cut,
         bodies=_bodies(mechanism, graph, framed),
-        frames=_frames(mechanism, places, symbols),
+        frames=frames,
         named_frames=tuple(mechanism.frames),
+        numbered=_numbered(mechanism, frames, len(framed.tree.links)),
         loops=_loop_rows(mechanism, framed),
         configuration=tuple(zero_position(framed.tree)),
         forces=attached_forces(mechanism, places, (coordinates, speeds, cut), symbols),
@@ -236,6 +238,17 @@ def _frames(
         link, pose = places[point.owner.name, point.port]
         frames[name] = link, pose @ point.placement.pose(symbols)
     return frames
+
+
+def _numbered(
+    mechanism: Mechanism, frames: Mapping[str, tuple[int, Pose]], links: int
+) -> dict[int, str]:
+    """The bodies of the frames of a table, where their numbers are not those of the links."""
+    same = len(mechanism.numbered) == links and all(
+        frames[name][0] == number - 1 and frames[name][1].is_identity()
+        for number, name in mechanism.numbered.items()
+    )
+    return {} if same else dict(mechanism.numbered)
 
 
 def _couplings(

@@ -214,6 +214,8 @@ class System:
         bounds: least and greatest value of the parameters that have one, by name.
         bounded: what is computed from parameters and has bounds.
         described: the components that hold parameters, as they were described.
+        numbered: the body of each frame of the table that it was made from, by the number there;
+            empty where these are the numbers of the links.
     """
 
     name: str
@@ -240,6 +242,7 @@ class System:
     bounds: Mapping[str, Bounds] = field(default_factory=dict)
     bounded: tuple[BoundedField, ...] = ()
     described: tuple[Component, ...] = ()
+    numbered: Mapping[int, str] = field(default_factory=dict)
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -342,10 +345,15 @@ class System:
     def frame(self, name: str | int) -> tuple[int, Pose]:
         """A frame by name, or the frame of link number 1, 2, ... (0 is the base).
 
+        A number is that of a frame of the table from which the mechanism was made, which counts
+        fixed frames, too.
+
         Raises:
             ModelError: there is no such frame.
         """
         if isinstance(name, (int, np.integer)) and not isinstance(name, bool):
+            if self.numbered:
+                return self._numbered_frame(int(name))
             if 0 <= name <= len(self.tree.links):
                 return int(name) - 1, Pose.identity()
             raise ModelError(
@@ -361,6 +369,17 @@ class System:
         raise ModelError(
             f"{self.name}: there is no frame {name!r}; " + did_you_mean(name, self.frames)
         )
+
+    def _numbered_frame(self, number: int) -> tuple[int, Pose]:
+        if number == 0:
+            return self.frames["base"]
+        if number not in self.numbered:
+            known = ", ".join(map(str, self.numbered))
+            raise ModelError(
+                f"{self.name}: no body has the frame {number} of the table; the frames are {known},"
+                " and 0 is the base"
+            )
+        return self.frames[self.numbered[number]]
 
     def position(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Positions q from values by coordinate name, the others as in the assembled configuration.

@@ -171,6 +171,9 @@ class Body(RigidBody):
         com: centre of mass in the reference frame [m].
         inertia: about the centre of mass, in the axes of the reference frame [kg m^2]: three
             principal values, or Ixx Ixy Ixz Iyy Iyz Izz, or a (3, 3) symmetric matrix.
+        checked: False takes a mass and an inertia that no body has, as the files of others hold
+            them: inverse dynamics and the inertia matrix are defined all the same. Readers set it
+            on such a body, and note it; nothing else should.
 
     Raises:
         DescriptionError: negative mass, or moments of inertia that no body has.
@@ -179,14 +182,16 @@ class Body(RigidBody):
     mass: Scalar = 0.0
     com: tuple[Scalar, ...] = (0.0, 0.0, 0.0)
     inertia: Any = (0.0, 0.0, 0.0)
+    checked: bool = True
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
         self._normalise("mass")
         object.__setattr__(self, "com", three(self.com, f"{self.name}, com"))
         object.__setattr__(self, "inertia", six_of(self.inertia, f"{self.name}, inertia"))
-        check_mass(self.name, self.mass)
-        check_tensor(self.name, self.inertia)
+        if self.checked:
+            check_mass(self.name, self.mass)
+            check_tensor(self.name, self.inertia)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
         """Inertia about the origin of the reference frame."""

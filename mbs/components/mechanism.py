@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from mbs.components.bodies import Mount, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.couplings import Coupling
 from mbs.components.drives import Flange, flange_pair
 from mbs.components.joints import Joint
+from mbs.components.locking import lock
 from mbs.components.notes import Note
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
@@ -129,6 +130,7 @@ class Mechanism:
 
     Attributes:
         notes: what the reader of a file renamed, ignored, doubted or completed; print them.
+        numbered: the body of each frame of the table that it was made from, by its number.
     """
 
     def __init__(
@@ -146,9 +148,12 @@ class Mechanism:
         self.cuts: list[str] = []
         self.guess = dict(guess or {})
         self.notes: list[Note] = []
+        self.numbered: dict[int, str] = {}
         self.world = World(gravity=gravity)
         self.components: dict[str, Component] = {self.world.name: self.world}
         self.connections: list[tuple[Point, Point]] = []
+        self._ports: set[tuple[str, str]] = set()  # of the first `_counted` connections
+        self._counted = 0
         self.shafts: list[tuple[Flange, Flange]] = []
         self.frames: dict[str, Point] = {}
         self.values: dict[str, Parameter] = {}
@@ -254,6 +259,23 @@ class Mechanism:
                 f"{self.name}: joint {joint.name!r} is not connected; connect it before the cut"
             )
         self.cuts.append(joint.name)
+
+    def lock(self, positions: Mapping[str, Any]) -> None:
+        """Weld joints at positions, in loops too; what couplings tie to them is locked with them.
+
+        Each becomes a Fixed joint of its name. Its motor, friction, spring and rotor go with its
+        motion, as do forces along its coordinates and their guess.
+
+        Args:
+            positions: of joints by name: a number or an expression [rad or m]; as many numbers as
+                it has positions for a joint with several, those of a Spherical or Free joint of
+                its frame_b in frame_a.
+
+        Raises:
+            DescriptionError: there is no such joint, a position is of another length, couplings
+                contradict the positions, or a sensor or a drive line is on the joint.
+        """
+        lock(self, positions)
 
     def assemble(
         self, guess: Mapping[str, float] | None = None, active: Sequence[str] = ()
@@ -381,11 +403,14 @@ class Mechanism:
         self.shafts.append(flanges)
 
     def _is_used(self, point: Point) -> bool:
-        return any(
-            p.owner is point.owner and p.port == point.port
-            for pair in self.connections
-            for p in pair
-        )
+        """Whether a frame of a joint is connected; each connection is looked at once."""
+        if self._counted > len(self.connections):
+            self._ports.clear()
+            self._counted = 0
+        for pair in self.connections[self._counted :]:
+            self._ports.update((p.owner.name, p.port) for p in pair)
+        self._counted = len(self.connections)
+        return (point.owner.name, point.port) in self._ports
 
 
 def _what(value: object) -> str:

@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -36,10 +36,11 @@ from mbs.components import (
     Spherical,
     Spring,
 )
+from mbs.components.locking import FREE_JOINT, Base
 from mbs.errors import DescriptionError
 from mbs.formats.files import component_name
 from mbs.formats.notes import Notes
-from mbs.formats.urdf import parse_xml
+from mbs.formats.xml import parse_xml
 from mbs.text import install_command, quoted
 
 # What the flags of an MJCF file switch off.
@@ -436,7 +437,7 @@ class Joints:
         acting: for each joint the actuators that drive it.
     """
 
-    def __init__(self, mechanism: Mechanism, mjcf: MjcfModel, base: Base) -> None:
+    def __init__(self, mechanism: Mechanism, mjcf: MjcfModel, base: Base | None) -> None:
         self.mechanism, self.mjcf, self.base = mechanism, mjcf, base
         self.acting = drives(mjcf)
 
@@ -455,7 +456,7 @@ class Joints:
         joints = range(first, first + int(model.body_jntnum[k]))
         if not joints and self.base == "free" and _is_root(mjcf, k):
             name = unused_name(mechanism, mjcf, FREE_JOINT)
-            mechanism.connect(parent, Free(name), body)
+            mechanism.connect(parent, Free(name, actuated=False), body)
             drawn = [*model.body_pos[k], *model.body_quat[k]]
             suffixes = (*"xyz", *_QUATERNION)
             mechanism.guess |= {
@@ -1028,13 +1029,8 @@ def _any(model: Any, field: str, k: int) -> bool:
 _LONGEST_REASON = 400
 """Letters of a message of MuJoCo that are repeated: it quotes names of any length."""
 
-Base = Literal["fixed", "free"] | None
 
-FREE_JOINT = "root_joint"
-"""Name of the joint of a root that is freed; it has coordinates root_joint.x, root_joint.qw ..."""
-
-
-def read_mjcf(path: str | Path, base: Base = None, strict: bool = False) -> Mechanism:
+def read_mjcf(path: str | Path, base: Base | None = None, strict: bool = False) -> Mechanism:
     """The mechanism in an MJCF file.
 
     Bodies, joints and sites keep their names, with blanks, dots and quotes replaced by

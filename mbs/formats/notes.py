@@ -15,11 +15,13 @@ class Notes:
     Attributes:
         path: of the file, as messages say it.
         strict: refuse the file where a note would be taken.
+        lines: whether the lines are those of the file, and not of a text made from it.
         taken: the notes, in the order of the file as far as it is read in order.
     """
 
     path: str
     strict: bool = False
+    lines: bool = True
     taken: list[Note] = field(default_factory=list)
 
     def add(self, kind: NoteKind, element: str, text: str, line: int | None = None) -> None:
@@ -34,7 +36,7 @@ class Notes:
         Raises:
             DescriptionError: reading is strict.
         """
-        note = Note(kind, element, text, line)
+        note = Note(kind, element, text, line if self.lines else None)
         if self.strict:
             raise DescriptionError(f"{self.path}: {note}; correct the file or read it not strictly")
         self.taken.append(note)

@@ -473,6 +473,7 @@ def to_mechanism(table: RobotTable) -> Mechanism:
             continue
         row = rows.get(j, InertiaRow(j))
         links[j] = mechanism.add(_body(j, row))
+        mechanism.numbered[j] = links[j].name
         point = links[frame.antecedent].at_khalil(**frame.geometry)
         if frame.sigma == 2:
             mechanism.connect(point, links[j])

@@ -1,20 +1,23 @@
-"""URDF robot files, read as mechanisms.
+"""URDF robot files, read as mechanisms; xacro files after `xacrodoc` has expanded them.
 
-Only what moves is read: links, inertials, joints, limits, friction and mimics. Visuals and
-collisions, and the meshes that they name, are not looked at.
+Only what moves is read: links, inertials, joints, limits, friction, mimics and the rotors of
+transmissions. Visuals and collisions, and the meshes that they name, are not looked at. A file is
+taken as far as it has a meaning, and what was made of the rest is in the notes of the mechanism.
 
 The reader is our own, without MuJoCo's: see "URDF without MuJoCo" in docs/decisions.md.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
@@ -29,37 +32,90 @@ from mbs.components import (
     Prismatic,
     Revolute,
 )
+from mbs.components.locking import FREE_JOINT, Base
+from mbs.components.notes import NoteKind
 from mbs.errors import DescriptionError
 from mbs.expressions import plain_numbers
-from mbs.formats.files import component_name, read_text
-from mbs.text import did_you_mean
+from mbs.formats.files import component_name, read_bytes
+from mbs.formats.notes import Notes
+from mbs.formats.xml import line_of, parse_content
+from mbs.text import did_you_mean, install_command, quoted
 
 # Numbers in URDF elements: vectors, origins and inertials.
 
 
 Vector = tuple[float, ...]
 
+UNLIMITED = 1e30
+"""A limit from which on there is none, in a format that has no infinity."""
+
+_LARGEST = 1e30
+"""Of lengths, masses and the like in SI units: their products stay finite in double precision."""
+
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Reads the numbers of one link or joint; `where` says which in the messages."""
+    """Reads the numbers of one link or joint, and takes notes of it.
 
-    where: str
+    Attributes:
+        what: the element, such as "joint 'j1'".
+        element: itself.
+        notes: of the file.
+    """
+
+    what: str
+    element: Element
+    notes: Notes
 
     def fail(self, message: str) -> NoReturn:
         """Refuse the element."""
         raise DescriptionError(f"{self.where}: {message}")
 
-    def number(self, element: Element | None, key: str, default: float) -> float:
-        """One number of an element that may be missing."""
-        return self.vector(element, key, (default,))[0]
+    def note(self, kind: NoteKind, text: str, element: Element | None = None) -> None:
+        """Take a note of the element, or of one in it."""
+        line = line_of(self.element if element is None else element)
+        self.notes.add(kind, self.what, text, line)
 
-    def vector(self, element: Element | None, key: str, default: Vector) -> Vector:
+    @property
+    def where(self) -> str:
+        """The element in messages."""
+        return f"{self.notes.path}: {self.what}"
+
+    def number(
+        self, element: Element | None, key: str, default: float, largest: float = _LARGEST
+    ) -> float:
+        """One number of an element that may be missing."""
+        return self.vector(element, key, (default,), largest)[0]
+
+    def vector(
+        self, element: Element | None, key: str, default: Vector, largest: float = _LARGEST
+    ) -> Vector:
         """As many numbers as the default has."""
         text = None if element is None else element.get(key)
         if text is None:
             return default
-        return plain_numbers(text, len(default), f"{self.where}: {key}")
+        if "${" in text or "$(" in text:
+            self.fail(f"{key} is {quoted(text)}, which xacro has not expanded; {_EXPAND}")
+        if "," in text:
+            text = self._without_commas(element, key, text)
+        values = plain_numbers(text, len(default), f"{self.where}: {key}")
+        if not max(map(abs, values)) <= largest:
+            self.fail(f"{key} is {quoted(text)}; give numbers of at most {largest:g}")
+        return values
+
+    def _without_commas(self, element: Element | None, key: str, text: str) -> str:
+        """The text with blanks for commas between numbers, not for those that are in numbers."""
+        bare = len(text.split()) == 1 and text.count(",") > 1  # 1,2,3 are three numbers
+        spaced = text.replace(",", " ") if bare else _COMMA.sub(" ", text)
+        if spaced != text:
+            self.note(
+                "doubted", f"{key} is {quoted(text)}, with commas between its numbers", element
+            )
+        return spaced
+
+
+_COMMA = re.compile(r",(?=\s)")
+_EXPAND = "load the .xacro file itself, or expand it first"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +124,12 @@ class Inertial:
 
     mass: float = 0.0
     com: Vector = (0.0, 0.0, 0.0)
-    tensor: Any = (0.0, 0.0, 0.0)
+    tensor: Any = ((0.0, 0.0, 0.0),) * 3
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the link has no inertia at all."""
+        return self.mass == 0 and not np.any(self.tensor)
 
 
 def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str, float]]]:
@@ -80,20 +141,26 @@ def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str,
     return xyz, turns
 
 
-def read_inertial(reader: Reader, link: Element) -> Inertial:
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def read_inertial(reader: Reader) -> Inertial:
     """The inertial of a link, without mass if it has none.
 
     Raises:
-        DescriptionError: a number is missing or cannot be read.
+        DescriptionError: a number cannot be read.
     """
-    inertial = link.find("inertial")
+    inertial = reader.element.find("inertial")
     if inertial is None:
         return Inertial()
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     if mass is None or mass.get("value") is None:
-        reader.fail("its inertial has no mass; give <mass value='...'/>")
-    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    Ixx, Ixy, Ixz, Iyy, Iyz, Izz = (reader.number(inertia, key, 0.0) for key in keys)
+        reader.note("ignored", "its inertial has no mass and was left out", inertial)
+        return Inertial()
+    missing = [key for key in _MOMENTS if inertia is None or inertia.get(key) is None]
+    if missing:
+        reader.note("completed", f"its inertia has no {', '.join(missing)}; taken as 0", inertial)
+    Ixx, Ixy, Ixz, Iyy, Iyz, Izz = (reader.number(inertia, key, 0.0) for key in _MOMENTS)
     com, turns = origin_of(reader, inertial)
     tensor = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
     for axis, angle in reversed(turns):
@@ -116,6 +183,14 @@ def _turn(axis: str, angle: float) -> Any:
 # Which links and joints a URDF file has, and how they hang together.
 
 
+_ONE_AXIS: Mapping[str, type[Revolute] | type[Prismatic]] = {
+    "revolute": Revolute,
+    "continuous": Revolute,
+    "prismatic": Prismatic,
+}
+_KINDS = (*_ONE_AXIS, "fixed", "floating", "planar")
+
+
 @dataclass(frozen=True, slots=True)
 class JointElement:
     """A joint and the links on either side."""
@@ -128,92 +203,138 @@ class JointElement:
     @property
     def kind(self) -> str:
         """Its type."""
-        return self.element.get("type", "")
+        return self.element.get("type", "").strip()
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfTree:
     """The links by name, and the joints in an order in which parents come first."""
 
-    path: str
+    notes: Notes
     root: str
     links: Mapping[str, Element]
     joints: tuple[JointElement, ...]
 
-    def reader(self, what: str) -> Reader:
-        """A reader of numbers whose messages name the file and the element."""
-        return Reader(f"{self.path}: {what}")
+    def link(self, name: str) -> Reader:
+        """A reader of the numbers of a link."""
+        return Reader(f"link {quoted(name)}", self.links[name], self.notes)
 
-    def body_name(self, link: str) -> str:
-        """The name of the body of a link; joints, and the base of all models, keep theirs."""
-        name = component_name(link)
-        taken = {component_name(joint.name) for joint in self.joints if joint.kind != "fixed"}
-        if link != self.root:
-            taken.add("base")
-        return f"{name}_link" if name in taken else name
+    def joint(self, joint: JointElement) -> Reader:
+        """A reader of the numbers of a joint."""
+        return Reader(f"joint {quoted(joint.name)}", joint.element, self.notes)
 
 
-def read_tree(path: str, root: Element) -> UrdfTree:
+def read_tree(root: Element, notes: Notes) -> UrdfTree:
     """The links and joints of a <robot>, checked to be a tree.
 
     Raises:
-        DescriptionError: a name is missing, unknown or used twice, or there is not one root.
+        DescriptionError: an end of a joint is unknown, links of one name differ, or there is not
+            one root.
     """
-    _check_elements(path, root)
-    links = _named(path, root, "link")
-    if not links:
-        raise DescriptionError(f"{path}: there is no <link>; give a URDF file with links")
+    path = notes.path
+    links = _links(root, notes)
     joints = [
-        _joint_element(path, name, element, links)
-        for name, element in _named(path, root, "joint").items()
+        _joint_element(notes, name, element, links)
+        for name, element in _joints(root, notes).items()
     ]
     parents: dict[str, str] = {}
     for joint in joints:
         if joint.child in parents:
             raise DescriptionError(
-                f"{path}: link {joint.child!r} is the child of joints {parents[joint.child]!r} and"
-                f" {joint.name!r}; a link has one parent, so close loops with mbs components"
+                f"{path}: link {quoted(joint.child)} is the child of joints"
+                f" {quoted(parents[joint.child])} and {quoted(joint.name)}; a link has one parent,"
+                " so close loops with mbs components"
             )
         parents[joint.child] = joint.name
     roots = [name for name in links if name not in parents]
     if len(roots) != 1:
-        found = f"the roots {', '.join(map(repr, roots))}" if roots else "no root but a cycle"
+        few = ", ".join(map(quoted, roots[:5])) + (" ..." if len(roots) > 5 else "")
+        found = f"the roots {few}" if roots else "no root but a cycle"
         raise DescriptionError(f"{path}: the links have {found}; connect them as one tree")
-    return UrdfTree(path, roots[0], links, _ordered(path, roots[0], links, joints))
+    return UrdfTree(notes, roots[0], links, _ordered(path, roots[0], links, joints))
 
 
-def _check_elements(path: str, root: Element) -> None:
-    for element in root.iter():
-        if "xacro" in element.tag:
-            raise DescriptionError(
-                f"{path}: the file holds xacro macros; expand it with xacro first"
-            )
-    if root.find("constraint") is not None:
-        raise DescriptionError(
-            f"{path}: <constraint> is not read; close the loop with mbs components instead"
-        )
-
-
-def _named(path: str, root: Element, tag: str) -> dict[str, Element]:
-    named: dict[str, Element] = {}
-    for element in root.findall(tag):
+def _links(root: Element, notes: Notes) -> dict[str, Element]:
+    links: dict[str, Element] = {}
+    texts = _Texts()
+    for element in root.findall("link"):
         name = (element.get("name") or "").strip()
         if not name:
-            raise DescriptionError(f"{path}: a <{tag}> has no name; give it one")
-        if name in named:
-            raise DescriptionError(f"{path}: two {tag}s are named {name!r}; rename one")
-        named[name] = element
-    return named
+            notes.add(
+                "ignored", "a <link>", "it has no name, so nothing holds it", line_of(element)
+            )
+        elif name not in links:
+            links[name] = element
+        elif texts.same(links[name], element):
+            notes.add("ignored", f"link {quoted(name)}", "it stands twice, alike", line_of(element))
+        else:
+            raise DescriptionError(
+                f"{notes.path}: two links are named {quoted(name)} and differ; rename one"
+            )
+    if not links:
+        if any(element.tag.startswith("xacro:") for element in root):
+            raise DescriptionError(
+                f"{notes.path}: there is no <link> but macros of xacro; load it with xacro={{}}"
+            )
+        raise DescriptionError(f"{notes.path}: there is no <link>; give a URDF file with links")
+    return links
 
 
-def _joint_element(path: str, name: str, element: Element, links: Iterable[str]) -> JointElement:
+def _joints(root: Element, notes: Notes) -> dict[str, Element]:
+    joints: dict[str, Element] = {}
+    count: dict[str, int] = {}
+    texts = _Texts()
+    for element in root.findall("joint"):
+        given = (element.get("name") or "").strip()
+        ends = ((element.find(side), side) for side in ("parent", "child"))
+        names = [(end.get("link") or side) if end is not None else side for end, side in ends]
+        name = given or f"{names[0]}_to_{names[1]}"
+        if name in joints and texts.same(joints[name], element):
+            notes.add(
+                "ignored", f"joint {quoted(name)}", "it stands twice, alike", line_of(element)
+            )
+            continue
+        while name in joints:
+            count[given] = count.get(given, 1) + 1
+            name = f"{given}_{count[given]}"
+        if not given:
+            notes.add(
+                "completed", "a <joint>", f"it has no name; named {quoted(name)}", line_of(element)
+            )
+        elif name != given:
+            notes.add(
+                "renamed",
+                f"joint {quoted(given)}",
+                f"a joint before it has this name; named {quoted(name)}",
+                line_of(element),
+            )
+        joints[name] = element
+    return joints
+
+
+class _Texts(dict[Element, str]):
+    """The texts of elements, which are written once."""
+
+    def same(self, one: Element, other: Element) -> bool:
+        """Whether two elements say the same, however they are laid out."""
+        if one not in self:
+            self[one] = self._text(one)
+        return self[one] == self._text(other)
+
+    def _text(self, element: Element) -> str:
+        return " ".join(tostring(element, encoding="unicode").split())
+
+
+def _joint_element(
+    notes: Notes, name: str, element: Element, links: Collection[str]
+) -> JointElement:
     ends = []
     for side in ("parent", "child"):
         end = element.find(side)
         link = "" if end is None else (end.get("link") or "").strip()
         if link not in links:
             raise DescriptionError(
-                f"{path}: joint {name!r}: {side} link {link!r} does not exist;"
+                f"{notes.path}: joint {quoted(name)}: {side} link {quoted(link)} does not exist;"
                 f" {did_you_mean(link, links)}"
             )
         ends.append(link)
@@ -236,138 +357,533 @@ def _ordered(
     missing = [name for name in links if name not in reached]
     if missing:
         raise DescriptionError(
-            f"{path}: link {missing[0]!r} is in a cycle of joints; connect the links as one tree"
+            f"{path}: link {quoted(missing[0])} is in a cycle of joints; connect the links as one"
+            " tree"
         )
     return tuple(ordered)
 
 
-_KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-_ONE_AXIS = {"revolute": Revolute, "continuous": Revolute, "prismatic": Prismatic}
+# Names that components can bear, each of them once.
 
 
-def read_urdf(path: str | Path) -> Mechanism:
-    """The mechanism in a URDF file.
+@dataclass(slots=True)
+class KeptNames:
+    """Gives every element a name of its own: that of the file, changed where it cannot be kept.
+
+    Attributes:
+        taken: what no further component may be called.
+        wanted: what elements of the file are called, which renamed ones keep away from.
+        number: of the last name that was made of another one.
+    """
+
+    taken: set[str]
+    wanted: set[str]
+    number: dict[str, int] = field(default_factory=dict)
+
+    def give(self, reader: Reader, text: str, suffix: str, why: str) -> str:
+        """A name for an element.
+
+        Args:
+            reader: of the element.
+            text: its name in the file.
+            suffix: what is put behind a name that cannot be kept.
+            why: it cannot, in words.
+        """
+        name = component_name(text) or suffix
+        if name not in self.taken:
+            self.taken.add(name)
+            if name != text:
+                reader.note("renamed", f"it is {quoted(name)} here, for the letters of its name")
+            return name
+        free = f"{name}_{suffix}"
+        while free in self.taken or free in self.wanted:
+            self.number[name] = self.number.get(name, 1) + 1
+            free = f"{name}_{suffix}_{self.number[name]}"
+        self.taken.add(free)
+        reader.note("renamed", f"it is {quoted(free)} here, for {why}")
+        return free
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """What the links, the moving joints, the couplings of mimics and a free root are called."""
+
+    links: Mapping[str, str]
+    joints: Mapping[str, str]
+    free: str
+
+
+def element_names(tree: UrdfTree, base: Base | None) -> Named:
+    """What the elements are called in the mechanism; changed names are noted."""
+    moving = [joint for joint in tree.joints if joint.kind != "fixed"]
+    wanted = {component_name(name) for name in (*tree.links, *(j.name for j in moving))}
+    names = KeptNames({"world"}, wanted)
+    of_joint = {
+        joint.name: names.give(
+            tree.joint(joint),
+            joint.name,
+            "joint",
+            "another joint or the world has this name",
+        )
+        for joint in moving
+    }
+    free = FREE_JOINT
+    if base == "free":
+        free = names.give(
+            tree.link(tree.root),
+            FREE_JOINT,
+            "free",
+            "a joint of the file has this name",
+        )
+    at_world = set() if base == "free" else _at_world(tree)
+    of_link = {}
+    for link in tree.links:
+        if link == tree.root == "world" and base != "free":
+            of_link[link] = link  # the world itself
+            continue
+        reserved = component_name(link) == "base" and link not in at_world
+        if reserved:
+            names.taken.add("base")
+        why = (
+            "the base of all models has this name, and the link is not there"
+            if reserved
+            else "a joint, another link or the world has this name"
+        )
+        of_link[link] = names.give(tree.link(link), link, "link", why)
+    return Named(of_link, of_joint, free)
+
+
+def _floats(tree: UrdfTree) -> bool:
+    """Whether the root is a place in the world alone, from which a floating joint leads."""
+    held = {tree.root}
+    for joint in tree.joints:
+        if joint.parent in held and joint.kind == "fixed":
+            held.add(joint.child)
+    massless = all(tree.links[link].find("inertial") is None for link in held)
+    return massless and any(j.parent in held and j.kind == "floating" for j in tree.joints)
+
+
+def _at_world(tree: UrdfTree) -> set[str]:
+    """The links whose frame is that of the world, where the root is welded to it."""
+    found = {tree.root}
+    for joint in tree.joints:
+        if joint.kind == "fixed" and joint.parent in found:
+            xyz, turns = origin_of(tree.joint(joint), joint.element)
+            if not any(xyz) and not turns:
+                found.add(joint.child)
+    return found
+
+
+def read_urdf(
+    path: str | Path,
+    *,
+    base: Base | None = None,
+    strict: bool = False,
+    xacro: Mapping[str, object] | None = None,
+    packages: Mapping[str, str | Path] | None = None,
+) -> Mechanism:
+    """The mechanism in a URDF file, or in a xacro file.
 
     Every link becomes a body of its name, fixed ones as well, and every joint that moves a joint
-    of its name; blanks, dots and quotes in names become underscores, and a link that is named as
-    a joint gets `_link` appended. The root link is the world when it is named "world" or has no
-    mass; otherwise it is a body welded to the world. One-axis joints are actuated unless they
-    mimic another one; floating ones are not.
+    of its name; names that cannot be kept are changed, with a note. The root link is the world
+    when it is named "world" or has no mass; otherwise it is a body welded to the world. With a
+    free base the root is always a body, on the Free joint "root_joint". One-axis joints are
+    actuated unless they mimic another one; floating ones are not.
+
+    Args:
+        path: of the file; one that ends in .xacro is expanded by the library `xacrodoc`.
+        base: "free" for a root that nothing holds; otherwise it is welded to the world.
+        strict: refuse the file where a note would be taken.
+        xacro: values of the arguments of a xacro file.
+        packages: folders of the packages that a xacro file names.
 
     Raises:
-        DescriptionError: the file is missing or malformed, or its links and joints form no tree.
+        DescriptionError: the file is missing or malformed, its links and joints form no tree, or
+            reading is strict and something would be noted.
     """
-    root = parse_xml(path)
+    notes = Notes(str(path), strict)
+    content = read_bytes(path)
+    if Path(path).suffix.lower() == ".xacro" or xacro is not None:
+        content, notes.lines = expanded(path, xacro or {}, packages or {}), False
+    root = parse_content(str(path), content, notes)
     if root.tag != "robot":
         raise DescriptionError(
-            f"{path}: the root element is <{root.tag}>, not <robot>; give a URDF file"
+            f"{path}: the root element is <{quoted(root.tag)[1:-1]}>, not <robot>; give a URDF file"
         )
-    tree = read_tree(str(path), root)
-    name = component_name(root.get("name") or Path(path).stem)
-    mechanism = Mechanism(name or "robot", source=f"URDF file {Path(path).name}")
-    points = {tree.root: _root_point(mechanism, tree)}
-    for joint in tree.joints:
-        points[joint.child] = _add(mechanism, tree, joint, points[joint.parent])
-    for joint in tree.joints:
-        _add_mimic(mechanism, tree, joint)
+    _note_unread(root, notes)
+    tree = read_tree(root, notes)
+    text = root.get("name") or ""
+    name = component_name(text)
+    if not name:
+        name = component_name(Path(path).stem) or "robot"
+        notes.add("completed", "<robot>", f"it has no name; named {quoted(name)}", line_of(root))
+    mechanism = Mechanism(name, source=f"URDF file {Path(path).name}")
+    mechanism.notes = notes.taken
+    base = "free" if base == "free" and not _floats(tree) else None
+    _Building(mechanism, tree, element_names(tree, base), _rotors(root, tree)).build(base)
     return mechanism
 
 
-def parse_xml(path: str | Path) -> Element:
-    """The root element of an XML file.
+def expanded(
+    path: str | Path, arguments: Mapping[str, object], packages: Mapping[str, str | Path]
+) -> bytes:
+    """The URDF text that a xacro file stands for.
+
+    xacro evaluates Python expressions: expand files of people that you trust.
+
+    Args:
+        path: of the file; packages are looked for in the folders above it as well.
+        arguments: of the file, by name; True and False are written as xacro has them.
+        packages: folder of each package that is found nowhere else.
 
     Raises:
-        DescriptionError: the file is missing or is not XML.
+        DescriptionError: the library is not installed, or the file cannot be expanded.
     """
-    text = read_text(path)
     try:
-        return ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        raise DescriptionError(f"{path}: the file is not XML: {error}; correct it") from None
+        import xacrodoc
+    except ImportError:
+        raise DescriptionError(
+            f"{path}: xacro files are expanded by xacrodoc, which is not installed; run: "
+            + install_command("xacro")
+        ) from None
+    given = {k: str(v).lower() if isinstance(v, bool) else str(v) for k, v in arguments.items()}
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):  # xacro prints what it also raises
+            xacrodoc.packages.update_package_cache(dict(packages))
+            document = xacrodoc.XacroDoc.from_file(
+                Path(path).resolve(), subargs=given, resolve_packages=False
+            )
+            return str(document.to_urdf_string()).encode()
+    except (Exception, SystemExit) as error:  # macros raise what their expressions raise
+        reason = quoted(str(error) or type(error).__name__)
+        raise DescriptionError(
+            f"{path}: xacro cannot expand it: {reason}; give its arguments as xacro={{...}} and the"
+            " folders of its packages as packages={...}"
+        ) from None
 
 
-def _root_point(mechanism: Mechanism, tree: UrdfTree) -> Point:
-    inertial = read_inertial(tree.reader(f"link {tree.root!r}"), tree.links[tree.root])
-    world = mechanism.world.frame
-    name = tree.body_name(tree.root)
-    if tree.root != "world" and inertial.mass != 0:
-        body = mechanism.add(_body(name, inertial))
-        mechanism.connect(world, body)
+# What a file holds beside links and joints.
+
+
+_SILENT = {
+    "robot": {
+        *("link", "joint", "transmission", "gazebo", "material"),
+        *("sensor", "ros2_control", "loop", "constraint", "loop_joint"),
+    },
+    "link": {"inertial", "visual", "collision", "sensor", "contact"},
+    "joint": {
+        *("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+        *("safety_controller", "calibration"),
+    },
+}
+"""Elements that are read, noted elsewhere, or known to be without effect on the equations."""
+
+_LOOPS = ("loop", "constraint", "loop_joint")
+_WITH_EFFECT = {"springStiffness", "springReference", "turnGravityOff", "kinematic"}
+
+
+def _note_unread(root: Element, notes: Notes) -> None:
+    """Notes of the elements that are not read, one for each kind of them."""
+    unread: dict[tuple[str, str], list[Element]] = {}
+    for parent in (root, *root.findall("link"), *root.findall("joint")):
+        for child in parent:
+            if child.tag not in _SILENT[parent.tag]:
+                unread.setdefault((parent.tag, child.tag), []).append(child)
+    for (tag, kind), found in unread.items():
+        text = f"it is not known in a <{tag}> and was left out"
+        if kind.startswith("xacro:"):
+            text = f"it was left by xacro and has no meaning in URDF; {_EXPAND}"
+        if len(found) > 1:
+            text += f" ({len(found)} of them)"
+        notes.add("ignored", f"<{quoted(kind)[1:-1]}>", text, line_of(found[0]))
+    _note_effects(root, notes)
+
+
+def _note_effects(root: Element, notes: Notes) -> None:
+    """Notes of what would change the motion: loops, and springs and the like of Gazebo."""
+    for element in root:
+        local = element.tag.rpartition(":")[2]
+        if local in _LOOPS:
+            text = "the loop that it closes stays open; close it with mbs components"
+            notes.add("ignored", f"<{quoted(element.tag)[1:-1]}>", text, line_of(element))
+        elif element.tag == "gazebo":
+            for inner in _effects(element):
+                of = quoted(element.get("reference", ""))
+                text = f"<{inner.tag}> would change the motion and is not read"
+                notes.add("ignored", f"<gazebo> of {of}", text, line_of(inner))
+
+
+def _effects(gazebo: Element) -> Iterator[Element]:
+    """What an element for Gazebo says that changes the motion."""
+    for inner in gazebo:
+        text = (inner.text or "").strip().lower()
+        off = text in ("", "0", "false") or _is_zero(text)
+        held = inner.tag == "gravity" and text in ("0", "false")
+        if (inner.tag in _WITH_EFFECT and not off) or held or inner.tag in ("joint", "link"):
+            yield inner
+
+
+def _is_zero(text: str) -> bool:
+    try:
+        return float(text) == 0
+    except ValueError:
+        return False
+
+
+_REDUCTION = ("mechanicalReduction", "mechanical_reduction", "gear_ratio")
+_ROTOR = ("motorInertia", "rotorInertia", "rotor_inertia")
+
+
+def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
+    """Inertia of the rotors of transmissions seen at their joints, Ia [kg m^2 or kg].
+
+    A rotor of inertia J behind a reduction n is n^2 J at the joint; a reduction alone changes no
+    equation, since the inputs of the models are efforts at the joints.
+    """
+    found: dict[str, float] = {}
+    one_axis = {joint.name for joint in tree.joints if joint.kind in _ONE_AXIS}
+    for element in root.findall("transmission"):
+        name = quoted((element.get("name") or "").strip())
+        reader = Reader(f"transmission {name}", element, tree.notes)
+        joints = [j.get("name", "").strip() for j in element.iter("joint")]
+        n, inertia = _scalar_in(element, _REDUCTION), _scalar_in(element, _ROTOR)
+        if inertia is None:
+            if n not in (None, 0.0, 1.0):
+                reader.note("ignored", f"a reduction of {n:g} without the inertia of a rotor")
+            continue
+        if len(joints) != 1 or joints[0] not in one_axis or inertia < 0:
+            reader.note("ignored", "its rotor is not that of one joint of one axis")
+            continue
+        found[joints[0]] = found.get(joints[0], 0.0) + (1.0 if n is None else n) ** 2 * inertia
+    return found
+
+
+def _scalar_in(element: Element, tags: Collection[str]) -> float | None:
+    """The first number in elements of these names, whatever their prefix."""
+    for inner in element.iter():
+        if inner.tag.rpartition(":")[2] in tags:
+            try:
+                value = float(inner.get("value") or inner.text or "")
+            except ValueError:
+                continue
+            if math.isfinite(value):
+                return value
+    return None
+
+
+# Bodies and joints.
+
+
+@dataclass(slots=True)
+class _Building:
+    """Puts the links and joints of a tree into a mechanism.
+
+    Attributes:
+        mechanism: that is built.
+        tree: of the file.
+        names: of its elements.
+        rotors: Ia of joints by their names in the file.
+        inertials: of the links.
+        leaders: of the joints that mimic another one.
+    """
+
+    mechanism: Mechanism
+    tree: UrdfTree
+    names: Named
+    rotors: Mapping[str, float]
+    inertials: dict[str, Inertial] = field(default_factory=dict)
+    leaders: dict[str, str] = field(default_factory=dict)
+
+    def build(self, base: Base | None) -> None:
+        tree = self.tree
+        for link in tree.links:
+            self.inertials[link] = read_inertial(tree.link(link))
+        self.leaders = _leaders(tree)
+        points = {tree.root: self._root(base)}
+        for joint in tree.joints:
+            points[joint.child] = self._add(joint, points[joint.parent])
+        self._note_massless(base)
+        self._add_mimics()
+
+    def _root(self, base: Base | None) -> Point:
+        mechanism, link = self.mechanism, self.tree.root
+        world, name = mechanism.world.frame, self.names.links[link]
+        if base == "free":
+            body = mechanism.add(self._body(link))
+            mechanism.connect(world, Free(self.names.free, actuated=False), body)
+            return body.frame
+        if link != "world" and self.inertials[link].mass != 0:
+            body = mechanism.add(self._body(link))
+            mechanism.connect(world, body)
+            return body.frame
+        if name not in ("world", "base"):
+            mechanism.add_frame(name, world)
+        return world
+
+    def _body(self, link: str) -> Body:
+        name, inertial = self.names.links[link], self.inertials[link]
+        numbers = {"mass": inertial.mass, "com": inertial.com, "inertia": inertial.tensor}
+        try:
+            return Body(name, **numbers)
+        except DescriptionError as error:
+            reason = str(error).removeprefix(f"{name}: ").partition(";")[0]
+            self.tree.link(link).note(
+                "doubted",
+                f"{reason}, which no body has; taken as it is",
+                self.tree.links[link].find("inertial"),
+            )
+            return Body(name, **numbers, checked=False)
+
+    def _add(self, joint: JointElement, parent: Point) -> Point:
+        body = self.mechanism.add(self._body(joint.child))
+        reader = self.tree.joint(joint)
+        xyz, turns = origin_of(reader, joint.element)
+        point = parent.at(*xyz, rotation=turns or None)
+        if joint.kind not in _KINDS:
+            reader.fail(f"type {quoted(joint.kind)} is unknown; {did_you_mean(joint.kind, _KINDS)}")
+        if joint.kind == "fixed":
+            self.mechanism.connect(point, body)
+        else:
+            self.mechanism.connect(point, self._joint(reader, joint), body)
         return body.frame
-    if name not in ("world", "base"):
-        mechanism.add_frame(name, world)
-    return world
 
-
-def _body(name: str, inertial: Inertial) -> Body:
-    return Body(name, mass=inertial.mass, com=inertial.com, inertia=inertial.tensor)
-
-
-def _add(mechanism: Mechanism, tree: UrdfTree, joint: JointElement, parent: Point) -> Point:
-    link = tree.links[joint.child]
-    inertial = read_inertial(tree.reader(f"link {joint.child!r}"), link)
-    body = mechanism.add(_body(tree.body_name(joint.child), inertial))
-    reader = tree.reader(f"joint {joint.name!r}")
-    xyz, turns = origin_of(reader, joint.element)
-    point = parent.at(*xyz, rotation=turns or None)
-    kind = joint.element.get("type", "")
-    if kind not in _KINDS:
-        reader.fail(f"type {kind!r} is unknown; {did_you_mean(kind, _KINDS)}")
-    if kind == "fixed":
-        mechanism.connect(point, body)
-    else:
-        mechanism.connect(point, _joint(reader, joint, kind), body)
-    return body.frame
-
-
-def _joint(reader: Reader, joint: JointElement, kind: str) -> Joint:
-    name = component_name(joint.name)
-    dynamics = joint.element.find("dynamics")
-    Fv = reader.number(dynamics, "damping", 0.0)
-    Fs = reader.number(dynamics, "friction", 0.0)
-    if kind == "floating":
-        return Free(name, actuated=False, Fv=Fv, Fs=Fs)
-    axis = reader.vector(joint.element.find("axis"), "xyz", (1.0, 0.0, 0.0))
-    if kind == "planar":
-        return Planar(name, axis=axis, Fv=Fv, Fs=Fs)
-    return _ONE_AXIS[kind](
-        name,
-        axis=axis,
-        actuated=joint.element.find("mimic") is None,
-        limits=None if kind == "continuous" else _limits(reader, joint.element),
-        velocity=_largest(reader, joint.element, "velocity"),
-        effort=_largest(reader, joint.element, "effort"),
-        Fv=Fv,
-        Fs=Fs,
-    )
-
-
-def _limits(reader: Reader, element: Element) -> tuple[float, float] | None:
-    limit = element.find("limit")
-    low, high = (reader.number(limit, key, 0.0) for key in ("lower", "upper"))
-    return None if low == high == 0 else (low, high)
-
-
-def _largest(reader: Reader, element: Element, key: str) -> float | None:
-    """The largest velocity or effort; files write zero where it is not known."""
-    return reader.number(element.find("limit"), key, 0.0) or None
-
-
-def _add_mimic(mechanism: Mechanism, tree: UrdfTree, joint: JointElement) -> None:
-    mimic = joint.element.find("mimic")
-    if mimic is None:
-        return
-    reader = tree.reader(f"joint {joint.name!r}")
-    axes = {j.name: component_name(j.name) for j in tree.joints if j.kind in _ONE_AXIS}
-    driver = mimic.get("joint", "")
-    if joint.name not in axes:
-        reader.fail(f"it mimics {driver!r} but is {joint.kind}; only one-axis joints can mimic")
-    if driver not in axes:
-        reader.fail(
-            f"it mimics {driver!r}, which is not a one-axis joint; {did_you_mean(driver, axes)}"
+    def _joint(self, reader: Reader, joint: JointElement) -> Joint:
+        name, kind = self.names.joints[joint.name], joint.kind
+        dynamics = joint.element.find("dynamics")
+        Fv, Fs = (_friction(reader, dynamics, key) for key in ("damping", "friction"))
+        if kind == "floating":
+            return Free(name, actuated=False, Fv=Fv, Fs=Fs)
+        axis = reader.vector(joint.element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        if not any(axis):
+            reader.fail("its axis has zero length; give a direction")
+        if kind == "planar":
+            return Planar(name, axis=axis, Fv=Fv, Fs=Fs)
+        return _ONE_AXIS[kind](
+            name,
+            axis=axis,
+            actuated=joint.name not in self.leaders,
+            limits=None if kind == "continuous" else _limits(reader),
+            velocity=_largest(reader, "velocity"),
+            effort=_largest(reader, "effort"),
+            Fv=Fv,
+            Fs=Fs,
+            Ia=self.rotors.get(joint.name, 0.0),
         )
-    offset = reader.number(mimic, "offset", 0.0)
-    factor = reader.number(mimic, "multiplier", 1.0)
-    mechanism.add(
-        Coupling(f"{axes[joint.name]}_mimic", axes[joint.name], axes[driver], (offset, factor))
-    )
+
+    def _note_massless(self, base: Base | None) -> None:
+        """Notes of the joints that move nothing that has inertia."""
+        tree = self.tree
+        moves = {link: not self.inertials[link].is_zero for link in tree.links}
+        for joint in reversed(tree.joints):
+            moves[joint.parent] |= moves[joint.child]
+        text = "it moves nothing that has inertia, so its acceleration is not determined"
+        for joint in tree.joints:
+            if joint.kind != "fixed" and not moves[joint.child] and joint.name not in self.rotors:
+                tree.joint(joint).note("doubted", text)
+        if base == "free" and not moves[tree.root]:
+            tree.link(tree.root).note("doubted", "nothing of the free robot has inertia")
+
+    def _add_mimics(self) -> None:
+        taken = {*self.mechanism.components, *self.mechanism.frames}
+        for joint in self.tree.joints:
+            mimic = joint.element.find("mimic")
+            if mimic is None or joint.name not in self.leaders:
+                continue
+            reader = self.tree.joint(joint)
+            offset = reader.number(mimic, "offset", 0.0)
+            factor = reader.number(mimic, "multiplier", 1.0)
+            driven, driver = (self.names.joints[n] for n in (joint.name, self.leaders[joint.name]))
+            name = f"{driven}_mimic"
+            while name in taken:
+                name += "_"
+            taken.add(name)
+            self.mechanism.add(Coupling(name, driven, driver, (offset, factor)))
+
+
+def _leaders(tree: UrdfTree) -> dict[str, str]:
+    """What each joint mimics; notes of those that cannot."""
+    found: dict[str, str] = {}
+    last: dict[str, str] = {}
+    kinds = {joint.name: joint.kind for joint in tree.joints}
+    for joint in tree.joints:
+        mimic = joint.element.find("mimic")
+        if mimic is not None:
+            leader = (mimic.get("joint") or "").strip()
+            wrong = _mimic_fault(joint, leader, kinds, last)
+            if wrong:
+                text = f"it mimics {quoted(leader)}, {wrong}; left out"
+                tree.joint(joint).note("ignored", text, mimic)
+            else:
+                found[joint.name] = last[joint.name] = leader
+    return found
+
+
+def _mimic_fault(
+    joint: JointElement, leader: str, kinds: Mapping[str, str], leaders: dict[str, str]
+) -> str:
+    """Why a joint cannot follow another one; empty where it can.
+
+    Args:
+        joint: that mimics.
+        leader: what it mimics.
+        kinds: of all joints.
+        leaders: of the joints before it, or those that lead these; changed.
+    """
+    if joint.kind not in _ONE_AXIS:
+        return f"but is {joint.kind} and has not one position"
+    if leader not in kinds:
+        return "which does not exist"
+    if kinds[leader] not in _ONE_AXIS:
+        return f"which is {kinds[leader]} and has not one position"
+    passed = []
+    while leader in leaders:
+        passed.append(leader)
+        leader = leaders[leader]
+    leaders.update(dict.fromkeys(passed, leader))  # a long chain is walked through once
+    return "which follows it" if leader == joint.name else ""
+
+
+def _friction(reader: Reader, dynamics: Element | None, key: str) -> float:
+    value = reader.number(dynamics, key, 0.0)
+    if value >= 0:
+        return value
+    reader.note("ignored", f"{key} is {value:g}, less than zero; taken as 0", dynamics)
+    return 0.0
+
+
+_INFINITE = {"inf": math.inf, "infinity": math.inf, "nan": math.nan}
+
+
+def _limit(reader: Reader, limit: Element | None, key: str) -> float:
+    """A number of a <limit>, which may be infinite there, or not be one."""
+    text = ("" if limit is None else limit.get(key, "")).strip().lower()
+    if text.lstrip("+-") in _INFINITE:
+        return _INFINITE[text.lstrip("+-")] * (-1 if text.startswith("-") else 1)
+    value = reader.number(limit, key, 0.0, math.inf)
+    return value if abs(value) < UNLIMITED else math.copysign(math.inf, value)
+
+
+def _limits(reader: Reader) -> tuple[float, float] | None:
+    limit = reader.element.find("limit")
+    if limit is None:
+        reader.note("completed", "it has no <limit>; taken as unlimited")
+        return None
+    low, high = (_limit(reader, limit, key) for key in ("lower", "upper"))
+    if low < high and math.isfinite(low) and math.isfinite(high):
+        return low, high
+    if (low, high) != (-math.inf, math.inf):
+        text = f"its limits ({low:g}, {high:g}) leave it no range; taken as unlimited"
+        if low < high:
+            text = f"its limits ({low:g}, {high:g}) have one end; taken as unlimited"
+        reader.note("doubted", text, limit)
+    return None
+
+
+def _largest(reader: Reader, key: str) -> float | None:
+    """The largest velocity or effort; files write zero where it is not known."""
+    limit = reader.element.find("limit")
+    value = _limit(reader, limit, key)
+    if value < 0 or math.isnan(value):
+        reader.note("ignored", f"its largest {key} is {value:g}; taken as unlimited", limit)
+    return value if 0 < value < math.inf else None

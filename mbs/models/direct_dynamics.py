@@ -235,7 +235,8 @@ def _loose_in_tree(system: System) -> int | None:
     rng = np.random.default_rng(_SEED)
     configuration = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
     free, locked = np.array(pivots(configuration, system.p_default)).T
-    moves = free > _VANISHING * np.maximum(locked, _NO_INERTIA)
+    # The inertia of files may be negative: what counts is whether anything is there.
+    moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
     return None if moves.all() else int(np.max(np.flatnonzero(~moves)))
 
 

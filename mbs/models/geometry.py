@@ -24,7 +24,8 @@ def transform(system: System, frame: str | int, relative_to: str | int = "base")
 
     Args:
         system: open or closed; q must close the loops.
-        frame: a body, a named frame, or the number of a link (0 is the base).
+        frame: a body, a named frame, or the number of a link (0 is the base); of a mechanism that
+            was made from a table of frames, the number of a frame there.
         relative_to: likewise.
 
     Returns:
@@ -65,7 +66,11 @@ def terminal_frame(system: System) -> str | int:
     links = [row.number for row in system.links if row.name not in shafts]
     ends = _open_ends(system)
     links = [number for number in links if number in ends] or links
-    return links[-1] if links else len(system.tree.links)
+    last = links[-1] if links else len(system.tree.links)
+    if not system.numbered:
+        return last
+    # Numbers are those of a table: the body of its first frame that this link carries.
+    return next(name for name in system.numbered.values() if system.frames[name][0] == last - 1)
 
 
 def _open_ends(system: System) -> set[int]:

@@ -9,19 +9,20 @@ from types import MappingProxyType
 from typing import Any
 
 from mbs.components import Mechanism
+from mbs.components.locking import Base, fix_root, free_root
 from mbs.errors import DescriptionError
 from mbs.expressions import Parameter
 from mbs.formats import from_dict, read_mjcf, read_par, read_toml, read_urdf, to_mechanism
-from mbs.text import did_you_mean
+from mbs.formats.files import component_name
+from mbs.text import did_you_mean, quoted
 
 _READERS: Mapping[str, Callable[[str | Path], Mechanism]] = MappingProxyType(
     {
         ".toml": lambda path: to_mechanism(read_toml(path)),
         ".par": lambda path: to_mechanism(read_par(path)),
-        ".urdf": read_urdf,
-        ".xml": read_mjcf,
     }
 )
+_URDF, _MJCF = (".urdf", ".xacro"), ".xml"
 
 
 @cache
@@ -34,20 +35,52 @@ def catalogue() -> Mapping[str, Callable[[], Mechanism]]:
 
 
 def load(
-    source: str | Path | Mapping[str, Any], parameters: Mapping[str, float] | None = None
+    source: str | Path | Mapping[str, Any],
+    parameters: Mapping[str, float] | None = None,
+    *,
+    base: Base | None = None,
+    lock: Mapping[str, Any] | None = None,
+    strict: bool = False,
+    xacro: Mapping[str, object] | None = None,
+    packages: Mapping[str, str | Path] | None = None,
 ) -> Mechanism:
     """A mechanism from the catalogue, a dict of the TOML schema, or a file.
 
+    What a reader changed, ignored, doubts or completed is in `mechanism.notes`.
+
     Args:
-        source: a name such as "puma560", a dict, or the path of a .toml, .par, .urdf or .xml
-            (MJCF) file.
+        source: a name such as "puma560", a dict, or the path of a .toml, .par, .urdf, .xacro or
+            .xml (MJCF) file.
         parameters: values of the symbols that it uses.
+        base: "free" connects the root body to the world by the Free joint "root_joint", whose
+            positions are root_joint.x .y .z .qw .qx .qy .qz and whose velocities
+            root_joint.vx .vy .vz .wx .wy .wz are those of the body in its own axes; "fixed" locks
+            a root that the file leaves free where the file puts it; None is as the file says.
+            A table of frames (dict, .toml, .par) gives no inertia of its base, so that it cannot
+            be free.
+        lock: joints by name and the positions that they are welded at, as in `Mechanism.lock`.
+        strict: refuse a file where a note would be taken.
+        xacro: values of the arguments of a xacro file, by name.
+        packages: folders of the packages that a xacro file names.
 
     Raises:
-        DescriptionError: the name or the suffix is unknown, the description is impossible, or a
-            parameter is used nowhere.
+        DescriptionError: the name or the suffix is unknown, the description is impossible, a
+            parameter is used nowhere, the base cannot be free, a joint to be locked does not
+            exist, or reading is strict and there is a note.
     """
-    mechanism = _mechanism(source)
+    if base not in (None, "fixed", "free"):
+        raise DescriptionError(f"base is {quoted(base)}; give 'fixed', 'free' or None")
+    mechanism = _mechanism(source, base, strict, xacro, packages)
+    if strict and mechanism.notes:
+        raise DescriptionError(
+            f"{mechanism.name}: {mechanism.notes[0]}; correct the file or load it not strictly"
+        )
+    if base == "free":
+        free_root(mechanism)
+    elif base == "fixed":
+        fix_root(mechanism)
+    if lock:
+        mechanism.lock(_joint_names(mechanism, lock))
     known = {parameter.name: parameter for parameter in mechanism.parameters()}
     for name, value in (parameters or {}).items():
         if name not in known:
@@ -58,22 +91,46 @@ def load(
     return mechanism
 
 
-def _mechanism(source: str | Path | Mapping[str, Any]) -> Mechanism:
+def _joint_names(mechanism: Mechanism, lock: Mapping[str, Any]) -> dict[str, Any]:
+    """Positions by the names of joints here; names may be written as in the file."""
+    if not isinstance(lock, Mapping):
+        raise DescriptionError(
+            f"{mechanism.name}: lock is {quoted(lock)}; give a dict of joints to positions"
+        )
+    return {
+        name if name in mechanism.components else component_name(str(name)): position
+        for name, position in lock.items()
+    }
+
+
+def _mechanism(
+    source: str | Path | Mapping[str, Any],
+    base: Base | None,
+    strict: bool,
+    xacro: Mapping[str, object] | None,
+    packages: Mapping[str, str | Path] | None,
+) -> Mechanism:
     if isinstance(source, Mapping):
         return to_mechanism(from_dict(source))
     if isinstance(source, str) and source in catalogue():
         return catalogue()[source]()
     if not isinstance(source, (str, Path)):
         raise DescriptionError(
-            f"robot {source!r}: it is neither a name, a dict nor a path; give one of them"
+            f"robot {quoted(source)}: it is neither a name, a dict nor a path; give one of them"
         )
     suffix = Path(source).suffix.lower()
+    if suffix in _URDF:
+        return read_urdf(source, base=base, strict=strict, xacro=xacro, packages=packages)
+    if suffix == _MJCF:
+        return read_mjcf(source, base=base, strict=strict)
     if suffix in _READERS:
         return _READERS[suffix](source)
     if suffix or len(Path(source).parts) > 1:
         raise DescriptionError(
-            f"{source}: files of this kind are not read; {did_you_mean(suffix, _READERS)}"
+            f"{quoted(str(source))[1:-1]}: files of this kind are not read;"
+            f" {did_you_mean(suffix, [*_READERS, *_URDF, _MJCF])}"
         )
     raise DescriptionError(
-        f"robot {str(source)!r} is not in the catalogue; {did_you_mean(str(source), catalogue())}"
+        f"robot {quoted(str(source))} is not in the catalogue;"
+        f" {did_you_mean(str(source), catalogue())}"
     )

@@ -9,7 +9,8 @@ from casadi import DM, SX
 from support.messages import refused
 from support.random_trees import random_rotation
 
-from mbs.components import Body, Box, Cylinder, KhalilBody, PointMass, World
+import mbs
+from mbs.components import Body, Box, Cylinder, KhalilBody, PointMass, Revolute, World
 from mbs.errors import DescriptionError, ExpressionError
 from mbs.expressions import Parameter, parameters_of
 from mbs.spatial.inertia import TEN_PARAMETERS
@@ -224,3 +225,15 @@ def test_impossible_bodies(make, parts):
 
 def test_expression_errors_are_description_errors():
     assert issubclass(ExpressionError, DescriptionError)
+
+
+def test_readers_may_leave_an_inertia_unchecked():
+    """It is kept as it is, and what is computed with it is that of the formula."""
+    with pytest.raises(DescriptionError, match="triangle inequality"):
+        Body("b", mass=1, inertia=(1, 1, 3))
+    m = mbs.Mechanism("m")
+    b = m.add(Body("b", mass=1, com=(0.5, 0, 0), inertia=(1, 1, -3), checked=False))
+    m.connect(m.world, Revolute("j", axis="z"), b)
+    system = m.assemble()
+    assert float(mbs.models.inertia_matrix(system)([0.3])) == pytest.approx(-3 + 0.25)
+    assert float(mbs.models.direct_dynamics(system)([0.3], [0], [5.5])) == pytest.approx(-2.0)

@@ -6,9 +6,10 @@ import casadi
 import numpy as np
 import pytest
 
+import mbs
 from mbs import Parameter
 from mbs.components import KhalilBody, Prismatic, Revolute, Rotor, Spherical
-from mbs.errors import DescriptionError, ExportError
+from mbs.errors import DescriptionError, ExportError, ModelError
 from mbs.expressions import expression, to_float
 from mbs.formats import (
     InertiaRow,
@@ -368,3 +369,48 @@ def test_a_guess_of_a_joint_with_a_dot_in_its_name_is_kept():
     assert made.guess == {"arm.q1": 0.2}
     with pytest.raises(DescriptionError, match=r"there is no joint 'arm\.q2'"):
         replace(table, guess={"arm.q2": 0.2})
+
+
+def test_numbers_of_frames_are_those_of_the_table():
+    """Behind a fixed frame, and of a tool at the end, they are not the numbers of the links."""
+    table = from_dict(
+        {
+            "name": "arm",
+            "frame": [
+                {"antecedent": 0, "joint": "revolute"},
+                {"antecedent": 1, "joint": "fixed", "d": 0.5},
+                {"antecedent": 2, "joint": "revolute", "alpha": 0.3},
+                {"antecedent": 3, "joint": "fixed", "d": 0.25, "name": "tip"},
+            ],
+            "body": [{"frame": 1, "ZZ": 1.0}, {"frame": 3, "ZZ": 1.0}],
+        }
+    )
+    system = to_mechanism(table).assemble()
+    assert system.numbered == {1: "link1", 2: "link2", 3: "link3", 4: "link4"}
+    q = [0.3, 0.4]
+    for number, name in system.numbered.items():
+        one, other = (np.array(mbs.models.transform(system, f)(q)) for f in (number, name))
+        assert np.array_equal(one, other)
+    T = np.array(mbs.models.transform(system, 3)(q))
+    assert T[:2, 3] == pytest.approx([0.5 * np.cos(0.3), 0.5 * np.sin(0.3)], abs=1e-15)
+    T = np.array(mbs.models.transform(system, 4, relative_to=3)(q))
+    assert pytest.approx(np.array([[1, 0, 0, 0.25], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])) == T
+    assert np.array_equal(np.array(mbs.models.transform(system, 0)(q)), np.eye(4))
+    assert np.array_equal(
+        np.array(mbs.models.direct_geometry(system)(q)),
+        np.array(mbs.models.transform(system, "link3")(q)),
+    )
+    with pytest.raises(ModelError, match="no body has the frame 5 of the table; the frames are 1"):
+        mbs.models.transform(system, 5)
+    # A lock takes links away, but no frames.
+    locked = to_mechanism(table)
+    locked.lock({"q1": 0.3})
+    T_locked = np.array(mbs.models.transform(locked.assemble(), 3)([0.4]))
+    assert T_locked == pytest.approx(np.array(mbs.models.transform(system, 3)(q)), abs=1e-15)
+
+
+def test_without_fixed_frames_numbers_are_those_of_the_links():
+    system = mbs.load("puma560").assemble()
+    assert system.numbered == {}
+    for number in range(1, 7):
+        assert system.frame(number)[0] == number - 1

@@ -52,8 +52,8 @@ def _start(
 ) -> None:
     """Equations of robots and mechanisms with closed loops.
 
-    ROBOT is a name that `mbs robots` lists, or a .toml, .par, .urdf or .xml (MJCF) file. Units are
-    SI and radians; numbers may be written as pi/2.
+    ROBOT is a name that `mbs robots` lists, or a .toml, .par, .urdf, .xacro or .xml (MJCF) file.
+    Units are SI and radians; numbers may be written as pi/2.
 
     Exit codes: 0 fine; 1 refused, with one sentence on the standard error; 2 words that the
     command line does not know.

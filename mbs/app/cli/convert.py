@@ -22,9 +22,10 @@ EXAMPLES = examples(
     "mbs convert robot.par robot.toml",
     "mbs convert robot.urdf robot.xml",
     "mbs convert sr400 sr400.toml",
+    "mbs convert puma560 puma560.urdf",
 )
 _TABLES = (".par", ".toml")
-_WRITTEN = (*_TABLES, ".xml")
+_WRITTEN = (*_TABLES, ".urdf", ".xml")
 
 
 def convert(
@@ -33,17 +34,18 @@ def convert(
         Path,
         typer.Argument(
             metavar="TARGET",
-            help="File to write: .par (SYMORO), .toml or .xml (MJCF).",
+            help="File to write: .par (SYMORO), .toml, .urdf or .xml (MJCF).",
             show_default=False,
         ),
     ],
     *,
     parameter: Parameters = None,
 ) -> None:
-    """Convert a robot to a .par, .toml or .xml (MJCF) file.
+    """Convert a robot to a .par, .toml, .urdf or .xml (MJCF) file.
 
     From .par and .toml to one of them the table of frames is written as it was read, symbols and
-    all. From URDF, MJCF and the catalogue, link j of the assembled robot is frame j.
+    all. From URDF, MJCF and the catalogue, link j of the assembled robot is frame j. A URDF file
+    has numbers alone, and no loops.
     """
     suffix = target.suffix.lower()
     if suffix not in _WRITTEN:
@@ -64,7 +66,8 @@ def convert(
         from mbs.files import write_bytes
 
         assembled = mechanism(source, parameter).assemble()
-        content = (exporting.par if suffix == ".par" else exporting.toml)(assembled)
+        writers = {".par": exporting.par, ".toml": exporting.toml, ".urdf": exporting.urdf}
+        content = writers[suffix](assembled)
         write_bytes(content, target)
     note(f"wrote {target}")
 

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from mbs.app.cli.printing import note
+
 if TYPE_CHECKING:
     from mbs.assembly import System
     from mbs.components import Mechanism
 
+_MOST_NOTES = 8
+"""Notes of a file that are said; some files have hundreds."""
+
 
 def mechanism(robot: str, parameters: Sequence[str] | None = None) -> Mechanism:
-    """The description of a robot.
+    """The description of a robot; notes of its reader go to the standard error.
 
     Args:
         robot: name in the catalogue, or a file.
@@ -22,7 +27,12 @@ def mechanism(robot: str, parameters: Sequence[str] | None = None) -> Mechanism:
     """
     from mbs.robots import load
 
-    return load(robot, numbers(parameters, "--parameter"))
+    loaded = load(robot, numbers(parameters, "--parameter"))
+    for one in loaded.notes[:_MOST_NOTES]:
+        note(f"{robot}: {one}")
+    if len(loaded.notes) > _MOST_NOTES:
+        note(f"{robot}: and {len(loaded.notes) - _MOST_NOTES} notes more, see mechanism.notes")
+    return loaded
 
 
 def system(robot: str, parameters: Sequence[str] | None = None) -> System:

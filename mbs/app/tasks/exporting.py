@@ -141,6 +141,15 @@ def par(system: System) -> bytes:
     return _written(lambda path: export.par(system, path), "robot.par")
 
 
+def urdf(system: System) -> bytes:
+    """The system as a URDF file; see `mbs.export.urdf`.
+
+    Raises:
+        ModelError: the format cannot say it.
+    """
+    return _written(lambda path: export.urdf(system, path), "robot.urdf")
+
+
 def toml(system: System) -> bytes:
     """The system as a table of frames in TOML, its joints under their names.
 

@@ -298,7 +298,8 @@ def _terminal(system: System, chosen: Chosen = NOTHING, /) -> str | int:
 
 
 def _frames(system: System, chosen: Chosen = NOTHING, /) -> Values:
-    return (*range(len(system.tree.links) + 1), *system.frames)
+    numbers = (0, *system.numbered) if system.numbered else range(len(system.tree.links) + 1)
+    return (*numbers, *system.frames)
 
 
 def _speeds(system: System, chosen: Chosen = NOTHING, /) -> Values:

@@ -70,6 +70,27 @@ def test_symbols_of_a_table_stay_symbols_and_take_values(command, tmp_path) -> N
     assert (parameter.name, parameter.default) == ("L2", 0.7)
 
 
+def test_notes_of_a_file_are_said_beside_the_output(command) -> None:
+    joints = "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="b"/>'
+        f'<child link="l{k}"/></joint>\n'
+        for k in range(5)
+    )
+    Path("r.urdf").write_text(f'<robot name="r">\n<link name="b"/>{joints}</robot>')
+    answer = command("convert", "r.urdf", "r.toml")
+    assert "r.urdf: line 2: joint 'j0': it has no <limit>; taken as unlimited" in answer.err
+    assert "r.urdf: and 2 notes more, see mechanism.notes" in answer.err
+    assert answer.out == ""
+
+
+def test_a_robot_is_converted_to_urdf(command) -> None:
+    command("convert", "puma560", "puma560.urdf")
+    one, other = (mbs.load(name).assemble() for name in ("puma560", "puma560.urdf"))
+    q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    M = [np.array(mbs.models.inertia_matrix(system)(q)) for system in (one, other)]
+    assert M[1] == pytest.approx(M[0], abs=1e-12)
+
+
 def test_a_closed_robot_of_the_catalogue_is_converted(command) -> None:
     command("convert", "four_bar", "four_bar.toml")
     command("export", "par", "four_bar", "four_bar.par")

@@ -30,7 +30,7 @@ from mbs.formats import (
     to_mechanism,
 )
 from mbs.formats.table import DRIVE, GEOMETRY, LOOP_JOINTS
-from mbs.formats.urdf import parse_xml
+from mbs.formats.xml import parse_xml
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted
 

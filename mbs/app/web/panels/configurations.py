@@ -358,5 +358,6 @@ class _ConfigurationsPanel:
 
 def _frames(system: System) -> dict[str | int, str]:
     """The frames that can be asked for, with what the list calls them."""
-    frames = (*range(1, len(system.tree.links) + 1), *system.named_frames, terminal_frame(system))
+    numbers = system.numbered or range(1, len(system.tree.links) + 1)
+    frames = (*numbers, *system.named_frames, terminal_frame(system))
     return {frame: frame_label(system, frame) for frame in frames}

@@ -102,6 +102,8 @@ def frame_label(system: System, frame: object) -> str:
     """What a form calls a frame: 0 (base), 3 (q3), tool."""
     if frame == 0:
         return "0 (base)"
+    if isinstance(frame, int) and frame in system.numbered:
+        return f"{frame} ({system.numbered[frame]})"
     if isinstance(frame, int) and frame <= len(system.links):
         name = system.links[frame - 1].name
         return str(frame) if name == f"q{frame}" else f"{frame} ({name})"

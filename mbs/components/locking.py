@@ -1,0 +1,394 @@
+"""Joints that are locked, and roots that are freed of the world or welded to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from mbs.components.bodies import RigidBody
+from mbs.components.component import (
+    Component,
+    Oriented,
+    Placement,
+    Point,
+    Step,
+    Translation,
+    Turned,
+    angle_expression,
+)
+from mbs.components.constraints import Constraint
+from mbs.components.couplings import Coupling
+from mbs.components.forces import CoordinateForce
+from mbs.components.joints import Fixed, Free, Freedom, Joint, Motion
+from mbs.components.on_points import OnPoints
+from mbs.components.sensors import OnJoint
+from mbs.errors import DescriptionError
+from mbs.expressions import Expression, Number, Scalar, expression, to_float
+from mbs.spatial import align_z, nearest_rotation
+from mbs.text import did_you_mean, quoted
+
+if TYPE_CHECKING:
+    from mbs.components.mechanism import Mechanism
+
+_AGREE = 1e-9
+"""How far a coupling may be off between two locked joints [rad or m]; files have 10 digits."""
+
+
+@dataclass(slots=True)
+class _Locks:
+    """Positions of the joints that are locked, those included that couplings lock with them.
+
+    Attributes:
+        mechanism: whose joints they are.
+        positions: of each of them, one for each element of q.
+        values: of each coordinate.
+        gone: the couplings that hold among locked coordinates alone.
+        changed: couplings of more than two coordinates, as they are among those that are left.
+    """
+
+    mechanism: Mechanism
+    positions: dict[str, tuple[Expression, ...]] = field(default_factory=dict)
+    values: dict[str, Expression] = field(default_factory=dict)
+    gone: set[str] = field(default_factory=set)
+    changed: dict[str, Coupling] = field(default_factory=dict)
+
+    def add(self, name: str, given: Any) -> None:
+        """Take the position of a joint."""
+        joint = self._joint(name)
+        where = f"{self.mechanism.name}: lock of {name}"
+        many = given if np.ndim(given) else (given,)
+        count = sum(freedom.motion.nq for freedom in joint.freedoms)
+        if isinstance(given, Mapping) or len(many) != count:
+            raise DescriptionError(
+                f"{where}: {quoted(given)} is not its position; give {count} number(s)"
+            )
+        position = tuple(expression(value, where) for value in many)
+        self.positions[name] = position
+        at = 0
+        for freedom in joint.freedoms:
+            if freedom.motion.nq == 1:
+                self.values[freedom.coordinate_of(name)] = position[at]
+            at += freedom.motion.nq
+
+    def _joint(self, name: str) -> Joint:
+        joints = {
+            joint.name: joint
+            for joint in self.mechanism.joints()
+            if not isinstance(joint, (Fixed, Constraint))
+        }
+        if name not in joints:
+            raise DescriptionError(
+                f"{self.mechanism.name}: {quoted(name)} is no joint that could be locked;"
+                f" {did_you_mean(name, joints)}"
+            )
+        return joints[name]
+
+    def follow_couplings(self) -> None:
+        """Lock what follows a locked joint, or leads it."""
+        pending = list(self.mechanism.couplings())
+        while True:
+            touched = [c for c in pending if set(c.coordinates) & self.values.keys()]
+            if not touched:
+                return
+            for coupling in touched:
+                pending.remove(coupling)
+                left = self._among_free(coupling)
+                if set(left.coordinates) & self.values.keys():
+                    self._follow(left)
+                    self.gone.add(left.name)
+                else:  # it relates what is left, unless more of it will be locked
+                    self.changed[left.name] = left
+                    pending.append(left)
+
+    def _among_free(self, coupling: Coupling) -> Coupling:
+        """A coupling of many coordinates with the locked ones in its first coefficient."""
+        if not coupling.others:
+            return coupling
+        offset = sum(
+            (factor * self.values[name] for name, factor in coupling.others if name in self.values),
+            start=Number(0.0),
+        )
+        free = [(name, factor) for name, factor in coupling.others if name not in self.values]
+        first, *rest = coupling.coefficients or (0.0,)
+        left = replace(coupling, coefficients=(first + offset, *rest), others=tuple(free))
+        locked = self.values.get(left.driver)
+        if free and locked is not None:  # the next one leads
+            (leader, factor), *free = free
+            terms = (_polynomial(left, locked), factor)
+            left = replace(left, driver=leader, coefficients=terms, others=tuple(free))
+        locked = self.values.get(left.driven)
+        if free and locked is not None:  # the one that led follows
+            constant, factor = self._linear(left)
+            shares = [(name, expression(value) * -1.0 / factor) for name, value in free]
+            (leader, share), *shares = shares
+            terms = ((locked - constant) / factor, share)
+            left = replace(
+                left, driven=left.driver, driver=leader, coefficients=terms, others=tuple(shares)
+            )
+        return left
+
+    def _linear(self, coupling: Coupling) -> tuple[Expression, Expression]:
+        """The two coefficients of a coupling that can be turned round."""
+        terms = [expression(c) for c in coupling.coefficients]
+        offset, factor = (*terms, Number(0.0), Number(0.0))[:2]
+        if len(terms) > 2 or to_float(factor) == 0:
+            raise DescriptionError(
+                f"{self.mechanism.name}: {coupling.name} does not tell where {coupling.driver} is"
+                f" when {coupling.driven} is locked; lock {coupling.driver}"
+            )
+        return offset, factor
+
+    def _follow(self, coupling: Coupling) -> None:
+        driver, driven = (self.values.get(name) for name in (coupling.driver, coupling.driven))
+        if driver is None:
+            assert driven is not None
+            self._add_coupled(coupling, coupling.driver, self._driver(coupling, driven))
+            return
+        value = _polynomial(coupling, driver)
+        if driven is None:
+            self._add_coupled(coupling, coupling.driven, value)
+            return
+        one, other = to_float(value), to_float(driven)
+        if one is None or other is None or not math.isclose(one, other, abs_tol=_AGREE):
+            raise DescriptionError(
+                f"{self.mechanism.name}: {coupling.name} puts {coupling.driven} at {value}, but it"
+                f" is locked at {driven}; lock one of the two"
+            )
+
+    def _driver(self, coupling: Coupling, driven: Expression) -> Expression:
+        offset, factor = self._linear(coupling)
+        return (driven - offset) / factor
+
+    def _add_coupled(self, coupling: Coupling, coordinate: str, value: Expression) -> None:
+        joint = self.mechanism.components.get(coordinate)
+        if not isinstance(joint, Joint):
+            raise DescriptionError(
+                f"{self.mechanism.name}: {coupling.name} ties {coordinate} to a locked joint; lock"
+                " its joint as well"
+            )
+        self.add(coordinate, value)
+
+
+def _polynomial(coupling: Coupling, driver: Expression) -> Expression:
+    value = expression(0.0)
+    for coefficient in reversed(coupling.coefficients):
+        value = value * driver + expression(coefficient)
+    number = to_float(value)
+    return value if number is None else Number(number)
+
+
+def lock(mechanism: Mechanism, positions: Mapping[str, Any]) -> None:
+    """Weld joints of a mechanism at positions; see `Mechanism.lock`."""
+    locks = _Locks(mechanism)
+    for name, given in positions.items():
+        locks.add(name, given)
+    locks.follow_couplings()
+    _require_free_of_others(mechanism, locks)
+    welds = {name: Fixed(name) for name in locks.positions}
+    steps = {name: _steps(mechanism, name, values) for name, values in locks.positions.items()}
+
+    def moved(point: Point) -> Point:
+        name = point.owner.name
+        if name not in welds:
+            return point
+        # Both frames of the weld are frame_a of the joint; frame_b is where the position puts it.
+        before = steps[name] if point.port == "b" else ()
+        return replace(
+            point, owner=welds[name], placement=Placement((*before, *point.placement.steps))
+        )
+
+    kept: dict[str, Component] = {}
+    for name, component in mechanism.components.items():
+        if name in locks.gone or _acts_on(component, locks.values):
+            continue
+        kept[name] = welds.get(name) or locks.changed.get(name) or _with_points(component, moved)
+    mechanism.components = kept
+    mechanism.connections = [(moved(a), moved(b)) for a, b in mechanism.connections]
+    mechanism.frames = {name: moved(point) for name, point in mechanism.frames.items()}
+    mechanism.cuts = [name for name in mechanism.cuts if name not in welds]
+    mechanism.guess = {
+        name: value
+        for name, value in mechanism.guess.items()
+        if not any(name == joint or name.startswith(f"{joint}.") for joint in welds)
+    }
+
+
+def _acts_on(component: Component, coordinates: Mapping[str, Expression]) -> bool:
+    """Whether it acts along locked coordinates alone, where it moves nothing."""
+    return isinstance(component, CoordinateForce) and all(
+        name in coordinates for name, _ in component.levers
+    )
+
+
+def _require_free_of_others(mechanism: Mechanism, locks: _Locks) -> None:
+    """Refuse to lock joints that sensors read, shafts turn, or tendons share with others."""
+    driven = {flange.owner.name for pair in mechanism.shafts for flange in pair}
+    for name in locks.positions:
+        if name in driven:
+            raise DescriptionError(
+                f"{mechanism.name}: {name} is turned by a drive line; take the drive line away"
+                " before the joint is locked"
+            )
+    for component in mechanism.components.values():
+        if isinstance(component, CoordinateForce) and not _acts_on(component, locks.values):
+            names = [name for name, _ in component.levers]
+            locked = [name for name in names if name in locks.values]
+            if locked:
+                raise DescriptionError(
+                    f"{mechanism.name}: {component.name} acts along {', '.join(names)} together;"
+                    f" lock all of them, or take it away before {locked[0]} is locked"
+                )
+        if isinstance(component, OnJoint) and (
+            component.joint in locks.positions or component.joint in locks.values
+        ):
+            raise DescriptionError(
+                f"{mechanism.name}: {component.name} reads the joint {component.joint}, which is"
+                " to be locked; take the sensor away first"
+            )
+
+
+def _with_points(component: Component, moved: Any) -> Component:
+    """The component with its points where they are now."""
+    if not isinstance(component, OnPoints):
+        return component
+    changed = {
+        f.name: moved(getattr(component, f.name))
+        for f in fields(component)
+        if isinstance(getattr(component, f.name), Point)
+    }
+    same = all(point is getattr(component, name) for name, point in changed.items())
+    return component if same else replace(component, **changed)
+
+
+def _steps(mechanism: Mechanism, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:
+    """Frame_b seen from frame_a of a joint at a position."""
+    joint = mechanism.components[name]
+    assert isinstance(joint, Joint)
+    steps: list[Step] = []
+    at = 0
+    for freedom in joint.freedoms:
+        own = values[at : at + freedom.motion.nq]
+        at += freedom.motion.nq
+        steps.extend(_freedom_steps(f"{mechanism.name}: lock of {name}", freedom, own))
+    return tuple(steps)
+
+
+def _freedom_steps(where: str, freedom: Freedom, values: Sequence[Expression]) -> Iterable[Step]:
+    match freedom.motion:
+        case Motion.PRISMATIC:
+            return [
+                Translation(*(values[0] * part if part else Number(0.0) for part in freedom.axis))
+            ]
+        case Motion.REVOLUTE:
+            return _turn(freedom.axis, angle_expression(values[0], where))
+        case Motion.SPHERICAL:
+            return [_orientation(where, values)]
+    return [Translation(*values[:3]), _orientation(where, values[3:])]
+
+
+def _turn(axis: Sequence[float], angle: Expression) -> list[Step]:
+    for letter, part in zip("xyz", axis, strict=True):
+        if abs(part) == 1:
+            return [Turned(letter, angle if part > 0 else -angle)]
+    turn = align_z((axis[0], axis[1], axis[2]))
+    R = [[float(turn[row, column]) for column in range(3)] for row in range(3)]
+    back = [list(column) for column in zip(*R, strict=True)]
+    return [Oriented(nearest_rotation(R)), Turned("z", angle), Oriented(nearest_rotation(back))]
+
+
+def _orientation(where: str, values: Sequence[Scalar]) -> Oriented:
+    """The rotation of a unit quaternion w, x, y, z."""
+    numbers = [to_float(expression(value)) for value in values]
+    length = math.nan if None in numbers else math.hypot(*(n or 0.0 for n in numbers))
+    if not abs(length - 1) < 1e-6:  # as far as files write quaternions out
+        raise DescriptionError(
+            f"{where}: the quaternion {quoted([str(v) for v in values])} is not numbers of unit"
+            " length; divide it by its length"
+        )
+    w, x, y, z = ((n or 0.0) / length for n in numbers)
+    R = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return Oriented(nearest_rotation(R))
+
+
+# The root: what the world holds, by a weld or by a Free joint.
+
+
+Base = Literal["fixed", "free"]
+"""What holds the root: a weld to the world, or nothing."""
+
+FREE_JOINT = "root_joint"
+"""Name of the joint of a free root, as pinocchio has it; it has coordinates root_joint.x, .qw .."""
+
+
+def free_root(mechanism: Mechanism) -> None:
+    """Put a Free joint where one body is welded to the world; nothing where one is there already.
+
+    Args:
+        mechanism: changed.
+
+    Raises:
+        DescriptionError: there is not one weld that holds the whole mechanism.
+    """
+    if _free_joints(mechanism):
+        return
+    world = mechanism.world
+    held = [pair for pair in mechanism.connections if any(p.owner is world for p in pair)]
+    bodies = [point.owner for pair in held for point in pair if point.owner is not world]
+    if len(held) != 1 or not isinstance(bodies[0], RigidBody):
+        what = ", ".join(body.name for body in bodies[:5]) or "nothing"
+        raise DescriptionError(
+            f"{mechanism.name}: its base cannot be free, since no body of its own is the only thing"
+            f" that the world holds (it holds {what}); describe a body for the base, with its"
+            " inertia, and weld it to the world"
+        )
+    a, b = held[0] if held[0][0].owner is world else held[0][::-1]
+    mechanism.connections.remove(held[0])
+    mechanism.connect(a, Free(FREE_JOINT, actuated=False), b)
+
+
+def fix_root(mechanism: Mechanism) -> None:
+    """Lock the Free joints on the world where the guess has them, or else at zero."""
+    positions = {}
+    for joint, forward in _free_joints(mechanism):
+        names = ("x", "y", "z", "qw", "qx", "qy", "qz")
+        zero = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        values = [mechanism.guess.get(f"{joint}.{k}", v) for k, v in zip(names, zero, strict=True)]
+        positions[joint] = values if forward else _reversed(values)
+    lock(mechanism, positions)
+
+
+def _reversed(values: Sequence[float]) -> list[float]:
+    """Position and quaternion of the opposite displacement."""
+    R = np.array(_orientation("", [Number(v) for v in values[3:]]).rows)
+    p = -R.T @ np.array(values[:3])
+    w, x, y, z = values[3:]
+    return [*map(float, p), w, -x, -y, -z]
+
+
+def _free_joints(mechanism: Mechanism) -> list[tuple[str, bool]]:
+    """The Free joints on the world or on what is welded to it, and whether by their frame_a."""
+    neighbours: dict[str, list[str]] = {}
+    for a, b in mechanism.connections:
+        if all(isinstance(p.owner, (RigidBody, Fixed)) for p in (a, b)):
+            neighbours.setdefault(a.owner.name, []).append(b.owner.name)
+            neighbours.setdefault(b.owner.name, []).append(a.owner.name)
+    held, pending = {mechanism.world.name}, [mechanism.world.name]
+    while pending:
+        for name in neighbours.get(pending.pop(), ()):
+            if name not in held:
+                held.add(name)
+                pending.append(name)
+    found = {}
+    for a, b in mechanism.connections:
+        for point, other in ((a, b), (b, a)):
+            if isinstance(point.owner, Free) and other.owner.name in held:
+                found[point.owner.name] = point.port == "a"
+    return list(found.items())

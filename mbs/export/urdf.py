@@ -1,0 +1,290 @@
+"""URDF robot files from mechanisms without loops."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.tree import Link
+from mbs.components import Mechanism
+from mbs.components.joints import Motion
+from mbs.errors import ModelError
+from mbs.files import path_of, write_bytes
+from mbs.formats.urdf import UNLIMITED
+from mbs.text import quoted
+
+Array = NDArray[np.float64]
+
+_ON_AXIS = 1e-14
+"""How far a body may be from the axis that its joint is written on [m]: rounding, no more."""
+_DOWN = (0.0, 0.0, -9.81)
+
+
+def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
+    """Write a mechanism without loops as a URDF file, symbols at their default values.
+
+    Every body is a link of its name, every named frame a link without mass, and every motion a
+    joint. Of bodies that are welded together one has the whole inertia. Couplings of degree one
+    are mimics, rotor inertia Ia is that of a transmission of ratio one. Which joints have motors,
+    the width of Coulomb friction and one-sided ranges of a motor the format cannot say; they are
+    lost, the last are refused.
+
+    Args:
+        system: of revolute, prismatic and free motions; a Mechanism is assembled first.
+        path: of the .urdf file.
+
+    Raises:
+        ModelError: it is neither, it has loops, a ball joint, springs, rotors, force elements or
+            other gravity than 9.81 m/s^2 along -z, or a symbol has no value.
+        ExportError: the file cannot be written.
+    """
+    if isinstance(system, Mechanism):
+        system = system.assemble()
+    if not isinstance(system, System):
+        raise ModelError(
+            f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
+        )
+    _check(system)
+    root = _Writing(system, _Numbers(system)).robot()
+    indent(root)
+    content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    write_bytes(content, path_of(path))
+
+
+class _Numbers:
+    """Numbers of a system, its symbols at their defaults."""
+
+    def __init__(self, system: System) -> None:
+        missing = [p.name for p in system.parameters if p.default is None]
+        if missing:
+            raise ModelError(
+                f"{system.name}: {missing[0]} has no value, and a URDF file has no symbols; give it"
+                " one"
+            )
+        self.p, self.values = system.p, system.p_default
+
+    def __call__(self, value: SX) -> Array:
+        function = Function("value", [self.p], [casadi.densify(SX(value))])
+        return np.array(function(self.values), dtype=float)
+
+
+def _check(system: System) -> None:
+    """Refuse what URDF cannot say."""
+
+    def fail(what: str) -> None:
+        raise ModelError(f"{system.name}: {what}, which URDF cannot say; take it away first")
+
+    if system.cuts:
+        fail(f"{system.cuts[0].edge.joint.name} closes a loop")
+    if system.forces or system.shafts or system.devices:
+        fail("it has force elements or a drive line")
+    for link in system.tree.links:
+        if link.motion is Motion.SPHERICAL:
+            fail(f"{link.name} is a ball joint")
+        if link.rotor is not None or not (link.stiffness.is_zero() and link.rest.is_zero()):
+            fail(f"{link.name} has a rotor or a spring")
+    for coupling in system.couplings:
+        if len(coupling.coefficients) > 2:
+            fail(f"{coupling.name} is a coupling of a higher degree than one")
+        if coupling.others:
+            fail(f"{coupling.name} is a coupling of more than two joints")
+
+
+@dataclass(slots=True)
+class _Writing:
+    """Writes the elements of one robot.
+
+    Attributes:
+        system: that is written.
+        number: numbers of its expressions.
+        frame: of each link (-1 for the world): its name, and its (4, 4) pose in that of the tree.
+    """
+
+    system: System
+    number: _Numbers
+    frame: dict[int, tuple[str, Array]] = field(default_factory=dict)
+
+    def robot(self) -> Element:
+        system = self.system
+        gravity = self.number(system.tree.gravity).ravel()
+        if not np.array_equal(gravity, _DOWN):
+            raise ModelError(
+                f"{system.name}: gravity is {quoted(gravity.tolist())}, but that of URDF is"
+                f" {_DOWN}; turn the robot instead"
+            )
+        root = Element("robot", name=system.name)
+        SubElement(root, "link", name="world")
+        self.frame[-1] = "world", np.eye(4)
+        places = {
+            name: (link, self.number(pose.matrix))
+            for name, (link, pose) in system.frames.items()
+            if name not in ("base", "world")
+        }
+        for j, link in enumerate(system.tree.links):
+            self._link(root, j, link, places)
+        written = {name for name, _ in self.frame.values()}
+        for name, (number, pose) in places.items():
+            if name not in written:
+                self._fixed(root, name, number, pose)
+        return root
+
+    def _link(
+        self, root: Element, j: int, link: Link, places: Mapping[str, tuple[int, Array]]
+    ) -> None:
+        name, pose = self._carrier(j, link, places)
+        self.frame[j] = name, pose
+        _inertial(SubElement(root, "link", name=name), *self._inertia(link, pose))
+        parent, before = self.frame[link.antecedent]
+        kind = {Motion.FREE: "floating", Motion.PRISMATIC: "prismatic"}.get(link.motion, "revolute")
+        limits, velocity, effort = self._limits(link)
+        if kind == "revolute" and limits is None:
+            kind = "continuous"
+        joint = SubElement(root, "joint", name=link.name, type=kind)
+        SubElement(joint, "parent", link=parent)
+        SubElement(joint, "child", link=name)
+        _origin(joint, _inverse(before) @ self.number(link.pose().matrix) @ pose)
+        friction = [float(self.number(value).item()) for value in (link.Fv, link.Fs)]
+        if any(friction):
+            damping, dry = map(repr, friction)
+            SubElement(joint, "dynamics", damping=damping, friction=dry)
+        if kind == "floating":
+            return
+        SubElement(joint, "axis", xyz=_text(pose[2, :3]))
+        low, high = limits or (-UNLIMITED, UNLIMITED)
+        given = {"effort": repr(effort), "velocity": repr(velocity)}
+        if kind != "continuous":
+            given |= {"lower": repr(low), "upper": repr(high)}
+        SubElement(joint, "limit", given)
+        self._mimic(joint, link)
+        Ia = float(self.number(link.Ia).item())
+        if Ia:
+            _rotor(root, link.name, Ia)
+
+    def _carrier(
+        self, j: int, link: Link, places: Mapping[str, tuple[int, Array]]
+    ) -> tuple[str, Array]:
+        """The frame of a link of the file: a body on the axis of its joint, or one of its own."""
+        bodies = [body.name for body in self.system.bodies]
+        for name, (number, pose) in places.items():
+            away = pose[:2, 3] if link.motion is Motion.REVOLUTE else np.zeros(2)
+            if link.motion is Motion.FREE:
+                away = (pose - np.eye(4)).ravel()
+            if number == j and name in bodies and np.all(np.abs(away) <= _ON_AXIS):
+                return name, pose
+        own = f"{link.name}_axis"
+        while own in places:
+            own += "_"
+        return own, np.eye(4)
+
+    def _inertia(self, link: Link, pose: Array) -> tuple[float, Array, Array]:
+        """Mass, centre of mass, and inertia about it, in the frame of a link of the file."""
+        ten = self.number(link.inertia.parameters).ravel()
+        J = ten[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
+        mass, moment = float(ten[9]), ten[6:9]
+        if mass == 0 and np.any(moment):
+            raise ModelError(
+                f"{self.system.name}: what {link.name} carries has first moments but no mass, which"
+                " URDF cannot say; give it a mass"
+            )
+        c = moment / mass if mass else np.zeros(3)
+        J = J - mass * (c @ c * np.eye(3) - np.outer(c, c))
+        R, p = pose[:3, :3], pose[:3, 3]
+        return mass, R.T @ (c - p), R.T @ J @ R
+
+    def _limits(self, link: Link) -> tuple[tuple[float, float] | None, float, float]:
+        """Range of the position, largest velocity and largest effort."""
+        if link.motion is Motion.FREE:
+            return None, UNLIMITED, UNLIMITED
+        speed = self.system.speeds[link.v.start]
+        largest = []
+        for what, pair in (("velocity", speed.limits), ("effort", speed.effort)):
+            low, high = pair or (-UNLIMITED, UNLIMITED)
+            if low != -high:
+                raise ModelError(
+                    f"{self.system.name}: {what} of {link.name} is between {low:g} and {high:g},"
+                    " but URDF has one number for both directions; give it one"
+                )
+            largest.append(float(high))
+        return self.system.coordinates[link.q.start].limits, largest[0], largest[1]
+
+    def _mimic(self, joint: Element, link: Link) -> None:
+        for coupling in self.system.couplings:
+            if coupling.driven == link.q.start:
+                terms = [float(self.number(c).item()) for c in coupling.coefficients]
+                offset, factor = (*terms, 0.0, 0.0)[:2]
+                SubElement(
+                    joint,
+                    "mimic",
+                    joint=self.system.coordinates[coupling.driver].name,
+                    multiplier=repr(factor),
+                    offset=repr(offset),
+                )
+
+    def _fixed(self, root: Element, name: str, number: int, pose: Array) -> None:
+        """A body or a named frame that is fixed on a link."""
+        parent, before = self.frame[number]
+        SubElement(root, "link", name=name)
+        joint = SubElement(root, "joint", name=f"{name}_fixed", type="fixed")
+        SubElement(joint, "parent", link=parent)
+        SubElement(joint, "child", link=name)
+        _origin(joint, _inverse(before) @ pose)
+
+
+def _text(values: Any) -> str:
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def _inverse(pose: Array) -> Array:
+    R, p = pose[:3, :3], pose[:3, 3]
+    return np.block([[R.T, -(R.T @ p)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
+
+
+def _origin(element: Element, pose: Array) -> None:
+    SubElement(element, "origin", xyz=_text(pose[:3, 3]), rpy=_text(_angles(pose[:3, :3])))
+
+
+def _angles(R: Array) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation, to the last digits also where the pitch is a quarter turn.
+
+    Any yaw is right where the other two are taken for it.
+    """
+    yaw = math.atan2(R[1, 0], R[0, 0])
+    c, s = math.cos(yaw), math.sin(yaw)
+    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return roll, pitch, yaw
+
+
+def _inertial(link: Element, mass: float, com: Array, tensor: Array) -> None:
+    if mass == 0 and not np.any(tensor):
+        return
+    inertial = SubElement(link, "inertial")
+    SubElement(inertial, "origin", xyz=_text(com), rpy="0 0 0")
+    SubElement(inertial, "mass", value=repr(mass))
+    rows = {
+        "ixx": (0, 0),
+        "ixy": (0, 1),
+        "ixz": (0, 2),
+        "iyy": (1, 1),
+        "iyz": (1, 2),
+        "izz": (2, 2),
+    }
+    SubElement(inertial, "inertia", {name: repr(float(tensor[at])) for name, at in rows.items()})
+
+
+def _rotor(root: Element, joint: str, inertia: float) -> None:
+    transmission = SubElement(root, "transmission", name=f"{joint}_transmission")
+    SubElement(transmission, "joint", name=joint)
+    actuator = SubElement(transmission, "actuator", name=f"{joint}_motor")
+    SubElement(actuator, "mechanicalReduction").text = "1"
+    SubElement(actuator, "motorInertia").text = repr(inertia)

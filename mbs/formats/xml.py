@@ -1,0 +1,199 @@
+"""XML as robots' files hold it: with the lines of the elements, and lenient as their own tools.
+
+Prefixes need no declaration, since names are taken as they are written. What expat refuses and the
+tools of URDF do not (TinyXML) is mended, with a note: a declaration that is not at the beginning,
+two hyphens in a comment, a bare `&`, bytes that are not of the encoding, what follows the root.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+from xml.parsers import expat
+
+from mbs.errors import DescriptionError
+from mbs.formats.files import decoded, read_bytes
+from mbs.formats.notes import Notes
+
+_MOST_ELEMENTS = 1_000_000  # a file of the largest size could hold 16 times as many: gigabytes
+_DEEPEST = 200  # elements in elements; robots' files have ten
+
+
+class XmlElement(Element):
+    """An element that knows where it stands.
+
+    Attributes:
+        line: of the file, from 1; None where the text is not that of a file.
+    """
+
+    line: int | None = None
+
+
+def line_of(element: Element | None) -> int | None:
+    """The line of the file where an element begins, where it is known."""
+    return getattr(element, "line", None)
+
+
+def parse_xml(path: str | Path, notes: Notes | None = None) -> Element:
+    """The root element of an XML file, an `XmlElement` like all in it.
+
+    Args:
+        path: of the file.
+        notes: takes what had to be mended.
+
+    Raises:
+        DescriptionError: the file is missing, too large or is not XML.
+    """
+    return parse_content(str(path), read_bytes(path), notes)
+
+
+def parse_content(path: str, content: bytes, notes: Notes | None = None) -> Element:
+    """The root element of the content of an XML file.
+
+    Args:
+        path: of the file, for messages.
+        content: of it.
+        notes: takes what had to be mended.
+
+    Raises:
+        DescriptionError: it is too large or is not XML.
+    """
+    try:
+        return _Builder(path).parse(content)
+    except DescriptionError:
+        raise
+    except (expat.ExpatError, LookupError, ValueError):
+        pass  # an encoding that expat does not know raises the last two
+    notes = Notes(path) if notes is None else notes
+    text = _mended(content, notes)
+    builder = _Builder(path)
+    try:
+        return builder.parse(text)
+    except expat.ExpatError as error:
+        if error.code == _JUNK and builder.root is not None:
+            notes.add("ignored", "the text behind the root element", "left out", error.lineno)
+            return builder.root
+        raise DescriptionError(f"{path}: the file is not XML: {error}; correct it") from None
+    except DescriptionError:
+        raise
+    except ValueError as error:
+        raise DescriptionError(f"{path}: the file is not XML: {error}; correct it") from None
+
+
+_JUNK = expat.errors.codes[expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT]
+
+
+class _Builder:
+    """Builds the elements of one file as expat meets them."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self.root: XmlElement | None = None
+        self.open: list[XmlElement] = []
+        self.count = 0
+        self.closed: XmlElement | None = None
+        self.parser: Any = expat.ParserCreate()  # without a separator: prefixes are part of names
+        self.parser.buffer_text = True
+        self.parser.buffer_size = 1 << 20  # each full buffer copies the text of an element so far
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._data
+
+    def parse(self, content: bytes | str) -> Element:
+        self.parser.Parse(content, True)
+        assert self.root is not None  # expat refuses a text without elements
+        return self.root
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.count += 1
+        if self.count > _MOST_ELEMENTS or len(self.open) >= _DEEPEST:
+            what = (
+                f"more than {_MOST_ELEMENTS} elements"
+                if self.count > _MOST_ELEMENTS
+                else f"elements in elements, {_DEEPEST} deep"
+            )
+            raise DescriptionError(f"{self.path}: the file has {what}; give that of a robot")
+        element = XmlElement(tag, attributes)
+        element.line = self.parser.CurrentLineNumber
+        if self.open:
+            self.open[-1].append(element)
+        else:
+            self.root = element
+        self.open.append(element)
+        self.closed = None
+
+    def _end(self, tag: str) -> None:
+        self.closed = self.open.pop()
+
+    def _data(self, text: str) -> None:
+        if self.closed is not None:
+            self.closed.tail = (self.closed.tail or "") + text
+        else:
+            self.open[-1].text = (self.open[-1].text or "") + text
+
+
+_DECLARED = re.compile(rb"""encoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
+_DECLARATION = re.compile(r"<\?xml\b[^<>]*\?>")
+_BARE = re.compile(r"&(?!#?\w{1,32};)")
+_UNSEEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
+_MENDS = (
+    (_DECLARATION, "", "the XML declaration", "left out, for it is not at the beginning"),
+    (_BARE, "&amp;", "a bare &", "read as &amp;"),
+    (_UNSEEN, "", "control characters", "left out"),
+)
+
+
+def _mended(content: bytes, notes: Notes) -> str:
+    """A text that expat takes, its lines those of the file."""
+    declared = _DECLARED.search(content[:200])
+    encoding = declared.group(1).decode() if declared else "utf-8"
+    try:
+        known = codecs.lookup(encoding).name
+    except LookupError:
+        known = ""
+    # A declaration that can be read as plain letters is not written in two bytes for each.
+    if not known or known.startswith(("utf-16", "utf-32")):
+        known = "utf-8"
+    try:
+        text = decoded(content, known)
+    except (LookupError, ValueError):  # codecs that are not of texts
+        text = decoded(content)
+    if "\ufffd" in text:
+        line = text[: text.index("\ufffd")].count("\n") + 1
+        notes.add("doubted", "the text", f"not all is {known}; read as Latin-1", line)
+        text = content.decode("latin-1")
+    text = _without_comments(text)
+    first = _DECLARATION.match(text)
+    if first is not None:  # it has been read, for the encoding
+        text = text[first.end() :]
+    for pattern, by, element, what in _MENDS:
+        found = pattern.search(text)
+        if found is not None:
+            line = text[: found.start()].count("\n") + 1
+            notes.add("ignored", element, what, line)
+            text = _replaced(pattern, by, text)
+    return text.lstrip("\ufeff")
+
+
+def _replaced(pattern: re.Pattern[str], by: str, text: str) -> str:
+    """The text with every match replaced, its ends of lines kept."""
+
+    def replacement(found: re.Match[str]) -> str:
+        return by + "\n" * found.group().count("\n")
+
+    return pattern.sub(replacement, text)
+
+
+def _without_comments(text: str) -> str:
+    """The text with blanks for comments, which may hold two hyphens in the files of others."""
+    parts, at = [], 0
+    while (start := text.find("<!--", at)) >= 0:
+        end = text.find("-->", start + 4)
+        if end < 0:
+            break
+        parts += [text[at:start], "\n" * text.count("\n", start, end)]
+        at = end + 3
+    return "".join([*parts, text[at:]])

@@ -3,10 +3,10 @@
 import casadi
 import numpy as np
 import pytest
-from support.change_points import GRAVITY, linkage, rod
+from support.change_points import GRAVITY, linkage, rod, slider_crank
 
 import mbs
-from mbs.components import Body, CoulombFriction, Prismatic, Revolute, RigidStop
+from mbs.components import CoulombFriction, Revolute, RigidStop
 from mbs.errors import SolverError
 
 
@@ -22,24 +22,13 @@ def coupling_rod():
     return m.assemble(guess={"j0": 1.0, "j1": 1.0, "j2": 1.0, "p0": -1.0})
 
 
-def piston():
-    m = mbs.Mechanism("piston", gravity=GRAVITY)
-    crank, bar, head = m.add(rod("crank", 0.3)), m.add(rod("bar", 0.8)), m.add(Body("h", mass=1))
-    m.connect(m.world, Revolute("j1"), crank)
-    m.connect(crank.at(0.3), Revolute("j2"), bar)
-    m.connect(m.world, Prismatic("slide", axis="x", actuated=True), head)
-    m.connect(bar.at(0.8), pin := Revolute("pin"), head)
-    m.cut(pin)
-    return m.assemble(active=["slide"], guess={"j1": 1.0, "j2": -1.3, "slide": 0.9})
-
-
 MECHANISMS = {
     "parallelogram": lambda: mbs.robots.n_four_bar().assemble(active=["a0"]),
     "a+g=b+c": lambda: linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5)),
     "kite": lambda: linkage((0.5, 1.1, 1.1, 0.5), (1.0, 0.5, 2.0)),
     "antiparallelogram": lambda: linkage((0.4, 1.0, 0.4, 1.0), (1.0, -1.8, -1.5)),
     "coupling rod": coupling_rod,
-    "piston": piston,
+    "piston": slider_crank,
     "sr400": lambda: mbs.robots.sr400().assemble(),
     "five_bar": lambda: mbs.robots.five_bar().assemble(),
 }

@@ -255,6 +255,7 @@ class FmuVariable:
         max: greatest value; a parameter above it is refused.
         description: one line for people.
         fixed: a parameter that keeps its value once the motion has begun.
+        guess: an output whose start, where it is set, chooses the branch.
     """
 
     name: str
@@ -265,6 +266,7 @@ class FmuVariable:
     max: float | None = None
     description: str = ""
     fixed: bool = False
+    guess: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", structured(self.name))

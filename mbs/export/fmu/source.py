@@ -413,6 +413,7 @@ def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
         f"#define MODEL_TREE_INSIDE {int(model.solver == 'dopri5')} /* co-simulation has them */\n"
         f"#define MODEL_TREE_OUTSIDE {int(model.charted)} /* model exchange has charts of them */\n"
         f"#define MODEL_PASSAGE {{{sizes}}}\n"
+        f"#define N_HELD {len(tree.held)}\n"
         f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
         "/* where states, dependents and velocities of dependent joints stand in it, and the\n"
         " * independent joints among its velocities; typical sizes of these */\n"

@@ -52,10 +52,8 @@ static void foretell(const core *c, double *guide) {
 
 /* Where the states are coordinates of a chart. */
 static int by_chart(core *c, const double *y, found *f) {
-    static const passage_size size = MODEL_PASSAGE;
     const core_charts *m = &c->m.charts;
     double guide[NT], none[NT];
-    int i;
     foretell(c, guide);
     memset(f->rate, 0, sizeof f->rate);
     if (passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,
@@ -64,9 +62,7 @@ static int by_chart(core *c, const double *y, found *f) {
     if (passage_jumps(c->passage, m->time, m->X, m->slope, c->m.time - m->time, f->X, f->slope))
         return 1;
     if (core_call_tree(c, f->X, none, f->y)) return 1;
-    /* near the singular configuration itself accelerations come from beside it */
-    for (i = 0; i < PASSIVE_V - NZ; i++) f->y[i] = f->slope[size.nq + MODEL_TREE_HELD[i]];
-    for (i = 0; i < N_PASSIVE; i++) f->y[PASSIVE_A + i] = f->slope[MODEL_TREE_PASSIVE[i]];
+    core_show_slope(f->slope, f->y); /* near the singular configuration itself from beside it */
     return 0;
 }
 
@@ -157,8 +153,13 @@ static void show_joints(core *c) {
 }
 
 core_status charts_start(core *c) {
-    passage_start(c->passage);
     show_joints(c);
+    if (c->m.singular) {
+        c->m.singular = 0;
+        follow(c);
+        return choose(c, 1.0);
+    }
+    passage_start(c->passage);
     return begin(c);
 }
 

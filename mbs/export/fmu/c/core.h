@@ -101,9 +101,12 @@ typedef struct {
 #ifdef MODEL_TREE
     int loose; /* the tree is to be moved onto its rows first */
     double tree[NT], passage[PASSAGE_MEMORY(NT)];
+    double slope[NT]; /* of it, where it starts or the integrator is outside */
+    double speeds[N_PASSIVE + 1]; /* of dependent joints: where they are not MODEL_START, they choose
+                                     the branch of a start in a singular configuration */
+    int singular; /* it is in such a start */
 #endif
 #if MODEL_TREE_OUTSIDE
-    double slope[NT]; /* of it, where the integrator is outside */
     core_charts charts;
 #endif
     double solver[STEPPER_MEMORY(MOST(NX, NT))];

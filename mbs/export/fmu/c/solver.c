@@ -104,6 +104,75 @@ core_status core_start_tree(core *c) {
     return CORE_OK;
 }
 
+/* A singular start whose velocities choose no branch: which joint the loops do not hold. */
+static core_status undetermined(core *c) {
+    static const passage_size size = MODEL_PASSAGE;
+    char where[CORE_WHERE];
+    int k = passage_loosest(c->passage, c->m.time, c->m.tree, MODEL_TREE_UNITS), i, known = -1;
+    for (i = 0; i < NX; i++)
+        if (MODEL_TREE_STATES[i] == size.nq + k) known = STATES + i;
+    for (i = 0; i < N_PASSIVE; i++)
+        if (MODEL_TREE_PASSIVE[i] == size.nq + k) known = OUTPUTS + PASSIVE_V + i;
+    return core_no_answer(
+        c, "%s: it starts at time %.9g in a singular configuration (%s), where branches of motion "
+           "meet, and its velocities are those of no branch with the mobility of the mechanism; "
+           "the loops hardly hold %s there: set velocities of one branch, also of dependent joints, "
+           "or start beside it", c->name, c->m.time, core_where(c, where),
+        k < 0 || known < 0 ? "the joints" : MODEL_NAMES[known]);
+}
+
+/* The state of the tree at x and z, its passive velocities as they are given. */
+static void place_tree(core *c, const double *z) {
+    double *X = c->m.tree;
+    int i;
+    passage_start(c->passage);
+    for (i = 0; i < NX; i++) X[MODEL_TREE_STATES[i]] = c->m.values[STATES + i];
+    for (i = 0; i < NZ; i++) X[MODEL_TREE_DEPENDENTS[i]] = z[i];
+    for (i = 0; i < N_PASSIVE; i++) X[MODEL_TREE_PASSIVE[i]] = c->m.speeds[i];
+}
+
+int core_starts_singular(core *c, const double *z) {
+    place_tree(c, z);
+    return passage_singular(c->passage, c->m.time, c->m.tree) ||
+           closure_singular(&c->loops, c->m.values + STATES, z);
+}
+
+core_status core_start_singular(core *c, double *z) {
+    static const passage_size size = MODEL_PASSAGE;
+    double *X = c->m.tree, on[NT];
+    char where[CORE_WHERE];
+    int kept[N_HELD + N_PASSIVE + 1], count = 0, i;
+    place_tree(c, z);
+    if (passage_place(c->passage, c->m.time, X, MODEL_TREE_DEPENDENTS, NZ))
+        return core_no_answer(c, "%s: unclosable configuration at time %.9g (%s): no dependent "
+                              "coordinates near the last ones close the loops; start elsewhere or "
+                              "move less", c->name, c->m.time, core_where(c, where));
+    for (i = 0; i < NZ; i++) z[i] = X[MODEL_TREE_DEPENDENTS[i]];
+    if (core_first_modes(c)) return CORE_ERROR;
+    for (i = 0; i < N_HELD; i++) kept[count++] = MODEL_TREE_HELD[i];
+    for (i = 0; i < N_PASSIVE; i++)
+        if (c->m.speeds[i] != MODEL_START[OUTPUTS + PASSIVE_V + i])
+            kept[count++] = MODEL_TREE_PASSIVE[i] - size.nq;
+    if (passage_velocities(c->passage, c->m.time, X, kept, count))
+        return core_no_answer(
+            c, "%s: it starts at time %.9g in a singular configuration (%s) in which the loops allow "
+               "no motion with the velocities that are set; set others, also of dependent joints, "
+               "such as %s, or start elsewhere", c->name, c->m.time, core_where(c, where),
+            MODEL_NAMES[OUTPUTS + PASSIVE_V]);
+    if (passage_slope(c->passage, c->m.time, X, c->m.slope, on)) return undetermined(c);
+    memcpy(X, on, sizeof(double) * (size_t)size.nq); /* where branches cross rows tell 1e-8 of it */
+    c->m.singular = 1;
+    core_show_tree(c);
+    return CORE_OK;
+}
+
+void core_show_slope(const double *slope, double *y) {
+    static const passage_size size = MODEL_PASSAGE;
+    int i;
+    for (i = 0; i < N_HELD; i++) y[i] = slope[size.nq + MODEL_TREE_HELD[i]];
+    for (i = 0; i < N_PASSIVE; i++) y[PASSIVE_A + i] = slope[MODEL_TREE_PASSIVE[i]];
+}
+
 void core_show_tree(core *c) {
     int i;
     for (i = 0; i < NX; i++) c->m.values[STATES + i] = c->m.tree[MODEL_TREE_STATES[i]];

@@ -295,12 +295,14 @@ class Leg:
         times: (m,) s, that were reached.
         x: (m, nx) states at these times.
         contact: what rigid stops and Coulomb friction do meanwhile, None where there are none.
+        first_slope: as `EventMotion` has it.
     """
 
     state: FullState
     times: Array
     x: Array
     contact: ContactMotion | None = None
+    first_slope: Array | None = None
 
     @property
     def without_start(self) -> Leg:
@@ -315,7 +317,11 @@ class Leg:
         own = np.repeat(np.array(p, dtype=float).reshape(-1, 1), count, axis=1)
         every = own if self.contact is None else np.vstack([own, self.contact.modes.T])
         values = observe.map(count)(self.times.reshape(1, -1), self.x.T, every)
-        return [np.array(value).T for value in values]
+        a, *others = (np.array(value).T for value in values)
+        if self.first_slope is not None:  # the rows alone would allow other accelerations there
+            nv, z = a.shape[1], self.state.passage.size[2] if self.state.passage else 0
+            a[0] = self.first_slope[len(self.first_slope) - z - nv :][:nv]
+        return [a, *others]
 
 
 def integrated(
@@ -400,7 +406,8 @@ def _integrated(
             time=end,
         )
     motion = _motion(state, x0, times, None, p, options)
-    return [Leg(state, times[: len(motion.x)], motion.x)], motion.stop
+    leg = Leg(state, times[: len(motion.x)], motion.x, first_slope=motion.first_slope)
+    return [leg], motion.stop
 
 
 def _motion(
@@ -488,7 +495,8 @@ def _with_contacts(
     first = first_modes(system, x0, p)
     motion = _motion(state, x0, times, Events(*state.events, first), p, options)
     contact = ContactMotion(first, motion.modes, motion.events)
-    return [Leg(state, times[: len(motion.x)], motion.x, contact)], motion.stop
+    reached = times[: len(motion.x)]
+    return [Leg(state, reached, motion.x, contact, motion.first_slope)], motion.stop
 
 
 def _leg(

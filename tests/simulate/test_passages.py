@@ -172,6 +172,31 @@ def test_either_branch_is_left_on_from_where_they_cross(systems, name, along, sp
         assert energy_error(result) < tolerance
 
 
+@pytest.mark.parametrize("v0", [[0.0, 2.0, 2.0], [1.1, -0.8, 0.8]])
+def test_accelerations_of_a_start_are_those_of_the_branch(systems, v0):
+    """Those that the rows allow there are other ones, by 2 to 33 rad/s2."""
+    result = mbs.simulate.run(systems["kite"], 1e-2, q0=[0.0] * 3, v0=v0, step=1e-3, quiet=True)
+    for joint in ("j1", "j2", "j4"):
+        fit = np.polynomial.Polynomial.fit(result.time, result[f"{joint}.v"], 4)
+        assert result[f"{joint}.a"][0] == pytest.approx(fit.deriv()(0.0), abs=1e-2)
+
+
+@pytest.mark.parametrize("name", ["kite", "a+g=b+c", "parallelogram"])
+def test_the_implicit_method_passes_too(systems, name):
+    joint, speed = SPEED.get(name, ("j1", 6.0))
+    for tolerance in (1e-4, 1e-8):
+        result = mbs.simulate.run(
+            systems[name],
+            3.0,
+            v0={joint: speed},
+            tolerance=tolerance,
+            method="rodas",
+            step=0.05,
+            quiet=True,
+        )
+        assert energy_error(result) < 5 * tolerance
+
+
 @pytest.mark.parametrize("miss", [1e-2, 1e-4])
 def test_velocities_that_nearly_are_those_of_a_branch_are_refused(systems, miss):
     """What misses carries energy, which would be lost in silence."""

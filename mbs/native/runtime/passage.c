@@ -633,8 +633,10 @@ static int prepare(passage *g, double t, const double *x) {
     if (coordinates_of(g, t, x, g->own)) return STEPPER_SINGULAR;
     if (first) {
         g->sigma = HUGE_VAL;
-        if (slope(g, t, g->own, g->at, g->full[0], g->slopes[0]) || strays(g, x, g->at))
+        if (slope(g, t, g->own, g->at, g->full[0], g->slopes[0]) || strays(g, x, g->at)) {
+            m[BASED] = m[SIGMA] = 0.0; /* whoever asks again is refused again */
             return STEPPER_UNDETERMINED;
+        }
     }
     memcpy(g->ready_x, x, sizeof(double) * (size_t)n);
     g->ready_time = t;

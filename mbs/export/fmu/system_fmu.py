@@ -194,7 +194,7 @@ def fmu_model(
         interface.drive(system, controller),
     )
     tree = None
-    if state.events is None or settings.solver == "dopri5":
+    if state.events is None or settings.solver != "rk4":
         tree = tree_state(
             system,
             lambda seen: observed_values(system, request, seen),

@@ -92,6 +92,7 @@ struct passage {
     double ready_time, sigma;
     double turned; /* how far the tangents have turned from the chart: 1 at its origin, 0 across */
     int d, ready, charted, kept, singular, lasting;
+    int opened; /* the full step is, at the present state */
     int missed; /* branches that come near each other were met since the last full step */
 };
 
@@ -843,6 +844,9 @@ static int attempt(stepper *s, const double *x, double h) {
     g->charted = s->kept_closed = 0;
     s->noise = 0.0;
     if (ahead >= on) {
+        status = g->opened || !g->inner->open ? STEPPER_OK : g->inner->open(s, x);
+        if (status) return status;
+        g->opened = 1;
         status = g->inner->attempt(s, x, h);
         if (status || regularity_at(g, t + h, stepper_candidate(s)) >= on) {
             g->missed = 0;
@@ -879,6 +883,7 @@ static void keep(stepper *s, const double *x, double h) {
 
 static int close(stepper *s, double t) {
     passage *g = s->passage;
+    g->opened = 0;
     if (!g->charted) return g->inner->close(s, t);
     stepper_close(s, g->full[6]);
     return STEPPER_OK;
@@ -892,9 +897,13 @@ static void interpolate(const stepper *s, double a, double *row) {
         g->inner->interpolate(s, a, row);
 }
 
+/* What the full step opens with, such as a Jacobian, waits until one is made: near singular
+ * configurations it may have no value. */
 static int open(stepper *s, const double *x) {
     passage *g = s->passage;
-    return g->inner->open ? g->inner->open(s, x) : STEPPER_OK;
+    (void)x;
+    g->opened = 0;
+    return STEPPER_OK;
 }
 
 /* The slope that opens a step: where the rows are nearly dependent, that of the chart. */
@@ -918,7 +927,7 @@ void passage_start(passage *g) {
     passage_forget(g);
 }
 
-void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = 0; }
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = g->opened = 0; }
 
 /* The chart as memory tells it. */
 static int restored(passage *g) {

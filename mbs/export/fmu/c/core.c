@@ -250,7 +250,9 @@ static int allocate(core *c) {
 #if NK > 0 && defined MODEL_TREE
         mbs_tree_indicators_work, mbs_tree_rates_work, mbs_tree_jump_work,
 #endif
-#ifdef MODEL_RODAS
+#if defined MODEL_RODAS && defined MODEL_TREE
+        mbs_tree_jacobian_work,
+#elif defined MODEL_RODAS
         mbs_jacobian_work,
 #endif
     };

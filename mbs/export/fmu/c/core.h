@@ -126,7 +126,7 @@ typedef struct {
 #ifdef MODEL_TREE
     passage *passage;
 #endif
-    double work[MOST(SOLVER_WORK(NX), DOPRI5_WORK(NT)) + 1], 
+    double work[MOST(SOLVER_WORK(MOST(NX, NT)), DOPRI5_WORK(NT)) + 1],
         event_work[EVENTS_WORK(MOST(NX, NT), NK) + 1];
     double z[NZ + 1], u[NU + 1];
     const double **arg;

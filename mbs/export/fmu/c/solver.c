@@ -12,7 +12,7 @@ static int rhs(void *user, double t, const double *x, double *xdot) {
     return closure_solve(&c->loops, x, c->z) || core_call_rhs(c, t, x, c->z, xdot, NULL);
 }
 
-#ifdef MODEL_RODAS
+#if defined MODEL_RODAS && !defined MODEL_TREE
 static int jacobian(void *user, double t, const double *x, double *J, double *f_t) {
     core *c = user;
     double du[NU + 1];
@@ -84,9 +84,27 @@ static int tree_regularity(void *user, double t, const double *x, double *value)
     return mbs_tree_regularity(c->arg, c->res, c->iw, c->w, 0);
 }
 
+#ifdef MODEL_RODAS
+static int tree_jacobian(void *user, double t, const double *x, double *J, double *f_t) {
+    core *c = user;
+    double du[NU + 1];
+    core_point(c, &t, x, c->z);
+    core_input_rates(c, t, du);
+    c->arg[5] = du;
+    c->res[0] = J;
+    c->res[1] = f_t;
+    return mbs_tree_jacobian(c->arg, c->res, c->iw, c->w, 0);
+}
+#endif
+
 static int init_tree(core *c) {
     static const passage_size size = MODEL_PASSAGE;
     static const passage_model model = {tree_rows, tree_forces, tree_regularity, MODEL_REGULARITY};
+#ifdef MODEL_RODAS
+    if (c->m.cosimulation)
+        rodas_init(&c->solver, NT, tree_rhs, tree_jacobian, c, c->m.solver, c->work);
+    else
+#endif
     dopri5_init(&c->solver, NT, tree_rhs, c, c->m.solver, c->work);
     c->solver.project = tree_project;
     c->passage = passage_new(&c->solver, &size, &model, c->m.passage);
@@ -194,7 +212,7 @@ int core_init_solver(core *c) {
 #ifdef MODEL_TREE
     if (ON_TREE(c)) return init_tree(c);
 #endif
-#if defined MODEL_RODAS
+#if defined MODEL_RODAS && !defined MODEL_TREE
     rodas_init(&c->solver, NX, rhs, jacobian, c, c->m.solver, c->work);
 #elif defined MODEL_FIXED_STEP
     rk4_init(&c->solver, NX, rhs, c, c->m.solver, c->work);

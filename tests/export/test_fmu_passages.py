@@ -84,9 +84,7 @@ def test_the_implicit_solver_starts_in_a_singular_configuration(implicit):
 def test_a_state_of_the_implicit_solver_goes_on_bit_for_bit(implicit, tmp_path):
     """The Jacobian is none of it: it is taken again."""
     kite = Fmu(implicit[1], tmp_path)
-    instance, other = (
-        kite.open(FMU2Slave, start={"j1.v": 6.0}, tolerance=1e-7) for _ in range(2)
-    )
+    instance, other = (kite.open(FMU2Slave, start={"j1.v": 6.0}, tolerance=1e-7) for _ in range(2))
     for k in range(15):
         state = instance.serializeFMUstate(instance.getFMUstate())
         expected = kite.step(instance, 1, 0.05, begin=0.05 * k)

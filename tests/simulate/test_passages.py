@@ -129,6 +129,63 @@ def test_a_prescribed_crank_passes_flat(systems):
     assert result["a1.q"] == pytest.approx(1.0 + 2.0 * result.time, abs=1e-8)
 
 
+@pytest.mark.parametrize("name", ["a+g=b+c", "kite", "antiparallelogram"])
+def test_a_prescribed_crank_leads_on_along_its_branch(systems, name):
+    """The others move without a kink, and the drive gives what the energy takes."""
+    ends = []
+    for tolerance in (1e-5, 1e-9):
+        result = mbs.simulate.run(
+            systems[name],
+            2.0,
+            q0={"j1": 1.0},
+            motion={"j1.q": lambda t: 1.0 + 3.0 * t},
+            tolerance=tolerance,
+            step=2e-3,
+            quiet=True,
+        )
+        for joint in ("j2", "j4"):
+            v, a = result[f"{joint}.v"], result[f"{joint}.a"]
+            assert np.diff(v) == pytest.approx(2e-3 * (a[1:] + a[:-1]) / 2, abs=2e-3)
+        work = np.trapezoid(result["j1.tau"] * result["j1.v"], result.time)
+        energy = result["kinetic_energy"] + result["potential_energy"]
+        assert energy[-1] - energy[0] == pytest.approx(work, abs=1e-4)
+        ends.append([result["j2.q"][-1], result["j4.q"][-1]])
+    assert np.ptp(ends, axis=0).max() < 1e-5
+
+
+@pytest.mark.parametrize("miss", [0.0, 1.0])
+def test_a_drive_that_starts_where_branches_meet(systems, miss):
+    """Its first effort is that of the branch; where none is chosen there is an error."""
+    start = {"q0": {"a0": 0.0}, "v0": {"b0": -2.0 + miss}, "motion": {"a0.q": lambda t: 2.0 * t}}
+    if miss:
+        with pytest.raises(SolverError, match=r"velocities of one branch.*hold b0"):
+            mbs.simulate.run(systems["parallelogram"], 0.1, quiet=True, **start)
+        return
+    result = mbs.simulate.run(systems["parallelogram"], 0.1, step=1e-3, quiet=True, **start)
+    assert result["a1.q"] == pytest.approx(2.0 * result.time, abs=1e-9)
+    fit = np.polynomial.Polynomial.fit(result.time[1:], result["a0.tau"][1:], 4)
+    assert result["a0.tau"][0] == pytest.approx(fit(0.0), abs=1e-4)
+
+
+@pytest.mark.parametrize(("law", "stops"), [(0.19, False), (0.3, True)])
+def test_a_driven_slide_does_not_pass_its_dead_centre(systems, law, stops):
+    """The loops end there: the error names the time, the configuration and the slide."""
+
+    def driven():
+        return mbs.simulate.run(
+            systems["piston"],
+            2.0,
+            motion={"slide.q": lambda t: 0.9 + law * casadi.sin(t)},
+            quiet=True,
+        )
+
+    if stops:
+        with pytest.raises(SolverError, match=r"t = 0\.7297.*slide = 1\.1, .*hardly hold slide"):
+            driven()
+        return
+    assert driven()["slide.q"].max() == pytest.approx(1.09, abs=1e-4)
+
+
 def test_a_start_in_a_singular_configuration_with_velocities_of_one_branch(systems):
     system = systems["parallelogram"]
     result = mbs.simulate.run(

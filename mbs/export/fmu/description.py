@@ -433,9 +433,9 @@ class FmuModel:
             z is. None when nothing watches them.
         passive: the first output that is a velocity of a dependent joint, the first that is an
             acceleration of one, and how many of each there are.
-        tree: the same motion in all coordinates, which "dopri5" and "rodas" integrate, and integrators outside
-            where nothing jumps: it passes configurations in which the states determine nothing.
-            None where there is none.
+        tree: the same motion in all coordinates, which "dopri5" and "rodas" integrate, and
+            integrators outside where nothing jumps: it passes configurations in which the states
+            determine nothing. None where there is none.
         jumps: events; None when the motion is smooth.
         rules: what is asked of states and parameters; None where their bounds say all.
         stop_time: default end of a simulation, s.

@@ -13,9 +13,9 @@
 /* Part of the largest velocity of all joints, that of the independent ones, below which tangent
  * coordinates are used: errors are magnified by the inverse. */
 #define HOLD 0.1
-#define LEAVE 1.5      /* of that room, from which on the independent joints serve again */
-#define NEAR 1e-6      /* at the limit: where an importer finds it */
-#define TURNED 0.5     /* of the tangents at the origin, at which a chart is made anew */
+#define LEAVE 1.5  /* of that room, from which on the joints serve again: not at once, back and forth */
+#define NEAR 1e-6  /* of that room: importers find the limit to less, from either side */
+#define TURNED 0.5 /* of the tangents at the origin, 60 degrees: well before a chart ends (passage.c) */
 #define DIFFERENCE 1e-5 /* step of a difference: cube root of the rounding of a state, 1e-15 */
 
 /* A state of the tree, its slope, and that of the states. */

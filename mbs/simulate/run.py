@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi
@@ -23,6 +23,7 @@ from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
 from mbs.models.contacts import Contacts, contacts_of, require_lasting_rows, require_undriven
 from mbs.models.direct_dynamics import hybrid_dynamics
+from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
 from mbs.models.state.signals import (
     Effort,
@@ -295,12 +296,18 @@ class Leg:
         times: (m,) s, that were reached.
         x: (m, nx) states at these times.
         contact: what rigid stops and Coulomb friction do meanwhile, None where there are none.
+        first_slope: as `EventMotion` has it.
+        driven: numbers of the velocities whose motion is prescribed.
+        first_bias: (nv,) efforts of gravity and velocities at the first time; None as before.
     """
 
     state: FullState
     times: Array
     x: Array
     contact: ContactMotion | None = None
+    first_slope: Array | None = None
+    driven: tuple[int, ...] = ()
+    first_bias: Array | None = None
 
     @property
     def without_start(self) -> Leg:
@@ -315,7 +322,25 @@ class Leg:
         own = np.repeat(np.array(p, dtype=float).reshape(-1, 1), count, axis=1)
         every = own if self.contact is None else np.vstack([own, self.contact.modes.T])
         values = observe.map(count)(self.times.reshape(1, -1), self.x.T, every)
-        return [np.array(value).T for value in values]
+        a, tau, *others = (np.array(value).T for value in values)
+        if self.first_slope is not None:  # the rows alone would allow other accelerations there
+            self._correct_first(a[0], tau[0], every[:, 0])
+        return [a, tau, *others]
+
+    def _correct_first(self, a: Array, tau: Array, p: Array) -> None:
+        """Accelerations of the branch at a singular start, and what they ask of drives.
+
+        One drive gives the power that inertia and forces take; shares of several are not told.
+        """
+        assert self.state.passage is not None
+        assert self.first_slope is not None
+        nq, nv, *_ = self.state.passage.size
+        a[:] = self.first_slope[nq : nq + nv]
+        if self.driven and self.first_bias is not None:
+            M, f, _ = (np.array(x) for x in self.state.passage.forces(self.times[0], self.x[0], p))
+            v, (k, *more) = self.x[0, nq : nq + nv], self.driven
+            given, power = f[k, 0] + self.first_bias[k], v @ (M @ a - f[:, 0])
+            tau[list(self.driven)] = np.nan if more or not v[k] else given + power / v[k]
 
 
 def integrated(
@@ -400,7 +425,8 @@ def _integrated(
             time=end,
         )
     motion = _motion(state, x0, times, None, p, options)
-    return [Leg(state, times[: len(motion.x)], motion.x)], motion.stop
+    leg = Leg(state, times[: len(motion.x)], motion.x, first_slope=motion.first_slope)
+    return [leg], motion.stop
 
 
 def _motion(
@@ -488,7 +514,8 @@ def _with_contacts(
     first = first_modes(system, x0, p)
     motion = _motion(state, x0, times, Events(*state.events, first), p, options)
     contact = ContactMotion(first, motion.modes, motion.events)
-    return [Leg(state, times[: len(motion.x)], motion.x, contact)], motion.stop
+    reached = times[: len(motion.x)]
+    return [Leg(state, reached, motion.x, contact, motion.first_slope)], motion.stop
 
 
 def _leg(
@@ -778,6 +805,10 @@ def run(
             atol=atol,
             progress=reached,
         )
+    if motions and legs[0].first_slope is not None:
+        point = [x0[: system.nq], x0[system.nq : system.nq + system.nv]]
+        H = np.array(bias(system, "tree")(*point, *([p] if system.parameters else [])))[:, 0]
+        legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
     result = _result(system, legs, p, stop)
     if stop is not None:
         stop.result = result

@@ -5,6 +5,7 @@ import functools
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -120,8 +121,12 @@ def run_compiled(library: ctypes.CDLL, problem: Problem, progress: Progress | No
     done = ctypes.c_longlong(0)
     log: list[Event] = []
     stop: SolverError | Interrupted | None = None
+    first: Array | None = None
     with _opened(library, problem) as driver:
         status = library.mbs_begin(driver, _pointer(x))
+        if status <= _MORE and problem.equations.passage is not None:
+            slope = np.empty(len(x))
+            first = slope if library.mbs_leaves(driver, _pointer(x), _pointer(slope)) else None
         try:
             while status <= _MORE and done.value < len(times):
                 status = library.mbs_table(
@@ -148,7 +153,7 @@ def run_compiled(library: ctypes.CDLL, problem: Problem, progress: Progress | No
                 blamed,
                 x.tolist(),
             )
-    return problem.motion(table[: done.value], log, stop)
+    return replace(problem.motion(table[: done.value], log, stop), first_slope=first)
 
 
 def _event(library: ctypes.CDLL, driver: ctypes.c_void_p, problem: Problem) -> Event:
@@ -186,6 +191,7 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
         types["mbs_event"] = (None, [handle, pointer, pointer])
     if has_passage:
         types["mbs_pass"] = (ctypes.c_int, [handle, ctypes.POINTER(ctypes.c_int), real])
+        types["mbs_leaves"] = (ctypes.c_int, [handle, pointer, pointer])
     for name, (result, arguments) in types.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments

@@ -90,12 +90,15 @@ class EventMotion:
         modes: (m, nm) modes at these times.
         events: in the order of time.
         stop: why not all the times were reached; None where they were.
+        first_slope: (nx,) rates at the first time where constraints are dependent there, those of
+            the branch that the motion leaves on; None elsewhere.
     """
 
     x: Array
     modes: Array
     events: tuple[Event, ...]
     stop: SolverError | Interrupted | None = None
+    first_slope: Array | None = None
 
 
 def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:

@@ -11,7 +11,6 @@ from fmpy.fmi3 import FMU3Model
 from fmu_instances import Fmu, Fmu3
 
 import mbs
-from mbs.errors import SolverError
 from mbs.simulate.fmu import fmu
 
 MECHANISMS = {
@@ -226,11 +225,3 @@ def test_tuned_lengths_move_the_dependent_joints_in_event_mode(tmp_path):
     assert abs(unpacked.get(instance, "closure")[0]) < 1e-10
     instance.completedIntegratorStep()
     instance.freeInstance()
-
-
-@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
-def test_no_fmu_starts_where_branches_meet(made, fmi, kind):
-    """The error names the configuration, and what would decide."""
-    with pytest.raises(SolverError, match=r"time 0 \(a0.q = 0, a0.v = 0\).*start elsewhere"):
-        fmu(made["n_four_bar", fmi], 1.0, start={"a0.q": 0.0, "a0.v": 0.0}, kind=kind, quiet=True)

@@ -54,6 +54,46 @@ def test_the_motion_is_that_of_a_simulation(made, name):
         assert result[f"{speed.name}.v"] == pytest.approx(shown[f"{speed.name}.v"], abs=1e-3)
 
 
+@pytest.fixture(scope="module")
+def implicit(tmp_path_factory):
+    kite = linkage((0.5, 1.1, 1.1, 0.5), (1.0, 0.5, 2.0))
+    path = tmp_path_factory.mktemp("implicit") / "kite.fmu"
+    return kite, mbs.export.fmu(kite, path, solver="rodas", outputs=["energy", "closure"])
+
+
+def test_the_implicit_solver_passes_too(implicit):
+    kite, path = implicit
+    shown = mbs.simulate.run(kite, 3.0, v0={"j1": 6.0}, tolerance=1e-10, step=0.05, quiet=True)
+    assert np.ptp(shown["j1.q"]) > 2 * np.pi
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        result = fmu(path, 3.0, start={"j1.v": 6.0}, tolerance=tolerance, step=0.05, quiet=True)
+        assert energy(result) < 50 * tolerance
+        assert result["closure"].max() < 1e-11
+        assert result["j4.q"] == pytest.approx(shown["j4.q"], abs=300 * tolerance)
+
+
+def test_the_implicit_solver_starts_in_a_singular_configuration(implicit):
+    kite, path = implicit
+    v0 = [1.1, -0.8, 0.8]
+    shown = mbs.simulate.run(kite, 1.0, q0=[0] * 3, v0=v0, tolerance=1e-10, step=0.05, quiet=True)
+    start = {"j1.q": 0.0, "j1.v": 1.1, "j2.v": -0.8}
+    result = fmu(path, 1.0, start=start, tolerance=1e-9, step=0.05, quiet=True)
+    assert result["j4.q"] == pytest.approx(shown["j4.q"], abs=1e-6)
+
+
+def test_a_state_of_the_implicit_solver_goes_on_bit_for_bit(implicit, tmp_path):
+    """The Jacobian is none of it: it is taken again."""
+    kite = Fmu(implicit[1], tmp_path)
+    instance, other = (kite.open(FMU2Slave, start={"j1.v": 6.0}, tolerance=1e-7) for _ in range(2))
+    for k in range(15):
+        state = instance.serializeFMUstate(instance.getFMUstate())
+        expected = kite.step(instance, 1, 0.05, begin=0.05 * k)
+        other.setFMUstate(other.deSerializeFMUstate(state))
+        assert np.array_equal(kite.step(other, 1, 0.05, begin=0.05 * k), expected)
+    for each in (instance, other):
+        each.freeInstance()
+
+
 @pytest.mark.parametrize("step", [0.005, 0.3])
 def test_communication_steps_do_not_change_the_motion(made, step):
     start = MECHANISMS["n_four_bar"][1]

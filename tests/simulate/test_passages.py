@@ -3,10 +3,10 @@
 import casadi
 import numpy as np
 import pytest
-from support.change_points import GRAVITY, linkage, rod
+from support.change_points import GRAVITY, linkage, rod, slider_crank
 
 import mbs
-from mbs.components import Body, CoulombFriction, Prismatic, Revolute, RigidStop
+from mbs.components import CoulombFriction, Revolute, RigidStop
 from mbs.errors import SolverError
 
 
@@ -22,24 +22,13 @@ def coupling_rod():
     return m.assemble(guess={"j0": 1.0, "j1": 1.0, "j2": 1.0, "p0": -1.0})
 
 
-def piston():
-    m = mbs.Mechanism("piston", gravity=GRAVITY)
-    crank, bar, head = m.add(rod("crank", 0.3)), m.add(rod("bar", 0.8)), m.add(Body("h", mass=1))
-    m.connect(m.world, Revolute("j1"), crank)
-    m.connect(crank.at(0.3), Revolute("j2"), bar)
-    m.connect(m.world, Prismatic("slide", axis="x", actuated=True), head)
-    m.connect(bar.at(0.8), pin := Revolute("pin"), head)
-    m.cut(pin)
-    return m.assemble(active=["slide"], guess={"j1": 1.0, "j2": -1.3, "slide": 0.9})
-
-
 MECHANISMS = {
     "parallelogram": lambda: mbs.robots.n_four_bar().assemble(active=["a0"]),
     "a+g=b+c": lambda: linkage((0.4, 0.9, 0.7, 1.2), (1.0, -0.5, 1.5)),
     "kite": lambda: linkage((0.5, 1.1, 1.1, 0.5), (1.0, 0.5, 2.0)),
     "antiparallelogram": lambda: linkage((0.4, 1.0, 0.4, 1.0), (1.0, -1.8, -1.5)),
     "coupling rod": coupling_rod,
-    "piston": piston,
+    "piston": slider_crank,
     "sr400": lambda: mbs.robots.sr400().assemble(),
     "five_bar": lambda: mbs.robots.five_bar().assemble(),
 }
@@ -140,6 +129,63 @@ def test_a_prescribed_crank_passes_flat(systems):
     assert result["a1.q"] == pytest.approx(1.0 + 2.0 * result.time, abs=1e-8)
 
 
+@pytest.mark.parametrize("name", ["a+g=b+c", "kite", "antiparallelogram"])
+def test_a_prescribed_crank_leads_on_along_its_branch(systems, name):
+    """The others move without a kink, and the drive gives what the energy takes."""
+    ends = []
+    for tolerance in (1e-5, 1e-9):
+        result = mbs.simulate.run(
+            systems[name],
+            2.0,
+            q0={"j1": 1.0},
+            motion={"j1.q": lambda t: 1.0 + 3.0 * t},
+            tolerance=tolerance,
+            step=2e-3,
+            quiet=True,
+        )
+        for joint in ("j2", "j4"):
+            v, a = result[f"{joint}.v"], result[f"{joint}.a"]
+            assert np.diff(v) == pytest.approx(2e-3 * (a[1:] + a[:-1]) / 2, abs=2e-3)
+        work = np.trapezoid(result["j1.tau"] * result["j1.v"], result.time)
+        energy = result["kinetic_energy"] + result["potential_energy"]
+        assert energy[-1] - energy[0] == pytest.approx(work, abs=1e-4)
+        ends.append([result["j2.q"][-1], result["j4.q"][-1]])
+    assert np.ptp(ends, axis=0).max() < 1e-5
+
+
+@pytest.mark.parametrize("miss", [0.0, 1.0])
+def test_a_drive_that_starts_where_branches_meet(systems, miss):
+    """Its first effort is that of the branch; where none is chosen there is an error."""
+    start = {"q0": {"a0": 0.0}, "v0": {"b0": -2.0 + miss}, "motion": {"a0.q": lambda t: 2.0 * t}}
+    if miss:
+        with pytest.raises(SolverError, match=r"velocities of one branch.*hold b0"):
+            mbs.simulate.run(systems["parallelogram"], 0.1, quiet=True, **start)
+        return
+    result = mbs.simulate.run(systems["parallelogram"], 0.1, step=1e-3, quiet=True, **start)
+    assert result["a1.q"] == pytest.approx(2.0 * result.time, abs=1e-9)
+    fit = np.polynomial.Polynomial.fit(result.time[1:], result["a0.tau"][1:], 4)
+    assert result["a0.tau"][0] == pytest.approx(fit(0.0), abs=1e-4)
+
+
+@pytest.mark.parametrize(("law", "stops"), [(0.19, False), (0.3, True)])
+def test_a_driven_slide_does_not_pass_its_dead_centre(systems, law, stops):
+    """The loops end there: the error names the time, the configuration and the slide."""
+
+    def driven():
+        return mbs.simulate.run(
+            systems["piston"],
+            2.0,
+            motion={"slide.q": lambda t: 0.9 + law * casadi.sin(t)},
+            quiet=True,
+        )
+
+    if stops:
+        with pytest.raises(SolverError, match=r"t = 0\.7297.*slide = 1\.1, .*hardly hold slide"):
+            driven()
+        return
+    assert driven()["slide.q"].max() == pytest.approx(1.09, abs=1e-4)
+
+
 def test_a_start_in_a_singular_configuration_with_velocities_of_one_branch(systems):
     system = systems["parallelogram"]
     result = mbs.simulate.run(
@@ -181,6 +227,31 @@ def test_either_branch_is_left_on_from_where_they_cross(systems, name, along, sp
         )
         assert result["j1.v"][0] == pytest.approx(v0[0], abs=1e-12)
         assert energy_error(result) < tolerance
+
+
+@pytest.mark.parametrize("v0", [[0.0, 2.0, 2.0], [1.1, -0.8, 0.8]])
+def test_accelerations_of_a_start_are_those_of_the_branch(systems, v0):
+    """Those that the rows allow there are other ones, by 2 to 33 rad/s2."""
+    result = mbs.simulate.run(systems["kite"], 1e-2, q0=[0.0] * 3, v0=v0, step=1e-3, quiet=True)
+    for joint in ("j1", "j2", "j4"):
+        fit = np.polynomial.Polynomial.fit(result.time, result[f"{joint}.v"], 4)
+        assert result[f"{joint}.a"][0] == pytest.approx(fit.deriv()(0.0), abs=1e-2)
+
+
+@pytest.mark.parametrize("name", ["kite", "a+g=b+c", "parallelogram"])
+def test_the_implicit_method_passes_too(systems, name):
+    joint, speed = SPEED.get(name, ("j1", 6.0))
+    for tolerance in (1e-4, 1e-8):
+        result = mbs.simulate.run(
+            systems[name],
+            3.0,
+            v0={joint: speed},
+            tolerance=tolerance,
+            method="rodas",
+            step=0.05,
+            quiet=True,
+        )
+        assert energy_error(result) < 5 * tolerance
 
 
 @pytest.mark.parametrize("miss", [1e-2, 1e-4])

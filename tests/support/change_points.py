@@ -1,7 +1,7 @@
-"""Four-bar linkages, also those whose bars can lie on one line."""
+"""Four-bar linkages whose bars can lie on one line, and a slider-crank with a driven slide."""
 
 import mbs
-from mbs.components import Body, Revolute
+from mbs.components import Body, Prismatic, Revolute
 
 GRAVITY = (0, -9.81, 0)
 
@@ -24,3 +24,14 @@ def linkage(lengths, guess, more=()):
     for element in more:
         m.add(element)
     return m.assemble(guess=dict(zip(("j1", "j2", "j4"), guess, strict=True)))
+
+
+def slider_crank():
+    m = mbs.Mechanism("piston", gravity=GRAVITY)
+    crank, bar, head = m.add(rod("crank", 0.3)), m.add(rod("bar", 0.8)), m.add(Body("h", mass=1))
+    m.connect(m.world, Revolute("j1"), crank)
+    m.connect(crank.at(0.3), Revolute("j2"), bar)
+    m.connect(m.world, Prismatic("slide", axis="x", actuated=True), head)
+    m.connect(bar.at(0.8), pin := Revolute("pin"), head)
+    m.cut(pin)
+    return m.assemble(active=["slide"], guess={"j1": 1.0, "j2": -1.3, "slide": 0.9})

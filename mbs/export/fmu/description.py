@@ -282,6 +282,7 @@ class FmuVariable:
         max: greatest value; a parameter above it is refused.
         description: one line for people.
         fixed: a parameter that keeps its value once the motion has begun.
+        guess: an output whose start, where it is set, chooses the branch.
     """
 
     name: str
@@ -292,6 +293,7 @@ class FmuVariable:
     max: float | None = None
     description: str = ""
     fixed: bool = False
+    guess: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", structured(self.name))
@@ -458,9 +460,9 @@ class FmuModel:
             z is. None when nothing watches them.
         passive: the first output that is a velocity of a dependent joint, the first that is an
             acceleration of one, and how many of each there are.
-        tree: the same motion in all coordinates, which "dopri5" integrates, and integrators outside
-            where nothing jumps: it passes configurations in which the states determine nothing.
-            None where there is none.
+        tree: the same motion in all coordinates, which "dopri5" and "rodas" integrate, and
+            integrators outside where nothing jumps: it passes configurations in which the states
+            determine nothing. None where there is none.
         jumps: events; None when the motion is smooth.
         rules: what is asked of states and parameters; None where their bounds say all.
         stop_time: default end of a simulation, s.

@@ -36,7 +36,8 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, du the rates of the inputs; the
         last three also of a tree, as `mbs_tree_indicators` and so on. Where states and parameters
         have rules, `mbs_excess(x, p)`. For an implicit solver
-        `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`.
+        `mbs_jacobian(t, x, z, u, p, du) -> (d xdot / d x, d xdot / d t)`, where there is a tree
+        `mbs_tree_jacobian` of its states instead.
     """
     t, x = casadi.MX.sym("t"), casadi.MX.sym("x", len(model.states))
     z, u = casadi.MX.sym("z", len(model.dependents)), casadi.MX.sym("u", len(model.inputs))
@@ -67,9 +68,16 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
     if model.rules is not None:
         excess = _dense(model.rules.excess.call([x, _own(model, p)]))
         answers.append(casadi.Function("mbs_excess", [x, p], excess))
-    if model.solver == "rodas":
+    if model.solver == "rodas" and tree is None:
         slopes = _dense(_jacobian(model, point, du))
         answers.append(casadi.Function("mbs_jacobian", [*point, du], slopes))
+    if model.solver == "rodas" and tree is not None:
+        whole = [t, X, z, u, p]
+        rate = tree.rhs.call([t, X, casadi.MX(0, 1), u, p])[0]
+        J = casadi.densify(casadi.jacobian(rate, X))
+        rise = casadi.jacobian(rate, t) + casadi.jtimes(rate, u, du)
+        slopes = _dense([J, rise])
+        answers.append(casadi.Function("mbs_tree_jacobian", [*whole, du], slopes))
     return tuple(answers)
 
 
@@ -346,7 +354,7 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
     if model.target == "bare":
         options += "#define MODEL_BARE\n"
     if model.solver == "rodas":
-        names = (*names, "mbs_jacobian")
+        names = (*names, "mbs_jacobian" if tree is None else "mbs_tree_jacobian")
         options += "#define MODEL_RODAS\n"
     elif model.solver == "rk4":
         options += f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
@@ -423,9 +431,10 @@ def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
     sizes = ", ".join(map(str, tree.passage.size))
     return (
         f"#define MODEL_TREE {tree.start.numel_out(0)} /* its states */\n"
-        f"#define MODEL_TREE_INSIDE {int(model.solver == 'dopri5')} /* co-simulation has them */\n"
+        f"#define MODEL_TREE_INSIDE {int(model.solver != 'rk4')} /* co-simulation has them */\n"
         f"#define MODEL_TREE_OUTSIDE {int(model.charted)} /* model exchange has charts of them */\n"
         f"#define MODEL_PASSAGE {{{sizes}}}\n"
+        f"#define N_HELD {len(tree.held)}\n"
         f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
         "/* where states, dependents and velocities of dependent joints stand in it, and the\n"
         " * independent joints among its velocities; typical sizes of these */\n"

@@ -203,7 +203,7 @@ def fmu_model(
         interface.drive(system, controller),
     )
     tree = None
-    followed = state.events is None or settings.solver == "dopri5"
+    followed = state.events is None or settings.solver != "rk4"
     if followed and settings.target != "bare":
         tree = tree_state(
             system,
@@ -213,7 +213,8 @@ def fmu_model(
     x, z = consistent_start(system, state)
     x_variables = states(system, state, x)
     u_variables = (*inputs(system, state, interface.wrenches), *controller.inputs)
-    y_variables = (*outputs(system, state), *observed_variables(system, request))
+    shown = outputs(system, state, branches=tree is not None)
+    y_variables = (*shown, *observed_variables(system, request))
     model = FmuModel(
         name=system.name,
         description=words[0] or system.report().splitlines()[0],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from mbs.assembly import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT, Coordinate
@@ -103,13 +104,26 @@ def _prescribed(system: System, motion: InputMotion) -> Iterator[FmuVariable]:
     yield _acceleration(speed, "prescribed ")
 
 
-def outputs(system: System, state: MinimalState) -> Iterator[FmuVariable]:
-    """The elements of y but those that are observed."""
+def outputs(
+    system: System, state: MinimalState, *, branches: bool = False
+) -> Iterator[FmuVariable]:
+    """The elements of y but those that are observed.
+
+    Args:
+        system: open or closed.
+        state: its state equation.
+        branches: where branches of motion meet, velocities of dependent joints choose one.
+    """
     speeds = system.speeds
     yield from (_acceleration(speeds[k]) for k in state.accelerations)
     for k in state.shown:
         yield _position(system.coordinates[k], f"{system.coordinates[k].name}.q")
-    yield from (_velocity(speeds[k]) for k in state.passive)
+    for k in state.passive:
+        velocity = _velocity(speeds[k])
+        if branches:
+            text = f"{velocity.description}; a start of it chooses where branches of motion meet"
+            velocity = replace(velocity, description=text, guess=True)
+        yield velocity
     yield from (_acceleration(speeds[k]) for k in state.passive)
     yield from pose("tool", frame_text(terminal_frame(system)))
     for device in system.devices:

@@ -435,7 +435,7 @@ def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
     if isinstance(v, State) and v.output:
         attributes["causality"] = "output"
     if entry.kind in _INITIAL:
-        attributes["initial"] = _INITIAL[entry.kind]
+        attributes["initial"] = "approx" if v.guess else _INITIAL[entry.kind]
     return attributes
 
 
@@ -450,7 +450,7 @@ def real_attributes(entry: FmuEntry) -> dict[str, str]:
         if bound is not None and math.isfinite(bound):
             real[name] = repr(float(bound))
     real["nominal"] = repr(float(v.nominal))
-    if entry.kind in WITH_START:
+    if entry.kind in WITH_START or v.guess:
         real["start"] = repr(float(v.start))
     return real
 

@@ -169,6 +169,12 @@ EXPORT int mbs_pass(driver *d, const int *size, double typical) {
     d->passage = passage_new(&d->solver, &z, &model, d->passage_memory);
     return d->passage == NULL;
 }
+
+/* After mbs_begin; 1 where x is a singular configuration that is left on one branch: its slope. */
+EXPORT int mbs_leaves(driver *d, const double *x, double *slope) {
+    double t = stepper_time(&d->solver);
+    return passage_singular(d->passage, t, x) && !passage_slope(d->passage, t, x, slope, NULL);
+}
 #endif
 
 static void *array(size_t count, size_t size) { return calloc(count + 1, size); }

@@ -44,6 +44,14 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 /* Part of its velocities by which such a start may miss those of the branch: what a mean of values
  * beside it errs by is 1e-9, and what misses by more carries energy that the branch does not. */
 #define STRAY 1e-6
+/* Part of the longest row below which one is dependent where a start is closed: branches cross, and
+ * Newton steps halve the distance from there, until a remainder of the rows by rounding, its square,
+ * moves as much. */
+#define SETTLED 1e-8
+#define PLACING 40     /* such Newton steps: 1e-12 of the first distance */
+#define CLOSED 1e-12   /* largest row of a start, for coordinates of size one */
+/* The same where its velocities are found: more than what a start that is closed so far leaves. */
+#define DEPENDENT 1e-6
 #define MASSLESS 1e-10 /* part of the largest pivot of the inertia matrix below which one is none */
 
 /* places in memory */
@@ -84,6 +92,7 @@ struct passage {
     double ready_time, sigma;
     double turned; /* how far the tangents have turned from the chart: 1 at its origin, 0 across */
     int d, ready, charted, kept, singular, lasting;
+    int opened; /* the full step is, at the present state */
     int missed; /* branches that come near each other were met since the last full step */
 };
 
@@ -164,34 +173,58 @@ static int factor_mass(passage *g, frame *p) {
     return cholesky(p->M, n);
 }
 
-/* L^-1 J' = Q R by reflections, the longest remaining column first, as many as the rank. */
+/* A (n, m) = Q R by reflections, the longest remaining column first, up to a rank, or until what
+ * remains is shorter than a part of the first one; column k of R is order[k] of A. The rank. */
+static int pivoted(double *A, int n, int m, int rank, double least, int *order, double *weight) {
+    double first = 0.0;
+    int i, j, k;
+    for (j = 0; j < m; j++) order[j] = j;
+    for (k = 0; k < rank; k++) {
+        double most = -1.0;
+        int longest = k, kept = order[k];
+        for (j = k; j < m; j++) {
+            double size = 0.0;
+            for (i = k; i < n; i++) size += A[j * n + i] * A[j * n + i];
+            if (size > most) most = size, longest = j;
+        }
+        if (k == 0) first = most;
+        if (most < least * least * first) return k;
+        for (i = 0; i < n && longest != k; i++) {
+            double value = A[k * n + i];
+            A[k * n + i] = A[longest * n + i];
+            A[longest * n + i] = value;
+        }
+        order[k] = order[longest];
+        order[longest] = kept;
+        weight[k] = dense_reflection(A + k * n + k, n - k);
+        for (j = k + 1; j < m; j++)
+            dense_reflect(A + k * n + k, weight[k], n - k, A + j * n + k);
+    }
+    return rank;
+}
+
+/* L^-1 J' = Q R, as many columns as the rank. */
 static void factor_rows(passage *g, frame *p) {
-    int n = g->size.nv, m = g->size.speeds, i, j, k;
+    int n = g->size.nv, m = g->size.speeds, i, j;
     for (j = 0; j < m; j++) {
         for (i = 0; i < n; i++) p->A[j * n + i] = p->rows.J[i * m + j];
         lower(p->M, n, p->A + j * n);
-        p->order[j] = j;
     }
-    for (k = 0; k < p->rank; k++) {
-        double most = -1.0;
-        int longest = k, kept = p->order[k];
-        for (j = k; j < m; j++) {
-            double size = 0.0;
-            for (i = k; i < n; i++) size += p->A[j * n + i] * p->A[j * n + i];
-            if (size > most) most = size, longest = j;
-        }
-        for (i = 0; i < n && longest != k; i++) {
-            double value = p->A[k * n + i];
-            p->A[k * n + i] = p->A[longest * n + i];
-            p->A[longest * n + i] = value;
-        }
-        p->order[k] = p->order[longest];
-        p->order[longest] = kept;
-        p->weight[k] = dense_reflection(p->A + k * n + k, n - k);
-        for (j = k + 1; j < m; j++)
-            dense_reflect(p->A + k * n + k, p->weight[k], n - k, p->A + j * n + k);
-    }
+    pivoted(p->A, n, m, p->rank, 0.0, p->order, p->weight);
     p->sigma = p->rank ? fabs(p->A[(p->rank - 1) * n + p->rank - 1]) : 1.0;
+}
+
+/* The shortest y with A' y = b, A (n, m) replaced, on its rows that are not nearly dependent. */
+static void shortest(passage *g, double *A, int n, int m, const double *b, double least, double *y) {
+    int *order = g->orders + 2 * g->size.speeds, i, k;
+    int rank = pivoted(A, n, m, n < m ? n : m, least, order, g->w);
+    memset(y, 0, sizeof(double) * (size_t)n);
+    for (k = 0; k < rank; k++) {
+        double sum = b[order[k]];
+        for (i = 0; i < k; i++) sum -= A[k * n + i] * y[i];
+        if (A[k * n + k] != 0.0) y[k] = sum / A[k * n + k];
+    }
+    for (k = rank - 1; k >= 0; k--) dense_reflect(A + k * n + k, g->w[k], n - k, y + k);
 }
 
 /* v = L^-T Q y, in place. */
@@ -601,8 +634,10 @@ static int prepare(passage *g, double t, const double *x) {
     if (coordinates_of(g, t, x, g->own)) return STEPPER_SINGULAR;
     if (first) {
         g->sigma = HUGE_VAL;
-        if (slope(g, t, g->own, g->at, g->full[0], g->slopes[0]) || strays(g, x, g->at))
+        if (slope(g, t, g->own, g->at, g->full[0], g->slopes[0]) || strays(g, x, g->at)) {
+            m[BASED] = m[SIGMA] = 0.0; /* whoever asks again is refused again */
             return STEPPER_UNDETERMINED;
+        }
     }
     memcpy(g->ready_x, x, sizeof(double) * (size_t)n);
     g->ready_time = t;
@@ -809,6 +844,9 @@ static int attempt(stepper *s, const double *x, double h) {
     g->charted = s->kept_closed = 0;
     s->noise = 0.0;
     if (ahead >= on) {
+        status = g->opened || !g->inner->open ? STEPPER_OK : g->inner->open(s, x);
+        if (status) return status;
+        g->opened = 1;
         status = g->inner->attempt(s, x, h);
         if (status || regularity_at(g, t + h, stepper_candidate(s)) >= on) {
             g->missed = 0;
@@ -845,6 +883,7 @@ static void keep(stepper *s, const double *x, double h) {
 
 static int close(stepper *s, double t) {
     passage *g = s->passage;
+    g->opened = 0;
     if (!g->charted) return g->inner->close(s, t);
     stepper_close(s, g->full[6]);
     return STEPPER_OK;
@@ -858,21 +897,18 @@ static void interpolate(const stepper *s, double a, double *row) {
         g->inner->interpolate(s, a, row);
 }
 
+/* What the full step opens with, such as a Jacobian, waits until one is made: near singular
+ * configurations it may have no value. */
 static int open(stepper *s, const double *x) {
     passage *g = s->passage;
-    return g->inner->open ? g->inner->open(s, x) : STEPPER_OK;
+    (void)x;
+    g->opened = 0;
+    return STEPPER_OK;
 }
 
 /* The slope that opens a step: where the rows are nearly dependent, that of the chart. */
 static int opening(stepper *s, const double *x) {
-    passage *g = s->passage;
-    double t = stepper_time(s);
-    int status;
-    if (foreseen(g, t, x, 0.0) >= PASSAGE_ON * g->memory[LARGEST])
-        return stepper_evaluate(s, t, x, stepper_slope(s));
-    status = prepare(g, t, x);
-    g->sigma = HUGE_VAL;
-    return status ? status : slope(g, t, g->own, g->at, stepper_slope(s), g->slopes[0]);
+    return passage_slope(s->passage, stepper_time(s), x, stepper_slope(s), NULL);
 }
 
 int passage_project(passage *g, double t, double *x) {
@@ -891,7 +927,7 @@ void passage_start(passage *g) {
     passage_forget(g);
 }
 
-void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = 0; }
+void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = g->opened = 0; }
 
 /* The chart as memory tells it. */
 static int restored(passage *g) {
@@ -937,6 +973,97 @@ int passage_state(passage *g, double t, const double *y, const double *guide, do
     g->memory[SIGMA] = largest;
     *turned = g->turned;
     return status;
+}
+
+int passage_singular(passage *g, double t, const double *x) {
+    return !(regularity_at(g, t, x) > AWAY * FLOOR * g->memory[LARGEST]);
+}
+
+int passage_place(passage *g, double t, double *x, const int *loose, int count) {
+    int m = g->size.places, first = g->size.speeds - g->size.anchors, i, j, turn;
+    double worst = HUGE_VAL, move = HUGE_VAL, *A = g->K, *r = g->r;
+    for (turn = 0; turn <= PLACING; turn++) {
+        if (rows_at(g, t, x, &g->here.rows)) return 1;
+        for (worst = 0.0, j = 0; j < m; j++) {
+            int free = j >= first && j < g->size.speeds; /* what stops and friction hold is there */
+            r[j] = free ? 0.0 : -g->here.rows.place[j];
+            worst = fmax(worst, fabs(r[j]));
+            for (i = 0; i < count; i++)
+                A[j * count + i] = free ? 0.0 : g->here.rows.slope[loose[i] * m + j];
+        }
+        if (!isfinite(worst) || !stepper_all_finite(A, m * count)) return 1;
+        if (move < LAST_MOVE || turn == PLACING) break;
+        shortest(g, A, count, m, r, SETTLED, g->y);
+        for (move = 0.0, i = 0; i < count; i++) {
+            x[loose[i]] += g->y[i];
+            move = fmax(move, fabs(g->y[i]));
+        }
+    }
+    return !(worst < CLOSED);
+}
+
+int passage_velocities(passage *g, double t, double *x, const int *kept, int count) {
+    int nq = g->size.nq, nv = g->size.nv, m = g->size.speeds, i, j;
+    double *A = g->K, *r = g->r, *v = x + nq, *y = g->y, speed = 0.0, miss = 0.0;
+    if (rows_at(g, t, x, &g->here.rows)) return 1;
+    for (j = 0; j < m + count; j++) {
+        int held = j >= m - g->size.anchors && j < m;
+        r[j] = j < m ? g->here.rows.b[j] : v[kept[j - m]];
+        for (i = 0; i < nv; i++) {
+            double value = j < m ? g->here.rows.J[i * m + j] : i == kept[j - m];
+            A[j * nv + i] = held ? 0.0 : value;
+        }
+    }
+    if (!stepper_all_finite(A, (m + count) * nv)) return 1;
+    shortest(g, A, nv, m + count, r, DEPENDENT, y);
+    for (i = 0; i < nv; i++) speed = fmax(speed, fabs(y[i]));
+    for (j = 0; j < m + count; j++) {
+        double off = j < m ? -r[j] : y[kept[j - m]] - r[j];
+        if (j >= m - g->size.anchors && j < m) continue;
+        for (i = 0; i < nv && j < m; i++) off += g->here.rows.J[i * m + j] * y[i];
+        miss = fmax(miss, fabs(off));
+        if (j >= m) speed = fmax(speed, fabs(r[j]));
+    }
+    memcpy(v, y, sizeof(double) * (size_t)nv);
+    return !(miss <= STRAY * speed);
+}
+
+int passage_slope(passage *g, double t, const double *x, double *xdot, double *on) {
+    int status, n = g->s->n;
+    if (regularity_at(g, t, x) >= PASSAGE_ON * g->memory[LARGEST]) {
+        if (on) memcpy(on, x, sizeof(double) * (size_t)n);
+        return stepper_evaluate(g->s, t, x, xdot);
+    }
+    status = prepare(g, t, x);
+    g->sigma = HUGE_VAL;
+    if (!status) status = slope(g, t, g->own, g->at, xdot, g->slopes[0]);
+    if (!status && on) memcpy(on, g->at, sizeof(double) * (size_t)n);
+    return status;
+}
+
+int passage_loosest(passage *g, double t, const double *x, const double *unit) {
+    int nv = g->size.nv, found = -1, i, j, k, first;
+    double most = 0.0, *B = g->K, *moves = g->y;
+    if (evaluate(g, &g->here, t, x) || factor(g, &g->here) || !g->here.rank) return -1;
+    first = g->here.rank - 1;
+    memset(moves, 0, sizeof(double) * (size_t)nv);
+    for (k = first; k < nv; k++) { /* the directions that rows hold least, orthonormal */
+        double *v = B + (k - first) * nv, size = 0.0;
+        memset(v, 0, sizeof(double) * (size_t)nv);
+        v[k] = 1.0;
+        to_velocity(g, &g->here, v);
+        for (i = 0; i < nv; i++) v[i] *= unit[i];
+        for (j = 0; j < k - first; j++) {
+            double part = 0.0;
+            for (i = 0; i < nv; i++) part += B[j * nv + i] * v[i];
+            for (i = 0; i < nv; i++) v[i] -= part * B[j * nv + i];
+        }
+        for (i = 0; i < nv; i++) size += v[i] * v[i];
+        for (i = 0; i < nv; i++) v[i] /= sqrt(size), moves[i] += v[i] * v[i];
+    }
+    for (i = 0; i < nv; i++) /* the first of joints that move alike */
+        if (moves[i] > most + 1e-6) most = moves[i], found = i;
+    return found;
 }
 
 int passage_grip(passage *g, double t, const double *x, const int *held, const double *unit,
@@ -1025,7 +1152,8 @@ passage *passage_new(stepper *s, const passage_size *size, const passage_model *
     g->model = *model;
     g->memory = memory;
     g->block = calloc(lay(g, NULL), sizeof *g->block);
-    g->orders = calloc(2 * (size_t)size->speeds + 1, sizeof *g->orders);
+    g->orders = calloc(2 * (size_t)size->speeds + (size_t)(size->places + size->nv) + 1,
+                       sizeof *g->orders);
     if (!g->block || !g->orders) {
         passage_free(g);
         return NULL;

@@ -74,6 +74,26 @@ void passage_forget(passage *g);
  * such chart, and the projection of the full step is to be used. */
 int passage_project(passage *g, double t, double *x);
 
+/* A start where rows may be dependent, before any step. */
+
+/* 1 where they nearly are at a state. */
+int passage_singular(passage *g, double t, const double *x);
+
+/* Positions moved onto all rows, those of x that are loose alone; 1: they do not come there. */
+int passage_place(passage *g, double t, double *x, const int *loose, int count);
+
+/* The velocities in x become the smallest on all rows that keep the given ones of them; 1 where no
+ * motion has these. */
+int passage_velocities(passage *g, double t, double *x, const int *kept, int count);
+
+/* The slope of a state, in a singular configuration that of the branch which has its velocities; on
+ * (n,), where it is not NULL: the state on the branch, x where rows are independent. A status of the
+ * stepper: undetermined where no branch has these velocities. */
+int passage_slope(passage *g, double t, const double *x, double *xdot, double *on);
+
+/* The velocity that the rows hold least at a state, each in its unit (nv,); -1: no answer. */
+int passage_loosest(passage *g, double t, const double *x, const double *unit);
+
 /* Where the steps are made by somebody else, a chart lasts from one call of passage_chart to the
  * next; all return a status of the stepper. */
 

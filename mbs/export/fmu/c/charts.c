@@ -13,9 +13,9 @@
 /* Part of the largest velocity of all joints, that of the independent ones, below which tangent
  * coordinates are used: errors are magnified by the inverse. */
 #define HOLD 0.1
-#define LEAVE 1.5      /* of that room, from which on the independent joints serve again */
-#define NEAR 1e-6      /* at the limit: where an importer finds it */
-#define TURNED 0.5     /* of the tangents at the origin, at which a chart is made anew */
+#define LEAVE 1.5  /* of that room, from which on the joints serve again: not at once, back and forth */
+#define NEAR 1e-6  /* of that room: importers find the limit to less, from either side */
+#define TURNED 0.5 /* of the tangents at the origin, 60 degrees: well before a chart ends (passage.c) */
 #define DIFFERENCE 1e-5 /* step of a difference: cube root of the rounding of a state, 1e-15 */
 
 /* A state of the tree, its slope, and that of the states. */
@@ -52,10 +52,8 @@ static void foretell(const core *c, double *guide) {
 
 /* Where the states are coordinates of a chart. */
 static int by_chart(core *c, const double *y, found *f) {
-    static const passage_size size = MODEL_PASSAGE;
     const core_charts *m = &c->m.charts;
     double guide[NT], none[NT];
-    int i;
     foretell(c, guide);
     memset(f->rate, 0, sizeof f->rate);
     if (passage_state(c->passage, c->m.time, y, guide, f->X, f->slope, f->rate,
@@ -64,9 +62,7 @@ static int by_chart(core *c, const double *y, found *f) {
     if (passage_jumps(c->passage, m->time, m->X, m->slope, c->m.time - m->time, f->X, f->slope))
         return 1;
     if (core_call_tree(c, f->X, none, f->y)) return 1;
-    /* near the singular configuration itself accelerations come from beside it */
-    for (i = 0; i < PASSIVE_V - NZ; i++) f->y[i] = f->slope[size.nq + MODEL_TREE_HELD[i]];
-    for (i = 0; i < N_PASSIVE; i++) f->y[PASSIVE_A + i] = f->slope[MODEL_TREE_PASSIVE[i]];
+    core_show_slope(f->slope, f->y); /* near the singular configuration itself from beside it */
     return 0;
 }
 
@@ -155,8 +151,13 @@ static void show_joints(core *c) {
 }
 
 core_status charts_start(core *c) {
-    passage_start(c->passage);
     show_joints(c);
+    if (c->m.singular) {
+        c->m.singular = 0;
+        follow(c);
+        return choose(c, 1.0);
+    }
+    passage_start(c->passage);
     return begin(c);
 }
 

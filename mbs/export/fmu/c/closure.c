@@ -27,6 +27,9 @@
 /* Part of a move by which the dependents may end beside where their slope leads: on another branch
  * they differ by about the difference of the slopes, on the same one by half the step. */
 #define BENT REAL(0.1)
+/* What a line that ends in a singular configuration may leave of its way, in nominal sizes: Newton
+ * steps come to a millionth, and a branch that ends before its end does so anywhere. */
+#define LEFT REAL(1e-4)
 #define TRIALS 64 /* configurations from which a branch is looked for */
 #define RANGE REAL(3.14159265358979) /* of them about the start values, in nominal sizes */
 #define ALIKE REAL(1e-3)             /* weight of the coordinates that were not guessed */
@@ -128,8 +131,10 @@ static int follow(const loops *l, const real *x, real *z) {
         }
         if (status != CLOSURE_OK) {
             part /= REAL(2.0);
-            if (part < SMALLEST * FIRST * largest) return status;
-            continue;
+            if (part >= SMALLEST * FIRST * largest) continue;
+            if ((REAL(1.0) - done) * length > LEFT) return status;
+            for (i = 0; i < NZ; i++) z[i] += (REAL(1.0) - done) * slope[i];
+            return CLOSURE_NEARLY;
         }
         for (i = 0; i < NZ; i++) slope[i] = (trial[i] - z[i]) / (to - done);
         memcpy(z, trial, sizeof trial);
@@ -206,9 +211,10 @@ static void trial_start(const loops *l, int k, const real *near, real *z) {
 static int near_guesses(const loops *l, const real *x, real *z) {
     real near[NZ], trial[NZ], best = UNBOUNDED;
     int k, status = from_start(l, x, near);
-    if (status) memcpy(near, MODEL_START + DEPENDENTS, sizeof near);
+    int found = status == CLOSURE_OK || status == CLOSURE_NEARLY;
+    if (!found) memcpy(near, MODEL_START + DEPENDENTS, sizeof near);
     memcpy(z, near, sizeof near);
-    if (status == CLOSURE_OK) best = miss(l, z);
+    if (found) best = miss(l, z);
     for (k = 0; k < TRIALS; k++) {
         trial_start(l, k, near, trial);
         if (newton(l, x, trial, UNBOUNDED) == CLOSURE_OK && miss(l, trial) < best) {

@@ -9,7 +9,8 @@
 #include "model.h"
 #include "real.h"
 
-enum { CLOSURE_OK, CLOSURE_OPEN, CLOSURE_SINGULAR };
+/* NEARLY: of a start in a singular configuration, which Newton steps do not reach; z is beside it. */
+enum { CLOSURE_OK, CLOSURE_OPEN, CLOSURE_SINGULAR, CLOSURE_NEARLY };
 
 /* What a run knows of its loops. */
 typedef struct {

@@ -9,6 +9,12 @@
 #include "guard.h"
 #include "message.h"
 
+#ifdef MODEL_TREE
+#define IN_SINGULAR_START(c) ((c)->m.singular)
+#else
+#define IN_SINGULAR_START(c) 0
+#endif
+
 static const char *const CATEGORIES[] = {"logAll", "logStatusDiscard", "logStatusError"};
 enum { LOG_ALL, LOG_DISCARD, LOG_ERROR, N_CATEGORIES };
 
@@ -114,7 +120,7 @@ int core_call_rhs(core *c, double t, const double *x, const double *z, double *x
 }
 
 static core_status closure_failed(core *c, int status) {
-    if (status == CLOSURE_SINGULAR)
+    if (status == CLOSURE_SINGULAR || status == CLOSURE_NEARLY)
         return core_no_answer(c, "%s: singular configuration at time %.9g (%s): the states do not determine "
                               "the dependent coordinates; start elsewhere or choose other states",
                               c->name, c->m.time, core_where(c));
@@ -157,6 +163,22 @@ static core_status show_joints(core *c) {
     return core_show(c);
 }
 
+#ifdef MODEL_TREE
+/* In a singular configuration accelerations are those of the branch, which come from beside it. */
+static core_status show_start(core *c) {
+    double none[NT], *v = c->m.values;
+    int i;
+    core_show_tree(c);
+    if (passage_slope(c->passage, c->m.time, c->m.tree, c->m.slope, NULL) ||
+        core_call_tree(c, c->m.tree, none, v + OUTPUTS))
+        return core_no_answer(c, "%s: the equations have no solution at time %.9g", c->name,
+                              c->m.time);
+    core_show_slope(c->m.slope, v + OUTPUTS);
+    for (i = 0; i < NX; i++) v[DERIVATIVES + i] = c->m.slope[MODEL_TREE_STATES[i]];
+    return CORE_OK;
+}
+#endif
+
 core_status core_refresh(core *c) {
     double *v = c->m.values, *x = v + STATES;
     int status;
@@ -165,6 +187,10 @@ core_status core_refresh(core *c) {
     if (ON_TREE(c) && !(c->m.mode & (INSTANTIATED | INITIALIZATION))) {
         double slope[NT];
         int i;
+        if (c->m.singular) {
+            core_status found = show_start(c);
+            return found ? found : show_joints(c);
+        }
 #if MODEL_TREE_OUTSIDE
         if (!c->m.cosimulation) {
             core_status found = charts_refresh(c);
@@ -180,6 +206,14 @@ core_status core_refresh(core *c) {
     }
 #endif
     status = c->m.closed ? closure_solve(&c->loops, x, c->z) : closure_start(&c->loops, x, c->z);
+#ifdef MODEL_TREE
+    c->m.singular = 0;
+    if (ON_TREE(c) && (status == CLOSURE_NEARLY || (!status && core_starts_singular(c, c->z)))) {
+        status = (int)core_start_singular(c, c->z);
+        if (!status) status = (int)show_start(c);
+        return status ? (core_status)status : show_joints(c);
+    }
+#endif
     if (status) return closure_failed(c, status);
     if (c->m.mode == INITIALIZATION && core_first_modes(c)) return CORE_ERROR;
     if (core_call_rhs(c, c->m.time, x, c->z, v + DERIVATIVES, v + OUTPUTS))
@@ -199,6 +233,9 @@ static void to_start(core *c) {
     c->m.stop = HUGE_VAL;
     memcpy(c->m.values, MODEL_START, N_VALUES * sizeof *c->m.values);
     memcpy(c->m.guess, MODEL_START + DEPENDENTS, NZ * sizeof *c->m.guess);
+#ifdef MODEL_TREE
+    memcpy(c->m.speeds, MODEL_START + OUTPUTS + PASSIVE_V, N_PASSIVE * sizeof *c->m.speeds);
+#endif
 }
 
 static void init_loops(core *c) {
@@ -273,17 +310,19 @@ core_status core_exit_initialization(core *c) {
     if (core_check_rules(c)) return CORE_ERROR;
     status = core_refresh(c);
     if (status) return status;
-    status = core_accept_configuration(c, c->m.values + STATES, c->m.values + DEPENDENTS);
+    if (!IN_SINGULAR_START(c))
+        status = core_accept_configuration(c, c->m.values + STATES, c->m.values + DEPENDENTS);
     if (status) return status;
+    c->m.closed = 1;
     stepper_start(&c->solver, c->m.time);
 #ifdef MODEL_TREE
-    if (c->m.cosimulation && ON_TREE(c)) status = core_start_tree(c);
+    if (c->m.cosimulation && ON_TREE(c) && !c->m.singular) status = core_start_tree(c);
 #endif
     if (!status) status = core_start_events(c);
 #if MODEL_TREE_OUTSIDE
     if (!status && !c->m.cosimulation) status = charts_start(c);
 #endif
-    if (!status && !(c->m.cosimulation && ON_TREE(c))) status = guard_restart(c);
+    if (!status && !ON_TREE(c)) status = guard_restart(c);
     if (status) return status;
     if (!c->m.cosimulation || c->event_mode) {
         c->m.mode = EVENT;

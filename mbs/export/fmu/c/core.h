@@ -128,9 +128,12 @@ typedef struct {
 #ifdef MODEL_TREE
     int loose; /* the tree is to be moved onto its rows first */
     double tree[NT], passage[PASSAGE_MEMORY(NT)];
+    double slope[NT]; /* of it, where it starts or the integrator is outside */
+    double speeds[N_PASSIVE + 1]; /* of dependent joints: where they are not MODEL_START, they choose
+                                     the branch of a start in a singular configuration */
+    int singular; /* it is in such a start */
 #endif
 #if MODEL_TREE_OUTSIDE
-    double slope[NT]; /* of it, where the integrator is outside */
     core_charts charts;
 #endif
     double solver[STEPPER_MEMORY(MOST(NX, NT))];
@@ -154,7 +157,7 @@ typedef struct {
 #endif
 #ifdef MODEL_TREE
     passage *passage;
-    double work[MOST(SOLVER_WORK(NX), DOPRI5_WORK(NT)) + 1];
+    double work[MOST(SOLVER_WORK(MOST(NX, NT)), DOPRI5_WORK(NT)) + 1];
 #else
     double work[SOLVER_WORK(NX) + 1];
 #endif

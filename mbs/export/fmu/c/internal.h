@@ -48,10 +48,13 @@ int core_init_solver(core *c); /* 1: no memory is left */
 void core_prepare_solver(core *c);
 
 #ifdef MODEL_TREE
-/* The tree: its first state; the states and dependents of the model from it; derivatives and
+/* The tree: its first state, also where the loops are in a singular configuration, z beside it; the states and dependents of the model from it; derivatives and
  * outputs there. */
 core_status core_start_tree(core *c);
+int core_starts_singular(core *c, const double *z);
+core_status core_start_singular(core *c, double *z);
 void core_show_tree(core *c);
+void core_show_slope(const double *slope, double *y); /* its accelerations among the outputs */
 int core_call_tree(core *c, const double *X, double *Xdot, double *y);
 #endif
 

@@ -160,9 +160,11 @@ static int sane(const core_memory *m) {
 #ifdef MODEL_TREE
     if (!is_flag(m->loose) || !all_finite(m->tree, NT)) return 0;
     if (!all_finite(m->passage, PASSAGE_MEMORY(NT))) return 0;
+    if (!is_flag(m->singular) || !all_finite(m->speeds, N_PASSIVE)) return 0;
+    if (!all_finite(m->slope, NT)) return 0;
 #endif
 #if MODEL_TREE_OUTSIDE
-    if (!all_finite(v + SLOTS, NX) || !all_finite(m->slope, NT)) return 0;
+    if (!all_finite(v + SLOTS, NX)) return 0;
     if (!sane_charts(&m->charts)) return 0;
 #endif
     for (i = 0; i < STEPPER_MEMORY(0); i++)

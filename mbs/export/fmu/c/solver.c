@@ -12,7 +12,7 @@ static int rhs(void *user, double t, const double *x, double *xdot) {
     return closure_solve(&c->loops, x, c->z) || core_call_rhs(c, t, x, c->z, xdot, NULL);
 }
 
-#ifdef MODEL_RODAS
+#if defined MODEL_RODAS && !defined MODEL_TREE
 static int jacobian(void *user, double t, const double *x, double *J, double *f_t) {
     core *c = user;
     double du[NU + 1];
@@ -84,9 +84,27 @@ static int tree_regularity(void *user, double t, const double *x, double *value)
     return mbs_tree_regularity(c->arg, c->res, c->iw, c->w, 0);
 }
 
+#ifdef MODEL_RODAS
+static int tree_jacobian(void *user, double t, const double *x, double *J, double *f_t) {
+    core *c = user;
+    double du[NU + 1];
+    core_point(c, &t, x, c->z);
+    core_input_rates(c, t, du);
+    c->arg[5] = du;
+    c->res[0] = J;
+    c->res[1] = f_t;
+    return mbs_tree_jacobian(c->arg, c->res, c->iw, c->w, 0);
+}
+#endif
+
 static int init_tree(core *c) {
     static const passage_size size = MODEL_PASSAGE;
     static const passage_model model = {tree_rows, tree_forces, tree_regularity, MODEL_REGULARITY};
+#ifdef MODEL_RODAS
+    if (c->m.cosimulation)
+        rodas_init(&c->solver, NT, tree_rhs, tree_jacobian, c, c->m.solver, c->work);
+    else
+#endif
     dopri5_init(&c->solver, NT, tree_rhs, c, c->m.solver, c->work);
     c->solver.project = tree_project;
     c->passage = passage_new(&c->solver, &size, &model, c->m.passage);
@@ -102,6 +120,73 @@ core_status core_start_tree(core *c) {
         tree_project(c, t, c->m.tree))
         return core_no_answer(c, "%s: the velocities have no solution at time %.9g", c->name, t);
     return CORE_OK;
+}
+
+/* A singular start whose velocities choose no branch: which joint the loops do not hold. */
+static core_status undetermined(core *c) {
+    static const passage_size size = MODEL_PASSAGE;
+    int k = passage_loosest(c->passage, c->m.time, c->m.tree, MODEL_TREE_UNITS), i, known = -1;
+    for (i = 0; i < NX; i++)
+        if (MODEL_TREE_STATES[i] == size.nq + k) known = STATES + i;
+    for (i = 0; i < N_PASSIVE; i++)
+        if (MODEL_TREE_PASSIVE[i] == size.nq + k) known = OUTPUTS + PASSIVE_V + i;
+    return core_no_answer(
+        c, "%s: it starts at time %.9g in a singular configuration (%s), where branches of motion "
+           "meet, and its velocities are those of no branch with the mobility of the mechanism; "
+           "the loops hardly hold %s there: set velocities of one branch, also of dependent joints, "
+           "or start beside it", c->name, c->m.time, core_where(c),
+        k < 0 || known < 0 ? "the joints" : MODEL_NAMES[known]);
+}
+
+/* The state of the tree at x and z, its passive velocities as they are given. */
+static void place_tree(core *c, const double *z) {
+    double *X = c->m.tree;
+    int i;
+    passage_start(c->passage);
+    for (i = 0; i < NX; i++) X[MODEL_TREE_STATES[i]] = c->m.values[STATES + i];
+    for (i = 0; i < NZ; i++) X[MODEL_TREE_DEPENDENTS[i]] = z[i];
+    for (i = 0; i < N_PASSIVE; i++) X[MODEL_TREE_PASSIVE[i]] = c->m.speeds[i];
+}
+
+int core_starts_singular(core *c, const double *z) {
+    place_tree(c, z);
+    return passage_singular(c->passage, c->m.time, c->m.tree) ||
+           closure_singular(&c->loops, c->m.values + STATES, z);
+}
+
+core_status core_start_singular(core *c, double *z) {
+    static const passage_size size = MODEL_PASSAGE;
+    double *X = c->m.tree, on[NT];
+    int kept[N_HELD + N_PASSIVE + 1], count = 0, i;
+    place_tree(c, z);
+    if (passage_place(c->passage, c->m.time, X, MODEL_TREE_DEPENDENTS, NZ))
+        return core_no_answer(c, "%s: unclosable configuration at time %.9g (%s): no dependent "
+                              "coordinates near the last ones close the loops; start elsewhere or "
+                              "move less", c->name, c->m.time, core_where(c));
+    for (i = 0; i < NZ; i++) z[i] = X[MODEL_TREE_DEPENDENTS[i]];
+    if (core_first_modes(c)) return CORE_ERROR;
+    for (i = 0; i < N_HELD; i++) kept[count++] = MODEL_TREE_HELD[i];
+    for (i = 0; i < N_PASSIVE; i++)
+        if (c->m.speeds[i] != MODEL_START[OUTPUTS + PASSIVE_V + i])
+            kept[count++] = MODEL_TREE_PASSIVE[i] - size.nq;
+    if (passage_velocities(c->passage, c->m.time, X, kept, count))
+        return core_no_answer(
+            c, "%s: it starts at time %.9g in a singular configuration (%s) in which the loops allow "
+               "no motion with the velocities that are set; set others, also of dependent joints, "
+               "such as %s, or start elsewhere", c->name, c->m.time, core_where(c),
+            MODEL_NAMES[OUTPUTS + PASSIVE_V]);
+    if (passage_slope(c->passage, c->m.time, X, c->m.slope, on)) return undetermined(c);
+    memcpy(X, on, sizeof(double) * (size_t)size.nq); /* where branches cross rows tell 1e-8 of it */
+    c->m.singular = 1;
+    core_show_tree(c);
+    return CORE_OK;
+}
+
+void core_show_slope(const double *slope, double *y) {
+    static const passage_size size = MODEL_PASSAGE;
+    int i;
+    for (i = 0; i < N_HELD; i++) y[i] = slope[size.nq + MODEL_TREE_HELD[i]];
+    for (i = 0; i < N_PASSIVE; i++) y[PASSIVE_A + i] = slope[MODEL_TREE_PASSIVE[i]];
 }
 
 void core_show_tree(core *c) {
@@ -125,7 +210,7 @@ int core_init_solver(core *c) {
 #ifdef MODEL_TREE
     if (ON_TREE(c)) return init_tree(c);
 #endif
-#if defined MODEL_RODAS
+#if defined MODEL_RODAS && !defined MODEL_TREE
     rodas_init(&c->solver, NX, rhs, jacobian, c, c->m.solver, c->work);
 #elif defined MODEL_FIXED_STEP
     rk4_init(&c->solver, NX, rhs, c, c->m.solver, c->work);

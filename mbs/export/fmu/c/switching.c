@@ -27,7 +27,9 @@
 
 #ifdef MODEL_TREE
 #define SHOW_TREE(c) (ON_TREE(c) ? core_show_tree(c) : (void)0)
+#define LEAVE_START(c) ((c)->m.singular = 0)
 #else
+#define LEAVE_START(c) ((void)0)
 #define SHOW_TREE(c) ((void)0)
 #endif
 
@@ -114,6 +116,7 @@ core_status core_step(core *c, double limit) {
     double *x = moving(c);
     core_status status = tighten(c);
     int stopped;
+    LEAVE_START(c);
     if (!status && !ON_TREE(c) && !c->m.watched.on) status = guard_restart(c);
     if (status) return status;
 #if NK > 0
@@ -237,6 +240,7 @@ core_status core_settle(core *c, int *changed) {
     if (status) return step_failed(c, status);
     if (!core_pending(c)) return CORE_OK;
     memcpy(before, x, size);
+    LEAVE_START(c);
 #ifdef MODEL_TREE
     if (ON_TREE(c)) passage_forget(c->passage); /* a chart ends where modes change */
 #endif

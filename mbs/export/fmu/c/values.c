@@ -71,6 +71,16 @@ core_status core_get_modes(core *c, const core_reference *ref, size_t n, core_in
     return status;
 }
 
+/* Velocities of dependent joints, whose starts choose a branch where they are given. */
+static int is_speed(unsigned ref) {
+#ifdef MODEL_TREE
+    return among(ref, OUTPUTS + PASSIVE_V, OUTPUTS + PASSIVE_V + N_PASSIVE);
+#else
+    (void)ref;
+    return 0;
+#endif
+}
+
 /* Modes in which a variable may be set; 0: it is calculated. */
 static int settable(const core *c, core_reference ref) {
     int before = INSTANTIATED | INITIALIZATION;
@@ -79,6 +89,7 @@ static int settable(const core *c, core_reference ref) {
         return c->m.cosimulation ? before : before | EVENT | CONTINUOUS;
     if (ref < INPUTS) return 0;
     if (ref < OUTPUTS) return before | RUNNING;
+    if (is_speed(ref)) return before;
     if (ref < PARAMETERS) return 0;
     if (ref < MODES) return MODEL_FIXED[ref] ? before : before | EVENT | STEP;
     return among(ref, DEPENDENTS, INDICATORS) ? before : 0;
@@ -129,6 +140,17 @@ static void set_guess(core *c, core_reference ref, double value) {
     changed(c);
 }
 
+static void set_speed(core *c, unsigned ref, double value) {
+#ifdef MODEL_TREE
+    double *speed = c->m.speeds + (ref - OUTPUTS - PASSIVE_V);
+    if (*speed == value) return;
+    *speed = value;
+    changed(c);
+#else
+    (void)c, (void)ref, (void)value;
+#endif
+}
+
 /* States of the independent joints under their other names; before the start, one that is equal to
  * its value in the model description says nothing. */
 static void set_slot(core *c, core_reference ref, double value) {
@@ -159,6 +181,8 @@ core_status core_set(core *c, const core_reference *ref, size_t n, const double 
             set_slot(c, ref[i], values[i]);
         } else if (ref[i] >= DEPENDENTS) {
             set_guess(c, ref[i], values[i]);
+        } else if (is_speed(ref[i])) {
+            set_speed(c, ref[i], values[i]);
         } else if (c->m.values[ref[i]] != values[i]) {
             if (joints_set(c, ref[i])) return CORE_ERROR;
             c->m.values[ref[i]] = values[i];

@@ -14,7 +14,7 @@ from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import momentum_on
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regrouped, slid
+from mbs.recursions.regrouping import regroup, slide_frames
 from mbs.recursions.velocities import effort, unit_motions
 from mbs.spatial import Wrench, body_through, wrench_through, zeros
 
@@ -25,8 +25,8 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
     The composite body of link j is seen from the seat of its joint, where its momentum for a unit
     velocity can be read off, and from there as a part of link i.
     """
-    poses, bodies = slid(tree, poses, [link.inertia for link in tree.links])
-    composite = regrouped(tree, poses, bodies)
+    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    composite = regroup(tree, poses, bodies)
     A = zeros(tree.nv, tree.nv)
     for j in reversed(range(len(tree.links))):
         link, pose = tree.links[j], poses[j]

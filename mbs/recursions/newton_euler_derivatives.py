@@ -16,7 +16,7 @@ from mbs.assembly.tree import CarriedRotor, Tree
 from mbs.recursions.joint_axes import Drift, JointAxes, Line, Step, Twist, joint_axes
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments, spin_momenta
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import heights_first, regrouped, slid
+from mbs.recursions.regrouping import regroup, slide_frames
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     FreeDisplacement,
@@ -406,9 +406,8 @@ def newton_euler_derivatives(
         of the velocity].
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    poses, bodies = slid(tree, poses, bodies, base_rests=is_zero(base.w))
-    poses = heights_first(poses)
-    bodies = regrouped(tree, poses, bodies)
+    poses, bodies = slide_frames(tree, poses, bodies, base_rests=is_zero(base.w))
+    bodies = regroup(tree, poses, bodies)
     motions = link_accelerations(tree, poses, v, a, base)
     axes = joint_axes(tree, poses, v, motions, base)
     spins, moments = spin_momenta(tree, v), rotor_moments(tree, v, a, motions)

@@ -8,7 +8,7 @@ Source: Khalil & Kleinfinger 1986 for the frames; Renaud 1980 for sums of angles
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -18,7 +18,6 @@ from mbs.assembly.tree import Frame, Link, Tree
 from mbs.components.forces import RelativeMotion
 from mbs.components.joints import Motion
 from mbs.operations import count
-from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, Velocity
 from mbs.spatial import (
     Khalil,
@@ -48,31 +47,6 @@ def cost(value: SX, q: SX, p: SX) -> int:
     names = ["q", "p"], ["value"]
     f = Function("f", [q, p], [casadi.densify(value)], *names, {"cse": True})
     return count(f).price
-
-
-def price(value: SX, parameters: Collection[int]) -> int:
-    """The price of a matrix of any symbols, operations on parameters alone being free.
-
-    Args:
-        value: the matrix.
-        parameters: hashes of their symbols; see `parameters_of`.
-    """
-    symbols = casadi.symvar(value)
-    kinds: tuple[list[SX], list[SX]] = ([], [])
-    for symbol in symbols:
-        kinds[symbol.element_hash() in parameters].append(symbol)
-    return cost(value, casadi.vertcat(SX(0, 1), *kinds[0]), casadi.vertcat(SX(0, 1), *kinds[1]))
-
-
-def parameters_of(tree: Tree, poses: list[LinkPose]) -> frozenset[int]:
-    """Hashes of the symbols that the constants of a tree hold."""
-    constants = [tree.gravity]
-    for link, pose in zip(tree.links, poses, strict=True):
-        constants += [link.inertia.parameters, pose.foot, pose.at_seat(vector([1, 1, 1]))]
-        if link.motion is Motion.REVOLUTE:
-            constants.append(pose.height)
-    symbols = casadi.symvar(casadi.vertcat(*map(casadi.vec, constants)))
-    return frozenset(symbol.element_hash() for symbol in symbols)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -37,10 +37,8 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import CoordinateCoupling
 from mbs.closed_forms.kernels import closed_form
 from mbs.closed_forms.ring import (
-    Ring,
     constants,
     extent,
-    free_pose,
     independent_places,
     loop_links,
     ring_of,
@@ -60,6 +58,7 @@ from mbs.components import Fixed, PointOnLine, Rod
 from mbs.components.constraints import Constraint
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import OPEN, Closing, Vector, closure_parameters, difference
+from mbs.recursions.chain import Ring, free_pose
 from mbs.recursions.route import relative_pose
 from mbs.solvers.rank import null_space, rank
 from mbs.spatial import Pose

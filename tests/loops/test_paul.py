@@ -14,11 +14,11 @@ from support.arms import general_6r, slides_and_turns, spherical, three_parallel
 
 import mbs
 from mbs.closed_forms.paul import paul
-from mbs.closed_forms.ring import Gap, Ring, Unknown
 from mbs.closed_forms.sequence import Problem
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.chain import chain
+from mbs.recursions.chain import ChainJoint, Gap, Ring
 from mbs.robots.rows import frame, robot
 from mbs.spatial import Pose, axis_turn, vector
 
@@ -194,7 +194,7 @@ def test_a_loop_that_no_pose_closes():
 def test_refusals_name_the_joints_left():
     with pytest.raises(NoClosedForm, match=r"q1, q2, q3, q4, q5, q6.*more than two unknowns"):
         paul(chain(general_6r(1)).problem(np.zeros(0)))
-    ring = Ring((Unknown("ball", Motion.SPHERICAL, 0, 1),), (Gap(),))
+    ring = Ring((ChainJoint("ball", Motion.SPHERICAL, 0, 1),), (Gap(),))
     with pytest.raises(NoClosedForm, match="ball is spherical"):
         paul(Problem(ring, SX.sym("x", 2), SX.sym("g", 1), []))
 
@@ -209,7 +209,7 @@ def four_bar():
         Gap(Pose.moved(vector([coupler, 0, 0]))),
         Gap(Pose.moved(vector([0.7, 0, 0]))),
     )
-    joints = tuple(Unknown(f"q{k + 2}", Motion.REVOLUTE, k, 1) for k in range(3))
+    joints = tuple(ChainJoint(f"q{k + 2}", Motion.REVOLUTE, k, 1) for k in range(3))
     samples = []
     for angle, rocker in ((0.3, 1.9), (1.4, 2.4), (2.5, 0.8), (-0.9, 1.2)):
         tip = 0.3 * np.array([np.cos(angle), np.sin(angle)])

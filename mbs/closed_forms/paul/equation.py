@@ -26,6 +26,7 @@ from mbs.closed_forms.paul.splits import (
     simple_rows,
     splits,
 )
+from mbs.recursions.chain import Ring
 
 Key = tuple[int, ...]
 
@@ -224,11 +225,12 @@ def _key(term: Members, variables: tuple[Variable, ...]) -> Key:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ways:
-    """The matrices of the gaps of a loop, forwards and backwards, and a length of it.
+class RingMatrices:
+    """The gaps of a ring as (15, 15) matrices, see `represented`; `ring_matrices` alone makes them.
 
     Attributes:
-        on, back: (15, 15) each.
+        on: from joint to joint.
+        back: the other way round.
         length: of the size of the loop [m].
     """
 
@@ -245,26 +247,26 @@ class Factor:
     Y: SX
 
 
-def ways(knowledge: Knowledge) -> Ways:
-    """The matrices of the gaps of a loop."""
-    poses = [gap.pose for gap in knowledge.ring.gaps]
-    opposite = [gap.inverse().pose for gap in knowledge.ring.gaps]
+def ring_matrices(ring: Ring) -> RingMatrices:
+    """The matrices of the gaps of a ring."""
+    poses = [gap.pose for gap in ring.gaps]
+    opposite = [gap.inverse().pose for gap in ring.gaps]
     on = tuple(map(represented_pose, poses, opposite))
     back = tuple(map(represented_pose, opposite, poses))
     squares = [SX(casadi.sumsqr(pose.p)) for pose in poses]
     numbers = [square for square in squares if square.is_constant() and float(square) > 0]
     length = casadi.sqrt(sum(numbers or squares, SX(0 if numbers else 1e-60)))
-    return Ways(on, back, SX(length))
+    return RingMatrices(on, back, SX(length))
 
 
-def factor(knowledge: Knowledge, ways: Ways, equation: Equation, key: Key) -> Factor:
+def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key: Key) -> Factor:
     """What stands with a product of the variables of an equation."""
     total, part = Factor(SX(0), SX(0)), equation.parts.get(key)
     if part is None:
         return total
     sums = [value for _, value, _ in knowledge.open_sums()]
     for source in part.sources:
-        own = _own(knowledge, ways, equation, source.term)
+        own = _own(knowledge, matrices, equation, source.term)
         if source.known:
             angle = sum((way * sums[number] for number, way in source.known), SX(0))
             own = _turned(own, angle, source.conjugate)
@@ -280,21 +282,21 @@ def _turned(own: Factor, angle: SX, conjugate: bool) -> Factor:
     return Factor(SX(X), SX(-Y if conjugate else Y))
 
 
-def _own(knowledge: Knowledge, ways: Ways, equation: Equation, term: Members) -> Factor:
+def _own(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, term: Members) -> Factor:
     """X and Y of one product of powers of the joints."""
     joints = knowledge.ring.joints
     slides = {k: power for k, power in term if not joints[k].turns}
     angles = [(k, sign) for k, sign in term if joints[k].turns]
     if not angles:
-        return Factor(_coefficient(knowledge, ways, equation.row, slides), SX(0))
+        return Factor(_coefficient(knowledge, matrices, equation.row, slides), SX(0))
     if not _has_partner(equation, slides, angles, term):
         cosines = {k: 1 for k, _ in angles}
         with_sine = cosines | {angles[0][0]: 2}
         return Factor(
-            _coefficient(knowledge, ways, equation.row, slides | cosines),
-            _coefficient(knowledge, ways, equation.row, slides | with_sine),
+            _coefficient(knowledge, matrices, equation.row, slides | cosines),
+            _coefficient(knowledge, matrices, equation.row, slides | with_sine),
         )
-    return _mixed(knowledge, ways, equation.row, (slides, angles))
+    return _mixed(knowledge, matrices, equation.row, (slides, angles))
 
 
 def _has_partner(
@@ -315,7 +317,7 @@ def _has_partner(
 
 def _mixed(
     knowledge: Knowledge,
-    ways: Ways,
+    matrices: RingMatrices,
     row: Row,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
 ) -> Factor:
@@ -327,25 +329,27 @@ def _mixed(
             [0.5 if c == 1 else -0.5j * e for c, (_, e) in zip(choice, angles, strict=True)]
         )
         chosen = {k: c for c, (k, _) in zip(choice, angles, strict=True)}
-        value = _coefficient(knowledge, ways, row, dict(slides) | chosen)
+        value = _coefficient(knowledge, matrices, row, dict(slides) | chosen)
         X, Y = X + weight.real * value, Y - weight.imag * value
     return Factor(SX(X), SX(Y))
 
 
-def _coefficient(knowledge: Knowledge, ways: Ways, row: Row, chosen: Mapping[int, int]) -> SX:
+def _coefficient(
+    knowledge: Knowledge, matrices: RingMatrices, row: Row, chosen: Mapping[int, int]
+) -> SX:
     """What stands with a product of the elementary functions of the joints.
 
     Args:
         knowledge: whose known joints are put in.
-        ways: the gaps.
+        matrices: of the gaps.
         row: of the equation.
         chosen: number of the function of each joint of the product: see `joint_basis`.
     """
     total = SX(0)
     for way in (1, -1):
-        steps = list(_steps(row, len(ways.on), way))
+        steps = list(_steps(row, len(matrices.on), way))
         if all(("joint", k) in steps for k in chosen):
-            total += way * _along(knowledge, ways, (row, steps, way), chosen)
+            total += way * _along(knowledge, matrices, (row, steps, way), chosen)
     return SX(total)
 
 
@@ -360,7 +364,7 @@ def _steps(row: Row, n: int, way: int) -> Iterator[tuple[str, int]]:
 
 def _along(
     knowledge: Knowledge,
-    ways: Ways,
+    matrices: RingMatrices,
     path: tuple[Row, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
@@ -370,7 +374,7 @@ def _along(
     r[0, row.element] = 1
     for kind, k in steps:
         if kind == "gap":
-            matrix = (ways.on if way > 0 else ways.back)[k]
+            matrix = (matrices.on if way > 0 else matrices.back)[k]
         else:
             matrix = _joint(knowledge, k, chosen.get(k, 0), way)
         r = SX(casadi.sparsify(casadi.mtimes(r, matrix)))

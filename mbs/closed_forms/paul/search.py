@@ -11,15 +11,15 @@ import numpy as np
 from casadi import SX
 
 from mbs.closed_forms.paul.eliminated import eliminated
-from mbs.closed_forms.paul.equation import PRODUCTS, equations, ways
+from mbs.closed_forms.paul.equation import PRODUCTS, equations, ring_matrices
 from mbs.closed_forms.paul.linear import linear
 from mbs.closed_forms.paul.one_unknown import Candidate, Stage, one_unknown
 from mbs.closed_forms.paul.splits import Knowledge, Variable, beginning
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
-from mbs.closed_forms.ring import Gap, Ring
 from mbs.closed_forms.sequence import Found, Problem, Step, StepSequence, step
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
+from mbs.recursions.chain import Gap, Ring
 from mbs.spatial import Pose, vector
 
 # The last angle of a sum that is known.
@@ -138,7 +138,7 @@ def paul(problem: Problem) -> StepSequence:
     """
     _require_simple(problem)
     knowledge = beginning(problem, at_feet(problem))
-    loop, steps = ways(knowledge), list[Step]()
+    loop, steps = ring_matrices(knowledge.ring), list[Step]()
     while knowledge.unknown:
         stage = Stage(knowledge, loop, equations(knowledge))
         candidate = _cheapest(stage)

@@ -19,8 +19,8 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
-from mbs.closed_forms.ring import Ring
 from mbs.closed_forms.sequence import Problem
+from mbs.recursions.chain import Ring
 from mbs.spatial import Pose
 
 # What a search knows of a loop: joints, and sums of the angles of joints.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
-from mbs.models.inverse_geometry.chain import Chain
+from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.gathering import Gathered
 from mbs.models.inverse_geometry.search import Nearest, nearest
 from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
@@ -276,7 +276,7 @@ class Question:
         wishes: what the user asks for beside the pose.
     """
 
-    chain: Chain
+    chain: FrameChain
     target: Target
     p: Array
     wishes: Wishes

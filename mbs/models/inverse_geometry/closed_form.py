@@ -16,10 +16,11 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
 from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import Chain, chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, chain, wanted_pose
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
-from mbs.spatial import Pose, axis_turn, vector
+from mbs.recursions.chain import transforms
+from mbs.spatial import Pose
 from mbs.text import did_you_mean, quoted
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ Numbers: TypeAlias = NDArray[np.float64] | None
 _FEW = 8
 
 
-def sequence_of(chain: Chain, method: str = "auto", p: Numbers = None) -> StepSequence:
+def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> StepSequence:
     """The steps that give the joints of a chain from the pose of its frame.
 
     It is kept on the system: the next call with the same arguments is free.
@@ -85,12 +86,12 @@ def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
         )
 
 
-def given_of(way: Chain, T: SX) -> SX:
+def given_of(way: FrameChain, T: SX) -> SX:
     """What a sequence of symbolic parameters takes for a pose T, (4, 4)."""
     return SX(casadi.vertcat(way.system.p, casadi.vec(T[:3, :])))
 
 
-def _kept(chain: Chain, method: str, p: Numbers) -> StepSequence | str:
+def _kept(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
     """The steps by one method, or why there are none; kept on the system."""
 
     def solve() -> StepSequence | str:
@@ -103,7 +104,7 @@ def _kept(chain: Chain, method: str, p: Numbers) -> StepSequence | str:
     return steps
 
 
-def _key(chain: Chain, p: Numbers) -> tuple[object, ...]:
+def _key(chain: FrameChain, p: Numbers) -> tuple[object, ...]:
     return *chain.key, None if p is None else np.asarray(p, dtype=float).tobytes()
 
 
@@ -126,7 +127,7 @@ def _is_short(sequence: StepSequence) -> bool:
     return sequence.branches <= _FEW and all(one.kind != "quartic" for one in sequence.steps)
 
 
-def _price(chain: Chain, sequence: StepSequence, p: Numbers) -> tuple[int, int]:
+def _price(chain: FrameChain, sequence: StepSequence, p: Numbers) -> tuple[int, int]:
     """Number of branches, then of operations for all of them; kept on the system."""
 
     def counted() -> int:
@@ -163,7 +164,7 @@ class CharacteristicFunction(ModelFunction):
         return self._found.slides
 
 
-def characteristic_function(way: Chain) -> Function:
+def characteristic_function(way: FrameChain) -> Function:
     """The matrices of a chain of six joints.
 
     Source: Raghavan & Roth 1993; Manocha & Canny 1994.
@@ -198,7 +199,7 @@ def characteristic_function(way: Chain) -> Function:
 # How far configurations are from the wanted pose: the forward model of a chain on symbols.
 
 
-def forward(chain: Chain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
+def forward(chain: FrameChain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
     """The pose of the frame for positions x, (n, 1), of the free joints.
 
     Args:
@@ -206,12 +207,7 @@ def forward(chain: Chain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
         x: positions [rad or m].
         p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
     """
-    gaps = chain.ways(p)
-    pose = gaps[0]
-    for k, slides in enumerate(chain.prismatic):
-        turn = Pose.turned(axis_turn("z", SX(x[k])).matrix)
-        pose = pose @ (Pose.moved(vector([0, 0, x[k]])) if slides else turn) @ gaps[k + 1]
-    return pose
+    return transforms(chain.at(p), x)[-1]
 
 
 def residual(pose: Pose, T: SX) -> SX:
@@ -225,9 +221,9 @@ def relative_residual(pose: Pose, T: SX, length: SX) -> SX:
     return SX(casadi.mmax(casadi.fabs(casadi.vertcat(turned, (pose.p - T[:3, 3]) / length))))
 
 
-def size(chain: Chain, p: NDArray[np.float64] | None = None) -> SX:
+def size(chain: FrameChain, p: NDArray[np.float64] | None = None) -> SX:
     """A length of the chain's size [m], 1 where all its ways are turns alone."""
-    lengths = [casadi.norm_2(gap.p) for gap in chain.ways(p) if not gap.p.is_zero()]
+    lengths = [casadi.norm_2(gap.p) for gap in chain.at(p).between if not gap.p.is_zero()]
     return SX(sum(lengths, SX(0))) if lengths else SX(1)
 
 
@@ -337,7 +333,7 @@ def _require_open(system: System) -> None:
         )
 
 
-def _built(way: Chain, sequence: StepSequence) -> tuple[Named, Named, Named]:
+def _built(way: FrameChain, sequence: StepSequence) -> tuple[Named, Named, Named]:
     T, branch = SX.sym("T", 4, 4), SX.sym("branch")
     leaf = sequence.leaf(given_of(way, T), signs_of(sequence, branch))
     q = whole_configuration(way, leaf.x)
@@ -353,14 +349,14 @@ def signs_of(sequence: StepSequence, branch: SX) -> SX:
     return SX(casadi.vertcat(*(1 - 2 * bit for bit in bits)))
 
 
-def whole_configuration(way: Chain, x: SX) -> SX:
+def whole_configuration(way: FrameChain, x: SX) -> SX:
     """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
     q = SX(DM(way.system.position(way.locked)))
     q[list(way.places)] = x
     return q
 
 
-def _valid(way: Chain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) -> SX:
+def _valid(way: FrameChain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) -> SX:
     error = relative_residual(forward(way, leaf.x), T, size(way))
     real = casadi.mmin(casadi.vertcat(leaf.real, SX(1)))
     known = casadi.logic_and(branch >= 0, branch <= sequence.branches - 1)
@@ -368,7 +364,7 @@ def _valid(way: Chain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) ->
     return SX(casadi.logic_and(known, good))
 
 
-def _names(way: Chain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
+def _names(way: FrameChain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
     """The scalars that text names: signs, sines and cosines of the joints, coefficients."""
     signs = casadi.vertsplit(signs_of(sequence, branch)) if sequence.signs else []
     named = [(f"sign_{name}", sign) for name, sign in zip(sequence.signs, signs, strict=True)]
@@ -401,7 +397,7 @@ _OUTPUTS = ("q", "residual", "real", "regular", "mark")
 
 
 def all_branches(
-    chain: Chain, sequence: StepSequence, p: NDArray[np.float64] | None = None
+    chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64] | None = None
 ) -> Function:
     """``igm_all(T) -> q, residual, real, regular, mark``: a column for every branch.
 
@@ -428,7 +424,7 @@ def all_branches(
     return function_of(without_sines(graph_of(Function("igm_all", *every, {"cse": True}))))
 
 
-def _column(chain: Chain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> list[SX]:
+def _column(chain: FrameChain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> list[SX]:
     pose = forward(chain, leaf.x, p)
     differences = casadi.vertcat(casadi.vec(pose.R - T[:3, :3]), pose.p - T[:3, 3])
     largest = functools.reduce(_larger, casadi.vertsplit(casadi.fabs(differences)))
@@ -440,7 +436,7 @@ def _column(chain: Chain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> l
     ]
 
 
-def _mark(chain: Chain, x: SX) -> SX:
+def _mark(chain: FrameChain, x: SX) -> SX:
     """A generic combination of slides and of sines and cosines of turns."""
     weights = np.random.default_rng(_SEED).uniform(0.5, 1.0, (len(chain.names), 2))
     mark = SX(0)

@@ -15,7 +15,7 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.chain import Chain, chain, wanted_poses
+from mbs.models.inverse_geometry.chain import FrameChain, chain, wanted_poses
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
     all_branches,
@@ -60,7 +60,7 @@ class PoseBatch:
     mark: Array
 
 
-def batch(chain: Chain, sequence: StepSequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
+def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
     """All branches at poses T, (N, 4, 4).
 
     Args:
@@ -76,7 +76,7 @@ def batch(chain: Chain, sequence: StepSequence, p: NDArray[np.float64], T: Array
     return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
 
 
-def _plain(chain: Chain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
+def _plain(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
     key = ("igm_all", sequence, *chain.key, p.tobytes())
     plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
     return plain
@@ -154,7 +154,9 @@ def nothing(arm: Arm, count: int) -> BranchSolutions:
     return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
 
 
-def drafted(chain: Chain, sequence: StepSequence, p: Array, arm: Arm, T: Array) -> BranchSolutions:
+def drafted(
+    chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, T: Array
+) -> BranchSolutions:
     """The solutions by a closed form.
 
     Args:
@@ -254,7 +256,7 @@ _NEARLY_SINGULAR = 1e-4
 _REGULAR = 1e-9
 
 
-def ready(chain: Chain, p: Array) -> General | None:
+def ready(chain: FrameChain, p: Array) -> General | None:
     """The general method of a chain for parameters p, (np,); None where it hardly holds."""
     found = general_ready(chain, p)
     return found if found and found.prepared.regularity >= _REGULAR else None
@@ -391,7 +393,7 @@ def solve_many(
 class _Robot:
     """How a robot is solved; without both methods every pose is searched for by itself."""
 
-    way: Chain
+    way: FrameChain
     p: Array
     arm: Arm
     sequence: StepSequence | None
@@ -416,14 +418,14 @@ class _Robot:
         return every
 
 
-def _robot(way: Chain, method: str, p: Array) -> _Robot:
+def _robot(way: FrameChain, method: str, p: Array) -> _Robot:
     sequence, general = _sequence(way, method, p), None
     if sequence is None and method in ("auto", "general"):
         general = ready(way, p)
     return _Robot(way, p, way.arm(p), sequence, general)
 
 
-def _sequence(way: Chain, method: str, p: Array) -> StepSequence | None:
+def _sequence(way: FrameChain, method: str, p: Array) -> StepSequence | None:
     """The closed form that was asked for, None for methods that are none."""
     if method not in (*CLOSED_FORMS, "auto"):
         return None

@@ -11,7 +11,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.closed_forms.sequence import Problem, Step, StepSequence
-from mbs.models.inverse_geometry.chain import Chain, chain
+from mbs.models.inverse_geometry.chain import FrameChain, chain
 from mbs.models.inverse_geometry.closed_form import sequence_of
 from mbs.operations import simplify
 from mbs.operations.graph import Graph, Node, graph_of
@@ -202,7 +202,7 @@ def text(
     return "\n".join([*lines, "", *_branches(sequence)]) + "\n"
 
 
-def _head(way: Chain, sequence: StepSequence) -> Iterator[str]:
+def _head(way: FrameChain, sequence: StepSequence) -> Iterator[str]:
     system = way.system
     yield f"Inverse geometric model of {system.name}: {', '.join(way.names)} from the pose T of"
     yield f"frame {way.frame!r} in the base; units are SI and radians"

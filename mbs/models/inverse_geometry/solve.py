@@ -11,7 +11,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
-from mbs.models.inverse_geometry.chain import Chain, chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, chain, wanted_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.gathering import Gathered, further, gather
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
@@ -88,7 +88,7 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
 
 def _chain_or_none(
     system: System, frame: str | int | None, locked: Mapping[str, float] | None
-) -> Chain | None:
+) -> FrameChain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
     try:
         return chain(system, frame, locked)
@@ -109,7 +109,7 @@ def _is_doubtful(target: Target, gathered: Gathered) -> bool:
 
 def _wishes(
     system: System,
-    way: Chain | None,
+    way: FrameChain | None,
     limits: bool | Given | None,
     seed: Mapping[str, float] | Sequence[float] | None,
 ) -> Wishes:

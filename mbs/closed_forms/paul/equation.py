@@ -181,11 +181,11 @@ def _folded(
     rest, known = term, list[tuple[int, int]]()
     for number, (members, at) in enumerate(sums):
         powers = dict(rest)
-        way = powers.get(members[0][0], 0) if members else 0
-        if way and all(powers.get(k, 0) == way * sign for k, sign in members):
+        multiple = powers.get(members[0][0], 0) if members else 0
+        if multiple and all(powers.get(k, 0) == multiple * sign for k, sign in members):
             rest = tuple(member for member in rest if member[0] not in dict(members))
-            values = values * np.exp(1j * way * at)
-            known.append((number, way))
+            values = values * np.exp(1j * multiple * at)
+            known.append((number, multiple))
     if not known:
         return term, Source(term), values
     leading = next((e for k, e in rest if k not in slides), 0)
@@ -230,7 +230,7 @@ class RingMatrices:
 
     Attributes:
         on: from joint to joint.
-        back: the other way round.
+        back: in the other direction.
         length: of the size of the loop [m].
     """
 
@@ -268,7 +268,7 @@ def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key
     for source in part.sources:
         own = _own(knowledge, matrices, equation, source.term)
         if source.known:
-            angle = sum((way * sums[number] for number, way in source.known), SX(0))
+            angle = sum((multiple * sums[number] for number, multiple in source.known), SX(0))
             own = _turned(own, angle, source.conjugate)
         total = Factor(total.X + own.X, total.Y + own.Y)
     x, y = np.max(np.abs(part.values.real)), np.max(np.abs(part.values.imag))
@@ -346,20 +346,20 @@ def _coefficient(
         chosen: number of the function of each joint of the product: see `joint_basis`.
     """
     total = SX(0)
-    for way in (1, -1):
-        steps = list(_steps(row, len(matrices.on), way))
+    for direction in (1, -1):
+        steps = list(_steps(row, len(matrices.on), direction))
         if all(("joint", k) in steps for k in chosen):
-            total += way * _along(knowledge, matrices, (row, steps, way), chosen)
+            total += direction * _along(knowledge, matrices, (row, steps, direction), chosen)
     return SX(total)
 
 
-def _steps(row: Row, n: int, way: int) -> Iterator[tuple[str, int]]:
-    """The joints and the gaps between two frames, on one way around the loop."""
+def _steps(row: Row, n: int, direction: int) -> Iterator[tuple[str, int]]:
+    """The joints and the gaps between two frames, around the loop in one direction."""
     point = row.start
     while point != row.end:
-        at = point if way > 0 else (point - 1) % (2 * n)
+        at = point if direction > 0 else (point - 1) % (2 * n)
         yield ("joint", at // 2) if at % 2 == 0 else ("gap", (at // 2 + 1) % n)
-        point = (point + way) % (2 * n)
+        point = (point + direction) % (2 * n)
 
 
 def _along(
@@ -368,25 +368,25 @@ def _along(
     path: tuple[Row, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
-    """The element of w at the end of a way."""
-    row, steps, way = path
+    """The element of w at the end of a path."""
+    row, steps, direction = path
     r = SX(1, SIZE)
     r[0, row.element] = 1
     for kind, k in steps:
         if kind == "gap":
-            matrix = (matrices.on if way > 0 else matrices.back)[k]
+            matrix = (matrices.on if direction > 0 else matrices.back)[k]
         else:
-            matrix = _joint(knowledge, k, chosen.get(k, 0), way)
+            matrix = _joint(knowledge, k, chosen.get(k, 0), direction)
         r = SX(casadi.sparsify(casadi.mtimes(r, matrix)))
         if r.nnz() == 0:
             return SX(0)
     return SX(r[0, 0] + r[0, 6 + row.seed])
 
 
-def _joint(knowledge: Knowledge, k: int, number: int, way: int) -> SX:
+def _joint(knowledge: Knowledge, k: int, number: int, direction: int) -> SX:
     """One of the factors of an unknown joint, or the whole of a known one."""
     joint = knowledge.ring.joints[k]
-    sign = way * joint.sign
+    sign = direction * joint.sign
     if k not in knowledge.known:
         return _sparse_basis(joint.turns, sign)[number]
     basis, q = _sparse_basis(joint.turns, 1), knowledge.position(k)
@@ -397,6 +397,6 @@ def _joint(knowledge: Knowledge, k: int, number: int, way: int) -> SX:
 
 @cache
 def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
-    """The factors of a joint that moves with or against the way."""
+    """The factors of a joint that moves with or against the direction."""
     one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in joint_basis(not turns))
     return (one, first, sign * second) if turns else (one, sign * first, second)

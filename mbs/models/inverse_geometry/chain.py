@@ -124,7 +124,7 @@ class FrameChain:
         return samples
 
 
-def chain(
+def frame_chain(
     system: System,
     frame: str | int | None = None,
     locked: Mapping[str, float] | None = None,
@@ -144,9 +144,11 @@ def chain(
     name = _terminal_frame(system) if frame is None else frame
     number = system.frame(name)[0]
     links = [system.tree.links[k] for k in system.tree.path(number)]
-    held = _locked(system, links, locked)
-    key = ("chain", name, tuple(held.items()))
-    found: FrameChain = system.cached(key, lambda: _frame_chain(system, name, links, held))
+    locked_positions = _locked(system, links, locked)
+    key = ("chain", name, tuple(locked_positions.items()))
+    found: FrameChain = system.cached(
+        key, lambda: _frame_chain(system, name, links, locked_positions)
+    )
     return found
 
 
@@ -156,14 +158,14 @@ def _terminal_frame(system: System) -> str | int:
 
 
 def _frame_chain(
-    system: System, name: str | int, links: list[Link], held: Mapping[str, float]
+    system: System, name: str | int, links: list[Link], locked_positions: Mapping[str, float]
 ) -> FrameChain:
-    _require_few(system, name, links, held)
-    known = [link.q.start for link in links if link.name in held]
-    q = SX(DM(system.position(held)))
+    _require_few(system, name, links, locked_positions)
+    known = [link.q.start for link in links if link.name in locked_positions]
+    q = SX(DM(system.position(locked_positions)))
     chain = tree_chain(system.tree, system.frame("base"), system.frame(name), known, q)
     poses = (Gap(gap.pose) for gap in chain.gaps)  # a locked joint is no pivot
-    return FrameChain(system, name, replace(chain, gaps=tuple(poses)), held)
+    return FrameChain(system, name, replace(chain, gaps=tuple(poses)), locked_positions)
 
 
 def _locked(system: System, links: list[Link], given: object) -> dict[str, float]:
@@ -195,11 +197,11 @@ def _require_simple(system: System, link: Link) -> None:
 
 
 def _require_few(
-    system: System, frame: str | int, links: list[Link], held: Mapping[str, float]
+    system: System, frame: str | int, links: list[Link], locked_positions: Mapping[str, float]
 ) -> None:
     for link in links:
         _require_simple(system, link)
-    free = [link for link in links if link.name not in held]
+    free = [link for link in links if link.name not in locked_positions]
     if not links:
         raise ModelError(f"{system.name}: no joint moves frame {frame!r}; name another frame")
     if not free:
@@ -222,8 +224,8 @@ def _proposal(system: System, free: list[Link], surplus: int) -> str:
     An arm of seven joints keeps its elbow, without which it has one length alone.
     """
     first = (len(free) - surplus - 1) // 2
-    held = free[first : first + surplus]
-    return ", ".join(f"{link.name!r}: {system.configuration[link.q.start]:.6g}" for link in held)
+    chosen = free[first : first + surplus]
+    return ", ".join(f"{link.name!r}: {system.configuration[link.q.start]:.6g}" for link in chosen)
 
 
 # Poses as a user gives them: one, or many at once.

@@ -16,7 +16,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
 from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import FrameChain, chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_pose
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
 from mbs.recursions.chain import transforms
@@ -86,9 +86,9 @@ def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
         )
 
 
-def given_of(way: FrameChain, T: SX) -> SX:
+def given_of(chain: FrameChain, T: SX) -> SX:
     """What a sequence of symbolic parameters takes for a pose T, (4, 4)."""
-    return SX(casadi.vertcat(way.system.p, casadi.vec(T[:3, :])))
+    return SX(casadi.vertcat(chain.system.p, casadi.vec(T[:3, :])))
 
 
 def _kept(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
@@ -164,7 +164,7 @@ class CharacteristicFunction(ModelFunction):
         return self._found.slides
 
 
-def characteristic_function(way: FrameChain) -> Function:
+def characteristic_function(chain: FrameChain) -> Function:
     """The matrices of a chain of six joints.
 
     Source: Raghavan & Roth 1993; Manocha & Canny 1994.
@@ -180,19 +180,19 @@ def characteristic_function(way: FrameChain) -> Function:
     from mbs.closed_forms.raghavan_roth.expressions import characteristic
 
     def make() -> Function:
-        problem = way.problem()
+        problem = chain.problem()
         found = characteristic(problem)
 
         def build() -> tuple[Named, Named]:
             T = SX.sym("T", 4, 4)
             parts = Function("parts", [problem.given], list(found.matrices))
-            every = parts.call([given_of(way, T)])
+            every = parts.call([given_of(chain, T)])
             return [("T", T)], [(f"M{k}", part) for k, part in enumerate(every)]
 
-        plain = model_function(way.system, ("igm_characteristic", *way.key), build)
-        return CharacteristicFunction(Function(plain), way.system, found)
+        plain = model_function(chain.system, ("igm_characteristic", *chain.key), build)
+        return CharacteristicFunction(Function(plain), chain.system, found)
 
-    made: Function = way.system.cached(("characteristic matrix", *way.key), make)
+    made: Function = chain.system.cached(("characteristic matrix", *chain.key), make)
     return made
 
 
@@ -310,18 +310,18 @@ def function(
     """
     require_system(system)
     require_method(system, method, METHODS)
-    way = chain(system, frame, locked)
+    chain = frame_chain(system, frame, locked)
     if method == "general":
-        return characteristic_function(way)
+        return characteristic_function(chain)
     _require_open(system)
-    sequence = sequence_of(way, method)
+    sequence = sequence_of(chain, method)
 
     def make() -> Function:
-        key = ("igm", method, *way.key)
-        plain: Any = model_function(system, key, lambda: _built(way, sequence))
+        key = ("igm", method, *chain.key)
+        plain: Any = model_function(system, key, lambda: _built(chain, sequence))
         return InverseGeometry(Function(plain), system, sequence, plain.annotated)
 
-    made: Function = system.cached(("inverse geometry", method, *way.key), make)
+    made: Function = system.cached(("inverse geometry", method, *chain.key), make)
     return made
 
 
@@ -333,12 +333,12 @@ def _require_open(system: System) -> None:
         )
 
 
-def _built(way: FrameChain, sequence: StepSequence) -> tuple[Named, Named, Named]:
+def _built(chain: FrameChain, sequence: StepSequence) -> tuple[Named, Named, Named]:
     T, branch = SX.sym("T", 4, 4), SX.sym("branch")
-    leaf = sequence.leaf(given_of(way, T), signs_of(sequence, branch))
-    q = whole_configuration(way, leaf.x)
-    outputs: Named = [("q", q), ("valid", _valid(way, sequence, leaf, T, branch))]
-    return [("T", T), ("branch", branch)], outputs, _names(way, sequence, leaf, branch)
+    leaf = sequence.leaf(given_of(chain, T), signs_of(sequence, branch))
+    q = whole_configuration(chain, leaf.x)
+    outputs: Named = [("q", q), ("valid", _valid(chain, sequence, leaf, T, branch))]
+    return [("T", T), ("branch", branch)], outputs, _names(chain, sequence, leaf, branch)
 
 
 def signs_of(sequence: StepSequence, branch: SX) -> SX:
@@ -349,27 +349,27 @@ def signs_of(sequence: StepSequence, branch: SX) -> SX:
     return SX(casadi.vertcat(*(1 - 2 * bit for bit in bits)))
 
 
-def whole_configuration(way: FrameChain, x: SX) -> SX:
+def whole_configuration(chain: FrameChain, x: SX) -> SX:
     """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
-    q = SX(DM(way.system.position(way.locked)))
-    q[list(way.places)] = x
+    q = SX(DM(chain.system.position(chain.locked)))
+    q[list(chain.places)] = x
     return q
 
 
-def _valid(way: FrameChain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) -> SX:
-    error = relative_residual(forward(way, leaf.x), T, size(way))
+def _valid(chain: FrameChain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) -> SX:
+    error = relative_residual(forward(chain, leaf.x), T, size(chain))
     real = casadi.mmin(casadi.vertcat(leaf.real, SX(1)))
     known = casadi.logic_and(branch >= 0, branch <= sequence.branches - 1)
     good = casadi.logic_and(real >= -_ROUNDING, error <= _ROUNDING)
     return SX(casadi.logic_and(known, good))
 
 
-def _names(way: FrameChain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
+def _names(chain: FrameChain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
     """The scalars that text names: signs, sines and cosines of the joints, coefficients."""
     signs = casadi.vertsplit(signs_of(sequence, branch)) if sequence.signs else []
     named = [(f"sign_{name}", sign) for name, sign in zip(sequence.signs, signs, strict=True)]
-    for k, name in enumerate(way.names):
-        if not way.prismatic[k]:
+    for k, name in enumerate(chain.names):
+        if not chain.prismatic[k]:
             label = joint_label(name)
             named += [(f"S{label}", casadi.sin(leaf.x[k])), (f"C{label}", casadi.cos(leaf.x[k]))]
     named += leaf.coefficients.items()

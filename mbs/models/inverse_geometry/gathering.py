@@ -80,7 +80,7 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
     return _by_search(target) if ready is None else _by_general(target, ready)
 
 
-def further(chain: FrameChain, target: Target, gathered: Gathered, p: Array) -> Gathered:
+def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Array) -> Gathered:
     """What was gathered, and what the general method and the search add to it."""
     parts = [gathered]
     ready = general_ready(chain, p)

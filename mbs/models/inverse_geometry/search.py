@@ -174,11 +174,11 @@ def wrapped(arm: Arm, q: Array) -> Array:
 def _twin(arm: Arm, T: Array, found: Array, own: Array) -> int | None:
     if not len(found):
         return None
-    way = own - found
-    way = np.where(arm.prismatic, way, wrapped(arm, way))
-    farthest = np.max(np.abs(way / arm.units), axis=-1)
+    difference = own - found
+    difference = np.where(arm.prismatic, difference, wrapped(arm, difference))
+    farthest = np.max(np.abs(difference / arm.units), axis=-1)
     for number in np.flatnonzero(farthest < _CLOSE):
-        half = found[number] + 0.5 * way[number]
+        half = found[number] + 0.5 * difference[number]
         middle, *ends = relative_residual(arm, T, np.array([half, found[number], own]))
         if farthest[number] < _SAME or middle < max(_BETWEEN, *ends):
             return int(number)

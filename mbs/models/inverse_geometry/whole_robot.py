@@ -127,21 +127,21 @@ def posed(
     return sorted(found, key=lambda configuration: _distance(system, configuration.q, rest))
 
 
-def why_searched(system: System, way: FrameChain | str | int) -> str | None:
+def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
     """Why configurations are searched for, so that no proof of completeness stands behind them.
 
     Args:
         system: open or closed.
-        way: the chain that `close` gets, or the frame that `posed` gets.
+        chain: the one that `close` gets, or the frame that `posed` gets.
 
     Returns:
         One sentence; None where all are found by closed forms.
     """
     outcome: object = None
-    if not isinstance(way, FrameChain):
-        outcome = _plan_to(system, way)
+    if not isinstance(chain, FrameChain):
+        outcome = _plan_to(system, chain)
     elif system.is_closed:
-        outcome = _stages(system, _given(system, way))
+        outcome = _stages(system, _given(system, chain))
     return outcome if isinstance(outcome, str) else None
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.gathering import further, gather
 from mbs.models.inverse_geometry.target import Target
 
@@ -16,7 +16,7 @@ NONE = np.zeros(0)
 
 @cache
 def way(name):
-    return chain(mbs.load(name).assemble())
+    return frame_chain(mbs.load(name).assemble())
 
 
 def target(name, q):

@@ -37,7 +37,7 @@ as free."""
 _SAME_SHARE = 1e-6
 
 
-def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
+def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
     """The system with its loops closed at a configuration, and what they constrain.
 
     Args:

@@ -109,7 +109,7 @@ def factor_symbols(before: list[int]) -> TreeFactor:
     return TreeFactor(SX.sym("ratios", size), SX.sym("inverse", len(before)))
 
 
-def factorized(A: SX, before: list[int]) -> TreeFactor:
+def factorize(A: SX, before: list[int]) -> TreeFactor:
     """The factors of A.
 
     Args:
@@ -130,7 +130,7 @@ def factorized(A: SX, before: list[int]) -> TreeFactor:
     return TreeFactor(casadi.vertcat(SX(0, 1), *ratios), casadi.vertcat(*inverse))
 
 
-def substituted(factor: TreeFactor, right: SX, before: list[int]) -> SX:
+def substitute(factor: TreeFactor, right: SX, before: list[int]) -> SX:
     """The solution x of A x = right, one or several columns.
 
     Args:
@@ -154,7 +154,7 @@ def substituted(factor: TreeFactor, right: SX, before: list[int]) -> SX:
 
 def solve_tree(A: SX, right: SX, before: list[int]) -> SX:
     """The solution x of A x = right; arguments as of `factorized` and `substituted`."""
-    return substituted(factorized(A, before), right, before)
+    return substitute(factorize(A, before), right, before)
 
 
 def _path(before: list[int], k: int) -> list[int]:

@@ -27,7 +27,7 @@ from mbs.recursions.route import (
     OriginOf,
     OtherRotation,
     PathStep,
-    Translation,
+    PathTranslation,
     along,
     common_link,
     cost,
@@ -144,7 +144,7 @@ def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
     for step in reversed(branch):
         arms.append(arm)
         match step:
-            case Translation(p=p):
+            case PathTranslation(p=p):
                 arm = arm + p
             case OtherRotation(rotation=rotation):
                 (arm,) = along(rotation, [arm])
@@ -156,7 +156,7 @@ def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
     arms = []
     for step in branch:
         match step:
-            case Translation(p=p):
+            case PathTranslation(p=p):
                 arm = arm - p
             case OtherRotation(rotation=rotation) if not is_zero(arm):
                 arm = casadi.densify(rotation.apply_inverse(arm))

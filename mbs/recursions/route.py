@@ -66,7 +66,7 @@ class OtherRotation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Translation:
+class PathTranslation:
     """A displacement p, (3, 1), in the axes where it stands [m]."""
 
     p: SX
@@ -86,7 +86,7 @@ class OriginOf:
     link: int
 
 
-PathStep = RotationAboutZ | OtherRotation | Translation | JointAt | OriginOf
+PathStep = RotationAboutZ | OtherRotation | PathTranslation | JointAt | OriginOf
 
 
 def path_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[PathStep]:
@@ -103,7 +103,7 @@ def path_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[PathStep]:
         link = tree.links[k]
         steps += _link_steps(k, link, q[link.q])
     if not is_zero(inside.p):
-        steps.append(Translation(inside.p))
+        steps.append(PathTranslation(inside.p))
     if not inside.is_identity():
         steps.append(OtherRotation(MatrixTurn(inside.R)))
     return steps
@@ -117,9 +117,9 @@ def _link_steps(k: int, link: Link, q: SX) -> list[PathStep]:
         steps.append(JointAt(k))
     if motion is Motion.REVOLUTE:
         steps.append(RotationAboutZ(q))
-    steps += [RotationAboutZ(place.theta), Translation(vector([0, 0, height]))]
+    steps += [RotationAboutZ(place.theta), PathTranslation(vector([0, 0, height]))]
     if motion is Motion.FREE:
-        steps.append(Translation(q[0:3]))
+        steps.append(PathTranslation(q[0:3]))
     if motion in (Motion.SPHERICAL, Motion.FREE):
         steps += [OtherRotation(MatrixTurn(quaternion_rotation(q[motion.nq - 4 :]))), JointAt(k)]
     return [*(step for step in steps if not _is_idle(step)), OriginOf(k)]
@@ -129,15 +129,19 @@ def _seat_steps(frame: Khalil) -> list[PathStep]:
     """From one frame to the axis of the next."""
     return [
         RotationAboutZ(frame.gamma),
-        Translation(vector([0, 0, frame.b])),
+        PathTranslation(vector([0, 0, frame.b])),
         OtherRotation(axis_turn("x", frame.alpha)),
-        Translation(vector([frame.d, 0, 0])),
+        PathTranslation(vector([frame.d, 0, 0])),
     ]
 
 
 def _fixed_steps(frame: Khalil) -> list[PathStep]:
     """From one frame to the next, which does not move."""
-    return [*_seat_steps(frame), RotationAboutZ(frame.theta), Translation(vector([0, 0, frame.r]))]
+    return [
+        *_seat_steps(frame),
+        RotationAboutZ(frame.theta),
+        PathTranslation(vector([0, 0, frame.r])),
+    ]
 
 
 def _is_idle(step: PathStep) -> bool:
@@ -146,7 +150,7 @@ def _is_idle(step: PathStep) -> bool:
             return bool(angle.is_zero())
         case OtherRotation(rotation=Turn(s=s, c=c)):
             return bool(s.is_zero() and c.is_one())
-        case Translation(p=p):
+        case PathTranslation(p=p):
             return is_zero(p)
     return False
 
@@ -162,8 +166,8 @@ def _inverse(step: PathStep) -> PathStep:
             return RotationAboutZ(angle, not backwards)
         case OtherRotation(rotation=rotation):
             return OtherRotation(inverse_rotation(rotation))
-        case Translation(p=p):
-            return Translation(-p)
+        case PathTranslation(p=p):
+            return PathTranslation(-p)
     return step
 
 
@@ -190,8 +194,8 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
         match step:
             case RotationAboutZ():
                 rotations.append(step)
-            case Translation(p=p):
-                result.append(Translation(_total(rotations).apply(p)))
+            case PathTranslation(p=p):
+                result.append(PathTranslation(_total(rotations).apply(p)))
             case JointAt(link=k) if _along_z(tree.links[k]):
                 result.append(step)
             case OriginOf():
@@ -257,9 +261,9 @@ def relative_pose(
     pose = Pose.identity()
     for step in steps if outwards else reversed(steps):
         match step, outwards:
-            case Translation(p=p), True:
+            case PathTranslation(p=p), True:
                 pose = Pose(pose.R, pose.p + casadi.mtimes(pose.R, p))
-            case Translation(p=p), False:
+            case PathTranslation(p=p), False:
                 pose = Pose(pose.R, pose.p + p)
             case OtherRotation(rotation=rotation), True:
                 rows = (rotation.apply_inverse(pose.R[k, :].T).T for k in range(3))

@@ -10,8 +10,8 @@ from symbolic_robots import symbolic_robot
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.recursions.route import (
     OtherRotation,
+    PathTranslation,
     RotationAboutZ,
-    Translation,
     express,
     join_rotations,
     path_to,
@@ -51,7 +51,7 @@ def test_there_and_back_is_nowhere():
     point = SX([0.1, 0.2, 0.3])
     for step in reversed(join_rotations([*way, *reverse_path(way)], system.tree)):
         match step:
-            case Translation(p=p):
+            case PathTranslation(p=p):
                 point = point + p
             case OtherRotation(rotation=rotation):
                 point = rotation.apply(point)

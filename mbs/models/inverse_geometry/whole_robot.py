@@ -17,7 +17,7 @@ from mbs.loops.plan import (
     Known,
     Posed,
     Stage,
-    completed,
+    complete,
     every_configuration,
     plan_from,
     plan_to,
@@ -152,7 +152,7 @@ def _given(system: System, chain: FrameChain) -> tuple[int, ...]:
 
 
 def _known(system: System, given: tuple[int, ...]) -> Known:
-    known: Known = system.cached(("completed", given), lambda: completed(system, given))
+    known: Known = system.cached(("completed", given), lambda: complete(system, given))
     return known
 
 

@@ -9,7 +9,7 @@ import mbs
 from mbs.components import Body, Mechanism, Revolute, Spherical
 from mbs.loops.closing import Closing
 from mbs.loops.modes import closed_configurations
-from mbs.loops.plan import completed
+from mbs.loops.plan import complete
 from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.search import search
 from mbs.models.inverse_geometry.whole_robot import close, posed, why_searched
@@ -27,7 +27,7 @@ def systems():
 def drawn(system, away, seed):
     """A closed configuration whose independent joints stand elsewhere."""
     rng = np.random.default_rng(seed)
-    held = completed(system, ()).held
+    held = complete(system, ()).held
     q = np.array(system.configuration)
     q[list(held)] += rng.uniform(-away, away, len(held))
     closed = Closing(system, NONE, held).nearest(q)
@@ -213,7 +213,7 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
     reason = why_searched(system, way)
     if reason is not None:
         assert "no closed form known here" in reason
-    held = completed(system, way.places).held
+    held = complete(system, way.places).held
     rest = close(system, way, q[list(way.places)], NONE, q)
     assert any(same(system, configuration.q, q, 1e-6) for configuration in rest)
     for configuration in rest:

@@ -174,7 +174,7 @@ class Ring(Chain):
         )
 
     def reversed(self) -> Ring:
-        """The same loop the other way round."""
+        """The same loop in the other direction."""
         joints = tuple(replace(joint, sign=-joint.sign) for joint in self.joints[::-1])
         gaps = tuple(gap.inverse() for gap in (self.gaps[0], *self.gaps[:0:-1]))
         return Ring(joints, gaps)

@@ -129,7 +129,7 @@ def newton_euler(
     """
     # passes: frames where distances vanish, parameters in as few places as possible
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    if not external:
+    if not external:  # those are about the origins of the description
         poses, bodies = slide_frames(tree, poses, bodies, base_rests=is_zero(base.w))
     bodies = regroup(tree, poses, bodies)
 

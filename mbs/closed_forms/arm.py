@@ -1,26 +1,30 @@
-"""A serial arm in numbers: its pose, its Jacobian, for one configuration or many at once."""
+"""A chain in numbers: its pose, its Jacobian, for one configuration or many at once."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import casadi
 import numpy as np
+from casadi import DM, SX, Function
 from numpy.typing import NDArray
+
+from mbs.recursions.chain import Chain, transforms
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """Joints that turn about or slide along their z axes, and the constant ways between them.
+    """A `Chain` of revolute and prismatic joints in flat numbers, made by `arm_of` alone.
 
-    The pose of the frame is G_0 J_1(q_1) G_1 J_2(q_2) .. J_n(q_n) G_n.
+    `mbs/native/runtime/arm.c` reads the same numbers; all its chains run forwards.
 
     Attributes:
         names: of the joints.
-        prismatic: (n,) whether each slides.
-        gaps: (n + 1, 4, 4) the constant ways G.
-        length: a length of the arm's size [m], 1 where all its ways are turns alone.
+        prismatic: (n,) whether each is prismatic.
+        gaps: (n + 1, 4, 4) the constant transforms before, between and after them.
+        length: a length of the arm's size [m], 1 where all gaps are rotations alone.
         units: (n,) what joints are measured by: 1 rad, or the length of the arm [m].
     """
 
@@ -41,6 +45,15 @@ class Arm:
         """The number of joints."""
         return len(self.prismatic)
 
+    @property
+    def between(self) -> list[Array]:
+        """The gaps."""
+        return list(self.gaps)
+
+    def displacements(self, q: Array) -> list[Array]:
+        """(..., 4, 4) of every joint at configurations q, (..., n) [rad or m]."""
+        return [motion(q[..., k], bool(self.prismatic[k])) for k in range(self.size)]
+
     def wrapped(self, way: Array) -> Array:
         """Differences (..., n) of configurations, those of turns brought into [-pi, pi)."""
         return np.where(self.prismatic, way, np.mod(way + np.pi, 2 * np.pi) - np.pi)
@@ -52,11 +65,11 @@ class Arm:
 
     def pose(self, q: Array) -> Array:
         """(..., 4, 4) pose of the frame at configurations q, (..., n) [rad or m]."""
-        return self._walked(q)[0]
+        return transforms(self, np.asarray(q, dtype=float))[-1]
 
     def pose_and_jacobian(self, q: Array) -> tuple[Array, Array]:
         """The poses, and the Jacobians (..., 6, n) of [V; w] of the frame, in the base."""
-        T, axes, origins = self._walked(q)
+        T, axes, origins = self._frames(q)
         arms = T[..., None, :3, 3] - origins
         turning = np.where(self.prismatic[:, None], 0.0, axes)
         linear = np.where(self.prismatic[:, None], axes, np.cross(axes, arms))
@@ -64,21 +77,35 @@ class Arm:
 
     def lines(self, q: Array) -> tuple[Array, Array]:
         """The directions of all axes and a point on each, (..., n, 3) [m], in the base."""
-        return self._walked(q)[1:]
+        return self._frames(q)[1:]
 
-    def _walked(self, q: Array) -> tuple[Array, Array, Array]:
+    def _frames(self, q: Array) -> tuple[Array, Array, Array]:
         """The poses, then the axes and the origins of all joints, (..., n, 3), in the base."""
         q = np.asarray(q, dtype=float)
-        T = np.broadcast_to(self.gaps[0], (*q.shape[:-1], 4, 4))
+        *frames, T = transforms(self, q)
         axes, origins = np.empty((*q.shape, 3)), np.empty((*q.shape, 3))
-        for k in range(self.size):
-            axes[..., k, :], origins[..., k, :] = T[..., :3, 2], T[..., :3, 3]
-            T = T @ motion(q[..., k], bool(self.prismatic[k])) @ self.gaps[k + 1]
+        for k, frame in enumerate(frames):
+            axes[..., k, :], origins[..., k, :] = frame[..., :3, 2], frame[..., :3, 3]
         return T, axes, origins
 
 
+def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
+    """The numbers of a chain.
+
+    Args:
+        chain: of revolute and prismatic joints that run forwards; its gaps hold no pivots.
+        symbols: (np, 1) of its gaps.
+        p: (np,) their values.
+    """
+    stacked = casadi.vertcat(*(pose.matrix for pose in chain.between))
+    function = Function("gaps", [symbols], [casadi.densify(stacked)])
+    gaps = np.array(DM(function(p))).reshape(len(chain.gaps), 4, 4)
+    prismatic = np.array([not joint.turns for joint in chain.joints], dtype=bool)
+    return Arm(tuple(joint.name for joint in chain.joints), prismatic, gaps)
+
+
 def motion(q: Array, prismatic: bool) -> Array:
-    """(..., 4, 4) slide along z by q [m], or turn about z by q [rad]."""
+    """(..., 4, 4) translation along z by q [m], or rotation about z by q [rad]."""
     T = np.empty((*np.shape(q), 4, 4))
     T[...] = np.eye(4)
     if prismatic:

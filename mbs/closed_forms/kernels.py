@@ -7,7 +7,6 @@ from collections.abc import Callable
 from casadi import SX
 
 from mbs.closed_forms.planar import along_normal, planar
-from mbs.closed_forms.ring import Ring
 from mbs.closed_forms.roots import Root
 from mbs.closed_forms.spatial import (
     aim,
@@ -22,6 +21,7 @@ from mbs.closed_forms.spatial import (
 )
 from mbs.closed_forms.split import split
 from mbs.components.joints import Motion
+from mbs.recursions.chain import Ring
 
 _KERNELS: tuple[Callable[[Ring, SX, SX], Root | None], ...] = (
     free_body,

@@ -9,7 +9,6 @@ import casadi
 import numpy as np
 from casadi import SX
 
-from mbs.closed_forms.ring import Gap, Ring, Unknown
 from mbs.closed_forms.sequence import (
     Found,
     Problem,
@@ -23,6 +22,7 @@ from mbs.closed_forms.sequence import (
     trigonometric_quartic,
 )
 from mbs.errors import NoClosedForm
+from mbs.recursions.chain import ChainJoint, Gap, Ring
 from mbs.spatial import Pose, axis_turn, vector
 
 # Quantities that depend on one joint, and equations X e^(i q) = U in another.
@@ -62,10 +62,7 @@ class PieperLoop:
 
     def motion(self, k: int) -> Pose:
         """The motion of joint k, walked along the ring."""
-        joint, x = self.ring.joints[k], self.x(k)
-        if joint.turns:
-            return Pose.turned(axis_turn("z", joint.sign * x).matrix)
-        return Pose.moved(vector([0, 0, joint.sign * x]))
+        return self.ring.joints[k].displacement(self.x(k))
 
     def suffix(self, k: int) -> str:
         """What the names of the coefficients of joint k end with: its number."""
@@ -75,7 +72,7 @@ class PieperLoop:
         distinct = all(digits) and len(set(digits)) == len(digits)
         return digits[number] if distinct else str(number + 1)
 
-    def _named(self, k: int) -> Unknown:
+    def _named(self, k: int) -> ChainJoint:
         name = self.ring.joints[k].name
         return next(joint for joint in self.problem.ring.joints if joint.name == name)
 
@@ -92,7 +89,7 @@ def basis(scene: PieperLoop, k: int) -> SX:
     return casadi.vertcat(x * x, x, 1)
 
 
-def moved_point(joint: Unknown, point: SX) -> SX:
+def moved_point(joint: ChainJoint, point: SX) -> SX:
     """(3, 3) forms of the coordinates of a point that the joint moves."""
     x, y, z, sign = point[0], point[1], point[2], joint.sign
     if joint.turns:

@@ -5,14 +5,7 @@ from __future__ import annotations
 import casadi
 from casadi import SX
 
-from mbs.closed_forms.ring import (
-    Ring,
-    always_zero,
-    gap_samples,
-    is_planar,
-    with_elbow,
-    without_idle,
-)
+from mbs.closed_forms.ring import always_zero, gap_samples, is_planar, with_elbow, without_idle
 from mbs.closed_forms.roots import (
     Positions,
     Root,
@@ -27,7 +20,7 @@ from mbs.closed_forms.roots import (
 )
 from mbs.closed_forms.spatial import with_balls
 from mbs.components.joints import Motion
-from mbs.spatial import Pose
+from mbs.recursions.chain import Ring, frames_at_zero
 
 # A planar loop with three unknown turns: the law of cosines at the one in the middle.
 #
@@ -219,28 +212,19 @@ def along_normal(ring: Ring, q: SX, p: SX) -> Root | None:
         return None
     if Motion.SPHERICAL in kinds:
         ring = ring.rotated((kinds.index(Motion.SPHERICAL) + 1) % len(kinds))
-    poses = _held(ring)
-    turns = [pose for k, pose in poses.items() if ring.joints[k].motion is Motion.REVOLUTE]
+    poses = frames_at_zero(ring.gaps)
+    turns = [pose for k, pose in enumerate(poses) if ring.joints[k].motion is Motion.REVOLUTE]
     normal = turns[0].R[:, 2]
     if not all(always_zero(in_plane(turn.R.T @ normal), q, p) for turn in turns):
         return None
     moving = {
         k: slope
-        for k, pose in poses.items()
+        for k, pose in enumerate(poses)
         if ring.joints[k].motion is Motion.PRISMATIC
         and not always_zero(slope := casadi.dot(normal, pose.R[:, 2]), q, p)
     }
     if len(moving) != 1:
         return None
     ((k, slope),) = moving.items()
-    end = list(poses.values())[-1].p
+    end = poses[-1].p
     return Root({"": positions([ring.joints[k]], [-casadi.dot(normal, end) / slope])})
-
-
-def _held(ring: Ring) -> dict[int, Pose]:
-    """Where each joint is when all of them are at zero, seen from the start of the loop."""
-    poses, pose = dict[int, Pose](), Pose.identity()
-    for k, gap in enumerate(ring.gaps):
-        pose = pose @ gap.pose
-        poses[k] = pose
-    return poses

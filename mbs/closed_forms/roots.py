@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX
 
-from mbs.closed_forms.ring import Unknown
 from mbs.components.joints import Motion
+from mbs.recursions.chain import ChainJoint
 
 Positions = Mapping[int, SX]
 """Position of each unknown joint, by its number in q."""
@@ -41,7 +41,7 @@ class Root:
     spun: Spun | None = None
 
 
-def positions(joints: Sequence[Unknown], values: Sequence[SX]) -> Positions:
+def positions(joints: Sequence[ChainJoint], values: Sequence[SX]) -> Positions:
     """Positions in q from those along the way around the loop; balls are left out."""
     return {
         joint.place: joint.sign * value
@@ -50,7 +50,7 @@ def positions(joints: Sequence[Unknown], values: Sequence[SX]) -> Positions:
     }
 
 
-def signed(joint: Unknown) -> tuple[tuple[str, int], ...]:
+def signed(joint: ChainJoint) -> tuple[tuple[str, int], ...]:
     """The labels of a joint with two roots, each with the sign of the root along the loop."""
     return tuple((f"{joint.name}:{label}", sign * joint.sign) for label, sign in _SIGNS)
 

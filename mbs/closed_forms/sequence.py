@@ -12,7 +12,7 @@ import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
-from mbs.closed_forms.ring import Ring
+from mbs.recursions.chain import Ring
 
 # What is to be solved: a loop, the symbols in it, and numbers at which it closes.
 

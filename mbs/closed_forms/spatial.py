@@ -13,16 +13,7 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tables import CoordinateCoupling
-from mbs.closed_forms.ring import (
-    Gap,
-    Ring,
-    Unknown,
-    always_zero,
-    axes_meet,
-    meeting_point,
-    parallel,
-    with_elbow,
-)
+from mbs.closed_forms.ring import always_zero, axes_meet, meeting_point, parallel, with_elbow
 from mbs.closed_forms.roots import (
     Angle,
     Positions,
@@ -38,6 +29,7 @@ from mbs.closed_forms.roots import (
     turn_onto,
 )
 from mbs.components.joints import Motion
+from mbs.recursions.chain import Chain, ChainJoint, Gap, Ring, frames_at_zero
 from mbs.spatial import Pose, cross, quaternion_rotation, vector
 
 
@@ -92,7 +84,7 @@ def collapsed(ring: Ring, centre: Centre) -> Ring:
     begun = ring.rotated(centre.first)
     joints, gaps = begun.joints[centre.count :], begun.gaps[centre.count :]
     name = ", ".join(joint.name for joint in begun.joints[: centre.count])
-    ball = Unknown(name, Motion.SPHERICAL, None, 1)
+    ball = ChainJoint(name, Motion.SPHERICAL, None, 1)
     first = begun.gaps[0].then(Pose.moved(centre.before))
     leave = Gap(Pose.moved(-centre.after))
     if not joints:
@@ -300,15 +292,13 @@ class Span:
     """A rigid link between two centres, and the way around the loop from its end to its start.
 
     Attributes:
-        joints: unknown ones on that way.
-        gaps: one before each of them, and one after the last.
+        chain: on that way.
         goal: (3, 1) the end of the link, before the first gap.
         start: (3, 1) the start of the link, after the last gap.
         squared: the square of its length.
     """
 
-    joints: tuple[Unknown, ...]
-    gaps: tuple[Gap, ...]
+    chain: Chain
     goal: SX
     start: SX
     squared: SX
@@ -330,8 +320,7 @@ def _span(begun: Ring, one: Centre, other: Centre) -> Span:
     link = begun.gaps[one.count].pose
     after = one.count + other.count
     return Span(
-        begun.joints[after:],
-        (*begun.gaps[after:], begun.gaps[0]),
+        Chain(begun.joints[after:], (*begun.gaps[after:], begun.gaps[0])),
         other.after,
         one.before,
         square(link.p + link.R @ other.before - one.after),
@@ -341,22 +330,22 @@ def _span(begun: Ring, one: Centre, other: Centre) -> Span:
 def at_distance(ring: Ring, q: SX, p: SX) -> Root | None:
     """The two ways to place a joint so that a rigid link fits; None where no link asks for it."""
     for span in spans(ring, q, p):
-        if len(span.joints) == 1:
+        if len(span.chain.joints) == 1:
             m, d = _ends(span)
             idle = any(always_zero(in_plane(end), q, p) for end in (m, d))
-            if not (idle and span.joints[0].turns):
-                return _at_distance(span.joints[0], m, d, span.squared)
+            if not (idle and span.chain.joints[0].turns):
+                return _at_distance(span.chain.joints[0], m, d, span.squared)
     return None
 
 
 def _ends(span: Span) -> tuple[SX, SX]:
     """What the joint turns or moves, and the rest of the link, seen from it."""
-    before, after = (gap.pose for gap in span.gaps)
+    before, after = (gap.pose for gap in span.chain.gaps)
     back = before.inverse()
     return -(back.p + back.R @ span.goal), after.p + after.R @ span.start
 
 
-def _at_distance(joint: Unknown, m: SX, d: SX, squared: SX) -> Root:
+def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> Root:
     def value(sign: int) -> SX:
         if joint.turns:
             Z = (squared - square(m) - square(d)) / 2 - m[2] * d[2]
@@ -502,10 +491,8 @@ def slides(ring: Ring, q: SX, p: SX) -> Root | None:
 def _slid(ring: Ring, centre: Centre) -> Root:
     """The slides that lead from the centre, the first one of the loop, back to it."""
     joints = ring.joints[centre.count :]
-    pose, axes = Pose.moved(-centre.after), list[SX]()
-    for gap in ring.gaps[centre.count :]:
-        pose = pose @ gap.pose
-        axes.append(pose.R[:, 2])
+    poses = frames_at_zero(ring.gaps[centre.count :], Pose.moved(-centre.after))
+    axes, pose = [pose.R[:, 2] for pose in poses], poses[-1]
     if centre.count:
         pose = pose @ ring.gaps[0].pose
     e = pose.p + pose.R @ centre.before
@@ -548,7 +535,7 @@ def spin(ring: Ring, q: SX, p: SX) -> Root | None:
     return None
 
 
-def _aimed_rod(ring: Ring, joint: Unknown, q: SX) -> Root:
+def _aimed_rod(ring: Ring, joint: ChainJoint, q: SX) -> Root:
     before, after = ring.gaps[0].pose.inverse().p, ring.gaps[1].pose.p
     u, w = (after, before) if joint.sign > 0 else (before, after)
     u, w = u / casadi.norm_2(u), w / casadi.norm_2(w)
@@ -606,9 +593,9 @@ class _Sphere:
 
 def slid_places(span: Span) -> frozenset[int] | None:
     """Numbers in q of the slides between the ends of a link, where these are two or three."""
-    if any(joint.motion is not Motion.PRISMATIC for joint in span.joints):
+    if any(joint.motion is not Motion.PRISMATIC for joint in span.chain.joints):
         return None
-    places = frozenset(joint.place for joint in span.joints if joint.place is not None)
+    places = frozenset(joint.place for joint in span.chain.joints if joint.place is not None)
     return places if len(places) in (2, 3) else None
 
 
@@ -660,12 +647,12 @@ def held_point(name: str, spans: Sequence[Span]) -> Root:
 
 
 def _sphere(span: Span, places: Sequence[int]) -> _Sphere:
-    pose, axes = Pose.moved(-span.goal), dict[int | None, SX]()
-    for joint, gap in zip(span.joints, span.gaps, strict=False):
-        pose = pose @ gap.pose
-        axes[joint.place] = joint.sign * pose.R[:, 2]
-    pose = pose @ span.gaps[-1].pose
-    e = pose.p + pose.R @ span.start
+    *poses, end = frames_at_zero(span.chain.gaps, Pose.moved(-span.goal))
+    axes = {
+        joint.place: joint.sign * at.R[:, 2]
+        for joint, at in zip(span.chain.joints, poses, strict=True)
+    }
+    e = end.p + end.R @ span.start
     U = casadi.horzcat(*(axes[place] for place in places))
     return _Sphere(U.T @ U, U.T @ e, casadi.sumsqr(e) - span.squared)
 

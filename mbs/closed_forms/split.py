@@ -12,11 +12,12 @@ import casadi
 from casadi import DM, SX
 
 from mbs.closed_forms.paul import paul
-from mbs.closed_forms.ring import Gap, Ring, Unknown, closed_samples
+from mbs.closed_forms.ring import closed_samples
 from mbs.closed_forms.roots import Root
 from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
+from mbs.recursions.chain import ChainJoint, Gap, Ring
 from mbs.spatial import Pose
 
 _MOST = 6
@@ -52,13 +53,13 @@ def split(ring: Ring, q: SX, p: SX) -> Root | str:
 
 def _without_balls(ring: Ring) -> Ring:
     """The loop with three turns about crossed axes in the place of each ball."""
-    joints, gaps = list[Unknown](), list[Gap]()
+    joints, gaps = list[ChainJoint](), list[Gap]()
     for joint, gap in zip(ring.joints, ring.gaps, strict=True):
         gaps.append(gap)
         if joint.motion is not Motion.SPHERICAL:
             joints.append(joint)
             continue
-        turn = Unknown(joint.name, Motion.REVOLUTE, None, 1)
+        turn = ChainJoint(joint.name, Motion.REVOLUTE, None, 1)
         joints += [replace(turn, name=f"{joint.name}{k}") for k in (1, 2, 3)]
         gaps += [Gap(_AXES)] * 2
     return Ring(tuple(joints), tuple(gaps))

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 _ON_AXIS = 1e-14
 """How far a body may be from the axis that its joint is written on [m]: rounding, no more."""
-_DOWN = (0.0, 0.0, -9.81)
+_DOWN = (0.0, 0.0, -9.81)  # [m/s^2] what readers of URDF files suppose, which cannot say it
 
 
 def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:

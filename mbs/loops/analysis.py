@@ -39,7 +39,7 @@ _SAME_SHARE = 1e-6
 configuration: closing leaves 1e-12 in rows, and singular values of `_GAP` make 1e-7 of it."""
 
 
-def analysed(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
+def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] = ()) -> System:
     """The system with its loops closed at a configuration, and what they constrain.
 
     Args:

@@ -9,7 +9,7 @@ from mbs.assembly import System
 from mbs.assembly.open_system import open_system
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError
-from mbs.loops.analysis import analysed
+from mbs.loops.analysis import analyse
 from mbs.text import did_you_mean
 
 
@@ -31,7 +31,7 @@ def assemble(
     _check_guess(system, guess)
     chosen = _chosen(system, active)
     if system.cuts or system.couplings:
-        return analysed(system, guess, chosen)
+        return analyse(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}
     return replace(system, configuration=tuple(system.position(start)), _cache={})

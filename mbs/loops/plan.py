@@ -1,23 +1,9 @@
-"""Loops solved joint by joint without iteration: one kernel a file, chosen by the geometry.
+"""Loops solved joint by joint without iteration: stages in the order in which they can be solved.
 
-places          where the positions stand of joints, of cut joints and of rods that spin
-trigonometry    sine and cosine of an angle from its equation
-ring            a loop as its unknown joints and the poses between them
-root            what a kernel finds: the ways to close a loop
-survey          what holds of a loop at random positions, from which its class is read
-centre          the points that balls and meeting axes turn about
-distance, aim, spin, ball                               kernels: links between such points
-planar, three_turns, parallelogram, one_slide, two_slides, normal, confined    in a plane
-orientation, sphere, slides                             turns first, then slides
-bennett, trilateration, coupling                        special measures, shared slides, gears
-split, closed_samples    whatever is left, by Paul's method, and numbers at which a loop closes
-free_body       a body whose pose is known
-dispatch        the kernel for a loop
-stage           one step of a plan, and which of its ways lead to a configuration
-plan            the loops of a system in the order in which they can be solved
-verified        a plan held against configurations
-known           joints that may be known together
-posed           the plan for a frame whose pose is known
+Of every loop that is left the ring of its unknown joints is taken, with what is known by then in
+its gaps; `mbs.closed_forms.kernels` says whether it has a closed form. `verify` holds a plan
+against configurations, `complete` says which joints may be known together, and a `Posed` plan
+begins at a frame whose pose is known.
 """
 
 from __future__ import annotations
@@ -37,10 +23,8 @@ from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import CoordinateCoupling
 from mbs.closed_forms.kernels import closed_form
 from mbs.closed_forms.ring import (
-    Ring,
     constants,
     extent,
-    free_pose,
     independent_places,
     loop_links,
     ring_of,
@@ -60,6 +44,7 @@ from mbs.components import Fixed, PointOnLine, Rod
 from mbs.components.constraints import Constraint
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import OPEN, Closing, Vector, closure_parameters, difference
+from mbs.recursions.chain import Ring, free_pose
 from mbs.recursions.route import relative_pose
 from mbs.solvers.rank import null_space, rank
 from mbs.spatial import Pose
@@ -195,7 +180,7 @@ Start = Callable[[Vector], Vector]
 """All positions from a configuration (nq,), of which the known ones count."""
 
 
-def verified(
+def verify(
     system: System, stages: Sequence[Stage], started: Start | None = None
 ) -> tuple[Stage, ...]:
     """The stages with the ways of the assembled configuration, seen to hold at others as well.
@@ -296,8 +281,8 @@ def plan_from(system: System, known: Collection[int]) -> tuple[Stage, ...]:
 
     def build() -> tuple[Stage, ...]:
         q = SX.sym("q", extent(system))
-        stages = ordered(system, known, q)
-        return verified(
+        stages = order_stages(system, known, q)
+        return verify(
             system, stages, lambda configuration: started_at(system, configuration, known)
         )
 
@@ -339,7 +324,7 @@ class _Work:
         return ring_of(self.system, number, self.known, self.values)
 
 
-def ordered(system: System, known: Collection[int], q: SX) -> list[Stage]:
+def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
     """The stages in their order, not yet held against configurations.
 
     Args:
@@ -479,7 +464,7 @@ class Known:
         return self.independent + self.held
 
 
-def completed(system: System, given: Sequence[int]) -> Known:
+def complete(system: System, given: Sequence[int]) -> Known:
     """The given joints, and independent joints that the loops leave free beside them.
 
     Args:
@@ -606,12 +591,12 @@ def _plan_to(system: System, frame: str | int) -> Posed:
     p = closure_parameters(system)
     held = _posed_locked(system, at, p)
     known = {*held, *spin_places(welded).values(), *range(first, first + _POSE)}
-    plan = Posed(tuple(ordered(welded, known, q)), first + _POSE, held)
+    plan = Posed(tuple(order_stages(welded, known, q)), first + _POSE, held)
 
     def started(configuration: Vector) -> Vector:
         return plan.started(np.array(at(configuration, p)[0]), configuration)
 
-    return replace(plan, stages=verified(system, plan.stages, started))
+    return replace(plan, stages=verify(system, plan.stages, started))
 
 
 def _weld(link: int, pose: Pose, goal: Pose) -> Cut:

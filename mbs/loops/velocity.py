@@ -27,7 +27,7 @@ from mbs.loops.closure import (
     row_labels,
     slip_rows,
 )
-from mbs.recursions.force_elements import summed
+from mbs.recursions.force_elements import sum_wrenches
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, Wrench, add_wrenches, carried, cross, skew, vector
 
@@ -172,7 +172,7 @@ def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wr
                 T = relative_pose(system.tree, q, (link, Pose.identity()), cut.frames[1])
                 f, m = carried(T, wrenches[cut.edge.joint.name])
                 exerted.append({link: (sign * f, sign * m)})
-    return summed(*exerted)
+    return sum_wrenches(*exerted)
 
 
 def _displaced(d: SX) -> Pose:

@@ -35,8 +35,8 @@ from mbs.operations.counts import cheapest
 from mbs.recursions.composite_body import (
     TreeFactor,
     factor_symbols,
-    factorized,
-    substituted,
+    factorize,
+    substitute,
     velocity_antecedents,
 )
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
@@ -99,11 +99,11 @@ def implicit_formula(
     by = efforts_by_recursion if s.reduction is None else efforts_by_ad
     symbol = SX.sym("a", s.size)
     slopes, efforts = by(system, s, symbol)
-    factor = factorized(slopes["a"], before)
+    factor = factorize(slopes["a"], before)
     if "p" in names:
         slopes["p"] = casadi.jacobian(efforts, system.p)
     H = casadi.substitute(efforts, symbol, SX.zeros(s.size))
-    a = substituted(factor, tau - H, before)
+    a = substitute(factor, tau - H, before)
     minus = casadi.substitute([-SX(slopes[name]) for name in names], [symbol], [a])
     return factor, a, dict(zip(names, map(casadi.densify, minus), strict=True))
 
@@ -116,7 +116,7 @@ def accelerations_by_efforts(
     factor, a, right = implicit_formula(system, s, tau, wanted)
     sides = [*right.values(), casadi.densify(SX.eye(s.size))]
     ends = [0, *accumulate(side.shape[1] for side in sides)]
-    every = substituted(factor, casadi.horzcat(*sides), solution_order(system, s))
+    every = substitute(factor, casadi.horzcat(*sides), solution_order(system, s))
     *solved, inverse = casadi.horzsplit(every, ends)
     blocks = dict(zip(wanted, solved, strict=True))
     return {**blocks, "tau": casadi.triu2symm(casadi.triu(inverse))}, a
@@ -161,7 +161,7 @@ def solve_column(before: list[int]) -> Function:
     """
     factor, right = factor_symbols(before), SX.sym("right", len(before))
     names = ["ratios", "inverse", "right"], ["x"]
-    return Function("solve_column", [*factor, right], [substituted(factor, right, before)], *names)
+    return Function("solve_column", [*factor, right], [substitute(factor, right, before)], *names)
 
 
 def staged_accelerations(system: System, names: Sequence[str]) -> tuple[list[MX], list[MX]]:

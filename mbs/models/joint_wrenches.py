@@ -28,7 +28,12 @@ from mbs.models.symbols import (
     symbols_of,
     wrenches_on_links,
 )
-from mbs.recursions.force_elements import element_wrenches, inertial_loads, summed, transmitted
+from mbs.recursions.force_elements import (
+    element_wrenches,
+    inertial_loads,
+    sum_wrenches,
+    transmitted_wrenches,
+)
 from mbs.recursions.newton_euler import inertial_wrench
 from mbs.recursions.route import relative_pose
 from mbs.recursions.velocities import Acceleration, link_accelerations
@@ -194,7 +199,7 @@ def wrenches_of_joints(
     if system.is_closed:
         cut = cut_wrenches(system, s.q, _closure_efforts(system, s, a, tau, around))
         loads.append(on_links(system, s.q, cut))
-    through = transmitted(system.tree, s.poses, summed(*loads))
+    through = transmitted_wrenches(system.tree, s.poses, sum_wrenches(*loads))
     between = {
         joint.name: cut[joint.name] if joint.cut else _at_frame_b(system.tree, s.q, joint, through)
         for joint in system.joints

@@ -17,7 +17,7 @@ from mbs.models.symbols import (
     symbols_of,
 )
 from mbs.recursions.jacobian import VelocityTarget, cheapest_jacobian, renaud
-from mbs.recursions.route import expressed
+from mbs.recursions.route import express
 from mbs.recursions.velocities import Acceleration, Velocity, moving_base, resting_base
 from mbs.recursions.velocities import link_accelerations as tree_accelerations
 from mbs.recursions.velocities import link_velocities as tree_velocities
@@ -235,7 +235,7 @@ def jacobian_dot_velocity(
         motion = links[j] if j >= 0 else base
         vd = motion.vd + casadi.mtimes(motion.rate.U, inside.p)
         home = (j, Pose.identity())
-        parts = expressed(system.tree, s.q, axes, home, [vd, motion.wd])
+        parts = express(system.tree, s.q, axes, home, [vd, motion.wd])
         return [*_state(s), *extra], [("jpqp", casadi.vertcat(*parts))]
 
     key = ("jpqp", frame, expressed_in, moving_base, coordinates)

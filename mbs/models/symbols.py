@@ -13,7 +13,7 @@ from mbs.errors import ModelError
 from mbs.loops.examine import LED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
-from mbs.recursions.force_elements import element_wrenches, summed
+from mbs.recursions.force_elements import element_wrenches, sum_wrenches
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.velocities import Acceleration, moving_base, resting_base
 from mbs.spatial import Wrench, carried
@@ -182,7 +182,7 @@ def exerted(
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
     """
-    return summed(around.external, element_wrenches(system.tree, system.forces, poses, q, v))
+    return sum_wrenches(around.external, element_wrenches(system.tree, system.forces, poses, q, v))
 
 
 def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
@@ -191,7 +191,7 @@ def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
     for column, row in enumerate(system.bodies):
         link, pose = system.frames[row.name]
         exerted.append({link: carried(pose, (wrenches[0:3, column], wrenches[3:6, column]))})
-    return summed(*exerted)
+    return sum_wrenches(*exerted)
 
 
 # Functions made of other models, on the same symbols.

@@ -18,7 +18,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regrouped, slid
+from mbs.recursions.regrouping import regroup, slide_frames
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     Displacement,
@@ -217,7 +217,7 @@ def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
         poses: each with respect to its antecedent.
         right: (nv, m) efforts.
     """
-    poses, bodies = slid(tree, poses, [link.inertia for link in tree.links])
+    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
     eliminations = _eliminations(tree, poses, bodies)
     rest = [zeros(6)] * len(tree.links)
     columns = (_solution(tree, eliminations, rest, right[:, k]) for k in range(right.shape[1]))
@@ -247,13 +247,13 @@ def articulated_accelerations(
     """
     inertias = [link.inertia for link in tree.links]
     if not external:
-        poses, inertias = slid(tree, poses, inertias, base_rests=is_zero(base.w))
+        poses, inertias = slide_frames(tree, poses, inertias, base_rests=is_zero(base.w))
     bodies = [PseudoInertia.of(inertia) for inertia in inertias]
     still = SX.zeros(tree.nv)
     motions = link_accelerations(tree, poses, v, still, base)
     wrenches = [
         casadi.vertcat(*inertial_wrench(body, motion))
-        for body, motion in zip(regrouped(tree, poses, bodies), motions, strict=True)
+        for body, motion in zip(regroup(tree, poses, bodies), motions, strict=True)
     ]
     for j, wrench in external.items():
         wrenches[j] += casadi.vertcat(*wrench)
@@ -268,8 +268,8 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
 
     Where the first is a vanishing part of the second, the inertia matrix is singular.
     """
-    poses, bodies = slid(tree, poses, [link.inertia for link in tree.links])
-    rigid = regrouped(tree, poses, bodies)
+    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    rigid = regroup(tree, poses, bodies)
     free, locked = zeros(tree.nv), zeros(tree.nv)
     for link, elimination in zip(tree.links, _eliminations(tree, poses, bodies), strict=True):
         free[link.v] = casadi.vertcat(*(pivot.size for pivot in elimination.pivots))
@@ -292,8 +292,8 @@ def _eliminations(
     tree: Tree, poses: list[LinkPose], bodies: Sequence[Inertia]
 ) -> list[JointElimination]:
     """Every joint taken out, from the leaves to the base."""
-    regroup = regrouped(tree, poses, list(bodies))
-    articulated = [ArticulatedInertia.of(body) for body in regroup]
+    rigid = regroup(tree, poses, list(bodies))
+    articulated = [ArticulatedInertia.of(body) for body in rigid]
     leaves = set(range(len(tree.links))) - {link.antecedent for link in tree.links}
     result: list[JointElimination] = []
     for j in reversed(range(len(tree.links))):
@@ -302,7 +302,7 @@ def _eliminations(
         outer, body = pose.steps, articulated[j]
         if j in leaves and link.motion.nv == 1:
             inner, outer = pose.motion, pose.seat
-            body = ArticulatedInertia.of(pose.motion[0].body(regroup[j]))
+            body = ArticulatedInertia.of(pose.motion[0].body(rigid[j]))
         drive, pivots = _drive(tree, poses, j), list[Pivot]()
         if inner:
             drive = replace(drive, momentum=inner[0].turn.apply(drive.momentum))

@@ -14,7 +14,7 @@ from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import momentum_on
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regrouped, slid
+from mbs.recursions.regrouping import regroup, slide_frames
 from mbs.recursions.velocities import effort, unit_motions
 from mbs.spatial import Wrench, body_through, wrench_through, zeros
 
@@ -25,8 +25,8 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
     The composite body of link j is seen from the seat of its joint, where its momentum for a unit
     velocity can be read off, and from there as a part of link i.
     """
-    poses, bodies = slid(tree, poses, [link.inertia for link in tree.links])
-    composite = regrouped(tree, poses, bodies)
+    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    composite = regroup(tree, poses, bodies)
     A = zeros(tree.nv, tree.nv)
     for j in reversed(range(len(tree.links))):
         link, pose = tree.links[j], poses[j]
@@ -109,7 +109,7 @@ def factor_symbols(before: list[int]) -> TreeFactor:
     return TreeFactor(SX.sym("ratios", size), SX.sym("inverse", len(before)))
 
 
-def factorized(A: SX, before: list[int]) -> TreeFactor:
+def factorize(A: SX, before: list[int]) -> TreeFactor:
     """The factors of A.
 
     Args:
@@ -130,7 +130,7 @@ def factorized(A: SX, before: list[int]) -> TreeFactor:
     return TreeFactor(casadi.vertcat(SX(0, 1), *ratios), casadi.vertcat(*inverse))
 
 
-def substituted(factor: TreeFactor, right: SX, before: list[int]) -> SX:
+def substitute(factor: TreeFactor, right: SX, before: list[int]) -> SX:
     """The solution x of A x = right, one or several columns.
 
     Args:
@@ -154,7 +154,7 @@ def substituted(factor: TreeFactor, right: SX, before: list[int]) -> SX:
 
 def solve_tree(A: SX, right: SX, before: list[int]) -> SX:
     """The solution x of A x = right; arguments as of `factorized` and `substituted`."""
-    return substituted(factorized(A, before), right, before)
+    return substitute(factorize(A, before), right, before)
 
 
 def _path(before: list[int], k: int) -> list[int]:

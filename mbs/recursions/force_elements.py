@@ -54,7 +54,9 @@ def inertial_loads(
     return loads
 
 
-def transmitted(tree: Tree, poses: list[LinkPose], loads: Mapping[int, Wrench]) -> list[Wrench]:
+def transmitted_wrenches(
+    tree: Tree, poses: list[LinkPose], loads: Mapping[int, Wrench]
+) -> list[Wrench]:
     """The wrench that each link takes from its antecedent, about and in its frame.
 
     Args:
@@ -70,7 +72,7 @@ def transmitted(tree: Tree, poses: list[LinkPose], loads: Mapping[int, Wrench]) 
     return carried
 
 
-def summed(*parts: Mapping[int, Wrench]) -> dict[int, Wrench]:
+def sum_wrenches(*parts: Mapping[int, Wrench]) -> dict[int, Wrench]:
     """Wrenches on links added link by link."""
     total: dict[int, Wrench] = {}
     for part in parts:
@@ -109,7 +111,7 @@ def element_wrenches(
             if link >= 0 if held is None else (point.owner.name, point.port) in held:
                 f, m = carried(pose, wrench)
                 exerted.append({link: (-f, -m)})
-    return summed(*exerted)
+    return sum_wrenches(*exerted)
 
 
 def coordinate_efforts(tree: Tree, forces: Sequence[AttachedForce], q: SX, v: SX) -> SX:
@@ -176,6 +178,6 @@ def _on_frames(
 
 def wrench_efforts(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:
     """(nv, 1) efforts along the motions that transmit wrenches of links to the base."""
-    carried = transmitted(tree, poses, wrenches)
+    carried = transmitted_wrenches(tree, poses, wrenches)
     efforts = (effort(link.motion, f, m) for link, (f, m) in zip(tree.links, carried, strict=True))
     return casadi.vertcat(*efforts)

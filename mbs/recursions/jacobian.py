@@ -1,6 +1,6 @@
 """Jacobian of a frame, where its entries are zero or constant, and Renaud's factors of it.
 
-Every joint gives the velocity z x L along its own axis, L being the way from the joint to the
+Every joint gives the velocity z x L along its own axis, L being the vector from the joint to the
 point whose velocity is asked for; the axes in which the result is wanted may be those of any
 frame, and the nearer they are to the middle of the chain, the fewer turns are needed.
 
@@ -25,18 +25,18 @@ from mbs.recursions.poses import base_poses, link_poses
 from mbs.recursions.route import (
     JointAt,
     OriginOf,
-    Shift,
-    Step,
-    Tilt,
+    OtherRotation,
+    PathStep,
+    PathTranslation,
     along,
     common_link,
     cost,
-    expressed,
-    joined,
+    express,
+    join_rotations,
+    path_between,
+    path_to,
     relative_pose,
-    walked_back,
-    way_between,
-    way_to,
+    reverse_path,
 )
 from mbs.recursions.velocities import unit_motions
 from mbs.spatial import Pose, Rotation, cross, is_zero, skew, zeros
@@ -71,26 +71,28 @@ class Outlook:
 
     Attributes:
         tree: the links.
-        branches: two ways outwards from that frame: to the frame that moves, with the joints
+        branches: two paths outwards from that frame: to the frame that moves, with the joints
             that come after their common link, and to the base with the others.
     """
 
     tree: Tree
-    branches: tuple[list[Step], list[Step]]
+    branches: tuple[list[PathStep], list[PathStep]]
 
     @property
     def turns(self) -> int:
         """Number of turns on the longer branch."""
-        return max(sum(isinstance(s, Tilt) for s in branch) for branch in self.branches)
+        return max(sum(isinstance(s, OtherRotation) for s in branch) for branch in self.branches)
 
 
 def outlook(target: VelocityTarget) -> Outlook:
     """What the Jacobian of a frame in certain axes is made of."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
-    back, out = way_between(tree, q, axes, frame)
+    back, out = path_between(tree, q, axes, frame)
     aside = [step for step in back if not isinstance(step, (JointAt, OriginOf))]
-    trunk = walked_back(way_to(tree, q, (common_link(tree, frame[0], axes[0]), Pose.identity())))
-    return Outlook(tree, (joined([*aside, *out], tree), joined([*aside, *trunk], tree)))
+    trunk = reverse_path(path_to(tree, q, (common_link(tree, frame[0], axes[0]), Pose.identity())))
+    return Outlook(
+        tree, (join_rotations([*aside, *out], tree), join_rotations([*aside, *trunk], tree))
+    )
 
 
 def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> SX:
@@ -115,8 +117,8 @@ Column = tuple[int, SX, SX]
 """Number in v, and what a unit of it gives: linear and angular velocity."""
 
 
-def _arms(branches: Sequence[list[Step]], reference: int | None) -> list[list[SX]]:
-    """After each step of each branch, the way from there to the reference, in the axes there."""
+def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
+    """After each step of each branch, the vector from there to the reference, in the axes there."""
     place = [_place(branch, reference) for branch in branches]
     here = 0 if reference is None or place[0] is not None else 1
     number = place[here]
@@ -128,7 +130,7 @@ def _arms(branches: Sequence[list[Step]], reference: int | None) -> list[list[SX
     return [own, other] if here == 0 else [other, own]
 
 
-def _place(branch: list[Step], reference: int | None) -> int | None:
+def _place(branch: list[PathStep], reference: int | None) -> int | None:
     """The step after which the reference is; -1 is the beginning, None elsewhere."""
     if reference is None:
         return len(branch) - 1
@@ -136,33 +138,33 @@ def _place(branch: list[Step], reference: int | None) -> int | None:
     return branch.index(mark) if mark in branch else None
 
 
-def _inward(branch: list[Step]) -> tuple[list[SX], SX]:
+def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
     """Ways to the end of the branch, after each step and before the first."""
     arm, arms = zeros(), []
     for step in reversed(branch):
         arms.append(arm)
         match step:
-            case Shift(p=p):
+            case PathTranslation(p=p):
                 arm = arm + p
-            case Tilt(rotation=rotation):
+            case OtherRotation(rotation=rotation):
                 (arm,) = along(rotation, [arm])
     return arms[::-1], arm
 
 
-def _outward(branch: list[Step], arm: SX) -> list[SX]:
+def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
     """Ways to a reference that lies `arm` from the beginning of the branch."""
     arms = []
     for step in branch:
         match step:
-            case Shift(p=p):
+            case PathTranslation(p=p):
                 arm = arm - p
-            case Tilt(rotation=rotation) if not is_zero(arm):
+            case OtherRotation(rotation=rotation) if not is_zero(arm):
                 arm = casadi.densify(rotation.apply_inverse(arm))
         arms.append(arm)
     return arms
 
 
-def _local_columns(tree: Tree, branch: list[Step], arms: list[SX]) -> list[tuple[int, Column]]:
+def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[tuple[int, Column]]:
     """For each joint on the branch, the step where it is and its columns in the axes there."""
     result = []
     for number, step in enumerate(branch):
@@ -174,20 +176,22 @@ def _local_columns(tree: Tree, branch: list[Step], arms: list[SX]) -> list[tuple
     return result
 
 
-def _carried(branch: list[Step], columns: list[tuple[int, Column]], matrices: int) -> list[Column]:
+def _carried(
+    branch: list[PathStep], columns: list[tuple[int, Column]], matrices: int
+) -> list[Column]:
     """The columns in the axes at the beginning of the branch."""
-    turns = [number for number, step in enumerate(branch) if isinstance(step, Tilt)]
+    turns = [number for number, step in enumerate(branch) if isinstance(step, OtherRotation)]
     split = turns[matrices] if matrices < len(turns) else len(branch)
     R, near = Pose.identity().R, []
     for number, step in enumerate(branch[:split]):
-        if isinstance(step, Tilt):
+        if isinstance(step, OtherRotation):
             R = casadi.mtimes(R, step.rotation.matrix)
         near += [_turned(R, column) for at, column in columns if at == number]
     far: list[Column] = []
     for number in reversed(range(split, len(branch))):
         far += [column for at, column in columns if at == number]
         step = branch[number]
-        if isinstance(step, Tilt):
+        if isinstance(step, OtherRotation):
             far = [_moved(step.rotation, column) for column in far]
     return near + [_turned(R, column) for column in far]
 
@@ -219,13 +223,13 @@ _ZERO = 1e-10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """A frame's Jacobian and the frames on the way to it, at random configurations.
+    """A frame's Jacobian and the frames on the path to it, at random configurations.
 
     Lengths are parts of the largest one, so that a small mechanism has no more zeros than a large
     one.
 
     Attributes:
-        frames: the base, the links on the way, and at last the axes that were asked for.
+        frames: the base, the links on the path, and at last the axes that were asked for.
         R: (frames, samples, 3, 3) their orientations in the base.
         p: (frames, samples, 3) their origins in the base.
         target_p: (samples, 3) origin of the frame that moves, in the base.
@@ -406,8 +410,8 @@ def renaud(
 
     Args:
         target: the frame that moves, and the axes that are wanted.
-        intermediate: link on the way to the frame, -1 for the base, or None for the best.
-        reference: link on the way whose origin the velocity J v belongs to, or None for the best.
+        intermediate: link on the path to the frame, -1 for the base, or None for the best.
+        reference: link on the path whose origin the velocity J v belongs to, or None for the best.
     """
     found = survey(target)
     ranked = _ranked(found, intermediate, reference)
@@ -426,7 +430,7 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
         return zeros()
     place = reference, _HOME
     p = relative_pose(target.tree, target.q, place, target.frame).p
-    return expressed(target.tree, target.q, target.axes, place, [p])[0]
+    return express(target.tree, target.q, target.axes, place, [p])[0]
 
 
 def _ranked(

@@ -2,7 +2,7 @@
 
 They stand at the origin of link j and do not turn with joint j: what is computed there for the
 joint needs no turn about its own axis. Joints with parallel axes, one after the other, have the
-same axes, so that the way between them is a translation.
+same axes, so that what is between them is a translation.
 """
 
 from __future__ import annotations
@@ -96,8 +96,8 @@ class LineObserver:
     w_behind: SX
 
 
-def turning_line(dot: SX, ddot: SX, vd: SX) -> Line:
-    """A turn about z.
+def revolute_line(dot: SX, ddot: SX, vd: SX) -> Line:
+    """Of a revolute joint, about z.
 
     Args:
         dot: (3, 1) rate of the direction of the axis [rad/s].
@@ -112,8 +112,8 @@ def turning_line(dot: SX, ddot: SX, vd: SX) -> Line:
     )
 
 
-def sliding_line(dot: SX, ddot: SX) -> Line:
-    """A slide along z, for the rates of its direction."""
+def prismatic_line(dot: SX, ddot: SX) -> Line:
+    """Of a prismatic joint along z, for the rates of its direction."""
     return Line(
         unit=Twist(vector([0, 0, 1]), zeros()),
         spin=zeros(),
@@ -150,8 +150,8 @@ class Drift:
     twice: SX
 
 
-Step = Displacement | Drift
-"""An element of the way from the axes of one joint to those of the joint before."""
+AxesStep = Displacement | Drift
+"""An element of the path from the axes of one joint to those of the joint before."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,16 +159,16 @@ class JointAxes:
     """The axes of joint j at the origin of link j.
 
     Attributes:
-        turn: from the frame of link j to the axes; None when they are the same.
-        way: from the axes to those of the antecedent, when `joined`, else to its frame.
-        joined: whether the axes of the antecedent are parallel to these.
+        rotation: from the frame of link j to the axes; None when they are the same.
+        path: from the axes to those of the antecedent, when `parallel`, else to its frame.
+        parallel: whether the axes of the antecedent are parallel to these.
         lines: the motions that the joint allows, in these axes.
         w: (3, 1) angular velocity of link j, in these axes.
     """
 
-    turn: Rotation | None
-    way: tuple[Step, ...]
-    joined: bool
+    rotation: Rotation | None
+    path: tuple[AxesStep, ...]
+    parallel: bool
     lines: tuple[Line, ...]
     w: SX
 
@@ -204,14 +204,14 @@ def _of_several(
 ) -> JointAxes:
     """The frame of the link itself, for joints of several velocities."""
     linear, angular = motion_behind(link.motion, v)
-    way: tuple[Step, ...] = (
+    path: tuple[AxesStep, ...] = (
         *_drift(linear),
         *reversed(pose.steps),
         *_drift(cross(before.w, pose.p)),
     )
     vd = pose.apply_inverse(before.vd + casadi.mtimes(before.rate.U, pose.p))
     seen = LineObserver(-linear, own.w - angular, vd, pose.apply_inverse(before.wd), own.w)
-    return JointAxes(None, way, False, free_lines(link.motion, seen), own.w)
+    return JointAxes(None, path, False, free_lines(link.motion, seen), own.w)
 
 
 def _of_one(
@@ -224,30 +224,30 @@ def _of_one(
     screw = pose.motion[0]
     assert isinstance(screw, Screw)
     linear, _ = motion_behind(link.motion, v)
-    slide = Screw.about("z", SX(0), screw.t)
-    way: tuple[Step, ...] = (
+    height = Screw.about("z", SX(0), screw.t)
+    path: tuple[AxesStep, ...] = (
         *_drift(linear),
-        slide,
+        height,
         *reversed(pose.seat),
         *_drift(cross(before.w, pose.p)),
     )
     if link.motion is Motion.PRISMATIC:
-        line = sliding_line(dot, ddot)
+        line = prismatic_line(dot, ddot)
     else:
         vd = pose.at_seat(before.vd + casadi.mtimes(before.rate.U, pose.p))
-        line = turning_line(dot, ddot, vd)
-    return JointAxes(pose.spin, way, False, (line,), vector([w[0], w[1], own.w[2]]))
+        line = revolute_line(dot, ddot, vd)
+    return JointAxes(pose.spin, path, False, (line,), vector([w[0], w[1], own.w[2]]))
 
 
-def _continued(pose: LinkPose, turn: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
-    """The axes of the joint before, at another point; `turn` leads to them from its frame."""
-    p = turn.apply(pose.p)
+def _continued(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
+    """The axes of the joint before, at another point; `rotation` leads to them from its frame."""
+    p = rotation.apply(pose.p)
     shift = tuple(Screw.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))
-    way: tuple[Step, ...] = (*shift, *_drift(cross(axes.w, p)))
+    path: tuple[AxesStep, ...] = (*shift, *_drift(cross(axes.w, p)))
     before = axes.lines[0]
-    line = turning_line(before.spin, before.second.angular, pose.spin.apply(own.vd))
+    line = revolute_line(before.spin, before.second.angular, pose.spin.apply(own.vd))
     w = vector([axes.w[0], axes.w[1], own.w[2]])
-    return JointAxes(pose.spin, way, True, (line,), w)
+    return JointAxes(pose.spin, path, True, (line,), w)
 
 
 def _drift(velocity: SX) -> tuple[Drift, ...]:

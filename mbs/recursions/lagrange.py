@@ -20,8 +20,7 @@ from mbs.assembly.tree import Link, Tree, position_rate
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import momentum_on, spin_momenta
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regrouped, slid
-from mbs.recursions.route import parameters_of, price
+from mbs.recursions.regrouping import regroup, slide_frames
 from mbs.recursions.velocities import (
     effort,
     link_accelerations,
@@ -240,11 +239,6 @@ class _FormWork:
     w: list[SX]
 
 
-_COMPARED = 12
-"""Links up to which frames slid and not slid are both tried: a second for both. The gain beyond is
-below one operation in a hundred."""
-
-
 def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
     """The three matrices of the dynamic model.
 
@@ -254,19 +248,8 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
         v: (nv, 1) joint velocities.
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    moved = slid(tree, poses, bodies)
-    form = _form(tree, *moved, v)
-    if moved[0] is poses or len(tree.links) > _COMPARED:
-        return form
-    fixed = parameters_of(tree, poses)
-    return min(
-        (form, _form(tree, poses, bodies, v)),
-        key=lambda form: price(casadi.horzcat(form.A, form.B, form.Q), fixed),
-    )
-
-
-def _form(tree: Tree, poses: list[LinkPose], bodies: list[PseudoInertia], v: SX) -> LagrangeForm:
-    bodies = regrouped(tree, poses, bodies)
+    poses, bodies = slide_frames(tree, poses, bodies)
+    bodies = regroup(tree, poses, bodies)
     rest, base = zeros(tree.nv), resting_base(zeros())
     w = [motion.w for motion in link_accelerations(tree, poses, v, rest, base)]
     places = _places(tree, poses, v, w)

@@ -14,9 +14,9 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.forces import smooth_sign
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import heights_first, regrouped, slid
+from mbs.recursions.regrouping import regroup, slide_frames
 from mbs.recursions.velocities import Acceleration, effort, link_accelerations, moment_of_rotation
-from mbs.spatial import PseudoInertia, Rotation, Wrench, add_wrenches, cross, is_zero, vector, zeros
+from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero, zeros
 
 # Rotors that spin with joints: what their angular momentum asks of joints and carriers.
 #
@@ -89,73 +89,6 @@ def rotor_energy(tree: Tree, v: SX, w: list[SX]) -> SX:
     return total
 
 
-# The effort of a joint on the base, across the parallel axes behind it.
-#
-# A wrench reaches link 1 from a run of parallel axes turned once for each of them. The joint of
-# link 1 feels one element of its moment only; that one is had in fewer operations by turning the
-# load of every link of the run once, by the sum of its angles.
-
-
-def runs_behind(tree: Tree, poses: list[LinkPose]) -> dict[int, list[int]]:
-    """For links that turn on the base, the links of a run of parallel axes behind them.
-
-    There is one where the run has more than one joint and its axes stand at right angles to that
-    of the link on the base.
-    """
-    found = {}
-    for g, link in enumerate(tree.links):
-        i = link.antecedent
-        if i < 0 or tree.links[i].antecedent >= 0 or tree.links[i].motion is not Motion.REVOLUTE:
-            continue
-        members = [j for j, pose in enumerate(poses) if pose.run[0] == g]
-        if len(members) > 1 and i not in found and _stands_across(poses, members):
-            found[i] = members
-    return found
-
-
-def _stands_across(poses: list[LinkPose], members: list[int]) -> bool:
-    first = poses[members[0]]
-    axis = first.at_seat(vector([0, 0, 1]))
-    square = axis[2].is_zero() and first.foot[1].is_zero()
-    return bool(square) and all(poses[j].height.is_zero() for j in members)
-
-
-def moment_of_run(
-    tree: Tree, poses: list[LinkPose], members: list[int], loads: list[Wrench], forces: list[SX]
-) -> SX:
-    """Moment of a run about the axis of the link before it.
-
-    Args:
-        tree: the links.
-        poses: each with respect to its antecedent.
-        members: the links of the run.
-        loads: for every link the wrench on it, in its frame, without what the other links of the
-            run transmit to it.
-        forces: for every link the force that its joint transmits along its axis.
-    """
-    first = poses[members[0]]
-    axis = first.at_seat(vector([0, 0, 1]))
-    moments = {j: loads[j][1] for j in members}
-    pushes = {j: loads[j][0] for j in members}
-    total = cross(axis, first.at_seat(first.foot))[2] * forces[members[0]]
-    for j in reversed(members[1:]):
-        i, foot = tree.links[j].antecedent, poses[j].foot
-        moments[i] = moments[i] + vector([0, -foot[0] * forces[j], 0])
-    for j in members:
-        total += _along(axis, poses[j].spin, moments[j])
-    across = cross(axis, vector([0, 0, 1]))
-    for j in members[1:]:
-        behind = [k for k in members if j in poses[k].run]
-        total += poses[j].foot[2] * sum(
-            (_along(across, poses[k].spin, pushes[k]) for k in behind), SX(0)
-        )
-    return total
-
-
-def _along(axis: SX, turn: Rotation, vector: SX) -> SX:
-    return SX(casadi.dot(axis, turn.apply(vector)))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Dynamics:
     """Everything that the recursions of Newton and Euler compute.
@@ -194,33 +127,31 @@ def newton_euler(
         base: motion of the base; see `resting_base`.
         external: for some links the wrench that they exert on their environment.
     """
+    # passes: frames where distances vanish, parameters in as few places as possible
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    if not external:
-        poses, bodies = slid(tree, poses, bodies, base_rests=is_zero(base.w))
-        poses = heights_first(poses)
-    bodies = regrouped(tree, poses, bodies)
+    if not external:  # those are about the origins of the description
+        poses, bodies = slide_frames(tree, poses, bodies, base_rests=is_zero(base.w))
+    bodies = regroup(tree, poses, bodies)
+
+    # forward: accelerations of the links, and the wrenches that move their bodies
     motions = link_accelerations(tree, poses, v, a, base)
-    runs = runs_behind(tree, poses)
     own = [inertial_wrench(body, motion) for body, motion in zip(bodies, motions, strict=True)]
+
+    # what bodies exert on their environment and on the rotors that they carry
     wrenches = list(own)
     for j, wrench in (external or {}).items():
         wrenches[j] = add_wrenches(wrenches[j], wrench)
     for c, moment in rotor_moments(tree, v, a, motions).items():
         wrenches[c] = (wrenches[c][0], wrenches[c][1] + moment)
-    loads = list(wrenches)
-    for j in reversed(range(len(tree.links))):
-        i = tree.links[j].antecedent
+
+    # backward: wrenches to the base, and of each its part along the joint
+    efforts = rotor_efforts(tree, a, motions, base)
+    for j, link in reversed(list(enumerate(tree.links))):
+        i = link.antecedent
+        efforts[link.v] += effort(link.motion, *wrenches[j])
         if i >= 0:
-            passed = poses[j].wrench(*wrenches[j])
-            wrenches[i] = add_wrenches(wrenches[i], passed)
-            if j not in runs.get(i, ()) and poses[j].run == (j,):
-                loads[i] = add_wrenches(loads[i], passed)
-    efforts = [effort(link.motion, f, m) for link, (f, m) in zip(tree.links, wrenches, strict=True)]
-    for i, members in runs.items():
-        along = [f[2] for f, _ in wrenches]
-        efforts[i] = loads[i][1][2] + moment_of_run(tree, poses, members, loads, along)
-    spin = rotor_efforts(tree, a, motions, base)
-    return Dynamics(motions, own, wrenches, casadi.vertcat(*efforts) + spin)
+            wrenches[i] = add_wrenches(wrenches[i], poses[j].wrench(*wrenches[j]))
+    return Dynamics(motions, own, wrenches, efforts)
 
 
 def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:

@@ -13,10 +13,10 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import CarriedRotor, Tree
-from mbs.recursions.joint_axes import Drift, JointAxes, Line, Step, Twist, joint_axes
+from mbs.recursions.joint_axes import AxesStep, Drift, JointAxes, Line, Twist, joint_axes
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments, spin_momenta
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import heights_first, regrouped, slid
+from mbs.recursions.regrouping import regroup, slide_frames
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     FreeDisplacement,
@@ -124,7 +124,7 @@ class SubtreeMotion:
                 K[k, h] -= twice[k] * ms[h]
         return SubtreeMotion(self.body, K, self.n + self.body.m * twice, self.f, self.m)
 
-    def through(self, step: Step) -> SubtreeMotion:
+    def through(self, step: AxesStep) -> SubtreeMotion:
         """Seen from the other end of a step."""
         if isinstance(step, Drift):
             return self.drifting(step.twice)
@@ -161,14 +161,14 @@ def subtree_motions(
     in_frame, parallel = list(own), [SubtreeMotion.zero()] * len(own)
     result = list(own)
     for j in reversed(range(len(own))):
-        turn, i = axes[j].turn, tree.links[j].antecedent
+        turn, i = axes[j].rotation, tree.links[j].antecedent
         here = in_frame[j] if turn is None else in_frame[j].turned(turn)
         here = result[j] = here + parallel[j]
         if i < 0:
             continue
-        for step in axes[j].way:
+        for step in axes[j].path:
             here = here.through(step)
-        if axes[j].joined:
+        if axes[j].parallel:
             parallel[i] += here
         else:
             in_frame[i] += here
@@ -214,7 +214,7 @@ class EffortColumn:
     momentum: Wrench
     spin: SX
 
-    def through(self, step: Step) -> EffortColumn:
+    def through(self, step: AxesStep) -> EffortColumn:
         """Seen from the other end of a step."""
         if isinstance(step, Drift):
             return self.drifting(step.twice)
@@ -269,7 +269,7 @@ def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
 
 def rotor_couple(rotor: CarriedRotor, axes: JointAxes) -> Couple:
     """The couple of a rotor, in the axes of the joint of the link that carries it."""
-    momentum = rotor.momentum if axes.turn is None else axes.turn.apply(rotor.momentum)
+    momentum = rotor.momentum if axes.rotation is None else axes.rotation.apply(rotor.momentum)
     return Couple(cross(axes.w, momentum), momentum)
 
 
@@ -293,15 +293,17 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
     for j, link in enumerate(tree.links):
         path = tree.path(j)
         pairs = sum(tree.links[i].motion.nv for i in path[:-1])
-        walk = sum(_cost(step) for i in path[1:] for step in axes[i].way)
-        turns = sum(axes[i].turn is not None and not axes[k].joined for i, k in pairwise(path))
+        walk = sum(_cost(step) for i in path[1:] for step in axes[i].path)
+        turns = sum(
+            axes[i].rotation is not None and not axes[k].parallel for i, k in pairwise(path)
+        )
         saving = walk + _TURN * turns - (_BASE_PAIR - _PAIR) * pairs - _BASE_COLUMN
         if saving > 0:
             saved[j] = saving * link.motion.nv
     return set(saved) if sum(saved.values()) > _BASE_LINE * tree.nv else set()
 
 
-def _cost(step: Step) -> int:
+def _cost(step: AxesStep) -> int:
     """Operations that a step takes of a column."""
     match step:
         case Drift():
@@ -340,10 +342,10 @@ def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
         R, p, twice = SX.eye(3), zeros(), zeros()
         if i >= 0:
             R, p, twice = result[i].place.turn.matrix, result[i].place.p, result[i].twice
-            turn = axes[i].turn
-            if turn is not None and not own.joined:
+            turn = axes[i].rotation
+            if turn is not None and not own.parallel:
                 R = _turned(R, turn)
-        for step in reversed(own.way):
+        for step in reversed(own.path):
             R, p, twice = _after(step, R, p, twice)
         place = FreeDisplacement(MatrixTurn(R), p)
         lines = (line.displaced(R, p).drifting(twice) for line in own.lines)
@@ -351,7 +353,7 @@ def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
     return result
 
 
-def _after(step: Step, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
+def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
     if isinstance(step, Drift):
         return R, p, twice + casadi.mtimes(R, step.twice)
     p = p + casadi.mtimes(R, step.point(zeros()))
@@ -406,9 +408,8 @@ def newton_euler_derivatives(
         of the velocity].
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    poses, bodies = slid(tree, poses, bodies, base_rests=is_zero(base.w))
-    poses = heights_first(poses)
-    bodies = regrouped(tree, poses, bodies)
+    poses, bodies = slide_frames(tree, poses, bodies, base_rests=is_zero(base.w))
+    bodies = regroup(tree, poses, bodies)
     motions = link_accelerations(tree, poses, v, a, base)
     axes = joint_axes(tree, poses, v, motions, base)
     spins, moments = spin_momenta(tree, v), rotor_moments(tree, v, a, motions)
@@ -477,10 +478,10 @@ def _through_axes(
         couple: of its rotor on the link before, in the axes of that link.
     """
     while tree.links[j].antecedent >= 0:
-        for step in axes[j].way:
+        for step in axes[j].path:
             column = column.through(step)
-        joined, j = axes[j].joined, tree.links[j].antecedent
-        turn = axes[j].turn
+        joined, j = axes[j].parallel, tree.links[j].antecedent
+        turn = axes[j].rotation
         if turn is not None and not joined:
             column = column.turned(turn)
         if couple is not None:

@@ -35,7 +35,7 @@ class LinkPose:
     Attributes:
         seat: from frame i to the seat of joint j, a frame fixed on link i whose z axis is the
             axis of the joint.
-        motion: from the seat to frame j: the turn and slide of the joint.
+        motion: from the seat to frame j: the rotation and translation of the joint.
         run: numbers of the revolute joints with parallel axes, one after the other, that end
             with this joint; the joint alone when its antecedent's axis is another.
         spin: the turn by the sum of the angles of the run.

@@ -78,7 +78,7 @@ class ColumnSum:
         return total if self.less is None else total - own[self.less]
 
 
-def filled(tree: Tree, poses: list[LinkPose], height: int, links: list[Elements]) -> list[SX]:
+def fill_rows(tree: Tree, poses: list[LinkPose], height: int, links: list[Elements]) -> list[SX]:
     """For every link the ten columns (height, 10) of its inertial parameters.
 
     Args:
@@ -262,7 +262,7 @@ def inertial_regressor(tree: Tree, poses: list[LinkPose], motions: list[Accelera
     for motion, twists in zip(motions, path_twists(tree, poses), strict=True):
         units = unit_wrenches(motion)
         links.append({twist.row: partial(element, twist, units) for twist in twists})
-    return filled(tree, poses, tree.nv, links)
+    return fill_rows(tree, poses, tree.nv, links)
 
 
 def unit_wrenches(motion: Acceleration) -> list[Unit]:
@@ -323,7 +323,7 @@ def inertial_energy(tree: Tree, poses: list[LinkPose], velocities: list[Velocity
         heights.append(below + casadi.dot(up, pose.p))
         row = unit_energies(velocities[j], ups[j], heights[j])
         links.append({0: row.__getitem__})
-    return filled(tree, poses, 1, links)
+    return fill_rows(tree, poses, 1, links)
 
 
 def unit_energies(velocity: Velocity, up: SX, height: SX) -> list[SX]:
@@ -361,7 +361,7 @@ def momentum_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
     for velocity, twists in zip(velocities, path_twists(tree, poses), strict=True):
         units = unit_momenta(velocity)
         links.append({twist.row: partial(element, twist, units) for twist in twists})
-    return filled(tree, poses, tree.nv, links)
+    return fill_rows(tree, poses, tree.nv, links)
 
 
 def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
@@ -384,7 +384,7 @@ def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
             raising = None if twist.row in level else twist
             rows[twist.row] = partial(_element, raising, rate, lifts, units)
         links.append(rows)
-    return filled(tree, poses, tree.nv, links)
+    return fill_rows(tree, poses, tree.nv, links)
 
 
 def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:

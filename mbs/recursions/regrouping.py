@@ -20,7 +20,7 @@ from mbs.recursions.poses import LinkPose
 from mbs.spatial import Body, Inertia, Screw, body_through, elements, exact_sum
 
 
-def regrouped(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]:
+def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]:
     """The bodies of a tree with the same equations of motion and fewer parameters.
 
     Args:
@@ -86,7 +86,7 @@ def _moments(body: Body) -> tuple[SX, SX, SX]:
 # distance that is passed on to a joint without one saves nothing.
 
 
-def slid(
+def slide_frames(
     tree: Tree, poses: list[LinkPose], bodies: list[Body], *, base_rests: bool = True
 ) -> tuple[list[LinkPose], list[Body]]:
     """The same tree with other frames of revolute links.
@@ -102,23 +102,6 @@ def slid(
         return poses, bodies
     moved = [_between(tree, poses, rise, j) for j in range(len(poses))]
     return moved, [body.slid(2, -rise[j]) for j, body in enumerate(bodies)]
-
-
-def heights_first(poses: list[LinkPose]) -> list[LinkPose]:
-    """Links that turn about an axis parallel to that before: their height before their turn.
-
-    The wrenches and accelerations of a run of parallel axes then meet one height alone; inertias
-    are carried past a height at less cost behind the turn.
-    """
-    return [_height_first(pose) if len(pose.run) > 1 else pose for pose in poses]
-
-
-def _height_first(pose: LinkPose) -> LinkPose:
-    screw = pose.motion[0]
-    if not isinstance(screw, Screw) or screw.t.is_zero():
-        return pose
-    height = Screw.about("z", SX(0), screw.t)
-    return replace(pose, seat=(height, *pose.seat), motion=(replace(screw, t=SX(0)),))
 
 
 def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:

@@ -1,14 +1,15 @@
-"""The way from one frame of a tree to another one, its price, and how frames move on it.
+"""The path from one frame of a tree to another one, its price, and how frames move along it.
 
-Turns about parallel axes that follow each other are joined into one turn by the sum of their
-angles; what lies between them is seen from before the first.
+Rotations about parallel axes that follow each other are joined into one by the sum of their
+angles; what lies between them is seen from before the first. The steps of a link are written here
+once more than in `link_poses`, because a sum needs the angles, not their sines and cosines.
 
 Source: Khalil & Kleinfinger 1986 for the frames; Renaud 1980 for sums of angles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -18,7 +19,6 @@ from mbs.assembly.tree import Frame, Link, Tree
 from mbs.components.forces import RelativeMotion
 from mbs.components.joints import Motion
 from mbs.operations import count
-from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, Velocity
 from mbs.spatial import (
     Khalil,
@@ -34,7 +34,7 @@ from mbs.spatial import (
     zeros,
 )
 
-# The price of a result, by which one of several ways to it is chosen.
+# The price of a result, by which one of several forms of it is chosen.
 
 
 def cost(value: SX, q: SX, p: SX) -> int:
@@ -50,48 +50,23 @@ def cost(value: SX, q: SX, p: SX) -> int:
     return count(f).price
 
 
-def price(value: SX, parameters: Collection[int]) -> int:
-    """The price of a matrix of any symbols, operations on parameters alone being free.
-
-    Args:
-        value: the matrix.
-        parameters: hashes of their symbols; see `parameters_of`.
-    """
-    symbols = casadi.symvar(value)
-    kinds: tuple[list[SX], list[SX]] = ([], [])
-    for symbol in symbols:
-        kinds[symbol.element_hash() in parameters].append(symbol)
-    return cost(value, casadi.vertcat(SX(0, 1), *kinds[0]), casadi.vertcat(SX(0, 1), *kinds[1]))
-
-
-def parameters_of(tree: Tree, poses: list[LinkPose]) -> frozenset[int]:
-    """Hashes of the symbols that the constants of a tree hold."""
-    constants = [tree.gravity]
-    for link, pose in zip(tree.links, poses, strict=True):
-        constants += [link.inertia.parameters, pose.foot, pose.at_seat(vector([1, 1, 1]))]
-        if link.motion is Motion.REVOLUTE:
-            constants.append(pose.height)
-    symbols = casadi.symvar(casadi.vertcat(*map(casadi.vec, constants)))
-    return frozenset(symbol.element_hash() for symbol in symbols)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class RouteTurn:
-    """A turn about z by an angle [rad], backwards when the way is walked back."""
+class RotationAboutZ:
+    """A rotation about z by an angle [rad], backwards on the path from its end to its beginning."""
 
     angle: SX
     backwards: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tilt:
-    """Any other turn."""
+class OtherRotation:
+    """Any other rotation."""
 
     rotation: Rotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shift:
+class PathTranslation:
     """A displacement p, (3, 1), in the axes where it stands [m]."""
 
     p: SX
@@ -111,10 +86,10 @@ class OriginOf:
     link: int
 
 
-Step = RouteTurn | Tilt | Shift | JointAt | OriginOf
+PathStep = RotationAboutZ | OtherRotation | PathTranslation | JointAt | OriginOf
 
 
-def way_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[Step]:
+def path_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[PathStep]:
     """The steps from the base to a frame at the positions q.
 
     Args:
@@ -123,123 +98,127 @@ def way_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[Step]:
         frame: link (-1 for the base) and pose of the frame in it.
     """
     j, inside = frame
-    steps: list[Step] = [OriginOf(-1)]
+    steps: list[PathStep] = [OriginOf(-1)]
     for k in tree.path(j):
         link = tree.links[k]
         steps += _link_steps(k, link, q[link.q])
     if not is_zero(inside.p):
-        steps.append(Shift(inside.p))
+        steps.append(PathTranslation(inside.p))
     if not inside.is_identity():
-        steps.append(Tilt(MatrixTurn(inside.R)))
+        steps.append(OtherRotation(MatrixTurn(inside.R)))
     return steps
 
 
-def _link_steps(k: int, link: Link, q: SX) -> list[Step]:
+def _link_steps(k: int, link: Link, q: SX) -> list[PathStep]:
     place, motion = link.placement, link.motion
-    slid = place.r + q if motion is Motion.PRISMATIC else place.r
+    height = place.r + q if motion is Motion.PRISMATIC else place.r
     steps = [step for frame in link.via for step in _fixed_steps(frame)] + _seat_steps(place)
     if motion in (Motion.REVOLUTE, Motion.PRISMATIC):
         steps.append(JointAt(k))
     if motion is Motion.REVOLUTE:
-        steps += [RouteTurn(q), RouteTurn(place.theta), Shift(vector([0, 0, slid]))]
-    else:
-        steps += [RouteTurn(place.theta), Shift(vector([0, 0, slid]))]
+        steps.append(RotationAboutZ(q))
+    steps += [RotationAboutZ(place.theta), PathTranslation(vector([0, 0, height]))]
     if motion is Motion.FREE:
-        steps.append(Shift(q[0:3]))
+        steps.append(PathTranslation(q[0:3]))
     if motion in (Motion.SPHERICAL, Motion.FREE):
-        steps += [Tilt(MatrixTurn(quaternion_rotation(q[motion.nq - 4 :]))), JointAt(k)]
+        steps += [OtherRotation(MatrixTurn(quaternion_rotation(q[motion.nq - 4 :]))), JointAt(k)]
     return [*(step for step in steps if not _is_idle(step)), OriginOf(k)]
 
 
-def _seat_steps(frame: Khalil) -> list[Step]:
+def _seat_steps(frame: Khalil) -> list[PathStep]:
     """From one frame to the axis of the next."""
     return [
-        RouteTurn(frame.gamma),
-        Shift(vector([0, 0, frame.b])),
-        Tilt(axis_turn("x", frame.alpha)),
-        Shift(vector([frame.d, 0, 0])),
+        RotationAboutZ(frame.gamma),
+        PathTranslation(vector([0, 0, frame.b])),
+        OtherRotation(axis_turn("x", frame.alpha)),
+        PathTranslation(vector([frame.d, 0, 0])),
     ]
 
 
-def _fixed_steps(frame: Khalil) -> list[Step]:
+def _fixed_steps(frame: Khalil) -> list[PathStep]:
     """From one frame to the next, which does not move."""
-    return [*_seat_steps(frame), RouteTurn(frame.theta), Shift(vector([0, 0, frame.r]))]
+    return [
+        *_seat_steps(frame),
+        RotationAboutZ(frame.theta),
+        PathTranslation(vector([0, 0, frame.r])),
+    ]
 
 
-def _is_idle(step: Step) -> bool:
+def _is_idle(step: PathStep) -> bool:
     match step:
-        case RouteTurn(angle=angle):
+        case RotationAboutZ(angle=angle):
             return bool(angle.is_zero())
-        case Tilt(rotation=Turn(s=s, c=c)):
+        case OtherRotation(rotation=Turn(s=s, c=c)):
             return bool(s.is_zero() and c.is_one())
-        case Shift(p=p):
+        case PathTranslation(p=p):
             return is_zero(p)
     return False
 
 
-def walked_back(steps: Iterable[Step]) -> list[Step]:
-    """The same way from its end to its beginning."""
+def reverse_path(steps: Iterable[PathStep]) -> list[PathStep]:
+    """The same path from its end to its beginning."""
     return [_inverse(step) for step in reversed(list(steps))]
 
 
-def _inverse(step: Step) -> Step:
+def _inverse(step: PathStep) -> PathStep:
     match step:
-        case RouteTurn(angle=angle, backwards=backwards):
-            return RouteTurn(angle, not backwards)
-        case Tilt(rotation=rotation):
-            return Tilt(inverse_rotation(rotation))
-        case Shift(p=p):
-            return Shift(-p)
+        case RotationAboutZ(angle=angle, backwards=backwards):
+            return RotationAboutZ(angle, not backwards)
+        case OtherRotation(rotation=rotation):
+            return OtherRotation(inverse_rotation(rotation))
+        case PathTranslation(p=p):
+            return PathTranslation(-p)
     return step
 
 
 def inverse_rotation(rotation: Rotation) -> Rotation:
-    """The rotation the other way."""
+    """The inverse rotation."""
     if isinstance(rotation, Turn):
         return Turn(rotation.axis, -rotation.s, rotation.c)
     return MatrixTurn(rotation.matrix.T)
 
 
-def joined(steps: Sequence[Step], tree: Tree) -> list[Step]:
-    """The way with its successive turns about one z axis made one, after what lies between them.
+def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
+    """The path with successive rotations about one z axis made one, after what lies between them.
 
     Args:
-        steps: a way outwards from some frame.
+        steps: a path outwards from some frame.
         tree: its links; joints with three axes need their own axes.
 
     Returns:
-        the steps, without a Spin in them.
+        the steps, without a `RotationAboutZ` in them.
     """
-    result: list[Step] = []
-    spins: list[RouteTurn] = []
+    result: list[PathStep] = []
+    rotations: list[RotationAboutZ] = []
     for step in steps:
         match step:
-            case RouteTurn():
-                spins.append(step)
-            case Shift(p=p):
-                result.append(Shift(_total(spins).apply(p)))
+            case RotationAboutZ():
+                rotations.append(step)
+            case PathTranslation(p=p):
+                result.append(PathTranslation(_total(rotations).apply(p)))
             case JointAt(link=k) if _along_z(tree.links[k]):
                 result.append(step)
             case OriginOf():
                 result.append(step)
             case _:
-                result += [*_turns(spins), step]
-                spins = []
-    return result + _turns(spins)
+                result += [*_one_rotation(rotations), step]
+                rotations = []
+    return result + _one_rotation(rotations)
 
 
 def _along_z(link: Link) -> bool:
     return link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
 
 
-def _turns(spins: list[RouteTurn]) -> list[Step]:
-    return [Tilt(_total(spins))] if spins else []
+def _one_rotation(rotations: list[RotationAboutZ]) -> list[PathStep]:
+    return [OtherRotation(_total(rotations))] if rotations else []
 
 
-def _total(spins: list[RouteTurn]) -> Turn:
-    """One turn of several, their angles added in the order of the tree whichever way one goes."""
+def _total(rotations: list[RotationAboutZ]) -> Turn:
+    """One rotation of several, their angles added in the order of the tree in either direction."""
     forward, backward = (
-        [spin.angle for spin in spins if spin.backwards is way] for way in (False, True)
+        [rotation.angle for rotation in rotations if rotation.backwards is backwards]
+        for backwards in (False, True)
     )
     angle = _sum(forward)
     if not backward:
@@ -255,19 +234,19 @@ def _sum(angles: list[SX]) -> SX:
     return total
 
 
-def way_between(
+def path_between(
     tree: Tree, q: SX, a: tuple[int, Pose], b: tuple[int, Pose]
-) -> tuple[list[Step], list[Step]]:
-    """The way from frame a to frame b: back to their common link, then out to b."""
-    to_a, to_b = way_to(tree, q, a), way_to(tree, q, b)
+) -> tuple[list[PathStep], list[PathStep]]:
+    """The path from frame a to frame b: back to their common link, then out to b."""
+    to_a, to_b = path_to(tree, q, a), path_to(tree, q, b)
     fork = OriginOf(common_link(tree, a[0], b[0]))
-    return walked_back(to_a[to_a.index(fork) + 1 :]), to_b[to_b.index(fork) + 1 :]
+    return reverse_path(to_a[to_a.index(fork) + 1 :]), to_b[to_b.index(fork) + 1 :]
 
 
 def relative_pose(
     tree: Tree, q: SX, a: tuple[int, Pose], b: tuple[int, Pose], *, outwards: bool = False
 ) -> Pose:
-    """Frame b seen from frame a, turns about parallel axes joined.
+    """Frame b seen from frame a, rotations about parallel axes joined.
 
     Args:
         tree: the links.
@@ -277,19 +256,19 @@ def relative_pose(
         outwards: begin at frame a instead of frame b; the pose is the same, its operations are
             others.
     """
-    back, out = way_between(tree, q, a, b)
-    steps = joined([*back, *out], tree)
+    back, out = path_between(tree, q, a, b)
+    steps = join_rotations([*back, *out], tree)
     pose = Pose.identity()
     for step in steps if outwards else reversed(steps):
         match step, outwards:
-            case Shift(p=p), True:
+            case PathTranslation(p=p), True:
                 pose = Pose(pose.R, pose.p + casadi.mtimes(pose.R, p))
-            case Shift(p=p), False:
+            case PathTranslation(p=p), False:
                 pose = Pose(pose.R, pose.p + p)
-            case Tilt(rotation=rotation), True:
+            case OtherRotation(rotation=rotation), True:
                 rows = (rotation.apply_inverse(pose.R[k, :].T).T for k in range(3))
                 pose = Pose(casadi.vertcat(*rows), pose.p)
-            case Tilt(rotation=rotation), False:
+            case OtherRotation(rotation=rotation), False:
                 R = casadi.mtimes(rotation.matrix, pose.R)
                 pose = Pose(R, along(rotation, [pose.p])[0])
     return pose
@@ -297,30 +276,30 @@ def relative_pose(
 
 def cheapest_pose(tree: Tree, q: SX, p: SX, a: tuple[int, Pose], b: tuple[int, Pose]) -> Pose:
     """The relative pose from whichever end it takes fewer operations; p are the parameters."""
-    both = [relative_pose(tree, q, a, b, outwards=way) for way in (False, True)]
+    both = [relative_pose(tree, q, a, b, outwards=outwards) for outwards in (False, True)]
     return min(both, key=lambda pose: cost(pose.matrix, q, p))
 
 
-def expressed(
+def express(
     tree: Tree, q: SX, axes: tuple[int, Pose], frame: tuple[int, Pose], vectors: Iterable[SX]
 ) -> list[SX]:
-    """Vectors of a frame in the axes of another one, turn by turn."""
-    back, out = way_between(tree, q, axes, frame)
+    """Vectors of a frame in the axes of another one, rotation by rotation."""
+    back, out = path_between(tree, q, axes, frame)
     turned = list(vectors)
-    for step in reversed(joined([*back, *out], tree)):
-        if isinstance(step, Tilt):
+    for step in reversed(join_rotations([*back, *out], tree)):
+        if isinstance(step, OtherRotation):
             turned = along(step.rotation, turned)
     return turned
 
 
 def common_link(tree: Tree, a: int, b: int) -> int:
-    """The last link that is on the way to both links; -1 is the base."""
+    """The last link that is on the path to both links; -1 is the base."""
     shared = [k for k, m in zip(tree.path(a), tree.path(b), strict=False) if k == m]
     return shared[-1] if shared else -1
 
 
 def along(rotation: Rotation, vectors: Iterable[SX]) -> list[SX]:
-    """Each vector of the turned frame in the fixed one; zeros stay zeros."""
+    """Each vector of the rotated frame in the fixed one; zeros stay zeros."""
     return [v if is_zero(v) else casadi.densify(rotation.apply(v)) for v in vectors]
 
 

@@ -13,7 +13,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Screw, cross, is_zero, vector, zeros
+from mbs.spatial import cross, is_zero, vector, zeros
 
 # What an elementary motion adds to a link: its velocity, and the effort that it feels.
 
@@ -95,25 +95,22 @@ class RotationRate:
     spread: tuple[SX, SX, SX]
 
 
-def rotation_rate(w: SX, wd: SX, across: SX | None = None, still: SX | None = None) -> RotationRate:
+def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
     """U on six products of the velocities, or on five.
 
     Args:
         w: (3, 1) angular velocity.
         wd: (3, 1) angular acceleration.
         across: x^2 + y^2 of w where it is known; y^2 then needs no product.
-        still: (3, 1) part of wd that is not w x (0, 0, z), where z is the third element of w;
-            then U13 and U23 are elements of it.
     """
     x, y, z = w[0], w[1], w[2]
     xx, zz, xy, xz, yz = x * x, z * z, x * y, x * z, y * z
     xy_square = xx + y * y if across is None or x.is_zero() or y.is_zero() else across
     xz_square, xz_difference = xx + zz, xx - zz
     yz_square = xy_square - xz_difference
-    U13, U23 = (xz + wd[1], yz - wd[0]) if still is None else (still[1], -still[0])
     U = casadi.vertcat(
-        casadi.horzcat(-yz_square, xy - wd[2], U13),
-        casadi.horzcat(xy + wd[2], -xz_square, U23),
+        casadi.horzcat(-yz_square, xy - wd[2], xz + wd[1]),
+        casadi.horzcat(xy + wd[2], -xz_square, yz - wd[0]),
         casadi.horzcat(xz - wd[1], yz + wd[0], -xy_square),
     )
     return RotationRate(U, (xz_square - xy_square, xz_difference, yz_square - xz_square))
@@ -196,7 +193,8 @@ def link_accelerations(
         linear, angular = motion_behind(link.motion, v[link.v])
         linear_rate, _ = motion_behind(link.motion, a[link.v])
         w, wd, rate = _rotation(tree, poses, j, v, a, [*result, base])
-        vd = _moved(pose, before, rate.U) + linear_rate
+        carried = before.vd + casadi.mtimes(before.rate.U, pose.p)
+        vd = pose.apply_inverse(carried) + linear_rate
         vd += cross(2 * pose.apply_inverse(before.w) + angular, linear)
         result.append(Acceleration(w, wd, rate, vd))
     return result
@@ -225,10 +223,8 @@ def _rotation(
         for k in run:
             speed, acceleration = speed + v[tree.links[k].v], acceleration + a[tree.links[k].v]
     w = turn.apply_inverse(w_seat) + vector([0, 0, speed])
-    carried = turn.apply_inverse(wd_seat)
-    wd = carried + vector([w[1] * speed, -w[0] * speed, acceleration])
-    still = carried if w_seat[2].is_zero() else None
-    return w, wd, rotation_rate(w, wd, _square_across(before, pose), still)
+    wd = turn.apply_inverse(wd_seat) + vector([w[1] * speed, -w[0] * speed, acceleration])
+    return w, wd, rotation_rate(w, wd, _square_across(before, pose))
 
 
 def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]) -> tuple[int, ...]:
@@ -255,24 +251,3 @@ def _square_across(before: Acceleration, pose: LinkPose) -> SX | None:
         if axis[(k + 1) % 3].is_zero() and axis[(k + 2) % 3].is_zero():
             return SX(-before.rate.U[k, k])
     return None
-
-
-def _moved(pose: LinkPose, before: Acceleration, U: SX) -> SX:
-    """Acceleration of the point of link i at the origin of frame j, in frame j.
-
-    A point on the axis of a joint is a point of both links: its distance r from the foot of the
-    axis may be multiplied by U_j instead of U_i, whichever has fewer entries.
-    """
-    screw, U_i = pose.motion[0], before.rate.U
-    if isinstance(screw, Screw):
-        slide = pose.p - pose.foot
-        if _products(U_i, slide) > _products(U, vector([0, 0, screw.t])):
-            carried = pose.apply_inverse(before.vd + casadi.mtimes(U_i, pose.foot))
-            return carried + screw.t * U[:, 2]
-    return pose.apply_inverse(before.vd + casadi.mtimes(U_i, pose.p))
-
-
-def _products(U: SX, p: SX) -> int:
-    """How many multiplications U p takes."""
-    moved = [k for k in range(3) if not p[k].is_zero()]
-    return sum(not U[row, k].is_zero() for row in range(3) for k in moved)

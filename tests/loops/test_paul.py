@@ -14,11 +14,11 @@ from support.arms import general_6r, slides_and_turns, spherical, three_parallel
 
 import mbs
 from mbs.closed_forms.paul import paul
-from mbs.closed_forms.ring import Gap, Ring, Unknown
 from mbs.closed_forms.sequence import Problem
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
+from mbs.recursions.chain import ChainJoint, Gap, Ring
 from mbs.robots.rows import frame, robot
 from mbs.spatial import Pose, axis_turn, vector
 
@@ -106,11 +106,11 @@ def test_leaves_hold_every_configuration(name):
 @pytest.mark.parametrize("name", ["puma560", "stanford", "scara", "spherical_4", "parallel_2"])
 def test_equations_hold_as_they_are_written(name):
     system, steps, _ = solved(name)
-    problem = chain(system).problem(np.zeros(0))
+    problem = frame_chain(system).problem(np.zeros(0))
     leaf = steps.leaf(problem.given, SX(DM([1] * len(steps.signs))))
     values = list(leaf.coefficients.values())
     function = Function("f", [problem.given], [leaf.x, casadi.vertcat(*values)])
-    arm_at = chain(system).arm(np.zeros(0))
+    arm_at = frame_chain(system).arm(np.zeros(0))
     checked = 0
     for seed in range(20):
         q = np.random.default_rng(seed).uniform(-1, 1, arm_at.size) + 0.1
@@ -141,7 +141,7 @@ def test_symbolic_lengths_stay_symbols():
     system = arm(
         {}, {"alpha": -HALF, "r": "R2"}, {"d": "D3"}, {"alpha": -HALF, "d": "D4", "r": "R4"}
     )
-    with_wrist = chain(system)
+    with_wrist = frame_chain(system)
     problem = with_wrist.problem()
     steps = paul(problem)
     leaves = steps.leaves(problem.given)
@@ -168,7 +168,7 @@ def test_leaves_are_finite_for_every_pose(name):
 
 def test_radicands_tell_poses_out_of_reach():
     system, steps, _ = solved("rx90")
-    problem = chain(system).problem(np.zeros(0))
+    problem = frame_chain(system).problem(np.zeros(0))
     leaves = steps.leaves(problem.given)
     real = Function("f", [problem.given], [casadi.horzcat(*(leaf.real for leaf in leaves))])
     plain = plain_arm(system)
@@ -193,8 +193,8 @@ def test_a_loop_that_no_pose_closes():
 
 def test_refusals_name_the_joints_left():
     with pytest.raises(NoClosedForm, match=r"q1, q2, q3, q4, q5, q6.*more than two unknowns"):
-        paul(chain(general_6r(1)).problem(np.zeros(0)))
-    ring = Ring((Unknown("ball", Motion.SPHERICAL, 0, 1),), (Gap(),))
+        paul(frame_chain(general_6r(1)).problem(np.zeros(0)))
+    ring = Ring((ChainJoint("ball", Motion.SPHERICAL, 0, 1),), (Gap(),))
     with pytest.raises(NoClosedForm, match="ball is spherical"):
         paul(Problem(ring, SX.sym("x", 2), SX.sym("g", 1), []))
 
@@ -209,7 +209,7 @@ def four_bar():
         Gap(Pose.moved(vector([coupler, 0, 0]))),
         Gap(Pose.moved(vector([0.7, 0, 0]))),
     )
-    joints = tuple(Unknown(f"q{k + 2}", Motion.REVOLUTE, k, 1) for k in range(3))
+    joints = tuple(ChainJoint(f"q{k + 2}", Motion.REVOLUTE, k, 1) for k in range(3))
     samples = []
     for angle, rocker in ((0.3, 1.9), (1.4, 2.4), (2.5, 0.8), (-0.9, 1.2)):
         tip = 0.3 * np.array([np.cos(angle), np.sin(angle)])
@@ -225,7 +225,7 @@ def four_bar():
 def solved(name):
     """An arm of SOLVED, its sequence, and all leaves (m, n) as a function of the pose."""
     system = SOLVED[name][0]()
-    problem = chain(system).problem(np.zeros(0))
+    problem = frame_chain(system).problem(np.zeros(0))
     steps = paul(problem)
     leaves = casadi.horzcat(*(leaf.x for leaf in steps.leaves(problem.given)))
     function = Function("leaves", [problem.given], [casadi.densify(leaves)], {"cse": True})

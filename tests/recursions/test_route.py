@@ -9,14 +9,14 @@ from symbolic_robots import symbolic_robot
 
 from mbs.recursions.poses import base_poses, link_poses
 from mbs.recursions.route import (
-    RouteTurn,
-    Shift,
-    Tilt,
-    expressed,
-    joined,
+    OtherRotation,
+    PathTranslation,
+    RotationAboutZ,
+    express,
+    join_rotations,
+    path_to,
     relative_pose,
-    walked_back,
-    way_to,
+    reverse_path,
 )
 from mbs.spatial import Pose
 
@@ -35,7 +35,7 @@ def test_way_between_any_two_frames_is_the_relative_pose(seed):
         pose = (placed[a[0]] @ a[1]).inverse() @ (placed[b[0]] @ b[1])
         found = relative_pose(tree, q, a, b)
         other = relative_pose(tree, q, a, b, outwards=True)
-        (turned,) = expressed(tree, q, (a[0], a[1]), (b[0], b[1]), [arrow])
+        (turned,) = express(tree, q, (a[0], a[1]), (b[0], b[1]), [arrow])
         difference = casadi.vertcat(
             *(casadi.vec(T.matrix - pose.matrix) for T in (found, other)),
             turned - casadi.mtimes(pose.R, arrow),
@@ -47,15 +47,15 @@ def test_way_between_any_two_frames_is_the_relative_pose(seed):
 def test_there_and_back_is_nowhere():
     system = symbolic_robot("puma560", "none").assemble()
     q = SX.sym("q", system.nq)
-    way = way_to(system.tree, q, system.frame(6))
+    way = path_to(system.tree, q, system.frame(6))
     point = SX([0.1, 0.2, 0.3])
-    for step in reversed(joined([*way, *walked_back(way)], system.tree)):
+    for step in reversed(join_rotations([*way, *reverse_path(way)], system.tree)):
         match step:
-            case Shift(p=p):
+            case PathTranslation(p=p):
                 point = point + p
-            case Tilt(rotation=rotation):
+            case OtherRotation(rotation=rotation):
                 point = rotation.apply(point)
-            case RouteTurn():
+            case RotationAboutZ():
                 pytest.fail("a spin was not made a turn")
     f = casadi.Function("f", [q, system.p], [point])
     end = np.array(f(np.arange(6) * 0.4, system.p_default)).ravel()

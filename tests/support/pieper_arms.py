@@ -10,7 +10,7 @@ from support.arm_search import distance, merged, plain_arm, searched
 
 import mbs
 from mbs.closed_forms.pieper import pieper
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.robots.rows import frame, robot
 
 EXACT, NOISE = 1e-11, 1e-10
@@ -68,7 +68,7 @@ def square(values):
 def solved(build, *arguments):
     """The system, its leaves, its sequence and its plain arm."""
     system = build(*arguments)
-    return system, *leaves_of(chain(system).problem()), plain_arm(system)
+    return system, *leaves_of(frame_chain(system).problem()), plain_arm(system)
 
 
 def configurations(leaves, T, p=()):

@@ -26,6 +26,7 @@ from mbs.closed_forms.paul.splits import (
     simple_rows,
     splits,
 )
+from mbs.recursions.chain import Ring
 
 Key = tuple[int, ...]
 
@@ -180,11 +181,11 @@ def _folded(
     rest, known = term, list[tuple[int, int]]()
     for number, (members, at) in enumerate(sums):
         powers = dict(rest)
-        way = powers.get(members[0][0], 0) if members else 0
-        if way and all(powers.get(k, 0) == way * sign for k, sign in members):
+        multiple = powers.get(members[0][0], 0) if members else 0
+        if multiple and all(powers.get(k, 0) == multiple * sign for k, sign in members):
             rest = tuple(member for member in rest if member[0] not in dict(members))
-            values = values * np.exp(1j * way * at)
-            known.append((number, way))
+            values = values * np.exp(1j * multiple * at)
+            known.append((number, multiple))
     if not known:
         return term, Source(term), values
     leading = next((e for k, e in rest if k not in slides), 0)
@@ -224,11 +225,12 @@ def _key(term: Members, variables: tuple[Variable, ...]) -> Key:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ways:
-    """The matrices of the gaps of a loop, forwards and backwards, and a length of it.
+class RingMatrices:
+    """The gaps of a ring as (15, 15) matrices, see `represented`; `ring_matrices` alone makes them.
 
     Attributes:
-        on, back: (15, 15) each.
+        on: from joint to joint.
+        back: in the other direction.
         length: of the size of the loop [m].
     """
 
@@ -245,28 +247,28 @@ class Factor:
     Y: SX
 
 
-def ways(knowledge: Knowledge) -> Ways:
-    """The matrices of the gaps of a loop."""
-    poses = [gap.pose for gap in knowledge.ring.gaps]
-    opposite = [gap.inverse().pose for gap in knowledge.ring.gaps]
+def ring_matrices(ring: Ring) -> RingMatrices:
+    """The matrices of the gaps of a ring."""
+    poses = [gap.pose for gap in ring.gaps]
+    opposite = [gap.inverse().pose for gap in ring.gaps]
     on = tuple(map(represented_pose, poses, opposite))
     back = tuple(map(represented_pose, opposite, poses))
     squares = [SX(casadi.sumsqr(pose.p)) for pose in poses]
     numbers = [square for square in squares if square.is_constant() and float(square) > 0]
     length = casadi.sqrt(sum(numbers or squares, SX(0 if numbers else 1e-60)))
-    return Ways(on, back, SX(length))
+    return RingMatrices(on, back, SX(length))
 
 
-def factor(knowledge: Knowledge, ways: Ways, equation: Equation, key: Key) -> Factor:
+def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key: Key) -> Factor:
     """What stands with a product of the variables of an equation."""
     total, part = Factor(SX(0), SX(0)), equation.parts.get(key)
     if part is None:
         return total
     sums = [value for _, value, _ in knowledge.open_sums()]
     for source in part.sources:
-        own = _own(knowledge, ways, equation, source.term)
+        own = _own(knowledge, matrices, equation, source.term)
         if source.known:
-            angle = sum((way * sums[number] for number, way in source.known), SX(0))
+            angle = sum((multiple * sums[number] for number, multiple in source.known), SX(0))
             own = _turned(own, angle, source.conjugate)
         total = Factor(total.X + own.X, total.Y + own.Y)
     x, y = np.max(np.abs(part.values.real)), np.max(np.abs(part.values.imag))
@@ -280,21 +282,21 @@ def _turned(own: Factor, angle: SX, conjugate: bool) -> Factor:
     return Factor(SX(X), SX(-Y if conjugate else Y))
 
 
-def _own(knowledge: Knowledge, ways: Ways, equation: Equation, term: Members) -> Factor:
+def _own(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, term: Members) -> Factor:
     """X and Y of one product of powers of the joints."""
     joints = knowledge.ring.joints
     slides = {k: power for k, power in term if not joints[k].turns}
     angles = [(k, sign) for k, sign in term if joints[k].turns]
     if not angles:
-        return Factor(_coefficient(knowledge, ways, equation.row, slides), SX(0))
+        return Factor(_coefficient(knowledge, matrices, equation.row, slides), SX(0))
     if not _has_partner(equation, slides, angles, term):
         cosines = {k: 1 for k, _ in angles}
         with_sine = cosines | {angles[0][0]: 2}
         return Factor(
-            _coefficient(knowledge, ways, equation.row, slides | cosines),
-            _coefficient(knowledge, ways, equation.row, slides | with_sine),
+            _coefficient(knowledge, matrices, equation.row, slides | cosines),
+            _coefficient(knowledge, matrices, equation.row, slides | with_sine),
         )
-    return _mixed(knowledge, ways, equation.row, (slides, angles))
+    return _mixed(knowledge, matrices, equation.row, (slides, angles))
 
 
 def _has_partner(
@@ -315,7 +317,7 @@ def _has_partner(
 
 def _mixed(
     knowledge: Knowledge,
-    ways: Ways,
+    matrices: RingMatrices,
     row: Row,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
 ) -> Factor:
@@ -327,62 +329,64 @@ def _mixed(
             [0.5 if c == 1 else -0.5j * e for c, (_, e) in zip(choice, angles, strict=True)]
         )
         chosen = {k: c for c, (k, _) in zip(choice, angles, strict=True)}
-        value = _coefficient(knowledge, ways, row, dict(slides) | chosen)
+        value = _coefficient(knowledge, matrices, row, dict(slides) | chosen)
         X, Y = X + weight.real * value, Y - weight.imag * value
     return Factor(SX(X), SX(Y))
 
 
-def _coefficient(knowledge: Knowledge, ways: Ways, row: Row, chosen: Mapping[int, int]) -> SX:
+def _coefficient(
+    knowledge: Knowledge, matrices: RingMatrices, row: Row, chosen: Mapping[int, int]
+) -> SX:
     """What stands with a product of the elementary functions of the joints.
 
     Args:
         knowledge: whose known joints are put in.
-        ways: the gaps.
+        matrices: of the gaps.
         row: of the equation.
         chosen: number of the function of each joint of the product: see `joint_basis`.
     """
     total = SX(0)
-    for way in (1, -1):
-        steps = list(_steps(row, len(ways.on), way))
+    for direction in (1, -1):
+        steps = list(_steps(row, len(matrices.on), direction))
         if all(("joint", k) in steps for k in chosen):
-            total += way * _along(knowledge, ways, (row, steps, way), chosen)
+            total += direction * _along(knowledge, matrices, (row, steps, direction), chosen)
     return SX(total)
 
 
-def _steps(row: Row, n: int, way: int) -> Iterator[tuple[str, int]]:
-    """The joints and the gaps between two frames, on one way around the loop."""
+def _steps(row: Row, n: int, direction: int) -> Iterator[tuple[str, int]]:
+    """The joints and the gaps between two frames, around the loop in one direction."""
     point = row.start
     while point != row.end:
-        at = point if way > 0 else (point - 1) % (2 * n)
+        at = point if direction > 0 else (point - 1) % (2 * n)
         yield ("joint", at // 2) if at % 2 == 0 else ("gap", (at // 2 + 1) % n)
-        point = (point + way) % (2 * n)
+        point = (point + direction) % (2 * n)
 
 
 def _along(
     knowledge: Knowledge,
-    ways: Ways,
+    matrices: RingMatrices,
     path: tuple[Row, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
-    """The element of w at the end of a way."""
-    row, steps, way = path
+    """The element of w at the end of a path."""
+    row, steps, direction = path
     r = SX(1, SIZE)
     r[0, row.element] = 1
     for kind, k in steps:
         if kind == "gap":
-            matrix = (ways.on if way > 0 else ways.back)[k]
+            matrix = (matrices.on if direction > 0 else matrices.back)[k]
         else:
-            matrix = _joint(knowledge, k, chosen.get(k, 0), way)
+            matrix = _joint(knowledge, k, chosen.get(k, 0), direction)
         r = SX(casadi.sparsify(casadi.mtimes(r, matrix)))
         if r.nnz() == 0:
             return SX(0)
     return SX(r[0, 0] + r[0, 6 + row.seed])
 
 
-def _joint(knowledge: Knowledge, k: int, number: int, way: int) -> SX:
+def _joint(knowledge: Knowledge, k: int, number: int, direction: int) -> SX:
     """One of the factors of an unknown joint, or the whole of a known one."""
     joint = knowledge.ring.joints[k]
-    sign = way * joint.sign
+    sign = direction * joint.sign
     if k not in knowledge.known:
         return _sparse_basis(joint.turns, sign)[number]
     basis, q = _sparse_basis(joint.turns, 1), knowledge.position(k)
@@ -393,6 +397,6 @@ def _joint(knowledge: Knowledge, k: int, number: int, way: int) -> SX:
 
 @cache
 def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
-    """The factors of a joint that moves with or against the way."""
+    """The factors of a joint that moves with or against the direction."""
     one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in joint_basis(not turns))
     return (one, first, sign * second) if turns else (one, sign * first, second)

@@ -123,7 +123,7 @@ def _built(stage: Stage, rows: tuple[Equation, ...], variables: Variables) -> St
             values[place] = angle_of(solved[at + 1] * D, solved[at] * D).value
         at += 1 if variable.slides else 2
     if not D.is_constant():
-        regular.append(SX((D / stage.ways.length**power) ** 2))
+        regular.append(SX((D / stage.matrices.length**power) ** 2))
     kind = _kind(variables)
     found = Found(values, (), tuple(regular), named)
     return step(stage.knowledge.problem, kind, equation, {}, found)

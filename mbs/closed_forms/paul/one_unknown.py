@@ -9,7 +9,7 @@ import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
 
-from mbs.closed_forms.paul.equation import Equation, Factor, Key, Ways, factor
+from mbs.closed_forms.paul.equation import Equation, Factor, Key, RingMatrices, factor
 from mbs.closed_forms.paul.splits import ZERO, Knowledge, Variable
 from mbs.closed_forms.sequence import Found, Step, angle_of, cosine_root, square_root, step
 
@@ -25,17 +25,17 @@ class Stage:
 
     Attributes:
         knowledge: what is known.
-        ways: the gaps of the loop.
+        matrices: of the gaps of the ring.
         equations: that hold.
     """
 
     knowledge: Knowledge
-    ways: Ways
+    matrices: RingMatrices
     equations: tuple[Equation, ...]
 
     def factor(self, equation: Equation, key: Key) -> Factor:
         """What stands with a product of the variables of an equation."""
-        return factor(self.knowledge, self.ways, equation, key)
+        return factor(self.knowledge, self.matrices, equation, key)
 
     def number(self, variable: Variable) -> str:
         """What tells the coefficients of a variable from others."""
@@ -124,7 +124,7 @@ def angle_step(
     ]
     right = f"Z{number}" if f"Z{number}" in named else "0"
     sign = SX.sym("sign")
-    found = _roots(stage.knowledge.place(variable), XYZ, sign, stage.ways.length**power)
+    found = _roots(stage.knowledge.place(variable), XYZ, sign, stage.matrices.length**power)
     found = replace(found, coefficients=named)
     signs = {stage.knowledge.name(variable): sign}
     equation = f"{' + '.join(pieces)} = {right}"
@@ -160,7 +160,7 @@ def length_step(stage: Stage, variable: Variable, abc: list[SX], kind: str = "qu
     number, shown = stage.number(variable), stage.term(variable)
     middle = divided(b, 2 * a)
     sign = SX.sym("sign")
-    root = square_root(middle * middle - divided(c, a), sign, stage.ways.length)
+    root = square_root(middle * middle - divided(c, a), sign, stage.matrices.length)
     named = {f"A{number}": a, f"B{number}": b, f"C{number}": c}
     named = {name: value for name, value in named.items() if not value.is_zero()}
     powers = {f"A{number}": f" {shown}^2", f"B{number}": f" {shown}", f"C{number}": ""}

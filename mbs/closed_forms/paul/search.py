@@ -11,15 +11,15 @@ import numpy as np
 from casadi import SX
 
 from mbs.closed_forms.paul.eliminated import eliminated
-from mbs.closed_forms.paul.equation import PRODUCTS, equations, ways
+from mbs.closed_forms.paul.equation import PRODUCTS, equations, ring_matrices
 from mbs.closed_forms.paul.linear import linear
 from mbs.closed_forms.paul.one_unknown import Candidate, Stage, one_unknown
 from mbs.closed_forms.paul.splits import Knowledge, Variable, beginning
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
-from mbs.closed_forms.ring import Gap, Ring
 from mbs.closed_forms.sequence import Found, Problem, Step, StepSequence, step
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
+from mbs.recursions.chain import Gap, Ring
 from mbs.spatial import Pose, vector
 
 # The last angle of a sum that is known.
@@ -48,11 +48,11 @@ def _alone(stage: Stage) -> Iterator[tuple[Variable, SX, str]]:
     ]
     yield from (own for own in opened if own[0].single)
     for (first, a, text), (second, b, other) in combinations(opened, 2):
-        for way in (1, -1):
-            rest = _combined(first, second, way)
+        for sense in (1, -1):
+            rest = _combined(first, second, sense)
             if len(rest) == 1:
                 ((k, sign),) = rest.items()
-                value = SX(a + way * b) / sign
+                value = SX(a + sense * b) / sign
                 yield _angle(knowledge, k), value, f"{text}, {other}"
 
 
@@ -60,10 +60,10 @@ def _angle(knowledge: Knowledge, k: int) -> Variable:
     return Variable(not knowledge.ring.joints[k].turns, ((k, 1),))
 
 
-def _combined(first: Variable, second: Variable, way: int) -> dict[int, int]:
+def _combined(first: Variable, second: Variable, sense: int) -> dict[int, int]:
     total = dict(first.members)
     for k, sign in second.members:
-        total[k] = total.get(k, 0) + way * sign
+        total[k] = total.get(k, 0) + sense * sign
     return {k: sign for k, sign in total.items() if sign in (1, -1)} if _unit(total) else {}
 
 
@@ -84,7 +84,7 @@ _ZERO = 1e-9
 def at_feet(problem: Problem) -> Ring:
     """The loop of a problem, the frame of each turning joint moved along its axis.
 
-    The foot of the common normal with the axis that follows becomes the origin, where that way is
+    The foot of the common normal with the axis that follows becomes the origin, where that gap is
     not the first one of the loop, through the known pose.
     """
     ring = problem.ring
@@ -138,7 +138,7 @@ def paul(problem: Problem) -> StepSequence:
     """
     _require_simple(problem)
     knowledge = beginning(problem, at_feet(problem))
-    loop, steps = ways(knowledge), list[Step]()
+    loop, steps = ring_matrices(knowledge.ring), list[Step]()
     while knowledge.unknown:
         stage = Stage(knowledge, loop, equations(knowledge))
         candidate = _cheapest(stage)

@@ -19,8 +19,8 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
-from mbs.closed_forms.ring import Ring
 from mbs.closed_forms.sequence import Problem
+from mbs.recursions.chain import Ring
 from mbs.spatial import Pose
 
 # What a search knows of a loop: joints, and sums of the angles of joints.
@@ -269,8 +269,8 @@ class Split:
         end: the frame at which one looks.
         seed: 0, 1, 2: which axis of it; of its point only with the z axis.
         rows: of the 15 elements of w those that are meant.
-        left: the way forwards.
-        right: the way backwards.
+        left: the path forwards.
+        right: the path backwards.
     """
 
     start: int
@@ -405,7 +405,7 @@ def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
 
 
 def _merged(knowledge: Knowledge, k: int) -> Matrix:
-    """(samples, 4, 4) the way to joint k from the unknown joint before it."""
+    """(samples, 4, 4) the transform to joint k from the unknown joint before it."""
     ring, samples = knowledge.ring, knowledge.samples
     T, n = samples.gaps[:, k], len(ring.joints)
     before = (k - 1) % n
@@ -417,13 +417,13 @@ def _merged(knowledge: Knowledge, k: int) -> Matrix:
     return T
 
 
-def _basis(knowledge: Knowledge, k: int, way: int) -> Tensor:
+def _basis(knowledge: Knowledge, k: int, direction: int) -> Tensor:
     """(3, 15, 15) factors of e^-iq, 1, e^iq, or of r, 1, r^2."""
     joint = knowledge.ring.joints[k]
     one, first, second = joint_basis(not joint.turns)
     if not joint.turns:
-        return np.array([way * joint.sign * first, one, second], dtype=complex)
-    up = (first - 1j * way * joint.sign * second) / 2
+        return np.array([direction * joint.sign * first, one, second], dtype=complex)
+    up = (first - 1j * direction * joint.sign * second) / 2
     return np.array([up.conj(), one, up])
 
 

@@ -224,9 +224,9 @@ def _quartic(stage: Stage, variable: Variable, F: list[SX], unit: int) -> Step:
     """The step with four roots."""
     number, shown = stage.number(variable), stage.term(variable)
     signs = SX.sym("sign", 2)
-    scale = stage.ways.length**unit if unit else SX(1)
+    scale = stage.matrices.length**unit if unit else SX(1)
     if variable.slides:
-        root = real_quartic(casadi.vertcat(*F[::-1]), signs, stage.ways.length, scale)
+        root = real_quartic(casadi.vertcat(*F[::-1]), signs, stage.matrices.length, scale)
         pieces = ["", f" {shown}", f" {shown}^2", f" {shown}^3", f" {shown}^4"]
     else:
         ordered = casadi.vertcat(F[3], F[4], F[1], F[2], F[0])

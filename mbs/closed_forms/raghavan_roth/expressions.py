@@ -25,9 +25,9 @@ from mbs.closed_forms.raghavan_roth.numbers import (
     pencil,
     regularity,
 )
-from mbs.closed_forms.ring import Ring, Unknown
 from mbs.closed_forms.sequence import Problem
 from mbs.errors import NoClosedForm
+from mbs.recursions.chain import ChainJoint, Ring
 from mbs.solvers.rank import first_best, graded
 from mbs.spatial import Pose
 
@@ -306,7 +306,7 @@ def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
     return tuple((joint.sign / loop.length) ** k * part for k, part in enumerate(parts))
 
 
-def _place(joint: Unknown) -> int:
+def _place(joint: ChainJoint) -> int:
     if joint.place is None:
         raise NoClosedForm(f"joint {joint.name} has no place among the unknowns of the problem")
     return joint.place

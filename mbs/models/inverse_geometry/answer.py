@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
-from mbs.models.inverse_geometry.chain import Chain
+from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.gathering import Gathered
 from mbs.models.inverse_geometry.search import Nearest, nearest
 from mbs.models.inverse_geometry.self_motions import Family, connected, curve, family, freedoms
@@ -276,7 +276,7 @@ class Question:
         wishes: what the user asks for beside the pose.
     """
 
-    chain: Chain
+    chain: FrameChain
     target: Target
     p: Array
     wishes: Wishes
@@ -340,9 +340,9 @@ def _drafts(question: Question, found: list[ChainRoot]) -> list[RobotSolution]:
 
 def _named(question: Question, found: list[ChainRoot]) -> list[ChainRoot]:
     """With the names of shoulder, elbow and wrist where the arm has them, else a number."""
-    way, arm = question.chain, question.target.arm
-    key = ("anatomy", *way.key, question.p.tobytes())
-    has: Anatomy = way.system.cached(key, lambda: anatomy(arm))
+    chain, arm = question.chain, question.target.arm
+    key = ("anatomy", *chain.key, question.p.tobytes())
+    has: Anatomy = chain.system.cached(key, lambda: anatomy(arm))
     named = labels(arm, has, np.array([root.q for root in found]))
     names = [name or root.label for name, root in zip(named, found, strict=True)]
     seen = dict[str, int]()

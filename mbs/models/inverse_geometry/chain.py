@@ -8,20 +8,20 @@ from typing import Any
 
 import casadi
 import numpy as np
-from casadi import DM, SX, Function
+from casadi import DM, SX
 from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import Link
-from mbs.closed_forms.arm import Arm
-from mbs.closed_forms.ring import Gap, Ring, Unknown
+from mbs.closed_forms.arm import Arm, arm_of
 from mbs.closed_forms.sequence import Problem
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.loops.pose import defect, pose_numbers, rounded, wanted_pose
 from mbs.models.geometry import terminal_frame
-from mbs.spatial import Pose, axis_turn, vector
+from mbs.recursions.chain import Chain, Gap, Ring, tree_chain
+from mbs.spatial import Pose
 from mbs.text import did_you_mean, quoted
 
 _SAMPLES, _SEED = 4, 20260105
@@ -29,26 +29,36 @@ _LARGEST = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chain:
-    """Free joints from the base to a frame, and the ways between them.
+class FrameChain:
+    """The chain from the base of a system to a frame.
 
     Attributes:
         system: whose chain it is.
         frame: at its end.
-        names: of the free joints, from the base on.
-        places: their numbers in q.
-        prismatic: whether each slides.
-        gaps: the ways before, between and after them, of parameters p; locked joints are in them.
-        locked: positions of the other joints of the chain by name [rad or m].
+        chain: free joints, each with its number in q, and what is between them, of parameters p;
+            locked joints are in the gaps.
+        locked: positions of the other joints on the path by name [rad or m].
     """
 
     system: System
     frame: str | int
-    names: tuple[str, ...]
-    places: tuple[int, ...]
-    prismatic: tuple[bool, ...]
-    gaps: tuple[Pose, ...]
+    chain: Chain
     locked: Mapping[str, float]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the free joints, from the base on."""
+        return tuple(joint.name for joint in self.chain.joints)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Their numbers in q."""
+        return tuple(joint.place for joint in self.chain.joints if joint.place is not None)
+
+    @property
+    def prismatic(self) -> tuple[bool, ...]:
+        """Whether each is prismatic."""
+        return tuple(not joint.turns for joint in self.chain.joints)
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -57,25 +67,22 @@ class Chain:
 
     def arm(self, p: NDArray[np.float64]) -> Arm:
         """The chain in numbers for parameters p, (np,); kept on the system."""
-        arm: Arm = self.system.cached(("arm", *self.key, p.tobytes()), lambda: self._numbers(p))
+        arm: Arm = self.system.cached(
+            ("arm", *self.key, p.tobytes()), lambda: arm_of(self.chain, self.system.p, p)
+        )
         return arm
 
-    def _numbers(self, p: NDArray[np.float64]) -> Arm:
-        stacked = casadi.vertcat(*(gap.matrix for gap in self.gaps))
-        function = Function("gaps", [self.system.p], [casadi.densify(stacked)])
-        gaps = np.array(DM(function(p))).reshape(len(self.gaps), 4, 4)
-        return Arm(self.names, np.array(self.prismatic, dtype=bool), gaps)
-
-    def ways(self, p: NDArray[np.float64] | None = None) -> tuple[Pose, ...]:
-        """The gaps with numbers p, (np,), in the place of the parameters, where they are given."""
+    def at(self, p: NDArray[np.float64] | None = None) -> Chain:
+        """The chain with numbers p, (np,), in the place of the parameters, where they are given."""
         if p is None:
-            return self.gaps
+            return self.chain
         symbols, numbers = self.system.p, SX(DM(p))
 
         def substituted(matrix: SX) -> SX:
             return SX(casadi.substitute(matrix, symbols, numbers))
 
-        return tuple(Pose(substituted(gap.R), substituted(gap.p)) for gap in self.gaps)
+        poses = (Pose(substituted(pose.R), substituted(pose.p)) for pose in self.chain.between)
+        return Chain(self.chain.joints, tuple(Gap(pose) for pose in poses))
 
     def problem(self, p: NDArray[np.float64] | None = None) -> Problem:
         """The loop that the wanted pose closes.
@@ -90,12 +97,9 @@ class Chain:
         n, symbols = len(self.names), self.system.p if p is None else SX(0, 1)
         t = casadi.vertcat(*(SX.sym(f"T{r}{c}") for c in range(1, 5) for r in range(1, 4)))
         T = Pose(casadi.reshape(t[0:9], 3, 3), t[9:12])
-        gaps = [Gap(way) for way in self.ways(p)]
+        gaps = self.at(p).gaps
         back = gaps[n].then(T.inverse())
-        joints = tuple(
-            Unknown(name, Motion.PRISMATIC if slides else Motion.REVOLUTE, place, 1)
-            for place, (name, slides) in enumerate(zip(self.names, self.prismatic, strict=True))
-        )
+        joints = tuple(replace(joint, place=k) for k, joint in enumerate(self.chain.joints))
         closing = replace(
             gaps[0].after(back), back=gaps[0].pose.inverse() @ T @ gaps[n].pose.inverse()
         )
@@ -114,17 +118,17 @@ class Chain:
             q = np.where(self.prismatic, rng.uniform(0.2, 1.2, len(self.names)), 0.0)
             turns = rng.uniform(-np.pi, np.pi, len(self.names))
             q = np.where(self.prismatic, q, turns)
-            arm = self._numbers(own) if p is None else self.arm(p)
+            arm = arm_of(self.chain, self.system.p, own) if p is None else self.arm(p)
             T = arm.pose(q)[:3].ravel(order="F")
             samples.append((q, np.concatenate([own if p is None else np.zeros(0), T])))
         return samples
 
 
-def chain(
+def frame_chain(
     system: System,
     frame: str | int | None = None,
     locked: Mapping[str, float] | None = None,
-) -> Chain:
+) -> FrameChain:
     """The joints from the base to a frame; kept on the system.
 
     Args:
@@ -140,10 +144,12 @@ def chain(
     name = _terminal_frame(system) if frame is None else frame
     number = system.frame(name)[0]
     links = [system.tree.links[k] for k in system.tree.path(number)]
-    held = _locked(system, links, locked)
-    key = ("chain", name, tuple(held.items()))
-    way: Chain = system.cached(key, lambda: _chained(system, name, links, held))
-    return way
+    locked_positions = _locked(system, links, locked)
+    key = ("chain", name, tuple(locked_positions.items()))
+    found: FrameChain = system.cached(
+        key, lambda: _frame_chain(system, name, links, locked_positions)
+    )
+    return found
 
 
 def _terminal_frame(system: System) -> str | int:
@@ -151,36 +157,15 @@ def _terminal_frame(system: System) -> str | int:
     return name
 
 
-def _chained(
-    system: System, name: str | int, links: list[Link], held: Mapping[str, float]
-) -> Chain:
-    pose = system.frame(name)[1]
-    _require_few(system, name, links, held)
-    base = system.frame("base")[1].inverse()
-    gaps, free = [base], list[Link]()
-    for link in links:
-        gaps[-1] = gaps[-1] @ link.pose()
-        if link.name in held:
-            gaps[-1] = gaps[-1] @ _moved(link, held[link.name])
-        else:
-            free.append(link)
-            gaps.append(Pose.identity())
-    gaps[-1] = gaps[-1] @ pose
-    return Chain(
-        system,
-        name,
-        tuple(link.name for link in free),
-        tuple(link.q.start for link in free),
-        tuple(link.motion is Motion.PRISMATIC for link in free),
-        tuple(gaps),
-        held,
-    )
-
-
-def _moved(link: Link, q: float) -> Pose:
-    if link.motion is Motion.PRISMATIC:
-        return Pose.moved(vector([0, 0, q]))
-    return Pose.turned(axis_turn("z", SX(q)).matrix)
+def _frame_chain(
+    system: System, name: str | int, links: list[Link], locked_positions: Mapping[str, float]
+) -> FrameChain:
+    _require_few(system, name, links, locked_positions)
+    known = [link.q.start for link in links if link.name in locked_positions]
+    q = SX(DM(system.position(locked_positions)))
+    chain = tree_chain(system.tree, system.frame("base"), system.frame(name), known, q)
+    poses = (Gap(gap.pose) for gap in chain.gaps)  # a locked joint is no pivot
+    return FrameChain(system, name, replace(chain, gaps=tuple(poses)), locked_positions)
 
 
 def _locked(system: System, links: list[Link], given: object) -> dict[str, float]:
@@ -212,11 +197,11 @@ def _require_simple(system: System, link: Link) -> None:
 
 
 def _require_few(
-    system: System, frame: str | int, links: list[Link], held: Mapping[str, float]
+    system: System, frame: str | int, links: list[Link], locked_positions: Mapping[str, float]
 ) -> None:
     for link in links:
         _require_simple(system, link)
-    free = [link for link in links if link.name not in held]
+    free = [link for link in links if link.name not in locked_positions]
     if not links:
         raise ModelError(f"{system.name}: no joint moves frame {frame!r}; name another frame")
     if not free:
@@ -239,8 +224,8 @@ def _proposal(system: System, free: list[Link], surplus: int) -> str:
     An arm of seven joints keeps its elbow, without which it has one length alone.
     """
     first = (len(free) - surplus - 1) // 2
-    held = free[first : first + surplus]
-    return ", ".join(f"{link.name!r}: {system.configuration[link.q.start]:.6g}" for link in held)
+    chosen = free[first : first + surplus]
+    return ", ".join(f"{link.name!r}: {system.configuration[link.q.start]:.6g}" for link in chosen)
 
 
 # Poses as a user gives them: one, or many at once.

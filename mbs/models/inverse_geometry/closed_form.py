@@ -16,10 +16,11 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
 from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import Chain, chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_pose
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
-from mbs.spatial import Pose, axis_turn, vector
+from mbs.recursions.chain import transforms
+from mbs.spatial import Pose
 from mbs.text import did_you_mean, quoted
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ Numbers: TypeAlias = NDArray[np.float64] | None
 _FEW = 8
 
 
-def sequence_of(chain: Chain, method: str = "auto", p: Numbers = None) -> StepSequence:
+def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> StepSequence:
     """The steps that give the joints of a chain from the pose of its frame.
 
     It is kept on the system: the next call with the same arguments is free.
@@ -85,12 +86,12 @@ def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
         )
 
 
-def given_of(way: Chain, T: SX) -> SX:
+def given_of(chain: FrameChain, T: SX) -> SX:
     """What a sequence of symbolic parameters takes for a pose T, (4, 4)."""
-    return SX(casadi.vertcat(way.system.p, casadi.vec(T[:3, :])))
+    return SX(casadi.vertcat(chain.system.p, casadi.vec(T[:3, :])))
 
 
-def _kept(chain: Chain, method: str, p: Numbers) -> StepSequence | str:
+def _kept(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
     """The steps by one method, or why there are none; kept on the system."""
 
     def solve() -> StepSequence | str:
@@ -103,7 +104,7 @@ def _kept(chain: Chain, method: str, p: Numbers) -> StepSequence | str:
     return steps
 
 
-def _key(chain: Chain, p: Numbers) -> tuple[object, ...]:
+def _key(chain: FrameChain, p: Numbers) -> tuple[object, ...]:
     return *chain.key, None if p is None else np.asarray(p, dtype=float).tobytes()
 
 
@@ -126,7 +127,7 @@ def _is_short(sequence: StepSequence) -> bool:
     return sequence.branches <= _FEW and all(one.kind != "quartic" for one in sequence.steps)
 
 
-def _price(chain: Chain, sequence: StepSequence, p: Numbers) -> tuple[int, int]:
+def _price(chain: FrameChain, sequence: StepSequence, p: Numbers) -> tuple[int, int]:
     """Number of branches, then of operations for all of them; kept on the system."""
 
     def counted() -> int:
@@ -163,7 +164,7 @@ class CharacteristicFunction(ModelFunction):
         return self._found.slides
 
 
-def characteristic_function(way: Chain) -> Function:
+def characteristic_function(chain: FrameChain) -> Function:
     """The matrices of a chain of six joints.
 
     Source: Raghavan & Roth 1993; Manocha & Canny 1994.
@@ -179,26 +180,26 @@ def characteristic_function(way: Chain) -> Function:
     from mbs.closed_forms.raghavan_roth.expressions import characteristic
 
     def make() -> Function:
-        problem = way.problem()
+        problem = chain.problem()
         found = characteristic(problem)
 
         def build() -> tuple[Named, Named]:
             T = SX.sym("T", 4, 4)
             parts = Function("parts", [problem.given], list(found.matrices))
-            every = parts.call([given_of(way, T)])
+            every = parts.call([given_of(chain, T)])
             return [("T", T)], [(f"M{k}", part) for k, part in enumerate(every)]
 
-        plain = model_function(way.system, ("igm_characteristic", *way.key), build)
-        return CharacteristicFunction(Function(plain), way.system, found)
+        plain = model_function(chain.system, ("igm_characteristic", *chain.key), build)
+        return CharacteristicFunction(Function(plain), chain.system, found)
 
-    made: Function = way.system.cached(("characteristic matrix", *way.key), make)
+    made: Function = chain.system.cached(("characteristic matrix", *chain.key), make)
     return made
 
 
 # How far configurations are from the wanted pose: the forward model of a chain on symbols.
 
 
-def forward(chain: Chain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
+def forward(chain: FrameChain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
     """The pose of the frame for positions x, (n, 1), of the free joints.
 
     Args:
@@ -206,12 +207,7 @@ def forward(chain: Chain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
         x: positions [rad or m].
         p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
     """
-    gaps = chain.ways(p)
-    pose = gaps[0]
-    for k, slides in enumerate(chain.prismatic):
-        turn = Pose.turned(axis_turn("z", SX(x[k])).matrix)
-        pose = pose @ (Pose.moved(vector([0, 0, x[k]])) if slides else turn) @ gaps[k + 1]
-    return pose
+    return transforms(chain.at(p), x)[-1]
 
 
 def residual(pose: Pose, T: SX) -> SX:
@@ -225,9 +221,9 @@ def relative_residual(pose: Pose, T: SX, length: SX) -> SX:
     return SX(casadi.mmax(casadi.fabs(casadi.vertcat(turned, (pose.p - T[:3, 3]) / length))))
 
 
-def size(chain: Chain, p: NDArray[np.float64] | None = None) -> SX:
+def size(chain: FrameChain, p: NDArray[np.float64] | None = None) -> SX:
     """A length of the chain's size [m], 1 where all its ways are turns alone."""
-    lengths = [casadi.norm_2(gap.p) for gap in chain.ways(p) if not gap.p.is_zero()]
+    lengths = [casadi.norm_2(gap.p) for gap in chain.at(p).between if not gap.p.is_zero()]
     return SX(sum(lengths, SX(0))) if lengths else SX(1)
 
 
@@ -314,18 +310,18 @@ def function(
     """
     require_system(system)
     require_method(system, method, METHODS)
-    way = chain(system, frame, locked)
+    chain = frame_chain(system, frame, locked)
     if method == "general":
-        return characteristic_function(way)
+        return characteristic_function(chain)
     _require_open(system)
-    sequence = sequence_of(way, method)
+    sequence = sequence_of(chain, method)
 
     def make() -> Function:
-        key = ("igm", method, *way.key)
-        plain: Any = model_function(system, key, lambda: _built(way, sequence))
+        key = ("igm", method, *chain.key)
+        plain: Any = model_function(system, key, lambda: _built(chain, sequence))
         return InverseGeometry(Function(plain), system, sequence, plain.annotated)
 
-    made: Function = system.cached(("inverse geometry", method, *way.key), make)
+    made: Function = system.cached(("inverse geometry", method, *chain.key), make)
     return made
 
 
@@ -337,12 +333,12 @@ def _require_open(system: System) -> None:
         )
 
 
-def _built(way: Chain, sequence: StepSequence) -> tuple[Named, Named, Named]:
+def _built(chain: FrameChain, sequence: StepSequence) -> tuple[Named, Named, Named]:
     T, branch = SX.sym("T", 4, 4), SX.sym("branch")
-    leaf = sequence.leaf(given_of(way, T), signs_of(sequence, branch))
-    q = whole_configuration(way, leaf.x)
-    outputs: Named = [("q", q), ("valid", _valid(way, sequence, leaf, T, branch))]
-    return [("T", T), ("branch", branch)], outputs, _names(way, sequence, leaf, branch)
+    leaf = sequence.leaf(given_of(chain, T), signs_of(sequence, branch))
+    q = whole_configuration(chain, leaf.x)
+    outputs: Named = [("q", q), ("valid", _valid(chain, sequence, leaf, T, branch))]
+    return [("T", T), ("branch", branch)], outputs, _names(chain, sequence, leaf, branch)
 
 
 def signs_of(sequence: StepSequence, branch: SX) -> SX:
@@ -353,27 +349,27 @@ def signs_of(sequence: StepSequence, branch: SX) -> SX:
     return SX(casadi.vertcat(*(1 - 2 * bit for bit in bits)))
 
 
-def whole_configuration(way: Chain, x: SX) -> SX:
+def whole_configuration(chain: FrameChain, x: SX) -> SX:
     """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
-    q = SX(DM(way.system.position(way.locked)))
-    q[list(way.places)] = x
+    q = SX(DM(chain.system.position(chain.locked)))
+    q[list(chain.places)] = x
     return q
 
 
-def _valid(way: Chain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) -> SX:
-    error = relative_residual(forward(way, leaf.x), T, size(way))
+def _valid(chain: FrameChain, sequence: StepSequence, leaf: Leaf, T: SX, branch: SX) -> SX:
+    error = relative_residual(forward(chain, leaf.x), T, size(chain))
     real = casadi.mmin(casadi.vertcat(leaf.real, SX(1)))
     known = casadi.logic_and(branch >= 0, branch <= sequence.branches - 1)
     good = casadi.logic_and(real >= -_ROUNDING, error <= _ROUNDING)
     return SX(casadi.logic_and(known, good))
 
 
-def _names(way: Chain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
+def _names(chain: FrameChain, sequence: StepSequence, leaf: Leaf, branch: SX) -> Named:
     """The scalars that text names: signs, sines and cosines of the joints, coefficients."""
     signs = casadi.vertsplit(signs_of(sequence, branch)) if sequence.signs else []
     named = [(f"sign_{name}", sign) for name, sign in zip(sequence.signs, signs, strict=True)]
-    for k, name in enumerate(way.names):
-        if not way.prismatic[k]:
+    for k, name in enumerate(chain.names):
+        if not chain.prismatic[k]:
             label = joint_label(name)
             named += [(f"S{label}", casadi.sin(leaf.x[k])), (f"C{label}", casadi.cos(leaf.x[k]))]
     named += leaf.coefficients.items()
@@ -401,7 +397,7 @@ _OUTPUTS = ("q", "residual", "real", "regular", "mark")
 
 
 def all_branches(
-    chain: Chain, sequence: StepSequence, p: NDArray[np.float64] | None = None
+    chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64] | None = None
 ) -> Function:
     """``igm_all(T) -> q, residual, real, regular, mark``: a column for every branch.
 
@@ -428,7 +424,7 @@ def all_branches(
     return function_of(without_sines(graph_of(Function("igm_all", *every, {"cse": True}))))
 
 
-def _column(chain: Chain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> list[SX]:
+def _column(chain: FrameChain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> list[SX]:
     pose = forward(chain, leaf.x, p)
     differences = casadi.vertcat(casadi.vec(pose.R - T[:3, :3]), pose.p - T[:3, 3])
     largest = functools.reduce(_larger, casadi.vertsplit(casadi.fabs(differences)))
@@ -440,7 +436,7 @@ def _column(chain: Chain, leaf: Leaf, T: SX, p: NDArray[np.float64] | None) -> l
     ]
 
 
-def _mark(chain: Chain, x: SX) -> SX:
+def _mark(chain: FrameChain, x: SX) -> SX:
     """A generic combination of slides and of sines and cosines of turns."""
     weights = np.random.default_rng(_SEED).uniform(0.5, 1.0, (len(chain.names), 2))
     mark = SX(0)

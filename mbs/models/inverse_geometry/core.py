@@ -49,6 +49,8 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 
 class _ArmStruct(ctypes.Structure):
+    """`arm` of arm.h: the numbers of an `Arm`."""
+
     _fields_ = (
         ("n", ctypes.c_int),
         ("gaps", ctypes.c_void_p),

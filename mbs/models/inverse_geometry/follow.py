@@ -17,7 +17,7 @@ from mbs.errors import ModelError
 from mbs.loops.plan import held_beside, regular_configuration
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.chain import chain, wanted_pose, wanted_poses
+from mbs.models.inverse_geometry.chain import frame_chain, wanted_pose, wanted_poses
 from mbs.models.inverse_geometry.solutions import CoordinateLimits, Given, apart, bounds
 from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.solvers.rank import null_space
@@ -93,7 +93,7 @@ def carried(
     Args:
         tracker: what follows.
         start: at 0.
-        pose: the way of the pose, of a number between 0 and 1.
+        pose: the path of the pose, of a number between 0 and 1.
         step: first one to try.
 
     Returns:
@@ -132,8 +132,8 @@ def _stepped(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
     found = _corrected(tracker, led, T)
     if found is None or not tracker.may(found.x):
         return None
-    way, miss = np.linalg.norm(led - point.x), np.linalg.norm(found.x - led)
-    near = np.max(np.abs(found.x - point.x)) < _LARGEST and miss <= _CHANGE * way + _SMALL
+    ahead, miss = np.linalg.norm(led - point.x), np.linalg.norm(found.x - led)
+    near = np.max(np.abs(found.x - point.x)) < _LARGEST and miss <= _CHANGE * ahead + _SMALL
     change = np.max(np.abs(np.linalg.eigvals(back @ (found.J - point.J))))
     return found if near and change <= _CHANGE else None
 
@@ -264,7 +264,7 @@ def follower(
     path = system.tree.path(system.frame(frame)[0])
     simple = all(system.tree.links[k].motion.nq == 1 for k in path)
     if simple and not system.is_closed:
-        found = chain(system, frame, locked)
+        found = frame_chain(system, frame, locked)
         arm = found.arm(wanted.closing.p)
         scale = arm.units
         exact = arm.size == _WHOLE
@@ -331,7 +331,7 @@ class Path:
         """How many poses."""
         return len(self.poses)
 
-    def way(self, number: int, before: Array) -> Callable[[float], Array]:
+    def segment(self, number: int, before: Array) -> Callable[[float], Array]:
         """The pose, of a number from 0 to 1, from the pose before (4, 4) to that of the number."""
         after, function = self.poses[number], self.function
         if function is None or number == 0:
@@ -543,9 +543,9 @@ def _followed(led: Follower, poses: Path, q: Array) -> Followed:
     point, step = point_at(tracker, x, T), 1.0
     kept, reason = list[tuple[Array, float, float]](), ""
     for number in range(poses.count):
-        way = poses.way(number, T)
-        point, at, step = carried(tracker, point, way, min(1.0, step))
-        whole, T = led.whole(q, point.x), way(1.0)
+        segment = poses.segment(number, T)
+        point, at, step = carried(tracker, point, segment, min(1.0, step))
+        whole, T = led.whole(q, point.x), segment(1.0)
         if at < 1.0 or point.left > _OFF:
             reason = stop_reason(led, poses, number, whole, at)
             break

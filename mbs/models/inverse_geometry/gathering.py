@@ -11,7 +11,7 @@ from casadi import DM, SX, Function
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import Chain
+from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
     require_method,
@@ -47,7 +47,7 @@ class Gathered:
     doubtful: bool
 
 
-def gather(chain: Chain, target: Target, method: str, p: Array) -> Gathered:
+def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered:
     """The solutions by one method, or by the first that holds for the chain.
 
     Args:
@@ -80,7 +80,7 @@ def gather(chain: Chain, target: Target, method: str, p: Array) -> Gathered:
     return _by_search(target) if ready is None else _by_general(target, ready)
 
 
-def further(chain: Chain, target: Target, gathered: Gathered, p: Array) -> Gathered:
+def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Array) -> Gathered:
     """What was gathered, and what the general method and the search add to it."""
     parts = [gathered]
     ready = general_ready(chain, p)
@@ -96,7 +96,9 @@ def further(chain: Chain, target: Target, gathered: Gathered, p: Array) -> Gathe
     )
 
 
-def _by_closed_form(chain: Chain, target: Target, sequence: StepSequence, p: Array) -> Gathered:
+def _by_closed_form(
+    chain: FrameChain, target: Target, sequence: StepSequence, p: Array
+) -> Gathered:
     q, regular = (np.array(part).T for part in _leaves(chain, sequence, p)(DM(target.T)))
     error = target.residual(q)
     near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
@@ -105,7 +107,7 @@ def _by_closed_form(chain: Chain, target: Target, sequence: StepSequence, p: Arr
     return _polished(target, Gathered(q[near], labels, _name(chain, sequence, p), doubtful))
 
 
-def _leaves(chain: Chain, sequence: StepSequence, p: Array) -> Function:
+def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
     """``leaves(T) -> q, regular``: a column for every branch, kept on the system.
 
     q (n, branches) are configurations [rad or m], regular (1, branches) the least of the quantities
@@ -124,7 +126,7 @@ def _leaves(chain: Chain, sequence: StepSequence, p: Array) -> Function:
     return function
 
 
-def _name(chain: Chain, sequence: StepSequence, p: Array) -> str:
+def _name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
     """Which of the closed forms a sequence is."""
     try:
         return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"
@@ -153,7 +155,7 @@ def _polished(target: Target, gathered: Gathered) -> Gathered:
     return Gathered(better.q[solved], labels, gathered.method, gathered.doubtful)
 
 
-def general_ready(chain: Chain, p: Array) -> General | None:
+def general_ready(chain: FrameChain, p: Array) -> General | None:
     """The general method of a chain for parameters p, (np,); None where it does not hold."""
 
     def build() -> General | None:

@@ -15,7 +15,7 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.chain import Chain, chain, wanted_poses
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_poses
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
     all_branches,
@@ -60,7 +60,7 @@ class PoseBatch:
     mark: Array
 
 
-def batch(chain: Chain, sequence: StepSequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
+def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array) -> PoseBatch:
     """All branches at poses T, (N, 4, 4).
 
     Args:
@@ -76,7 +76,7 @@ def batch(chain: Chain, sequence: StepSequence, p: NDArray[np.float64], T: Array
     return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
 
 
-def _plain(chain: Chain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
+def _plain(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]) -> Function:
     key = ("igm_all", sequence, *chain.key, p.tobytes())
     plain: Function = chain.system.cached(key, lambda: all_branches(chain, sequence, p))
     return plain
@@ -154,7 +154,9 @@ def nothing(arm: Arm, count: int) -> BranchSolutions:
     return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
 
 
-def drafted(chain: Chain, sequence: StepSequence, p: Array, arm: Arm, T: Array) -> BranchSolutions:
+def drafted(
+    chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, T: Array
+) -> BranchSolutions:
     """The solutions by a closed form.
 
     Args:
@@ -254,7 +256,7 @@ _NEARLY_SINGULAR = 1e-4
 _REGULAR = 1e-9
 
 
-def ready(chain: Chain, p: Array) -> General | None:
+def ready(chain: FrameChain, p: Array) -> General | None:
     """The general method of a chain for parameters p, (np,); None where it hardly holds."""
     found = general_ready(chain, p)
     return found if found and found.prepared.regularity >= _REGULAR else None
@@ -374,15 +376,15 @@ def solve_many(
     given = limits if system.is_closed else None
     if system.is_closed:
         return _stacked(system, [solved(pose) for pose in poses])
-    robot = _robot(chain(system, frame, locked), method, p)
+    robot = _robot(frame_chain(system, frame, locked), method, p)
     draft = robot.draft(poses)
     for k in np.flatnonzero(draft.searched):
         pose = poses[k]
-        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.way.places)]
+        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.chain.places)]
         draft = with_configurations(draft, int(k), robot.arm, q, pose)
     q, valid = robot.whole(draft.q), draft.valid
     if leaves_out(limits):
-        q, within = _wound(bounds(system, limits, robot.way.places), q)
+        q, within = _wound(bounds(system, limits, robot.chain.places), q)
         valid = valid & within
     return ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
 
@@ -391,7 +393,7 @@ def solve_many(
 class _Robot:
     """How a robot is solved; without both methods every pose is searched for by itself."""
 
-    way: Chain
+    chain: FrameChain
     p: Array
     arm: Arm
     sequence: StepSequence | None
@@ -400,35 +402,35 @@ class _Robot:
     def draft(self, T: Array) -> BranchSolutions:
         """The solutions by a closed form, else by the general method."""
         if self.sequence is not None:
-            return drafted(self.way, self.sequence, self.p, self.arm, T)
+            return drafted(self.chain, self.sequence, self.p, self.arm, T)
         if self.general is not None:
             return general_draft(self.general, T)
         return nothing(self.arm, len(T))
 
     def whole(self, q: Array) -> Array:
         """(N, branches, nq) positions of all joints, those outside the chain as assembled."""
-        system = self.way.system
-        if self.way.places == tuple(range(system.nq)):
+        system = self.chain.system
+        if self.chain.places == tuple(range(system.nq)):
             return q
         every = np.empty((*q.shape[:2], system.nq))
-        every[...] = system.position(self.way.locked)
-        every[..., list(self.way.places)] = q
+        every[...] = system.position(self.chain.locked)
+        every[..., list(self.chain.places)] = q
         return every
 
 
-def _robot(way: Chain, method: str, p: Array) -> _Robot:
-    sequence, general = _sequence(way, method, p), None
+def _robot(chain: FrameChain, method: str, p: Array) -> _Robot:
+    sequence, general = _sequence(chain, method, p), None
     if sequence is None and method in ("auto", "general"):
-        general = ready(way, p)
-    return _Robot(way, p, way.arm(p), sequence, general)
+        general = ready(chain, p)
+    return _Robot(chain, p, chain.arm(p), sequence, general)
 
 
-def _sequence(way: Chain, method: str, p: Array) -> StepSequence | None:
+def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:
     """The closed form that was asked for, None for methods that are none."""
     if method not in (*CLOSED_FORMS, "auto"):
         return None
     try:
-        return sequence_of(way, method, p)
+        return sequence_of(chain, method, p)
     except NoClosedForm:
         if method != "auto":
             raise

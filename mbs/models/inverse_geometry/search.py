@@ -23,7 +23,7 @@ _FINEST = 1e-31  # nothing is left to gain
 _LEAST = 1e-31  # damping, so that no matrix is singular
 
 
-def examined(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
+def examine_arm(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
     """Costs (m,), gaps (m, 6) and Jacobians (m, 6, n) of configurations q, (m, n).
 
     Lengths are measured by that of the arm; the cost is the square of the gap.
@@ -36,7 +36,7 @@ def examined(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
     return np.sum(gap**2, axis=-1), gap, J
 
 
-def descended(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
+def descend(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
     """Configurations (m, n) where rounding or a smallest distance stops; their costs (m,).
 
     The damping is proportional to the cost, which makes the last steps those of Newton, even
@@ -50,7 +50,7 @@ def descended(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
     """
     wanted = np.broadcast_to(T, (len(q), 4, 4))
     q = np.array(q, dtype=float)
-    cost, gap, J = examined(arm, wanted, q)
+    cost, gap, J = examine_arm(arm, wanted, q)
     damping, stalls = np.full(len(q), 0.1), np.zeros(len(q), dtype=int)
     for _ in range(_STEPS):
         going = np.flatnonzero((cost > _FINEST) & (stalls < _STALLS))
@@ -58,7 +58,7 @@ def descended(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
             break
         dx = _step(J[going], gap[going], damping[going] * cost[going] + _LEAST)
         tried = q[going] + arm.units * dx
-        tried_cost, tried_gap, tried_J = examined(arm, wanted[going], tried)
+        tried_cost, tried_gap, tried_J = examine_arm(arm, wanted[going], tried)
         better = tried_cost < cost[going]
         _settle(going, tried_cost, cost, damping, stalls)
         won = going[better]
@@ -174,11 +174,11 @@ def wrapped(arm: Arm, q: Array) -> Array:
 def _twin(arm: Arm, T: Array, found: Array, own: Array) -> int | None:
     if not len(found):
         return None
-    way = own - found
-    way = np.where(arm.prismatic, way, wrapped(arm, way))
-    farthest = np.max(np.abs(way / arm.units), axis=-1)
+    difference = own - found
+    difference = np.where(arm.prismatic, difference, wrapped(arm, difference))
+    farthest = np.max(np.abs(difference / arm.units), axis=-1)
     for number in np.flatnonzero(farthest < _CLOSE):
-        half = found[number] + 0.5 * way[number]
+        half = found[number] + 0.5 * difference[number]
         middle, *ends = relative_residual(arm, T, np.array([half, found[number], own]))
         if farthest[number] < _SAME or middle < max(_BETWEEN, *ends):
             return int(number)
@@ -218,7 +218,7 @@ def counted_search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> M
 
 def searched_with_numpy(arm: Arm, T: Array, starts: int, seed: int) -> Merged:
     """`counted_search` where there is no C compiler."""
-    q = wrapped(arm, descended(arm, T, random_configurations(arm, T, starts, seed))[0])
+    q = wrapped(arm, descend(arm, T, random_configurations(arm, T, starts, seed))[0])
     return merged_with_numpy(arm, T, q[reached(arm, T, q)])
 
 
@@ -276,7 +276,7 @@ def polish(arm: Arm, T: Array, q: Array) -> Polished:
 def polished_with_numpy(arm: Arm, T: Array, q: Array) -> Polished:
     """`polish` where there is no C compiler."""
     before = arm.residual(q, T)
-    better = wrapped(arm, descended(arm, T, q)[0])
+    better = wrapped(arm, descend(arm, T, q)[0])
     after = arm.residual(better, T)
     improved = after < before
     return Polished(np.where(improved[:, None], better, q), np.where(improved, after, before))
@@ -327,7 +327,7 @@ def nearest(arm: Arm, T: Array) -> Nearest:
 
 def nearest_with_numpy(arm: Arm, T: Array) -> Array:
     """(n,) the configuration of `nearest` where there is no C compiler."""
-    q, cost = descended(arm, T, random_configurations(arm, T, _STARTS, SEED))
+    q, cost = descend(arm, T, random_configurations(arm, T, _STARTS, SEED))
     best = [_refined(arm, T, q[k]) for k in _apart(cost)]
     lowest = min(best, key=lambda found: found[1])
     return wrapped(arm, lowest[0])
@@ -385,7 +385,7 @@ def _sloped(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
     They are exact although J is the motion of the frame and not of the rotation vector, because
     that vector is the axis of its own turn.
     """
-    cost, gap, J = examined(arm, T, q)
+    cost, gap, J = examine_arm(arm, T, q)
     return cost, -np.einsum("...ij,...i->...j", J, gap)
 
 

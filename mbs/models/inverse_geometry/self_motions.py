@@ -449,23 +449,25 @@ def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
     """
     x, end = q / target.unit, goal / target.unit
     for _ in range(_STEPS):
-        way = target.wrapped(end - x)
-        size = np.linalg.norm(way, axis=1, keepdims=True)
+        difference = target.wrapped(end - x)
+        size = np.linalg.norm(difference, axis=1, keepdims=True)
         if np.all(size < _ARRIVED):
             break
         _, J = target.excess(x)
-        along = _projected(J, way * np.minimum(1.0, _SURFACE_STEP / np.maximum(size, 1e-300)))
+        along = _projected(
+            J, difference * np.minimum(1.0, _SURFACE_STEP / np.maximum(size, 1e-300))
+        )
         x = _corrected(target, x + along)
     arrived = np.linalg.norm(target.wrapped(end - x), axis=1) < _ARRIVED
     return np.asarray(arrived & (target.residual(x * target.unit) < target.tolerance))
 
 
-def _projected(J: Array, way: Array) -> Array:
+def _projected(J: Array, difference: Array) -> Array:
     """Ways (m, n) within the null spaces of J, (m, 6, n)."""
     _, s, Vt = np.linalg.svd(J, full_matrices=False)
     rows = np.where((s > _ZERO)[..., None], Vt, 0.0)
-    across = np.einsum("mki,mi->mk", rows, way)
-    return np.asarray(way - np.einsum("mki,mk->mi", rows, across))
+    across = np.einsum("mki,mi->mk", rows, difference)
+    return np.asarray(difference - np.einsum("mki,mk->mi", rows, across))
 
 
 def _corrected(target: Target, x: Array) -> Array:

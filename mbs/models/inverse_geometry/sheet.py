@@ -11,7 +11,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.closed_forms.sequence import Problem, Step, StepSequence
-from mbs.models.inverse_geometry.chain import Chain, chain
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain
 from mbs.models.inverse_geometry.closed_form import sequence_of
 from mbs.operations import simplify
 from mbs.operations.graph import Graph, Node, graph_of
@@ -194,21 +194,21 @@ def text(
         NoClosedForm: no closed form is known; the message says what stood in the way.
         ModelError: there is no such method, frame or joint, or more than six joints are free.
     """
-    way = chain(system, frame, locked)
-    sequence, problem = sequence_of(way, method), way.problem()
-    lines = [*_head(way, sequence)]
+    chain = frame_chain(system, frame, locked)
+    sequence, problem = sequence_of(chain, method), chain.problem()
+    lines = [*_head(chain, sequence)]
     for number, one in enumerate(sequence.steps, 1):
         lines += ["", *_sheet(number, one, problem)]
     return "\n".join([*lines, "", *_branches(sequence)]) + "\n"
 
 
-def _head(way: Chain, sequence: StepSequence) -> Iterator[str]:
-    system = way.system
-    yield f"Inverse geometric model of {system.name}: {', '.join(way.names)} from the pose T of"
-    yield f"frame {way.frame!r} in the base; units are SI and radians"
-    held = ", ".join(f"{name} = {value:.12g}" for name, value in way.locked.items())
-    if held:
-        yield f"locked: {held}"
+def _head(chain: FrameChain, sequence: StepSequence) -> Iterator[str]:
+    system = chain.system
+    yield f"Inverse geometric model of {system.name}: {', '.join(chain.names)} from the pose T of"
+    yield f"frame {chain.frame!r} in the base; units are SI and radians"
+    locked = ", ".join(f"{name} = {value:.12g}" for name, value in chain.locked.items())
+    if locked:
+        yield f"locked: {locked}"
     if system.parameters:
         yield f"parameters: {', '.join(parameter.name for parameter in system.parameters)}"
     yield f"steps: {len(sequence.steps)}, branches: {sequence.branches}"

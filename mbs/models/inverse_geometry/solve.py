@@ -11,9 +11,9 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
-from mbs.models.inverse_geometry.chain import Chain, chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
-from mbs.models.inverse_geometry.gathering import Gathered, further, gather
+from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
 from mbs.models.inverse_geometry.target import Target
 from mbs.models.inverse_geometry.whole_robot import parallel
@@ -63,11 +63,11 @@ def solve(
     require_system(system)
     p = np.array(system.parameter_values(parameters))
     wanted = wanted_pose(system, T)
-    way = _chain_or_none(system, frame, locked)
-    wishes = _wishes(system, way, limits, seed)
-    if way is None:
+    chain = _chain_or_none(system, frame, locked)
+    wishes = _wishes(system, chain, limits, seed)
+    if chain is None:
         return parallel(wishes, frame, wanted, p)
-    question = Question(way, Target(way.arm(p), wanted), p, wishes)
+    question = Question(chain, Target(chain.arm(p), wanted), p, wishes)
     found, used = solved(question, method)
     return answer(question, found, used)
 
@@ -79,19 +79,19 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
         question: the chain and the pose.
         method: as in `solve`.
     """
-    way, target, p = question.chain, question.target, question.p
-    gathered = gather(way, target, method, p)
+    chain, target, p = question.chain, question.target, question.p
+    gathered = gather(chain, target, method, p)
     if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
-        gathered = further(way, target, gathered, p)
+        gathered = gather_further(chain, target, gathered, p)
     return roots(target, gathered, question.place), gathered.method
 
 
 def _chain_or_none(
     system: System, frame: str | int | None, locked: Mapping[str, float] | None
-) -> Chain | None:
+) -> FrameChain | None:
     """The chain to the frame; None where a robot with loops has none that can stand alone."""
     try:
-        return chain(system, frame, locked)
+        return frame_chain(system, frame, locked)
     except ModelError:
         if locked or not system.is_closed:
             raise
@@ -109,18 +109,18 @@ def _is_doubtful(target: Target, gathered: Gathered) -> bool:
 
 def _wishes(
     system: System,
-    way: Chain | None,
+    chain: FrameChain | None,
     limits: bool | Given | None,
     seed: Mapping[str, float] | Sequence[float] | None,
 ) -> Wishes:
     near = np.array(system.position(seed))
     names = [coordinate.name for coordinate in system.coordinates]
-    held = [] if way is None else [names.index(name) for name in way.locked]
-    if way is not None:
+    locked_places = [] if chain is None else [names.index(name) for name in chain.locked]
+    if chain is not None:
         if seed is None:
-            near[list(way.places)] = 0.0
-        near[held] = list(way.locked.values())
-    turning = None if way is None or system.is_closed else way.places
+            near[list(chain.places)] = 0.0
+        near[locked_places] = list(chain.locked.values())
+    turning = None if chain is None or system.is_closed else chain.places
     coupled = [k for c in system.couplings for k in c.coordinates]
-    limited = bounds(system, limits, set(turning or range(system.nq)) - {*held, *coupled})
+    limited = bounds(system, limits, set(turning or range(system.nq)) - {*locked_places, *coupled})
     return Wishes(system, near, limited, leaves_out(limits), seed is not None)

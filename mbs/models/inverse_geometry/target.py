@@ -108,10 +108,10 @@ def distinct(target: Target, q: Array) -> list[list[int]]:
         return [[k] for k in range(len(q))]
     for k in range(len(q)):
         first = [group[0] for group in groups]
-        way = target.wrapped(x[k] - x[first])
-        far = np.max(np.abs(way), axis=1, initial=0.0)
+        difference = target.wrapped(x[k] - x[first])
+        far = np.max(np.abs(difference), axis=1, initial=0.0)
         near = np.flatnonzero(far < _CLOSE)
-        half = (x[[first[m] for m in near]] + 0.5 * way[near]) * target.unit
+        half = (x[[first[m] for m in near]] + 0.5 * difference[near]) * target.unit
         between = target.residual(half) < _BETWEEN * scale if len(near) else np.zeros(0, bool)
         same = near[(far[near] < _SAME) | between]
         if len(same):

@@ -17,7 +17,7 @@ from mbs.loops.plan import (
     Known,
     Posed,
     Stage,
-    completed,
+    complete,
     every_configuration,
     plan_from,
     plan_to,
@@ -25,7 +25,7 @@ from mbs.loops.plan import (
 )
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.chain import Chain
+from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wishes
 
 # Whole configurations of trees and of robots with closed loops, from the joints on the way to a
@@ -61,7 +61,7 @@ class ClosedConfiguration:
 
 
 def close(
-    system: System, chain: Chain, configurations: Array, p: Array, seed: Array | None = None
+    system: System, chain: FrameChain, configurations: Array, p: Array, seed: Array | None = None
 ) -> list[ClosedConfiguration]:
     """The whole configurations that belong to configurations of a chain.
 
@@ -127,32 +127,32 @@ def posed(
     return sorted(found, key=lambda configuration: _distance(system, configuration.q, rest))
 
 
-def why_searched(system: System, way: Chain | str | int) -> str | None:
+def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
     """Why configurations are searched for, so that no proof of completeness stands behind them.
 
     Args:
         system: open or closed.
-        way: the chain that `close` gets, or the frame that `posed` gets.
+        chain: the one that `close` gets, or the frame that `posed` gets.
 
     Returns:
         One sentence; None where all are found by closed forms.
     """
     outcome: object = None
-    if not isinstance(way, Chain):
-        outcome = _plan_to(system, way)
+    if not isinstance(chain, FrameChain):
+        outcome = _plan_to(system, chain)
     elif system.is_closed:
-        outcome = _stages(system, _given(system, way))
+        outcome = _stages(system, _given(system, chain))
     return outcome if isinstance(outcome, str) else None
 
 
-def _given(system: System, chain: Chain) -> tuple[int, ...]:
+def _given(system: System, chain: FrameChain) -> tuple[int, ...]:
     """The numbers in q of the free joints of the chain, then of the locked ones."""
     starts = {link.name: link.q.start for link in system.tree.links}
     return (*chain.places, *(starts[name] for name in chain.locked))
 
 
 def _known(system: System, given: tuple[int, ...]) -> Known:
-    known: Known = system.cached(("completed", given), lambda: completed(system, given))
+    known: Known = system.cached(("completed", given), lambda: complete(system, given))
     return known
 
 

@@ -15,7 +15,7 @@ from mbs.errors import ModelError
 from mbs.loops.reduction import reduction
 from mbs.models.contacts import contacts_of, require_undriven
 from mbs.models.direct_dynamics import hybrid_dynamics
-from mbs.recursions.force_elements import summed, wrench_efforts
+from mbs.recursions.force_elements import sum_wrenches, wrench_efforts
 from mbs.recursions.poses import link_poses
 from mbs.recursions.route import BASE, relative_pose
 from mbs.spatial import Wrench, carried
@@ -258,7 +258,7 @@ def wrenches_of(system: System, q: SX, frames: Sequence[Frame], u: SX) -> dict[i
         force, moment = u[first : first + 3], u[first + 3 : first + 6]
         f, m = carried(pose, (casadi.mtimes(R.T, force), casadi.mtimes(R.T, moment)))
         exerted.append({link: (-f, -m)})
-    return summed(*exerted)
+    return sum_wrenches(*exerted)
 
 
 def load_of(system: System, q: SX, external: dict[int, Wrench]) -> SX:

@@ -9,7 +9,7 @@ import pytest
 import mbs
 from mbs.errors import NoClosedForm
 from mbs.loops import modes
-from mbs.loops.plan import plan, started_at, verified
+from mbs.loops.plan import plan, started_at, verify
 
 
 def changed(stage, labels, change):
@@ -26,7 +26,7 @@ def test_a_way_that_never_closes_is_left_out():
     more = changed(
         stage, ("x", *stage.labels), lambda v: casadi.horzcat(v[:, 0] + 0.3, v[:, 0], v[:, 1])
     )
-    (kept,) = verified(system, [more])
+    (kept,) = verify(system, [more])
     assert kept.labels == stage.labels
     assert kept.chosen == stage.chosen
     q = started_at(system, np.array(modes(system, {"j1": 0.3})[0].q))
@@ -38,7 +38,7 @@ def test_a_plan_that_does_not_give_the_assembled_configuration_is_refused():
     (stage,) = plan(system)
     wrong = changed(stage, stage.labels, lambda v: v + 0.3)
     with pytest.raises(NoClosedForm, match="the loop of j3 does not close as the directions"):
-        verified(system, [wrong])
+        verify(system, [wrong])
 
 
 def test_a_way_out_of_reach_is_kept():
@@ -47,5 +47,5 @@ def test_a_way_out_of_reach_is_kept():
     lost = changed(
         stage, (*stage.labels, "x"), lambda v: casadi.horzcat(v, casadi.sqrt(-1 - v[:, 0] ** 2))
     )
-    (kept,) = verified(system, [lost])
+    (kept,) = verify(system, [lost])
     assert kept.labels == (*stage.labels, "x")

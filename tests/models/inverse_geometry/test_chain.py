@@ -6,7 +6,7 @@ import pytest
 import mbs
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry import solve_many
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 
 
 @pytest.fixture(scope="module")
@@ -15,9 +15,9 @@ def puma():
 
 
 def test_it_is_kept_on_the_system(puma):
-    way = chain(puma, locked={"q6": 0.3, "q4": 0.1})
-    assert chain(puma, 6, {"q4": 0.1, "q6": 0.3}) is way
-    assert chain(puma, 6, {"q4": 0.1, "q6": 0.4}) is not way
+    way = frame_chain(puma, locked={"q6": 0.3, "q4": 0.1})
+    assert frame_chain(puma, 6, {"q4": 0.1, "q6": 0.3}) is way
+    assert frame_chain(puma, 6, {"q4": 0.1, "q6": 0.4}) is not way
     assert (way.names, way.places) == (("q1", "q2", "q3", "q5"), (0, 1, 2, 4))
     assert way.locked == {"q4": 0.1, "q6": 0.3}
     p = np.zeros(0)
@@ -26,7 +26,7 @@ def test_it_is_kept_on_the_system(puma):
 
 def test_locked_joints_stand_in_its_ways(puma):
     q = np.array([0.3, -0.8, 0.4, 0.2, 0.6, 0.1])
-    way = chain(puma, locked={"q2": q[1], "q6": q[5]})
+    way = frame_chain(puma, locked={"q2": q[1], "q6": q[5]})
     expected = np.array(mbs.models.direct_geometry(puma)(q))
     assert way.arm(np.zeros(0)).pose(q[list(way.places)]) == pytest.approx(expected, abs=1e-14)
 
@@ -43,12 +43,12 @@ def test_locked_joints_stand_in_its_ways(puma):
 )
 def test_refusals(puma, frame, locked, message):
     with pytest.raises(ModelError, match=message):
-        chain(puma, frame, locked)
+        frame_chain(puma, frame, locked)
 
 
 def test_the_elbow_is_not_proposed_to_be_locked():
     with pytest.raises(ModelError, match=r"7 joints are free .* locked=\{'q3': 0\}"):
-        chain(mbs.load("panda").assemble())
+        frame_chain(mbs.load("panda").assemble())
 
 
 def test_many_poses_need_a_system():

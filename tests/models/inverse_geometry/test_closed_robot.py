@@ -9,8 +9,8 @@ import mbs
 from mbs.components import Body, Mechanism, Revolute, Spherical
 from mbs.loops.closing import Closing
 from mbs.loops.modes import closed_configurations
-from mbs.loops.plan import completed
-from mbs.models.inverse_geometry.chain import chain
+from mbs.loops.plan import complete
+from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.search import search
 from mbs.models.inverse_geometry.whole_robot import close, posed, why_searched
 
@@ -27,7 +27,7 @@ def systems():
 def drawn(system, away, seed):
     """A closed configuration whose independent joints stand elsewhere."""
     rng = np.random.default_rng(seed)
-    held = completed(system, ()).held
+    held = complete(system, ()).held
     q = np.array(system.configuration)
     q[list(held)] += rng.uniform(-away, away, len(held))
     closed = Closing(system, NONE, held).nearest(q)
@@ -40,7 +40,7 @@ def pose(system, frame, q):
 
 
 def solutions(system, frame, T):
-    way = chain(system, frame)
+    way = frame_chain(system, frame)
     return close(system, way, search(way.arm(NONE), T), NONE)
 
 
@@ -63,7 +63,7 @@ def test_the_configuration_that_made_the_pose_is_found(systems, name, seed):
     found = solutions(system, frame, T)
     assert_solved(system, frame, T, found)
     assert any(same(system, configuration.q, q, 1e-7) for configuration in found)
-    assert why_searched(system, chain(system, frame)) is None
+    assert why_searched(system, frame_chain(system, frame)) is None
 
 
 @pytest.mark.parametrize("way", ["parallel", "crossed"])
@@ -148,7 +148,7 @@ def test_a_tree_keeps_the_other_arm_where_it_is():
     q = rng.uniform(-1, 1, 7)
     for frame, other in ((4, [4, 5, 6]), (7, [1, 2, 3])):
         T = pose(system, frame, q)
-        way = chain(system, frame)
+        way = frame_chain(system, frame)
         configurations = search(way.arm(NONE), T)
         found = close(system, way, configurations, NONE, q)
         assert len(found) == len(configurations) >= 1
@@ -163,7 +163,7 @@ def test_a_tree_keeps_the_other_arm_where_it_is():
 def test_joints_that_nothing_determines_stay(systems):
     system = systems["five_bar"]
     q = drawn(system, 0.3, 2)
-    way = chain(system, "link1")
+    way = frame_chain(system, "link1")
     found = close(system, way, q[[0]], NONE, q)
     assert len(found) == 2
     assert all(configuration.q[0] == q[0] and configuration.q[2] == q[2] for configuration in found)
@@ -173,16 +173,19 @@ def test_joints_that_nothing_determines_stay(systems):
 def test_locked_joints_are_known():
     system = mbs.load("sr400").assemble()
     q = drawn(system, 0.4, 4)
-    way = chain(system, 6, {"q4": float(q[3])})
+    way = frame_chain(system, 6, {"q4": float(q[3])})
     found = close(system, way, q[[0, 1, 2, 4, 5]], NONE)
     assert len(found) == 2
     assert any(same(system, configuration.q, q, 1e-9) for configuration in found)
 
 
 def test_a_configuration_of_the_chain_that_leaves_the_loop_open(systems):
-    assert close(systems["five_bar"], chain(systems["five_bar"], "tool"), [[3.0, 0.0]], NONE) == []
+    assert (
+        close(systems["five_bar"], frame_chain(systems["five_bar"], "tool"), [[3.0, 0.0]], NONE)
+        == []
+    )
     nothing = np.zeros((0, 2))
-    assert close(systems["five_bar"], chain(systems["five_bar"], "tool"), nothing, NONE) == []
+    assert close(systems["five_bar"], frame_chain(systems["five_bar"], "tool"), nothing, NONE) == []
 
 
 def test_chain_joints_that_depend_on_each_other():
@@ -191,7 +194,7 @@ def test_chain_joints_that_depend_on_each_other():
     system = mbs.load("four_bar").assemble()
     q = drawn(system, 0.3, 1)
     frame = next(k + 1 for k in range(len(system.tree.links)) if len(system.tree.path(k)) == 2)
-    way = chain(system, frame)
+    way = frame_chain(system, frame)
     found = solutions(system, frame, pose(system, frame, q))
     assert [same(system, configuration.q, q, 1e-8) for configuration in found] == [True]
     assert close(system, way, q[list(way.places)] + 0.1, NONE) == []
@@ -202,7 +205,7 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
     mechanism, guess = closed_chain(seed, closing)
     system = mechanism.assemble(guess=guess)
     frame = "body2"
-    way = chain(system, frame)
+    way = frame_chain(system, frame)
     q = drawn(system, 0.1, seed)
     T = pose(system, frame, q)
     found = solutions(system, frame, T)
@@ -210,7 +213,7 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
     reason = why_searched(system, way)
     if reason is not None:
         assert "no closed form known here" in reason
-    held = completed(system, way.places).held
+    held = complete(system, way.places).held
     rest = close(system, way, q[list(way.places)], NONE, q)
     assert any(same(system, configuration.q, q, 1e-6) for configuration in rest)
     for configuration in rest:
@@ -220,9 +223,9 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
 def test_search_with_positions_held_finds_what_closed_forms_find(systems):
     system = systems["akr3000"]
     q = drawn(system, 0.03, 3)
-    places = chain(system, 10).places
+    places = frame_chain(system, 10).places
     found = closed_configurations(Closing(system, NONE, places), q)
-    exact = close(system, chain(system, 10), q[list(places)], NONE)
+    exact = close(system, frame_chain(system, 10), q[list(places)], NONE)
     assert len(found) == len(exact) == 4
     for configuration in exact:
         assert any(same(system, configuration.q, other, 1e-7) for other in found)
@@ -240,7 +243,7 @@ def test_a_ball_that_turns_freely_stays():
     places = [k for k, c in enumerate(system.coordinates) if c.name.startswith("loose")]
     seed = np.array(system.configuration)
     seed[places] = [0.5, -0.5, 0.5, 0.5]
-    found = close(system, chain(system, "a"), [[1.1]], NONE, seed)
+    found = close(system, frame_chain(system, "a"), [[1.1]], NONE, seed)
     assert len(found) == 2
     for configuration in found:
         np.testing.assert_array_equal(configuration.q[places], seed[places])

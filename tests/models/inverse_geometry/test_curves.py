@@ -3,7 +3,7 @@
 import numpy as np
 
 import mbs
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.self_motions import connected, curve, freedoms
 from mbs.models.inverse_geometry.target import Target, reduction
 
@@ -12,7 +12,7 @@ def planar(count):
     rows = [
         {"antecedent": k, "joint": "revolute", "d": 0.0 if k == 0 else 0.4} for k in range(count)
     ]
-    return chain(mbs.load({"name": "planar", "frame": rows}).assemble()).arm(np.zeros(0))
+    return frame_chain(mbs.load({"name": "planar", "frame": rows}).assemble()).arm(np.zeros(0))
 
 
 def at(arm, q):

@@ -7,7 +7,7 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.follow import follow
 from mbs.models.inverse_geometry.search import search
 
@@ -58,7 +58,7 @@ def test_the_branch_is_kept(puma, seed):
     path = poses(puma, 6, line(start, start + rng.uniform(-0.9, 0.9, 6), 12))
     path = np.concatenate([path, path[-2::-1]])
     found = follow(puma, path, start, limits=False)
-    arm = chain(puma, 6).arm(np.zeros(0))
+    arm = frame_chain(puma, 6).arm(np.zeros(0))
     signs = np.sign(np.linalg.det(arm.pose_and_jacobian(found.q)[1]))
     assert np.all(signs == signs[0])
     if found.reason == "":
@@ -105,7 +105,7 @@ def test_a_pose_too_far_is_out_of_reach(puma):
     assert found.reason.startswith(f"pose {found.reached + 1} of 30 is out of reach: the nearest")
     assert len(found.q) == found.reached + 1
     last, beyond = path[found.reached], path[found.reached + 1]
-    arm = chain(puma, 6).arm(np.zeros(0))
+    arm = frame_chain(puma, 6).arm(np.zeros(0))
     assert len(search(arm, last)) > 0
     assert len(search(arm, beyond)) == 0
     away = float(found.reason.split(" m away")[0].rsplit(" ", 1)[1])
@@ -151,7 +151,7 @@ def test_start_near_the_first_pose(puma):
 def test_chains_of_fewer_than_six_joints(robot, frame):
     """Between the poses of a path the straight line leaves what the joints can reach."""
     system = mbs.load(robot).assemble()
-    own = chain(system, frame)
+    own = frame_chain(system, frame)
     start = np.linspace(0.3, 0.6, system.nq)
     end = start.copy()
     end[list(own.places)] += np.linspace(0.5, -0.4, len(own.places))

@@ -7,8 +7,8 @@ import pytest
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import chain
-from mbs.models.inverse_geometry.gathering import further, gather
+from mbs.models.inverse_geometry.chain import frame_chain
+from mbs.models.inverse_geometry.gathering import gather, gather_further
 from mbs.models.inverse_geometry.target import Target
 
 NONE = np.zeros(0)
@@ -16,7 +16,7 @@ NONE = np.zeros(0)
 
 @cache
 def way(name):
-    return chain(mbs.load(name).assemble())
+    return frame_chain(mbs.load(name).assemble())
 
 
 def target(name, q):
@@ -39,7 +39,7 @@ def test_a_degenerate_pose_is_doubtful():
     aim = target("puma560", [0.3, -0.5, 0.7, 0.4, 0.0, 0.2])
     found = gather(way("puma560"), aim, "pieper", NONE)
     assert found.doubtful
-    more = further(way("puma560"), aim, found, NONE)
+    more = gather_further(way("puma560"), aim, found, NONE)
     assert len(more.q) > len(found.q)
     assert more.labels[: len(found.labels)] == found.labels
     assert np.max(aim.residual(more.q)) < aim.tolerance

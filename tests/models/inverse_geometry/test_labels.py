@@ -9,12 +9,12 @@ import pytest
 import mbs
 from mbs.models.inverse_geometry import solve
 from mbs.models.inverse_geometry.answer import Anatomy, anatomy, labels
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 
 
 @cache
 def arm(name):
-    return chain(mbs.load(name).assemble()).arm(np.zeros(0))
+    return frame_chain(mbs.load(name).assemble()).arm(np.zeros(0))
 
 
 def label(name, q):

@@ -17,7 +17,7 @@ from support.pieper_arms import (
 )
 
 from mbs.closed_forms.sequence import Problem
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 
 H = np.pi / 2
 
@@ -82,7 +82,7 @@ def test_slides_among_the_position_joints(kinds, first, steps):
 @pytest.mark.parametrize(("kinds", "special", "steps"), SPECIAL)
 def test_special_arms_take_simple_equations(kinds, special, steps):
     leaves, sequence = leaves_of(
-        chain(system := with_wrist(kinds + "RRR", 4, 2, special)).problem()
+        frame_chain(system := with_wrist(kinds + "RRR", 4, 2, special)).problem()
     )
     assert kinds_of(sequence)[:3] == steps
     arm = plain_arm(system)
@@ -93,7 +93,7 @@ def test_special_arms_take_simple_equations(kinds, special, steps):
 @pytest.mark.parametrize("kinds", placements(3)[::3])
 def test_three_slides_anywhere(kinds):
     system = slides_and_turns(kinds, 1)
-    leaves, sequence = leaves_of(chain(system).problem())
+    leaves, sequence = leaves_of(frame_chain(system).problem())
     assert kinds_of(sequence) == ("type 2", "type 3", "type 3", "linear")
     arm = plain_arm(system)
     for q in arm.random(np.random.default_rng(8), 5):
@@ -106,7 +106,7 @@ def test_three_slides_anywhere(kinds):
 )
 def test_the_loop_may_begin_anywhere_and_run_backwards(build, arguments):
     system, _, _, arm = solved(build, *arguments)
-    problem = chain(system).problem()
+    problem = frame_chain(system).problem()
     q = arm.random(np.random.default_rng(9))
     count = set[int]()
     for first in (1, 3, 4):

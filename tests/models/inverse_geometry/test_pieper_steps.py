@@ -19,14 +19,14 @@ from support.pieper_arms import (
 
 from mbs.closed_forms.pieper import pieper
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 
 H = np.pi / 2
 
 
 def test_symbolic_lengths_give_the_same_configurations():
     system, p = lengths()
-    way = chain(system)
+    way = frame_chain(system)
     symbolic, sequence = leaves_of(way.problem())
     numeric, plain = leaves_of(way.problem(p))
     assert sequence.signs == plain.signs == ("q3a", "q3", "q5")
@@ -42,7 +42,7 @@ def test_symbolic_lengths_give_the_same_configurations():
 @pytest.mark.parametrize("scale", [1e-2, 1e3])
 def test_the_size_of_the_arm_does_not_matter(scale):
     system, p = lengths()
-    way, sizes = chain(system), np.array([scale] * (len(p) - 1) + [1.0])
+    way, sizes = frame_chain(system), np.array([scale] * (len(p) - 1) + [1.0])
     leaves, _ = leaves_of(way.problem(p * sizes))
     arm, like = way.arm(p * sizes), way.arm(p)
     same, _ = leaves_of(way.problem(p))
@@ -118,7 +118,7 @@ def test_steps_can_be_read():
     names = [name for one in sequence.steps for name in one.coefficients]
     assert len(set(names)) == len(names)
     assert sorted(name for one in sequence.steps for name in one.names) == list(
-        chain(catalogue("puma560")).names
+        frame_chain(catalogue("puma560")).names
     )
 
 
@@ -142,18 +142,18 @@ def test_coefficients_fulfil_the_equation():
 
 def test_refusals_name_the_joints_and_the_condition():
     with pytest.raises(NoClosedForm, match=r"three neighbouring axes of q1 \.\. q6 meet"):
-        pieper(chain(general_6r(0)).problem())
+        pieper(frame_chain(general_6r(0)).problem())
     with pytest.raises(NoClosedForm, match="the loop has 5 unknown joints"):
-        pieper(chain(general_5r(0)).problem())
+        pieper(frame_chain(general_5r(0)).problem())
     flat = {1: {"alpha": 0.0}, 2: {"alpha": 0.0}}
     with pytest.raises(NoClosedForm, match="singular in every configuration"):
-        pieper(chain(with_wrist("RRRRRR", 4, 3, flat)).problem())
+        pieper(frame_chain(with_wrist("RRRRRR", 4, 3, flat)).problem())
     four = {1: {"d": 0.0, "r": 0.0}, 2: {"d": 0.0, "r": 0.0}, 3: {"d": 0.0}}
     with pytest.raises(NoClosedForm, match="singular in every configuration"):
-        pieper(chain(with_wrist("RRRRRR", 4, 3, four)).problem())
+        pieper(frame_chain(with_wrist("RRRRRR", 4, 3, four)).problem())
     coplanar = {1: {"alpha": H}, 2: {"alpha": 0.0}}
     with pytest.raises(NoClosedForm, match="slide in one plane"):
-        pieper(chain(with_wrist("PPPRRR", 4, 3, coplanar)).problem())
+        pieper(frame_chain(with_wrist("PPPRRR", 4, 3, coplanar)).problem())
     parallel = {4: {"alpha": 0.0}}
     with pytest.raises(NoClosedForm, match="axes stay parallel"):
-        pieper(chain(with_wrist("PPPRRR", 4, 3, parallel)).problem())
+        pieper(frame_chain(with_wrist("PPPRRR", 4, 3, parallel)).problem())

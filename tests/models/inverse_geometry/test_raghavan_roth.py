@@ -12,7 +12,7 @@ from mbs.closed_forms.raghavan_roth.numbers import (
     rho,
 )
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.raghavan_roth import (
     candidates,
     candidates_many,
@@ -35,7 +35,7 @@ SLIDING = [*placements(1), *placements(2)[::2], *placements(3)[::3]]
 
 
 def arm_of(system):
-    return chain(system).arm(np.array(system.p_default))
+    return frame_chain(system).arm(np.array(system.p_default))
 
 
 def configurations(arm, rng, count):

@@ -5,7 +5,7 @@ from support.arms import general_6r, slides_and_turns
 
 import mbs
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.chain import chain
+from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.raghavan_roth import characteristic
 
 CHARACTERISTIC = {
@@ -20,7 +20,7 @@ CHARACTERISTIC = {
 
 
 def arm_of(system):
-    return chain(system).arm(np.array(system.p_default))
+    return frame_chain(system).arm(np.array(system.p_default))
 
 
 def configurations(arm, rng, count):
@@ -44,7 +44,7 @@ def conditions(arm, found, given, shift, p=()):
 @pytest.mark.parametrize("name", CHARACTERISTIC)
 def test_characteristic_matrix_is_singular_at_configurations(name):
     system = CHARACTERISTIC[name]()
-    own = chain(system)
+    own = frame_chain(system)
     problem, arm = own.problem(np.zeros(0)), arm_of(system)
     found = characteristic(problem)
     assert own.names[found.place] == found.joint
@@ -62,7 +62,7 @@ def test_characteristic_matrix_of_symbolic_lengths():
         for k, (alpha, d, r) in enumerate(rows)
     ]
     description = {"name": "arm", "parameters": lengths, "frame": frames}
-    own = chain(mbs.load(description).assemble())
+    own = frame_chain(mbs.load(description).assemble())
     problem, p = own.problem(), np.array(list(lengths.values()))
     found, other = characteristic(problem), 1.3 * p
     assert np.max(conditions(own.arm(p), found, problem.given, 0.0, p)) < 1e-12
@@ -71,6 +71,6 @@ def test_characteristic_matrix_of_symbolic_lengths():
 
 
 def test_characteristic_matrix_needs_six_joints():
-    problem = chain(mbs.load("scara").assemble()).problem(np.zeros(0))
+    problem = frame_chain(mbs.load("scara").assemble()).problem(np.zeros(0))
     with pytest.raises(NoClosedForm, match="4 joints"):
         characteristic(problem)

@@ -194,3 +194,11 @@ def test_a_file_that_is_no_saved_result(tmp_path):
     for name in ("x.npz", "absent.npz", "empty.npz", "one.npy"):
         with pytest.raises(ModelError, match="is no saved result"):
             Result.load(tmp_path / name)
+
+
+def test_a_file_with_objects_is_refused(tmp_path):
+    """Unpickling one would run whatever its author wrote."""
+    path = tmp_path / "result.npz"
+    np.savez(path, rest=np.array([{"units": {}}], dtype=object), time=[0.0], values=[[0.0]])
+    with pytest.raises(ModelError, match="is no saved result"):
+        Result.load(path)

@@ -10,11 +10,13 @@ read.
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -1110,7 +1112,26 @@ def _model_name(path: str | Path) -> str:
             f"{path}: the root element is <{root.tag}>, not <mujoco>; give an MJCF file, or read a"
             " URDF file with read_urdf"
         )
+    _refuse_many_copies(path, root, 1)
     return component_name(root.get("model") or Path(path).stem)
+
+
+_MOST_COPIES = 10_000
+"""Of one element: models of crowds have hundreds of copies; MuJoCo makes any number, in hours."""
+
+
+def _refuse_many_copies(path: str | Path, element: Element, copies: int) -> None:
+    """Refuse an element that its own count and those around it multiply beyond reason."""
+    if element.tag in ("replicate", "composite", "flexcomp"):
+        counts = [int(count) for count in re.findall(r"\d{1,18}", element.get("count", ""))]
+        copies *= math.prod(counts)
+        if copies > _MOST_COPIES:
+            raise DescriptionError(
+                f"{path}: a <{element.tag}> makes {copies} copies, and {_MOST_COPIES} are the most;"
+                " write fewer"
+            )
+    for child in element:
+        _refuse_many_copies(path, child, copies)
 
 
 def _mujoco() -> Any:

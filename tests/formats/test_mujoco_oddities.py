@@ -458,3 +458,22 @@ def _outcome(read, text):
     except MbsError as error:
         return str(error)
     return ""
+
+
+@pytest.mark.parametrize(
+    "copies",
+    [
+        '<replicate count="100000000"><body><joint/><geom size=".1"/></body></replicate>',
+        '<replicate count="200"><replicate count="200"><geom size=".1"/></replicate></replicate>',
+        '<body><flexcomp name="f" type="grid" count="100 100 100" spacing=".1 .1 .1"/></body>',
+    ],
+)
+def test_copies_without_end_are_refused_before_they_are_made(read, copies):
+    with pytest.raises(DescriptionError, match="copies, and 10000 are the most; write fewer"):
+        read(f"<mujoco><worldbody>{copies}</worldbody></mujoco>")
+
+
+def test_some_copies_are_made(read):
+    body = '<body name="b"><joint name="j" axis="0 1 0"/><geom size=".1" pos=".2 0 0"/></body>'
+    copies = f'<replicate count="3" offset="1 0 0">{body}</replicate>'
+    assert read(f"<mujoco><worldbody>{copies}</worldbody></mujoco>").assemble().nq == 3

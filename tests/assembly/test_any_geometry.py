@@ -42,6 +42,7 @@ def test_a_symbol_as_an_angle_is_the_number(axis, before, after, value, default)
         np.testing.assert_allclose(ours, np.array(model(plain)(q, v, a)), rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     "tilt", [0.0, *(sign * 10.0**-k for k in range(1, 16) for sign in (1, -1))]
 )

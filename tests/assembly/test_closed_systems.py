@@ -254,6 +254,7 @@ MECHANISMS = [
 ]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("make", "mobility", "gruebler"), MECHANISMS, ids=lambda x: getattr(x, "__name__", "")
 )

@@ -78,6 +78,7 @@ def names(system):
     return [c.name for c in system.coordinates]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("aligned", [False, True])
 def test_frames_reproduce_the_poses_of_the_components(seed, aligned):

@@ -137,6 +137,7 @@ def test_validity_is_a_function_beside_the_models(loop, ball):
     assert mbs.models.validity(mbs.load("puma560").assemble()).numel_out(0) == 0
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ["puma560", "sr400", "delta", "five_bar", "stewart_platform"])
 def test_systems_travel_whole(name):
     system = mbs.load(name).assemble()

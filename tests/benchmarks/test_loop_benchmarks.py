@@ -27,6 +27,7 @@ def reference(name):
     return case.reference(case.times)
 
 
+@pytest.mark.sweep
 @each
 def test_mbs_and_reference_tell_one_motion(name):
     case = case_of(name)

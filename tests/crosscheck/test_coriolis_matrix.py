@@ -8,6 +8,7 @@ import mbs
 import mbs.models
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("method", ["renaud", "christoffel"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_coriolis_matrix(name, method):

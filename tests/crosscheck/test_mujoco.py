@@ -90,6 +90,7 @@ def close(ours, theirs, tolerance=1e-10):
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=tolerance * scale)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("seed", "options"), CASES)
 def test_dynamics(seed, options):
     twin = Twin(seed, options)
@@ -114,6 +115,7 @@ def test_dynamics(seed, options):
         close(U, twin.data.energy[0])
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("seed", "options"), CASES)
 def test_kinematics(seed, options):
     twin = Twin(seed, options)

@@ -18,6 +18,7 @@ from mbs.native import find_compiler
 # ---- saved states ----
 
 
+@pytest.mark.sweep
 @SOLVERS
 @pytest.mark.parametrize("name", ["ball", "stopped_crank"])
 def test_states_saved_around_events_continue_bit_for_bit(fmu_of, name, solver):

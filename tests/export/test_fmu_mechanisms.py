@@ -10,6 +10,7 @@ from fmu_mechanisms import CASES, imported, simulated
 import mbs
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     "name", ["four_bar", "five_bar", "floating_body", "two_roots", "massless_slide", "bricard"]
 )

@@ -51,6 +51,7 @@ def given(system, position, v, count):
     return first | dict(zip(named, v, strict=False))
 
 
+@pytest.mark.sweep
 @KINDS
 @pytest.mark.parametrize("case", STARTS)
 def test_a_start_with_velocities_of_one_branch_moves_as_a_simulation(made, case, kind):

@@ -116,6 +116,7 @@ def test_robots_come_back(tmp_path, robot):
     assert close(values(inverse_dynamics(system), q, v, a), values(inverse_dynamics(back), q, v, a))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("robot", ["four_bar", "sr400", "stewart_platform", "delta", "bricard"])
 def test_loops_come_back(tmp_path, robot):
     """Revolute joints as two connects, spherical ones as one, rods as tendons that keep length."""

@@ -266,6 +266,7 @@ def test_every_flag_of_this_mujoco_is_known():
     assert not _EFFECTIVE & _WITHOUT_EFFECT
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     "flag",
     [

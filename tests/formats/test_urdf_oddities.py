@@ -285,6 +285,7 @@ ALONE = {
 }
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("case", [case for case in NOTED if case not in ALONE])
 def test_equal_to_pinocchio(urdf, case, free):

@@ -78,6 +78,7 @@ def floating():
 # ---- what it needs ----
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("real", ["double", "float"])
 @pytest.mark.parametrize("name", ["puma560", "four_bar", "five_bar"])
 def test_it_needs_functions_of_numbers_alone(name, real, tmp_path):

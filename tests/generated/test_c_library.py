@@ -39,6 +39,7 @@ def printed(folder):
     return {(row[0], row[1]): np.array([float(x) for x in row[2:]]) for row in rows}
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ROBOTS)
 def test_example_program_equals_the_functions(name, tmp_path):
     functions = models(name)

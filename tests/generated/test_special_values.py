@@ -23,6 +23,7 @@ RUNS = {
 }
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("language", RUNS)
 def test_numbers_that_are_not_finite(language, tmp_path):
     tool, run = RUNS[language]

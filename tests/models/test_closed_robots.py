@@ -53,6 +53,7 @@ def test_terminal_frame(systems, name):
     assert terminal_frame(systems[name]) == TOOLS[name]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", TOOLS)
 def test_direct_geometry_is_the_pose_after_closure(systems, name, seed):
@@ -82,6 +83,7 @@ def test_direct_geometry_of_the_five_bar_is_where_two_circles_meet(systems):
     np.testing.assert_allclose(T[:2, 3], [top.real, top.imag], atol=1e-12)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", TOOLS)
 def test_jacobian_is_the_slope_of_the_pose_along_closed_configurations(systems, name, seed):

@@ -38,6 +38,7 @@ def after(system, phases, state, a, h):
     return numbers(phases.motion()(q + h * rate, v + h * a)[1])
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("touching", PHASES, ids=str)
 def test_what_is_held_does_not_accelerate_and_the_rest_has_no_force(quadruped, phases, touching):
     q, v, tau = random_state(quadruped, np.random.default_rng(1), 0.3)

@@ -92,6 +92,7 @@ def test_algebraic_equations_hold_where_the_equations_of_motion_do(name, form):
     np.testing.assert_array_equal(np.concatenate([numbers(q_of), numbers(v_of)]), x)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", [*CLOSED, *OPEN])
 def test_reduced_equations_give_the_same_motion(name):
     system = built(name)

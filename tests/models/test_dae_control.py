@@ -63,6 +63,7 @@ def least_effort(system, form):
     return float(found["f"]), solver.stats()["iter_count"]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("form", "iterations"),
     [("reduced", 14), ("index1", None), ("index2", 8), ("index3", 48), ("ggl", 8)],

@@ -73,6 +73,7 @@ STARTS = {
 }
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("form", ["reduced", "index1"])
 @pytest.mark.parametrize("name", STARTS)
 def test_idas_follows_the_simulation(name, form):
@@ -91,6 +92,7 @@ def test_idas_follows_the_simulation(name, form):
     assert np.abs(invariants).max(initial=0) < 1e-6
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("form", ORDER)
 @pytest.mark.parametrize("name", ["smooth", "massless", "rssr", "rolling"])
 def test_radau_method_has_its_order_in_every_form(name, form):

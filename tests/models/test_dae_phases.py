@@ -42,6 +42,7 @@ def motors(system):
     return dict(zip(names, np.linspace(-4, 6, len(names)), strict=True))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("form", SOME)
 @pytest.mark.parametrize("touching", SETS, ids=str)
 def test_every_form_has_the_accelerations_and_the_forces_of_the_phase(feet, touching, form):

@@ -69,6 +69,7 @@ def assert_close(found, expected, tolerance):
         np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(1.0, np.abs(b).max()))
 
 
+@pytest.mark.sweep
 def test_efforts_against_differences(system):
     q, v, a = random_state(system, np.random.default_rng(0))
     idm = mbs.models.inverse_dynamics(system)
@@ -77,6 +78,7 @@ def test_efforts_against_differences(system):
     assert_close([tau], [idm(q, v, a)], 1e-12)
 
 
+@pytest.mark.sweep
 def test_recursions_equal_differentiation(system):
     q, v, a = random_state(system, np.random.default_rng(1))
     analytical, ad = (
@@ -85,6 +87,7 @@ def test_recursions_equal_differentiation(system):
     assert_close(analytical, ad, 1e-12)
 
 
+@pytest.mark.sweep
 def test_slope_along_accelerations_is_the_inertia_matrix(system):
     q, v, a = random_state(system, np.random.default_rng(2))
     A = np.array(inverse_dynamics_derivatives(system)(q, v, a)[2])
@@ -126,6 +129,7 @@ def recursion_of(system, base=None):
     return casadi.Function("f", [q, v, a], matrices), casadi.Function("tau", [q, v, a], [tau])
 
 
+@pytest.mark.sweep
 def test_every_way_to_the_base_gives_the_same(driven, monkeypatch):
     state, numbers = random_state(driven, np.random.default_rng(3)), range(len(driven.tree.links))
     results = []
@@ -136,6 +140,7 @@ def test_every_way_to_the_base_gives_the_same(driven, monkeypatch):
     assert_close(results[2], results[0], 1e-12)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("by_base", [False, True])
 def test_moving_base(driven, monkeypatch, by_base):
     links = set(range(len(driven.tree.links))) if by_base else set()

@@ -23,6 +23,7 @@ def system(request):
     return tree_of(request.param)
 
 
+@pytest.mark.sweep
 def test_accelerations_against_differences(system):
     q, v, tau = random_state(system, np.random.default_rng(4))
     ddm = mbs.models.direct_dynamics(system)
@@ -31,6 +32,7 @@ def test_accelerations_against_differences(system):
     assert_close([a], [ddm(q, v, tau)], 1e-10)
 
 
+@pytest.mark.sweep
 def test_implicit_formula_equals_differentiation(system):
     q, v, tau = random_state(system, np.random.default_rng(5))
     implicit, ad = (

@@ -81,6 +81,7 @@ def pair(request):
     return system, twin(system)
 
 
+@pytest.mark.sweep
 def test_efforts(pair):
     system, model = pair
     data, Ia = model.createData(), rotor_inertia(system)
@@ -96,6 +97,7 @@ def test_efforts(pair):
             assert_close(inverse_dynamics_derivatives(system, method)(q, v, a), expected, 1e-11)
 
 
+@pytest.mark.sweep
 def test_accelerations(pair):
     system, model = pair
     model.armature = rotor_inertia(system)

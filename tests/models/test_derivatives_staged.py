@@ -50,6 +50,7 @@ def test_values(system):
         assert np.array_equal(inverse, inverse.T)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("names", [("tau",), ("v", "q"), ("tau", "v")])
 def test_some_derivatives_in_any_order(system, names):
     f = direct_dynamics_derivatives(system, with_respect_to=names)

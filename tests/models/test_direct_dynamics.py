@@ -54,6 +54,7 @@ def test_methods_agree_on_catalogue_robots(name):
     assert_methods_agree(mbs.load(name).assemble(), 0)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("seed", "options"), TREES)
 def test_methods_agree_on_random_trees(seed, options):
     assert_methods_agree(random_tree(seed, **options).mechanism.assemble(), seed)

@@ -61,6 +61,7 @@ def test_symbols_maps_and_expansion(name, builder):
     on_symbols(f, at, expected)
 
 
+@pytest.mark.sweep
 @COMPILER
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_the_c_code_of_all_models(name, tmp_path):

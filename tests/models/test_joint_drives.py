@@ -59,6 +59,7 @@ def test_inverse_dynamics_is_inertia_and_bias(system):
     assert np.linalg.eigvalsh(A).min() > 0
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("method", ["composite", "articulated", "auto"])
 def test_direct_dynamics_inverts_inverse_dynamics(system, method):
     q, v, a = random_state(system, np.random.default_rng(1))
@@ -88,6 +89,7 @@ def test_static_effort_is_the_gradient_of_the_potential_energy(system):
     close(MODELS.bias(system)(q, np.zeros(system.nv)), Q)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("method", ["renaud", "christoffel"])
 def test_lagrange_form(system, method):
     q, v, a = random_state(system, np.random.default_rng(4))

@@ -25,6 +25,7 @@ IDM = mbs.models.inverse_dynamics
 REVOLUTE_CHAIN = dict(n=8, kinds=("revolute", "revolute", "prismatic"), serial=True)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kind", CLOSING)
 def test_bodies_of_a_loop_are_in_balance(kind):
     mechanism, guess = closed_chain(3, kind)

@@ -29,6 +29,7 @@ COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(Health
 ARMS = ("puma560", "rx90", "stanford")
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("axes", ["base", 3, 6])
 @pytest.mark.parametrize("name", ARMS)
 def test_arm(name, axes):

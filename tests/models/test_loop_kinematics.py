@@ -89,6 +89,7 @@ def cut_positions(system, q):
     return np.array(values)
 
 
+@pytest.mark.sweep
 def test_the_rows_are_those_of_the_closure(system):
     q, closure = list(system.configuration), system.closure
     M = matrices(system, q)
@@ -126,6 +127,7 @@ def test_angular_velocity_of_a_spherical_cut_joint():
     np.testing.assert_allclose(v_c, [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-8)
 
 
+@pytest.mark.sweep
 def test_accelerations_are_the_rates_of_velocities(system):
     v_a, v = motion(system)
     q, h = list(system.configuration), 1e-5
@@ -142,6 +144,7 @@ def test_accelerations_are_the_rates_of_velocities(system):
     np.testing.assert_allclose(G_dot, rate("G"), atol=scale)
 
 
+@pytest.mark.sweep
 def test_tree_velocities_give_the_same(system):
     v_a, v = motion(system)
     q = list(system.configuration)

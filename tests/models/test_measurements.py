@@ -223,6 +223,7 @@ def test_power_that_joints_bring_is_that_of_the_motor():
     assert np.abs(now["p3_P"]) > 0.1
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "cylindrical", "universal", "planar"])
 def test_coordinates_of_cut_joints(kind):
     mechanism, guess = closed_chain(2, kind)

@@ -17,6 +17,7 @@ BOUNDS = {
 """Multiplications, divisions among them, and additions; symbols for lengths and inertias."""
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("inertia", ["full", "base"])
 def test_models_take_no_more_operations(robot, inertia):

@@ -158,6 +158,7 @@ def layouts(array):
     yield np.moveaxis(last, -1, 0)
 
 
+@pytest.mark.sweep
 @pytest.mark.usefixtures("processors")
 @pytest.mark.parametrize("rows", [1, 6, 13])
 def test_layouts(rows):

@@ -49,6 +49,7 @@ def worst(function, *states):
     return result
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kind", OPERATIONS)
 def test_every_operation(kind):
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
@@ -60,6 +61,7 @@ def test_every_operation(kind):
         np.testing.assert_allclose(g(np.array(a), np.array(b)), exact, rtol=1e-14, atol=1e-15)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ["puma560", "rx90", "stanford", "two_branch_tree"])
 @pytest.mark.parametrize("builder", ["inverse_dynamics", "inertia_matrix", "direct_dynamics"])
 def test_models(name, builder):

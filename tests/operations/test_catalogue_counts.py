@@ -18,6 +18,7 @@ def test_the_jacobian_of_the_rx90():
     require_equal(f, simple)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("robot", "model", "most"),
     [

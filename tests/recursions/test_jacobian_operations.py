@@ -51,6 +51,7 @@ def test_choice_is_the_least_of_all_ways():
     assert best < 0.8 * max(every)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("reference", [None, -1, 0, 2, 5])
 @pytest.mark.parametrize("axes", [0, 3, 6])
 def test_no_choice_changes_the_result(axes, reference):

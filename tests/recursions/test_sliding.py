@@ -46,6 +46,7 @@ def both(assemble, monkeypatch):
     return slid, prices(assemble)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_no_model_of_a_robot_is_dearer(robot, monkeypatch):
     slid, plain = both(lambda: mbs.load(robot).assemble(), monkeypatch)

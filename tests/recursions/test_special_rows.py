@@ -66,6 +66,7 @@ def drawn(seed):
     return lambda options: options[rng.integers(len(options))]
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("seed", range(8))
 def test_models_of_random_rows(shape, seed):
@@ -78,6 +79,7 @@ def test_models_of_drawn_rows(data, shape):
     check_models(special_table(lambda options: data.draw(st.sampled_from(options)), shape))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("gamma", [0.0, pi, -pi, pi / 2, 0.4])
 @pytest.mark.parametrize("alpha", [pi / 2, -pi / 2, 0.7])
 def test_parallel_axes_behind_a_link_on_the_base(gamma, alpha):
@@ -98,6 +100,7 @@ def test_parallel_axes_behind_a_link_on_the_base(gamma, alpha):
     check_models(table)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("seed", range(4))
 def test_external_wrenches(shape, seed):
@@ -112,6 +115,7 @@ def test_external_wrenches(shape, seed):
         case.accelerates(method, tau, given_wrenches, f_ext=True)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("seed", range(4))
 def test_moving_base(shape, seed):

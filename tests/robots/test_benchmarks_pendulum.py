@@ -52,6 +52,7 @@ def windows(request):
     return request.param, n_four_bar(request.param).assemble()
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("tolerance", LIMITS)
 def test_windows_whirl_through_every_singular_configuration(windows, tolerance):
     """On the parallelogram branch the uprights turn together and the couplers only translate.

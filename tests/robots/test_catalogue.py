@@ -60,6 +60,7 @@ def test_every_robot(name):
         assert not isinstance(body, KhalilBody) or not body.grouped
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ACTIVE)
 def test_every_robot_assembles(name):
     """By its own guess, without a word from the user."""

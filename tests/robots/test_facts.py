@@ -79,6 +79,7 @@ def turn(T):
     return np.arctan2(T[1, 0], T[0, 0])
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", MOBILITY)
 def test_mobility(name):
     system = assembled(name)

@@ -84,6 +84,7 @@ def outcome(systems, run):
     return np.ptp(energy) / result["kinetic_energy"].max() / tolerance
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("constant", "factor", "run", "bound"), MOVED)
 def test_a_constant_that_is_moved_tenfold_is_told(
     systems, monkeypatch, constant, factor, run, bound

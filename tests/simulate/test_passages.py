@@ -46,6 +46,7 @@ def energy_error(result):
     return np.ptp(energy) / result["kinetic_energy"].max()
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_energy_falls_with_the_tolerance_through_singular_configurations(systems, name):
     joint, speed = SPEED.get(name, ("j1", 6.0))
@@ -94,6 +95,7 @@ def test_output_times_do_not_change_the_motion(systems):
     assert energy_error(result) < 1e-4
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("longer", [1e-5, -1e-5, 1e-7, -1e-7, 1e-8, -1e-8])
 def test_near_misses_turn_whatever_the_tolerance(longer):
     """Lengths that miss a + g = b + c by a little: the branches come near and do not meet."""

@@ -23,12 +23,14 @@ def counts(robot):
     return tuple(base.count for base in found)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", OPEN)
 def test_counts_of_inertial_parameters_then_rotors_then_friction(name):
     frames, gravity, expected = OPEN[name]
     assert counts(system(name, frames, gravity)) == expected
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_counts_of_the_catalogue(name):
     gravity, expected = CATALOGUE[name]

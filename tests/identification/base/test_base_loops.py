@@ -33,6 +33,7 @@ def counts(system):
     return tuple(base.count for base in found)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("name", "gravity"), COUNTS)
 def test_counts(name, gravity):
     system = mbs.load(name).assemble()

@@ -34,6 +34,7 @@ def plain_regressor(rows, columns, rng, states):
     return np.vstack(parts)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("first", range(1000, 1060, 10))
 def test_efforts_are_the_same_and_the_count_is_the_rank(first):
     for seed in range(first, first + 10):

@@ -21,6 +21,7 @@ EVERY = (*OPEN, *CLOSED, *TREES, *ROTORS)
 BOUNDS = {"puma560": "131/70", "rx90": "109/54", "iiwa": "132/67"}
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", [name for name in EVERY if name != "andrews_squeezer"])
 def test_energy_of_a_system_without_springs(name):
     system = system_of(name)
@@ -31,6 +32,7 @@ def test_energy_of_a_system_without_springs(name):
     assert found == pytest.approx(float(E + U), rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", EVERY)
 def test_its_rate_is_the_power_of_the_efforts(name):
     system = system_of(name)

@@ -30,6 +30,7 @@ def parts(name):
     return system, regressor(system, **options), filtered_regressor(system, **options)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", [*OPEN, *CLOSED, *TREES, *ROTORS])
 def test_rate_and_rest_are_the_dynamic_model(name):
     system, D, filtered = parts(name)

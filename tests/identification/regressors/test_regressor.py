@@ -53,6 +53,7 @@ def error(system, coordinates="independent", seed=0):
     return np.abs(found - tau).max() / np.abs(tau).max()
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", [*OPEN, *CLOSED, *TREES, *ROTORS])
 def test_efforts_of_inverse_dynamics(name):
     assert error(system_of(name)) < 1e-12

@@ -59,22 +59,26 @@ def check_slope(system, mode, q_a):
     np.testing.assert_allclose(G, wanted, atol=1e-8 * max(1.0, np.abs(wanted).max()))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kinds", SEARCHED)
 def test_the_modes_are_those_that_a_search_finds(kinds):
     check_count(ring_loop(1, kinds).assemble())
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kinds", LISTED)
 def test_the_same_joints_in_another_order(kinds):
     listed = check_modes(ring_loop(1, kinds).assemble())
     assert len(listed) in (2, 4)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("kinds", "parallel"), PARALLEL)
 def test_a_ball_in_a_plane_of_parallel_joints(kinds, parallel):
     check_count(ring_loop(1, kinds, parallel=parallel).assemble(), starts=150)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kinds", ["RUSR", "RUPS", "RWVR", "RRCPC", "RWPPP", "RRRRS"])
 def test_any_joint_may_be_cut(kinds):
     count = sum(len(MADE_OF.get(kind, kind)) for kind in kinds)

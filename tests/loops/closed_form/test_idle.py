@@ -31,6 +31,7 @@ def loop(joint, closing, offset):
     return m.assemble()
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("closing", CLOSING.values(), ids=CLOSING.keys())
 @pytest.mark.parametrize("joint", JOINTS.values(), ids=JOINTS.keys())
 def test_what_a_joint_of_the_tree_does_not_use_is_found_as_well(joint, closing):

@@ -42,6 +42,7 @@ def configuration(arm, name, seed):
     return arm.random(np.random.default_rng((7, seed, *name.encode())))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robot(name, seed):
@@ -49,6 +50,7 @@ def test_robot(name, seed):
     assert_complete(system, configuration(plain_arm(system), name, seed))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("joint", range(7))
 def test_panda_with_one_joint_locked(joint):
     system = assembled("panda")

@@ -29,6 +29,7 @@ def test_three_parallel_axes(first):
     complete(arms.three_parallel(first, 0), first)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("kinds", SLIDING)
 def test_slides_anywhere(kinds):
     complete(arms.slides_and_turns(kinds, 0), 4)

@@ -36,6 +36,7 @@ def regular_count(name):
     return len(searched(arm, arm.pose(configuration(name))))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("q5", [1e-5, 1e-7])
 @pytest.mark.parametrize("name", WRISTS)
 def test_near_the_wrist_singularity(name, q5):

@@ -27,6 +27,7 @@ def poses(system, count, seed, locked=None):
     return arm, q, arm.pose(q)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ["puma560", "tx90", "ur5", "stanford", "scara", "panda"])
 def test_every_solution_once(name):
     system, locked = assembled(name), LOCKED.get(name)

@@ -57,6 +57,7 @@ def test_catalogue_arms_have_eight_configurations(name):
         assert len(assert_all(leaves, arm, q)) == 8
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("first", [1, 2, 3, 4])
 @pytest.mark.parametrize("seed", range(2))
 def test_three_axes_that_meet_anywhere(first, seed):
@@ -69,6 +70,7 @@ def test_three_axes_that_meet_anywhere(first, seed):
         assert_complete(leaves, arm, 3)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("kinds", "first", "steps"), WITH_SLIDES)
 def test_slides_among_the_position_joints(kinds, first, steps):
     _, leaves, sequence, arm = solved(with_wrist, kinds, first, 1)
@@ -79,6 +81,7 @@ def test_slides_among_the_position_joints(kinds, first, steps):
         assert_complete(leaves, arm, 5)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("kinds", "special", "steps"), SPECIAL)
 def test_special_arms_take_simple_equations(kinds, special, steps):
     leaves, sequence = leaves_of(

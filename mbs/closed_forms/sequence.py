@@ -302,9 +302,7 @@ second, and the square of that is no zero yet."""
 _NOISE = 1e-11  # of a trace that decides whether the lines are real
 _FAR = 1e8  # largest root, in its scale
 _STEPS = 3  # of Newton
-_MOST_STEP = (
-    0.1  # twice the longest of them [rad, or of the scale]: near a fold a slope may be zero
-)
+_MOST_STEP = 0.1  # twice the longest [rad, or of the scale]: near a fold the slope is small
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,7 @@ from mbs.spatial import skew
 
 _SINGULAR = 1e-9
 """Part of the largest singular value that counts as zero: rounding leaves 1e-15, and at random
-positions a matrix that is not always singular has 1e-4 or so."""
+positions a matrix that is not always singular is far from it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,7 +25,7 @@ from mbs.closed_forms.sequence import Found, Step, real_quartic, step, trigonome
 
 _SMALL = 1e-7
 """Factors and shares below it, of equations whose coefficients are of about one, count as zero:
-products of several of them at closed samples carry some 1e-10 of rounding."""
+products of several of them magnify the 1e-12 to which the samples close."""
 _VANISHES = 1e-14
 """Largest coefficient of a resultant below which all of them are rounding: they are sums of
 products of factors of about one. Above it the shares decide."""

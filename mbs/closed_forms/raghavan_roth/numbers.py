@@ -313,7 +313,7 @@ def _rayleigh(vectors: Array, X: Array) -> Array:
 # of joint k, C_k the way to the next joint, and the pose is in one of the ways.
 
 
-_TINY_LENGTH = 1e-9  # part of an arm's length that the ways between its joints have by rounding
+_TINY_LENGTH = 1e-9  # part of an arm's length that is rounding of lengths between its joints
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,8 +26,8 @@ _PARALLEL = 1e-9
 """Sine or cosine between axes, or part of the arm's length, that counts as zero: products of six
 transforms leave 1e-15 of rounding, descriptions with twelve digits 1e-12."""
 _UNDECIDED = 1e-9
-"""Indicator of a branch, of the size of a sine times one, at which two branches meet: there the
-sign is rounding and names neither."""
+"""Indicator of a branch, lengths in those of the arm, at which two branches meet: its sign is
+rounding there and names neither."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def _elbow(bend: float, right: float) -> str:
 
 def _wrist_meets(arm: Arm) -> bool:
     """Whether axes 4, 5, 6 meet in one point; they do so in every configuration if in two."""
-    # two of many [rad or m], at neither of which an axis is at zero or a half turn
+    # any two [rad or m], at neither of which an axis is at zero or a half turn
     return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
 
 

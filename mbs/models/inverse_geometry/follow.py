@@ -45,7 +45,8 @@ SINGULAR = 1e-7
 _CHANGE = 0.5
 _CONTRACTION = 0.5
 _LARGEST = 0.35
-"""Longest step of any joint [rad or arm lengths], 20 degrees: what a whole turn is told from."""
+"""Longest step of any joint [rad or arm lengths], 20 degrees: a longer one may lead to another
+branch, or by a whole turn."""
 _ITERATIONS = 12
 _SMALL = 1e-9
 """Rows, and moves [rad or arm lengths], that count as nothing: a thousand times the 1e-12 of a

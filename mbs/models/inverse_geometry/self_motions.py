@@ -27,6 +27,8 @@ _AWAY = 0.05
 residual is then some 1e-3, far above the tolerance, and the null space still points along."""
 _TRIES = 24
 _SEED = 20260108
+_ZERO = 1e-6
+"""Singular values below it are zero: on a self-motion they are known to the root of 1e-12."""
 _INTEGER = 1e-3
 """Distance from integers within which slopes are rounded to them: a singular configuration is known
 to half its digits or fewer, and so is the null space; where rounding is wrong the residual
@@ -92,7 +94,7 @@ def _nearest_on_sphere(reduced: TargetReduction, direction: Array) -> Array:
         away = x - reduced.x
         rows = np.vstack([J, away / _AWAY])
         right = np.append(e, 0.5 * (away @ away / _AWAY - _AWAY))
-        # dependent rows, of the singular configuration itself, are rounding or 1e-2 and more
+        # rows that a self-motion leaves dependent are so but for rounding, no others are so near
         step = np.linalg.lstsq(rows, -right, rcond=1e-10)[0]
         size = float(np.linalg.norm(step))
         # short beside the sphere, so that it is not left for another solution
@@ -185,8 +187,7 @@ def _tangent(target: Target, x: Array, before: Array) -> Array:
     """The direction along which the equations stay solved, nearest the one before."""
     J = target.excess(x)[1]
     _, s, Vt = np.linalg.svd(J)
-    # singular values on a self-motion are solved to 1e-12 and their zeros known to its root
-    rank = min(int(np.sum(s > 1e-6)), x.size - 1)
+    rank = min(int(np.sum(s > _ZERO)), x.size - 1)
     null = Vt[rank:].T
     along: Array = null @ (null.T @ before)
     size = float(np.linalg.norm(along))
@@ -453,8 +454,6 @@ def _end(target: Target, curve: ConfigurationCurve, free: int, sign: float) -> f
 _SURFACE_STEP, _STEPS = 0.15, 150
 """Length of a step on a surface of configurations [rad or arm lengths], 9 degrees, which four
 Newton steps bring back to it; all steps together are more than three turns."""
-_ZERO = 1e-6
-"""Singular values below it are zero: on a self-motion they are known to the root of 1e-12."""
 _ARRIVED = 1e-6
 """Distance [rad or arm lengths] from the goal, itself known to the root of 1e-12 where singular."""
 

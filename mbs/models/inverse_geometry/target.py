@@ -312,7 +312,7 @@ def _dual_dimension(reduced: TargetReduction) -> int:
     for degree in range(1, 6):
         matrix = _macaulay(powers, columns, degree, reduced.corank)
         s = np.linalg.svd(matrix, compute_uv=False)
-        # fitted coefficients, in units of the radius, carry some 1e-6; dimensions need no more
+        # fitted coefficients, in units of the radius, lack terms beyond degree 6, which are less
         nullity = int(matrix.shape[1]) - int(np.sum(s > 1e-4 * max(float(s[0]), NONZERO)))
         if nullity == before:
             return nullity

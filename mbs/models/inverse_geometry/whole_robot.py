@@ -39,8 +39,8 @@ from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wish
 
 
 _SAME = 1e-7
-"""Difference [rad or m] of two configurations that are one: loops closed to 1e-12 place joints to
-1e-10 or so, and regular branches are farther apart."""
+"""Difference [rad or m] of two configurations that are one: loops are closed to 1e-12, which
+joints that they determine weakly magnify, and regular branches are farther apart."""
 _SEED = 20260108
 _AGREE = 1e-7
 """Difference [rad or m] of joints that both the chain and the loops determine, likewise."""

@@ -9,6 +9,7 @@ import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
+from mbs.numbers import NONZERO
 from mbs.recursions.chain import Chain, transforms
 
 Array = NDArray[np.float64]
@@ -125,6 +126,12 @@ def inverse(T: Array) -> Array:
     return back
 
 
+_STRAIGHT = 1e-9
+"""Sine of an angle below which it is zero or a half turn: angle / sine is there one but for its
+square, 1e-18, and next to a half turn the differences that give the axis are rounding, 1e-16, to
+seven digits."""
+
+
 def gap_to(wanted: Array, T: Array) -> Array:
     """(..., 6) what is missing from poses T to the wanted one: translation [m], rotation [rad].
 
@@ -138,9 +145,9 @@ def gap_to(wanted: Array, T: Array) -> Array:
     )
     s = 0.5 * np.linalg.norm(vector, axis=-1)
     angle = np.arctan2(s, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1))
-    scale = np.where(s > 1e-9, angle / np.maximum(2 * s, 1e-300), 0.5)
+    scale = np.where(s > _STRAIGHT, angle / np.maximum(2 * s, NONZERO), 0.5)
     rotation = scale[..., None] * vector
-    half_turn = (s <= 1e-9) & (angle > 1)
+    half_turn = (s <= _STRAIGHT) & (angle > 1)
     if np.any(half_turn):
         turn = np.where(half_turn, angle, 0.0)
         rotation = rotation + turn[..., None] * _half_turn_axis(R)
@@ -152,5 +159,5 @@ def _half_turn_axis(R: Array) -> Array:
     B = 0.5 * (R + np.eye(3))
     column = np.argmax(B[..., range(3), range(3)], axis=-1)
     axis: Array = np.take_along_axis(B, column[..., None, None], axis=-1)[..., 0]
-    length: Array = np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-300)
+    length: Array = np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), NONZERO)
     return axis / length

@@ -10,6 +10,8 @@ import numpy as np
 from casadi import SX
 
 from mbs.closed_forms.sequence import (
+    TINY_SQUARE,
+    ZERO,
     Found,
     Problem,
     Root,
@@ -204,8 +206,9 @@ def turn_onto(
 # Steps that find one joint from one equation: of degree 1 or 2 in its form.
 
 
-_TINY = 1e-280
 _SMALL = 1e-30
+"""Added to the square of the first factor of a quadratic, free of units: factors below 1e-15 are
+rounding, and the root is then finite."""
 
 
 def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
@@ -272,7 +275,7 @@ def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float =
     """
     joint = scene.ring.joints[k]
     r, n, size = joint.name, scene.suffix(k), factor / scale
-    x = value / scale * size / (size * size + _TINY)
+    x = value / scale * size / (size * size + TINY_SQUARE)
     regular = () if factor.is_constant() else (size * size,)
     found = Found({scene.place(k): x}, (), regular, {f"X{n}": factor, f"Y{n}": value})
     return step(scene.problem, "type 1", f"X{n} {r} = Y{n}", {}, found)
@@ -318,7 +321,7 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
     inverse = a / (a * a + _SMALL)
     middle = -b * inverse / 2
     root = square_root(middle * middle - c * inverse, sign)
-    size = middle * middle + casadi.fabs(c * inverse) + _TINY
+    size = middle * middle + casadi.fabs(c * inverse) + TINY_SQUARE
     return Root(SX((middle + root.value) * length), SX(root.real / size), SX(a * a))
 
 
@@ -408,7 +411,7 @@ def _by_turning(reach: Reach) -> list[Step] | None:
         return None
     b3 = basis(scene, 2)
     point = casadi.mtimes(reach.f[:2, :], b3)
-    wanted = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + _TINY)
+    wanted = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + TINY_SQUARE)
     regular = () if K.is_constant() else (K / unit_K,)
     return [third, turn_onto(scene, 1, (point, wanted), scene.length, regular)]
 
@@ -531,7 +534,7 @@ def _slides(scene: PieperLoop) -> Step:
     if scene.zero(determinant):
         names = ", ".join(scene.ring.joints[k].name for k in places)
         raise NoClosedForm(f"joints {names} slide in one plane, so that they are not determined")
-    r = -casadi.mtimes(adjugate, way.p) * determinant / (determinant * determinant + _TINY)
+    r = -casadi.mtimes(adjugate, way.p) * determinant / (determinant * determinant + TINY_SQUARE)
     ends = [scene.suffix(k) for k in places]
     values = {scene.place(k): r[m] for m, k in enumerate(places)}
     return step(
@@ -568,7 +571,6 @@ def _text(scene: PieperLoop, places: list[int], ends: list[str]) -> str:
 
 
 _JOINTS = 6
-_ZERO = 1e-9
 
 
 def pieper(problem: Problem) -> StepSequence:
@@ -629,7 +631,7 @@ def _steps(scene: PieperLoop) -> list[Step] | None:
 def _length(problem: Problem) -> SX:
     """Of the size of the arm and of the pose [m]."""
     squares = [casadi.sumsqr(gap.pose.p) for gap in problem.ring.gaps]
-    return SX(casadi.sqrt(sum(squares, SX(_TINY))))
+    return SX(casadi.sqrt(sum(squares, SX(TINY_SQUARE))))
 
 
 def _arrangements(problem: Problem) -> list[PieperLoop]:
@@ -671,8 +673,8 @@ def _concurrent(problem: Problem, length: SX) -> list[int]:
             casadi.horzcat(bend, turn, *(far / length for far in (miss, lost, along - back)))
         )
     values = np.array(problem.at_samples(casadi.vertcat(*rows)))
-    meet = np.all(np.abs(values[:, :, 2:]) < _ZERO, axis=(0, 2))
-    bent = np.all(np.abs(values[:, :, :2]) > _ZERO, axis=(0, 2))
+    meet = np.all(np.abs(values[:, :, 2:]) < ZERO, axis=(0, 2))
+    bent = np.all(np.abs(values[:, :, :2]) > ZERO, axis=(0, 2))
     three = [all(joints[(k + m) % _JOINTS].turns for m in range(3)) for k in range(_JOINTS)]
     return [k for k in (3, 0, 1, 2, 4, 5) if meet[k] and bent[k] and three[k]]
 

@@ -153,6 +153,13 @@ Matrix = NDArray[np.float64]
 _SURVEYED = 3
 _SURVEY_SEED = 20260103
 _CLOSE = 1e-9
+"""Lengths [m] and cosines that count as zero or equal: products of a few transforms leave 1e-15 of
+rounding, and those that do not vanish everywhere are of about one at random positions."""
+PARAMETERS = (0.4, 1.6)
+"""Between which symbols get random values: of the size of one, positive, and not near zero, so that
+they may be lengths."""
+_POSITIONS = (-1.5, 1.5)
+"""The same of positions [rad or m]: of both signs, and turns within a quarter turn."""
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -169,7 +176,9 @@ def _evaluated(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
     rng = np.random.default_rng(_SURVEY_SEED)
     function = Function("samples", [q, p], values)
     return [
-        function.call([DM(rng.uniform(-1.5, 1.5, q.numel())), DM(rng.uniform(0.4, 1.6, p.numel()))])
+        function.call(
+            [DM(rng.uniform(*_POSITIONS, q.numel())), DM(rng.uniform(*PARAMETERS, p.numel()))]
+        )
         for _ in range(_SURVEYED)
     ]
 
@@ -286,6 +295,8 @@ _SAMPLES, _TRIES, _SEED = 4, 24, 20260107
 _ITERATIONS = 40
 _MOVABLE = 2
 _LOOSE = 1e-6
+"""Relative singular value below which a joint moves while the given stay: it is the
+root of 1e-12, to which loops are closed, and so what a double root leaves of a zero."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -329,7 +340,9 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
     function = Function("closure", [every], [r, casadi.densify(casadi.jacobian(r, every))])
     samples = list[Sample]()
     for _ in range(_TRIES):
-        start = np.where(held, rng.uniform(0.4, 1.6, held.size), rng.uniform(-1.5, 1.5, held.size))
+        start = np.where(
+            held, rng.uniform(*PARAMETERS, held.size), rng.uniform(*_POSITIONS, held.size)
+        )
         closed = _closed(function, start, held)
         if closed is not None:
             J = np.array(function(closed)[1])[:, :n]

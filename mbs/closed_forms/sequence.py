@@ -12,6 +12,7 @@ import numpy as np
 from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
+from mbs.numbers import NONZERO
 from mbs.recursions.chain import Ring
 
 # What is to be solved: a loop, the symbols in it, and numbers at which it closes.
@@ -19,7 +20,10 @@ from mbs.recursions.chain import Ring
 
 Matrix = NDArray[np.float64]
 
-_ZERO = 1e-9
+ZERO = 1e-9
+"""Values at the samples of a problem, lengths [m] and numbers free of units, that count as zero:
+the samples close to 1e-12 or so, and what does not vanish everywhere is of about one at one of
+them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +59,7 @@ class Problem:
 
     def always_zero(self, values: SX) -> bool:
         """Whether an expression of x and given vanishes wherever the loop closes."""
-        return all(bool(np.all(np.abs(sample) < _ZERO)) for sample in self.at_samples(values))
+        return all(bool(np.all(np.abs(sample) < ZERO)) for sample in self.at_samples(values))
 
 
 # One step of a solution: an equation that gives some joints, and the signs of its roots.
@@ -233,9 +237,6 @@ def _taken(leaf: Leaf, step: Step, given: SX, s: SX) -> Leaf:
 # fold between them.
 
 
-_TINY = 1e-300
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Root:
     """A root and what tells whether it may be used.
@@ -265,9 +266,9 @@ def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
     """
     size = X * X + Y * Y
     radicand = size - Z * Z
-    W = sign * casadi.sqrt(casadi.fmax(radicand, _TINY))
+    W = sign * casadi.sqrt(casadi.fmax(radicand, NONZERO))
     angle = casadi.atan2(Y * Z + X * W, X * Z - Y * W)
-    return Root(SX(angle), SX(radicand / (size + Z * Z + _TINY)), SX(size / (scale * scale)))
+    return Root(SX(angle), SX(radicand / (size + Z * Z + NONZERO)), SX(size / (scale * scale)))
 
 
 def angle_of(s: SX, c: SX, scale: SX | float = 1.0) -> Root:
@@ -277,7 +278,7 @@ def angle_of(s: SX, c: SX, scale: SX | float = 1.0) -> Root:
 
 def square_root(square: SX, sign: SX, scale: SX | float = 1.0) -> Root:
     """The root of r^2 = square of the given sign; scale is of the size of r, in its unit."""
-    value = sign * casadi.sqrt(casadi.fmax(square, _TINY))
+    value = sign * casadi.sqrt(casadi.fmax(square, NONZERO))
     return Root(SX(value), SX(square / (scale * scale)), SX(1))
 
 
@@ -295,13 +296,13 @@ def square_root(square: SX, sign: SX, scale: SX | float = 1.0) -> Root:
 # Source: Richter-Gebert 2011, chapter 11, for the pencil and its lines.
 
 
-_TINY_SQUARE, _SMALL = (
-    1e-280,
-    1e-140,
-)  # added to squares, and to numbers, so that nothing divides by zero
+TINY_SQUARE, _TINY_NUMBER = 1e-280, 1e-140
+"""Added to squares, and to numbers, so that nothing divides by zero: the root of the first is the
+second, and the square of that is no zero yet."""
 _NOISE = 1e-11  # of a trace that decides whether the lines are real
 _FAR = 1e8  # largest root, in its scale
 _STEPS = 3  # of Newton
+_MOST_STEP = 0.1  # twice the longest [rad, or of the scale]: near a fold the slope is small
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,6 +319,7 @@ class _Curve:
     side: tuple[float, float, float]
 
 
+# not along an axis: where the equation is in cos t, or sin t, alone, the lines meet on one of them
 _CIRCLE = _Curve(DM([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), -1.0, (1.0, 0.6, 0.0))
 _PARABOLA = _Curve(DM([[0, 0, -0.5], [0, 1, 0], [-0.5, 0, 0]]), -0.25, (0.0, 0.0, 1.0))
 
@@ -336,19 +338,19 @@ def trigonometric_quartic(a: SX, signs: SX, scale: SX | float = 1.0) -> Root:
         The angle in (-pi, pi] [rad]; `real` has two rows.
     """
     size = casadi.sumsqr(a[:4])
-    b = a / casadi.sqrt(casadi.sumsqr(a) + _TINY_SQUARE)
+    b = a / casadi.sqrt(casadi.sumsqr(a) + TINY_SQUARE)
     A = _symmetric((b[0] + b[4] / 3, b[1], b[2] / 2), (b[4] / 3 - b[0], b[3] / 2), 2 * b[4] / 3)
     line, other, split = _line(A, _CIRCLE, signs[0])
     X, Y, Z = line[0], line[1], -line[2]
     square = X * X + Y * Y
     radicand = square - Z * Z
     foot = (other[0] * X + other[1] * Y) * Z + other[2] * square
-    W = signs[1] * _minus_sign(foot) * casadi.sqrt(casadi.fmax(radicand, _TINY_SQUARE))
-    t = casadi.atan2(Y * Z + X * W, X * Z - Y * W + _SMALL)
+    W = signs[1] * _minus_sign(foot) * casadi.sqrt(casadi.fmax(radicand, TINY_SQUARE))
+    t = casadi.atan2(Y * Z + X * W, X * Z - Y * W + _TINY_NUMBER)
     for _ in range(_STEPS):
-        t = t + _newton(*_trigonometric(b, t), 0.1)
+        t = t + _newton(*_trigonometric(b, t), _MOST_STEP)
     t = casadi.atan2(casadi.sin(t), casadi.cos(t))
-    real = casadi.vertcat(split, radicand / (square + Z * Z + _TINY_SQUARE))
+    real = casadi.vertcat(split, radicand / (square + Z * Z + TINY_SQUARE))
     return Root(SX(t), SX(real), SX(size / (scale * scale)))
 
 
@@ -374,7 +376,7 @@ def real_quartic(
     powers = casadi.vertcat(*(scale**k for k in (4, 3, 2, 1, 0)))
     scaled = coefficients * powers
     size = casadi.sumsqr(scaled[:4])
-    b = scaled / casadi.sqrt(casadi.sumsqr(scaled) + _TINY_SQUARE)
+    b = scaled / casadi.sqrt(casadi.sumsqr(scaled) + TINY_SQUARE)
     A = _symmetric((b[0], b[1] / 2, b[2] / 6), (2 * b[2] / 3, b[3] / 2), b[4])
     line, other, split = _line(A, _PARABOLA, signs[0])
     radicand = line[1] * line[1] - 4 * line[0] * line[2]
@@ -384,13 +386,13 @@ def real_quartic(
         + 2 * other[2] * line[0] * line[0]
     )
     sign = -signs[1] * _minus_sign(foot)
-    r = _quadratic(line, sign * casadi.sqrt(casadi.fmax(radicand, _TINY_SQUARE)))
+    r = _quadratic(line, sign * casadi.sqrt(casadi.fmax(radicand, TINY_SQUARE)))
     for _ in range(_STEPS):
-        r = r + _newton(*_quartic(b, r), 0.1 * casadi.sqrt(1 + r * r))
+        r = r + _newton(*_quartic(b, r), _MOST_STEP * casadi.sqrt(1 + r * r))
     r = casadi.fmax(casadi.fmin(r, _FAR), -_FAR)
     size_line = line[1] * line[1] + 4 * casadi.fabs(line[0] * line[2])
-    real = casadi.vertcat(split, radicand / (size_line + _TINY_SQUARE))
-    finite = (line[0] ** 2 + line[1] ** 2) / (casadi.sumsqr(line) + _TINY_SQUARE) / (1 + r * r) ** 2
+    real = casadi.vertcat(split, radicand / (size_line + TINY_SQUARE))
+    finite = (line[0] ** 2 + line[1] ** 2) / (casadi.sumsqr(line) + TINY_SQUARE) / (1 + r * r) ** 2
     return Root(SX(r * scale), SX(real), SX(finite * size / (unit * unit)))
 
 
@@ -413,8 +415,8 @@ def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
     sizes = [casadi.fabs(adjugate[k, k]) for k in range(3)]
     column = _largest(sizes, [adjugate[:, k] for k in range(3)])
     minor = -_largest(sizes, [adjugate[k, k] for k in range(3)])
-    root = casadi.sqrt(casadi.fmax(minor, 0) + _TINY_SQUARE)
-    p = -column * root / (casadi.fabs(minor) + _TINY_SQUARE)
+    root = casadi.sqrt(casadi.fmax(minor, 0) + TINY_SQUARE)
+    p = -column * root / (casadi.fabs(minor) + TINY_SQUARE)
     side = p[0] * curve.side[0] + p[1] * curve.side[1] + p[2] * curve.side[2]
     p = -sign * _minus_sign(side) * p
     N = M - casadi.skew(p)
@@ -422,7 +424,7 @@ def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
     line = _largest(sums, [N[:, k] for k in range(3)])
     weights = [casadi.fabs(line[k]) for k in range(3)]
     other = _largest(weights, [N[k, :].T * -_minus_sign(line[k]) for k in range(3)])
-    return SX(line), SX(other), SX(minor / (casadi.sumsqr(M) + _TINY_SQUARE))
+    return SX(line), SX(other), SX(minor / (casadi.sumsqr(M) + TINY_SQUARE))
 
 
 def _degenerate(A: SX, curve: _Curve) -> SX:
@@ -440,16 +442,16 @@ def _outer_roots(c: SX, d: SX) -> list[SX]:
     """The smallest and the largest real root of x^3 + c x + d = 0."""
     Q, R = -c / 3, d / 2
     D = R * R - Q * Q * Q
-    angle = casadi.atan2(casadi.sqrt(casadi.fmax(-D, _TINY_SQUARE)), R)
-    size = -2 * casadi.sqrt(casadi.fmax(Q, _TINY_SQUARE))
-    cube = casadi.fabs(R) + casadi.sqrt(casadi.fmax(D, _TINY_SQUARE))
+    angle = casadi.atan2(casadi.sqrt(casadi.fmax(-D, TINY_SQUARE)), R)
+    size = -2 * casadi.sqrt(casadi.fmax(Q, TINY_SQUARE))
+    cube = casadi.fabs(R) + casadi.sqrt(casadi.fmax(D, TINY_SQUARE))
     large = _minus_sign(R) * cube ** (1 / 3)
-    single = large + Q * large / (large * large + _TINY_SQUARE)
+    single = large + Q * large / (large * large + TINY_SQUARE)
     several = [size * casadi.cos((angle + 2 * math.pi) / 3), size * casadi.cos(angle / 3)]
     roots = []
     for x in (casadi.if_else(D > 0, single, root) for root in several):
         for _ in range(2):
-            x = x + _newton((x * x + c) * x + d, 3 * x * x + c, 0.1)
+            x = x + _newton((x * x + c) * x + d, 3 * x * x + c, _MOST_STEP)
         roots.append(SX(x))
     return roots[::-1]
 
@@ -475,6 +477,7 @@ def _minus_sign(value: SX) -> SX:
 
 def _newton(value: SX, slope: SX, most: SX | float) -> SX:
     """A Newton step that is never larger than half of `most`."""
+    # where the slope is rounding, below 1e-15, the step goes to zero and not to infinity
     step = -value * slope / (slope * slope + 1e-30)
     return SX(step / (1 + (step / most) ** 2))
 
@@ -502,5 +505,5 @@ def _quadratic(line: SX, root: SX) -> SX:
     steady = b * root <= 0
     over = casadi.if_else(steady, up, 2 * c)
     under = casadi.if_else(steady, 2 * a, down)
-    r = over / (under - _minus_sign(under) * _SMALL)
+    r = over / (under - _minus_sign(under) * _TINY_NUMBER)
     return SX(casadi.fmax(casadi.fmin(r, _FAR), -_FAR))

@@ -264,6 +264,7 @@ class MjcfModel:
 def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:
     """The frame at a position [m] and a quaternion (w, x, y, z) of a frame."""
     R = matrix_of(quat)
+    # rounding of a normalised quaternion (1, 0, 0, 0); any rotation that is written is larger
     turned = None if np.allclose(R, np.eye(3), rtol=0, atol=1e-15) else R.tolist()
     x, y, z = (float(value) for value in pos)
     return point.at(x, y, z, rotation=turned)

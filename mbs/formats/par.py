@@ -86,6 +86,8 @@ _ASSIGNMENT = re.compile(r"\s*([A-Za-z_]\w*)\s*=\s*(.*)", re.DOTALL)
 _REMARKS = ("Value", "Guess", "Fs_width", "rest", "grouped")
 _REMARKED = re.compile(r"[\w.]+")
 _SHORTEST_MISSPELT, _SIMILAR = 3, 0.75
+"""Letters from which a key may be misspelt, and the part of letters that match, of difflib: one
+wrong letter in four, so that two of three letters alike are another name."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,6 +68,7 @@ def from_dict(data: Mapping[str, Any]) -> RobotTable:
         frames=tuple(_frame(row, where) for row, where in _rows(data, "frame", name)),
         bodies=tuple(_body(row, where) for row, where in _rows(data, "body", name)),
         loops=tuple(_loop(row, where) for row, where in _rows(data, "loop", name)),
+        # where the file has none: downwards along z, as in `Mechanism` [m/s^2]
         gravity=data.get("gravity", (0.0, 0.0, -9.81)),
         parameters=_table(data, "parameters", name),
         source=_text(data, "source", name),

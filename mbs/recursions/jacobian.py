@@ -314,11 +314,13 @@ def survey(target: VelocityTarget) -> Survey:
 def random_samples(tree: Tree, parameters: int) -> list[tuple[Array, Array]]:
     """Positions at random, and the same random parameters with each of them."""
     rng = np.random.default_rng(4)
+    # positive and of about one, as lengths and masses are, and not near zero
     p = rng.uniform(0.3, 1.7, parameters)
     return [(_random_position(tree, rng), p) for _ in range(_SAMPLES)]
 
 
 def _random_position(tree: Tree, rng: np.random.Generator) -> Array:
+    # [rad or m], between zero and a half turn, of which neither is generic
     q = rng.uniform(0.3, 2.8, tree.nq)
     for link in tree.links:
         if link.motion in (Motion.SPHERICAL, Motion.FREE):

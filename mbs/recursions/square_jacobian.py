@@ -35,6 +35,8 @@ from mbs.solvers.block_triangular import Block, block_triangular, determinant, s
 from mbs.spatial import skew
 
 _SINGULAR = 1e-9
+"""Part of the largest singular value that counts as zero: rounding leaves 1e-15, and at random
+positions a matrix that is not always singular is far from it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

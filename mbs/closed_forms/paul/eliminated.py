@@ -13,12 +13,18 @@ import numpy as np
 from casadi import SX
 
 from mbs.closed_forms.paul.equation import Equation
-from mbs.closed_forms.paul.linear import Matrix, Variables, columns, row_factors, row_values
+from mbs.closed_forms.paul.linear import (
+    DEPENDENT,
+    Matrix,
+    Variables,
+    columns,
+    row_factors,
+    row_values,
+)
 from mbs.closed_forms.paul.one_unknown import Candidate, Stage, angle_step, unsteady
 from mbs.closed_forms.paul.splits import Variable
 from mbs.closed_forms.sequence import Step
 
-_SMALL = 1e-5
 _MOST = 2
 _ROWS = 8
 
@@ -44,20 +50,21 @@ def _of(
     for chosen in combinations(rows, width + 1):
         K = _stacked(chosen, others)
         minors = _minors(K)
-        if np.min(np.max(np.abs(minors), axis=-1)) < _SMALL or np.any(
-            np.max(np.abs(minors), axis=0) < _SMALL
+        if np.min(np.max(np.abs(minors), axis=-1)) < DEPENDENT or np.any(
+            np.max(np.abs(minors), axis=0) < DEPENDENT
         ):
             continue
         own = _stacked(chosen, (variable,))
         XY = np.einsum("...k,...kc->...c", minors, own)
         size = np.linalg.norm(XY, axis=-1)
-        if np.min(size) < _SMALL:
+        if np.min(size) < DEPENDENT:
             continue
         cost = float(sum(row.cost for row in chosen))
 
         def build(chosen: tuple[Equation, ...] = chosen) -> Step:
             return _built(stage, chosen, variable, others)
 
+        # after the equations in one unknown, 4 and 5, and before the pairs of equations, 6
         order = 5.5 if variable.single else 5.7
         yield Candidate((order, unsteady(size), cost), (variable,), build)
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from mbs.closed_forms.paul.splits import (
     MOST_VARIABLES,
     SIZE,
-    ZERO,
     Knowledge,
     Members,
     Row,
@@ -26,6 +25,7 @@ from mbs.closed_forms.paul.splits import (
     simple_rows,
     splits,
 )
+from mbs.closed_forms.sequence import ZERO
 from mbs.recursions.chain import Ring
 
 Key = tuple[int, ...]
@@ -134,6 +134,7 @@ def _leading(table: Values) -> NDArray[np.float64]:
     """At each sample a number that changes sign with the column and is not small."""
     parts = np.concatenate([table.real, table.imag])
     largest = np.max(np.abs(parts), axis=0)
+    # no nearly zero number decides, and of equal ones but for rounding always the same one
     first = np.argmax(np.abs(parts) > 0.3 * largest, axis=0)
     leading: NDArray[np.float64] = np.take_along_axis(parts, first[None], axis=0)[0]
     return leading
@@ -255,6 +256,7 @@ def ring_matrices(ring: Ring) -> RingMatrices:
     back = tuple(map(represented_pose, opposite, poses))
     squares = [SX(casadi.sumsqr(pose.p)) for pose in poses]
     numbers = [square for square in squares if square.is_constant() and float(square) > 0]
+    # 1e-30 m where all symbolic lengths are zero, so that nothing divides by zero
     length = casadi.sqrt(sum(numbers or squares, SX(0 if numbers else 1e-60)))
     return RingMatrices(on, back, SX(length))
 

@@ -19,12 +19,15 @@ from mbs.closed_forms.paul.equation import Equation, Key
 from mbs.closed_forms.paul.one_unknown import Candidate, Stage, divided, unsteady
 from mbs.closed_forms.paul.splits import Variable
 from mbs.closed_forms.sequence import Found, Step, angle_of, step
+from mbs.numbers import NONZERO
 from mbs.solvers.rank import graded
 
 Matrix = NDArray[np.float64]
 Variables = tuple[Variable, ...]
 
-_SMALL = 1e-5
+DEPENDENT = 1e-5
+"""Determinant at the samples below which rows count as dependent: coefficients are of about one,
+what rounding leaves of a zero is 1e-12 after closing, and a step by less would lose five digits."""
 _CHOICES = 8
 _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
@@ -97,8 +100,8 @@ def _best(
     choices = list[tuple[tuple[Equation, ...], tuple[float, ...]]]()
     for chosen in combinations(range(len(first)), width):
         det = np.linalg.det(values[:, chosen])
-        size = np.maximum(np.prod(norms[:, chosen], axis=-1), 1e-300)
-        if np.min(np.abs(det) / size) < _SMALL:
+        size = np.maximum(np.prod(norms[:, chosen], axis=-1), NONZERO)
+        if np.min(np.abs(det) / size) < DEPENDENT:
             continue
         cost = sum(first[k].cost for k in chosen)
         rank = (unsteady(det), float(cost), -graded(float(np.min(np.abs(det)))))

@@ -10,13 +10,16 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.closed_forms.paul.equation import Equation, Factor, Key, RingMatrices, factor
-from mbs.closed_forms.paul.splits import ZERO, Knowledge, Variable
-from mbs.closed_forms.sequence import Found, Step, angle_of, cosine_root, square_root, step
+from mbs.closed_forms.paul.splits import Knowledge, Variable
+from mbs.closed_forms.sequence import ZERO, Found, Step, angle_of, cosine_root, square_root, step
+from mbs.numbers import NONZERO
 
 # Ways to go on at one stage of a search, and how they are told in text.
 
 
 STEADY = 1e-9
+"""Relative spread over the samples below which a quantity is constant: closing by iteration leaves
+1e-12 or so, and what depends on generic positions changes by about one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +80,7 @@ def divided(numerator: SX, denominator: SX) -> SX:
     """The ratio; finite where the denominator is zero."""
     if denominator.is_constant():
         return SX(numerator / denominator)
-    return SX(numerator * denominator / (denominator * denominator + 1e-300))
+    return SX(numerator * denominator / (denominator * denominator + NONZERO))
 
 
 def one_unknown(stage: Stage) -> Iterator[Candidate]:
@@ -93,6 +96,7 @@ def one_unknown(stage: Stage) -> Iterator[Candidate]:
 
 def _type_2(stage: Stage, equation: Equation) -> Candidate:
     G, Z = equation.at((1,)), equation.at((0,))
+    # after the linear equations, 1 to 3; single joints before sums
     order = 4.0 if equation.variables[0].single else 5.0
     shifted = float(np.max(np.abs(Z)) > ZERO)
     rank = (order, shifted, unsteady(np.abs(G)), float(equation.cost), -float(np.min(np.abs(G))))

@@ -16,7 +16,7 @@ from mbs.closed_forms.paul.linear import linear
 from mbs.closed_forms.paul.one_unknown import Candidate, Stage, one_unknown
 from mbs.closed_forms.paul.splits import Knowledge, Variable, beginning
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
-from mbs.closed_forms.sequence import Found, Problem, Step, StepSequence, step
+from mbs.closed_forms.sequence import ZERO, Found, Problem, Step, StepSequence, step
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
 from mbs.recursions.chain import Gap, Ring
@@ -78,9 +78,6 @@ def _unit(total: dict[int, int]) -> bool:
 # Source: Khalil & Kleinfinger 1986, whose frames have their origins so.
 
 
-_ZERO = 1e-9
-
-
 def at_feet(problem: Problem) -> Ring:
     """The loop of a problem, the frame of each turning joint moved along its axis.
 
@@ -102,7 +99,7 @@ def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
     sine2 = axis[0] ** 2 + axis[1] ** 2
     across = pose.p[2] * sine2 - (pose.p[0] * axis[0] + pose.p[1] * axis[1]) * cosine
     values = np.array(problem.at_samples(casadi.vertcat(sine2, across)))
-    if np.max(np.abs(values[:, 1])) < _ZERO or np.min(np.abs(values[:, 0])) < _ZERO:
+    if np.max(np.abs(values[:, 1])) < ZERO or np.min(np.abs(values[:, 0])) < ZERO:
         return ring
     along = SX(across / sine2)
     to, back = (Gap(Pose.moved(vector([0, 0, sign * along]))) for sign in (1, -1))

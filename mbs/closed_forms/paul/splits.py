@@ -19,7 +19,7 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
-from mbs.closed_forms.sequence import Problem
+from mbs.closed_forms.sequence import ZERO, Problem
 from mbs.recursions.chain import Ring
 from mbs.spatial import Pose
 
@@ -432,7 +432,6 @@ def _basis(knowledge: Knowledge, k: int, direction: int) -> Tensor:
 
 Values = NDArray[np.complex128]
 
-ZERO = 1e-9
 MOST_VARIABLES = 3
 _MOST_JOINTS = 4
 

@@ -24,6 +24,14 @@ from mbs.closed_forms.paul.splits import Variable
 from mbs.closed_forms.sequence import Found, Step, real_quartic, step, trigonometric_quartic
 
 _SMALL = 1e-7
+"""Factors and shares below it, of equations whose coefficients are of about one, count as zero:
+products of several of them magnify the 1e-12 to which the samples close."""
+_VANISHES = 1e-14
+"""Largest coefficient of a resultant below which all of them are rounding: they are sums of
+products of factors of about one. Above it the shares decide."""
+_PARALLEL = 1e-5
+"""Imaginary part of the ratio of two factors, of about one, below which they are parallel: nothing
+is eliminated; a step that divides by less would lose five digits."""
 _ROWS = 8
 
 Numbers = list[Any]
@@ -95,7 +103,7 @@ def _candidate(stage: Stage, rows: tuple[Equation, Equation], stays: int) -> Can
         return None
     F = np.array(np.broadcast_arrays(*_resultant(forms, power, rows[0].variables[stays].slides)))
     size = np.max(np.abs(F), axis=0)
-    if np.min(size) < 1e-14:
+    if np.min(size) < _VANISHES:
         return None
     shares = np.max(np.abs(F) / size, axis=1) > _SMALL
     if not np.any(shares[1:]):
@@ -105,6 +113,7 @@ def _candidate(stage: Stage, rows: tuple[Equation, Equation], stays: int) -> Can
     leading = np.sum(F[1:] ** 2, axis=0)
     cost = float(sum(row.cost for row in rows))
     sums = 0.0 if pair.variable.single else 0.5
+    # 6 to 7.5: quadratics before quartics, single joints before sums; after all in one equation
     rank = (6.0 + quartic + sums, unsteady(leading), cost)
     return Candidate(rank, (pair.variable,), lambda: _built(stage, pair, shares))
 
@@ -117,7 +126,7 @@ def _common_power(forms: Sequence[_Form]) -> int | None:
     if sizes[power] < _SMALL:
         return None
     ratio = second[power] / first[power]
-    if np.min(np.abs(ratio.imag)) < 1e-5 or np.max(np.abs(second - ratio * first)) > _SMALL:
+    if np.min(np.abs(ratio.imag)) < _PARALLEL or np.max(np.abs(second - ratio * first)) > _SMALL:
         return None
     return power
 

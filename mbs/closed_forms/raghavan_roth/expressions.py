@@ -15,6 +15,7 @@ from casadi import DM, SX
 from numpy.typing import NDArray
 
 from mbs.closed_forms.raghavan_roth.numbers import (
+    REGULAR,
     SIZE,
     SLOPES,
     Array,
@@ -37,6 +38,8 @@ from mbs.spatial import Pose
 
 
 _ZERO = 1e-12
+"""Entries, of about one in units of the loop, that vanish at all samples: elimination leaves 1e-14
+of rounding in a zero, and an entry that depends on generic positions is larger at one of them."""
 
 
 def table(elimination: Elimination, ways: Sequence[Pose]) -> SX:
@@ -158,8 +161,7 @@ def _constant(part: NDArray[np.float64]) -> SX:
     return SX(casadi.sparsify(DM(part)))
 
 
-_REGULAR = 1e-10
-_ANGLES = (0.3, 1.4, -2.1)
+_ANGLES = (0.3, 1.4, -2.1)  # of joint 3 [rad], at which nothing is special
 _FOLDED, _TRIED = 10.0, 3
 
 
@@ -231,7 +233,7 @@ def characteristic(problem: Problem) -> Characteristic:
     loops = sorted(_loops(problem), key=lambda loop: graded(loop.merit), reverse=True)
     for loop in loops[:_TRIED]:
         found = _characteristic(problem, loop)
-        if found.regularity > _REGULAR:
+        if found.regularity > REGULAR:
             return found
     raise NoClosedForm(
         "the matrix of the general inverse geometric model is singular at every configuration of"
@@ -251,7 +253,7 @@ def _loops(problem: Problem) -> list[_Loop]:
                 continue
             ways = _numbers(problem, own, length)
             pencils = (pencil(elimination, ways) for elimination in eliminations(slides))
-            found += [_Loop(own, one, length) for one in pencils if one.regularity > _REGULAR]
+            found += [_Loop(own, one, length) for one in pencils if one.regularity > REGULAR]
     return found
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, inverse, motion
 from mbs.errors import ModelError, NoClosedForm
+from mbs.numbers import NONZERO
 
 # A point and a direction as fifteen numbers that every rigid displacement maps linearly.
 #
@@ -294,6 +295,7 @@ def _shift(low: Array, high: Array) -> Array:
     """(n, m, m) the least-squares solution X of high = low X."""
     count = low.shape[-1]
     low, high = (part.reshape(len(low), -1, count) for part in (low, high))
+    # a direction in which no vector goes but by rounding, some 1e-15, gives no shift
     return np.linalg.pinv(low, rcond=1e-13) @ high
 
 
@@ -311,7 +313,7 @@ def _rayleigh(vectors: Array, X: Array) -> Array:
 # of joint k, C_k the way to the next joint, and the pose is in one of the ways.
 
 
-_TINY_LENGTH = 1e-9
+_TINY_LENGTH = 1e-9  # part of an arm's length that is rounding of lengths between its joints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -488,8 +490,11 @@ def _mixed(size: int, rows: int) -> Array:
 
 
 _PREPARE_SEED, _POSES = 20260211, 2
+# angles of joints 4 and 5 [rad] that no design prefers, so that none has an infinite half angle
 _TRIAL_OFFSETS = np.array([0.0, 0.0, 0.0, 0.7345, -1.1127, 0.0])
-_REGULAR = 1e-10
+REGULAR = 1e-10
+"""Regularity above which the method holds: of a matrix that is always singular rounding leaves
+1e-15, and at it six digits of a root are left."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -516,7 +521,7 @@ class Prepared:
         It may hold for an arm that is redundant in one direction and short of another, such as one
         with four parallel axes: its configurations make families, of which candidates are samples.
         """
-        return self.regularity > _REGULAR
+        return self.regularity > REGULAR
 
 
 def prepare(arm: Arm) -> Prepared:
@@ -548,6 +553,7 @@ def _reached(arm: Arm) -> Array:
     """(2, 4, 4) poses of generic configurations."""
     rng = np.random.default_rng(_PREPARE_SEED)
     turns = rng.uniform(-np.pi, np.pi, (_POSES, 6))
+    # slides of the arm's own size and never near zero, where axes might meet
     slides = loop_length(arm) * rng.uniform(0.2, 0.8, (_POSES, 6))
     return arm.pose(np.where(arm.prismatic, slides, turns))
 
@@ -622,11 +628,12 @@ def _crossings(prismatic: bool, n: Array, g: Array) -> tuple[Array, Array]:
     """Both roots of n_x cos q + n_y sin q = g, or of n_x r + n_y r^2 = g; the fold if not real."""
     if not prismatic:
         middle = np.arctan2(n[:, 1], n[:, 0])
-        half = np.arccos(np.clip(g / np.maximum(np.linalg.norm(n, axis=1), 1e-300), -1, 1))
+        half = np.arccos(np.clip(g / np.maximum(np.linalg.norm(n, axis=1), NONZERO), -1, 1))
         return middle - half, middle + half
     root = np.sqrt(np.maximum(n[:, 0] ** 2 + 4 * n[:, 1] * g, 0))
     larger = -0.5 * (n[:, 0] + np.copysign(root, n[:, 0]))
-    low = -g / np.where(np.abs(larger) > 1e-300, larger, 1e-300)
+    low = -g / np.where(np.abs(larger) > NONZERO, larger, NONZERO)
+    # less is rounding, and the second root lies 1e9 lengths away
     curved = np.abs(n[:, 1]) > 1e-9 * np.abs(n[:, 0])
     high = np.where(curved, larger / np.where(curved, n[:, 1], 1.0), low)
     return low, high
@@ -641,7 +648,7 @@ _OFF_CIRCLE = 0.5  # |log| of the size of e^(i u) of roots that are kept
 _OFFSETS = 0.2731 + np.arange(8) * np.pi / 4  # of joint 3 [rad], angles that no design prefers
 _COARSE, _FINE = 1e-3, 1e-6  # gaps between angles that may be one multiple root, a double one [rad]
 _LARGEST = 6  # solutions at one root
-_ROUNDING, _TINY = 1e-16, 1e-300
+_ROUNDING = 1e-16  # part of the largest singular value that divides in place of a smaller one
 
 
 def roots(M: Array) -> tuple[NDArray[np.int64], Array]:
@@ -657,7 +664,7 @@ def roots(M: Array) -> tuple[NDArray[np.int64], Array]:
     offset, coefficients = _rotated(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
     top, bottom = 1 + 1j * x, 1 - 1j * x
-    size = np.log(np.abs(top) + _TINY) - np.log(np.abs(bottom) + _TINY)
+    size = np.log(np.abs(top) + NONZERO) - np.log(np.abs(bottom) + NONZERO)
     number, column = np.nonzero(np.abs(size) < _OFF_CIRCLE)
     u = (offset[:, None] + np.angle(top * np.conj(bottom)))[number, column]
     return number, (u + np.pi) % (2 * np.pi) - np.pi
@@ -670,7 +677,7 @@ def _companion(coefficients: Array) -> Array:
     companion[:, range((degree - 1) * n), range(n, degree * n)] = 1.0
     lower = np.concatenate([coefficients[:, k] for k in range(degree)], axis=-1)
     U, s, V = np.linalg.svd(coefficients[:, -1])
-    s = np.maximum(s, _ROUNDING * s[:, :1] + _TINY)
+    s = np.maximum(s, _ROUNDING * s[:, :1] + NONZERO)
     companion[:, -n:] = -np.swapaxes(V, 1, 2) @ (np.swapaxes(U, 1, 2) / s[..., None] @ lower)
     return companion
 
@@ -682,7 +689,7 @@ def _rotated(M: Array) -> tuple[Array, Array]:
     """
     far = np.einsum("ok,nkab->noab", weights(_OFFSETS + np.pi, M.shape[1]), M)
     values = np.linalg.svd(far, compute_uv=False)
-    best = np.argmax(values[..., -1] / np.maximum(values[..., 0], _TINY), axis=1)
+    best = np.argmax(values[..., -1] / np.maximum(values[..., 0], NONZERO), axis=1)
     offset = _OFFSETS[best]
     if M.shape[1] == 2:
         c, s = (part[:, None, None] for part in (np.cos(offset / 2), np.sin(offset / 2)))

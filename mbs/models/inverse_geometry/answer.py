@@ -23,7 +23,11 @@ from mbs.models.inverse_geometry.whole_robot import ClosedConfiguration, close, 
 
 
 _PARALLEL = 1e-9
+"""Sine or cosine between axes, or part of the arm's length, that counts as zero: products of six
+transforms leave 1e-15 of rounding, descriptions with twelve digits 1e-12."""
 _UNDECIDED = 1e-9
+"""Indicator of a branch, lengths in those of the arm, at which two branches meet: its sign is
+rounding there and names neither."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +102,7 @@ def _elbow(bend: float, right: float) -> str:
 
 def _wrist_meets(arm: Arm) -> bool:
     """Whether axes 4, 5, 6 meet in one point; they do so in every configuration if in two."""
+    # any two [rad or m], at neither of which an axis is at zero or a half turn
     return all(_meet(arm, q) for q in (np.full(6, 0.3), np.full(6, 1.1)))
 
 
@@ -124,7 +129,13 @@ def _dot(a: Array, b: Array) -> Array:
 # The distinct solutions of a pose, how often each counts, and the self-motions among them.
 
 
-_REFINEMENTS, _SETTLED, _EXACT = 8, 1e-7, 0.02
+_REFINEMENTS = 8
+_SETTLED = 1e-7
+"""Move [rad or arm lengths] below which the middle of meeting roots stays: rounding moves a double
+root by the root of 1e-16, 1e-8."""
+_EXACT = 0.02
+"""Part of the tolerance of solutions, 2e-14 of the length, that rounding leaves: a singular root at
+which no others meet, and that misses by more, is not certain to be isolated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

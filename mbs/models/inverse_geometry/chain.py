@@ -15,6 +15,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import Link
 from mbs.closed_forms.arm import Arm, arm_of
+from mbs.closed_forms.ring import PARAMETERS
 from mbs.closed_forms.sequence import Problem
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
@@ -114,7 +115,8 @@ class FrameChain:
         rng = np.random.default_rng(_SEED)
         samples = []
         for _ in range(_SAMPLES):
-            own = rng.uniform(0.4, 1.6, self.system.p.numel()) if p is None else p
+            own = rng.uniform(*PARAMETERS, self.system.p.numel()) if p is None else p
+            # slides of about a metre and never near zero, where axes might meet
             q = np.where(self.prismatic, rng.uniform(0.2, 1.2, len(self.names)), 0.0)
             turns = rng.uniform(-np.pi, np.pi, len(self.names))
             q = np.where(self.prismatic, q, turns)

@@ -17,6 +17,7 @@ from mbs.assembly.model_function import ModelFunction, Named, model_function, re
 from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_pose
+from mbs.numbers import NONZERO
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
 from mbs.recursions.chain import transforms
@@ -391,7 +392,6 @@ def joint_label(name: str) -> str:
 # All branches of the inverse geometric model at once, in one graph without sines of angles.
 
 
-_TINY = 1e-300
 _SEED = 20260111
 _OUTPUTS = ("q", "residual", "real", "regular", "mark")
 
@@ -484,7 +484,7 @@ def without_sines(graph: Graph) -> Graph:
         y, x = (new[k] for k in of.args)
         if angle not in scales:
             square = add(casadi.OP_ADD, add(casadi.OP_SQ, x), add(casadi.OP_SQ, y))
-            tiny = add(casadi.OP_CONST, value=_TINY)
+            tiny = add(casadi.OP_CONST, value=NONZERO)
             scales[angle] = add(
                 casadi.OP_INV, add(casadi.OP_SQRT, add(casadi.OP_ADD, square, tiny))
             )

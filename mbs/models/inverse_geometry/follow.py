@@ -18,7 +18,8 @@ from mbs.loops.plan import held_beside, regular_configuration
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import frame_chain, wanted_pose, wanted_poses
-from mbs.models.inverse_geometry.solutions import CoordinateLimits, Given, apart, bounds
+from mbs.models.inverse_geometry.solutions import WITHIN, CoordinateLimits, Given, apart, bounds
+from mbs.numbers import NONZERO
 from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.solvers.rank import null_space
 from mbs.text import did_you_mean, quoted
@@ -44,12 +45,19 @@ SINGULAR = 1e-7
 _CHANGE = 0.5
 _CONTRACTION = 0.5
 _LARGEST = 0.35
+"""Longest step of any joint [rad or arm lengths], 20 degrees: a longer one may lead to another
+branch, or by a whole turn."""
 _ITERATIONS = 12
 _SMALL = 1e-9
+"""Rows, and moves [rad or arm lengths], that count as nothing: a thousand times the 1e-12 of a
+solution, as towards a singular configuration rounding is magnified."""
 _SMALLEST_STEP = 1e-12
+"""Part of the way between two poses that is not halved any more: next to one, 1e-16 is rounding."""
 _MOST_STEPS = 200
 """Between two poses; a joint that turns all the way round takes some tens."""
 _NOISE = 1e-14
+"""Rounding of a row: some tens of 1e-16 from products of transforms; the step that it makes is as
+much larger as the inverse of the Jacobian is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +168,7 @@ def _pseudo_inverse(tracker: Tracker, J: Array) -> tuple[Array, float]:
     """The inverse of J, and its norm."""
     U, values, V = np.linalg.svd(J, full_matrices=False)
     kept = J.shape[1] - tracker.slack
-    inverse = 1 / np.maximum(values[:kept], 1e-300)
+    inverse = 1 / np.maximum(values[:kept], NONZERO)
     back: Array = (V[:kept].T * inverse) @ U[:, :kept].T
     return back, float(inverse[-1])
 
@@ -169,7 +177,6 @@ def _pseudo_inverse(tracker: Tracker, J: Array) -> tuple[Array, float]:
 
 
 _WHOLE = 6
-_ON_LIMIT = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -239,7 +246,7 @@ class Follower:
         return None
 
     def _may(self, x: Array) -> bool:
-        return self.passed(x, -_ON_LIMIT) is None
+        return self.passed(x, -WITHIN) is None
 
 
 def follower(
@@ -393,9 +400,15 @@ def _turn(vector: Array) -> Array:
 
 
 _AT_LIMIT = 1e-6
+"""Distance from a limit [rad or m] at which it is the reason to stop: halved steps end much nearer,
+and what stops for another reason is hardly ever so near."""
 _REACHED = 1e-6
+"""Largest row that is missing at a pose within reach: at a double root rounding leaves the root of
+1e-12, to which solutions are found."""
 _STARTS, _SEED = 6, 20260109
 _NUDGE = 1e-3
+"""Move of a joint [rad or arm lengths] that tells which one leads away from a singular
+configuration: longer than the way to it, 1e-7, and short beside that to another one."""
 
 
 def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) -> str:
@@ -468,6 +481,8 @@ def _singular(led: Follower, q: Array) -> str:
 
 
 _OFF = 1e-9
+"""Largest row at a pose that was reached: solutions are found to 1e-12, and next to singular
+configurations rounding is larger."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -549,6 +564,7 @@ def _followed(led: Follower, poses: Path, q: Array) -> Followed:
         if at < 1.0 or point.left > _OFF:
             reason = stop_reason(led, poses, number, whole, at)
             break
+        # a part of the next segment: after a narrow passage ten doublings lead back to all of it
         step = max(step, 1e-3)
         kept.append((whole, led.residual(whole, T), smallest(tracker, point.J)))
     rows = np.array([whole for whole, _, _ in kept]).reshape(len(kept), q.size)

@@ -24,8 +24,14 @@ METHODS = ("auto", *CLOSED_FORMS, "general", "search")
 """The methods that `solve` knows."""
 
 _BRANCH_NEAR = 1e-2
+"""Residual, of max(1 m, the arm's length), up to which a branch is polished: near a double root
+those that are not real miss by little, and all others that do not hold miss by much."""
 _DEGENERATE = 1e-5
-_ILL_CONDITIONED = 1e-9
+"""Squared and free of units, below which a step loses digits and its other roots may be missed:
+five of sixteen in the square, half as many in the angle."""
+ILL_CONDITIONED = 1e-9
+"""Regularity of the general method below which it may miss solutions: seven digits are left of a
+root, of a double one three."""
 _STARTS = 300
 
 
@@ -136,7 +142,7 @@ def _name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
 
 def _by_general(target: Target, ready: General) -> Gathered:
     q = general(ready, target.T)
-    doubtful = ready.prepared.regularity < _ILL_CONDITIONED
+    doubtful = ready.prepared.regularity < ILL_CONDITIONED
     return _polished(target, Gathered(q, ("",) * len(q), "general", doubtful))
 
 

@@ -22,9 +22,10 @@ from mbs.models.inverse_geometry.closed_form import (
     require_method,
     sequence_of,
 )
-from mbs.models.inverse_geometry.gathering import METHODS, general_ready
+from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, METHODS, general_ready
 from mbs.models.inverse_geometry.search import General, general_many, polish
 from mbs.models.inverse_geometry.solutions import (
+    WITHIN,
     CoordinateLimits,
     Given,
     Solutions,
@@ -32,7 +33,7 @@ from mbs.models.inverse_geometry.solutions import (
     leaves_out,
 )
 from mbs.models.inverse_geometry.solve import solve
-from mbs.models.inverse_geometry.target import SOLVED, Target
+from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, SOLVED, Target
 from mbs.native import compiled
 
 # The closed form of a chain at many poses: in machine code, several poses in vector lanes.
@@ -121,8 +122,16 @@ _DOUBTFUL = 1e-6
 """Residual, of max(1 m, the arm's length), below which a solution may stand beside a
 configuration."""
 _DEGENERATE = 1e-12
+"""Squared and free of units, below which a pose is searched: its steps keep ten digits, and one
+that loses more is told by the residuals. For one pose alone, `gathering` is more careful."""
 _FOLD = 1e-9
-_SAME, _MEETING = 1e-9, 1e-5
+"""Below zero, radicand, free of units, of a root that is real but for rounding: the residual, which
+grows with it, decides."""
+_SAME = 1e-9
+"""Difference [rad or m] of two configurations that are one: polished ones repeat to 1e-12 or so."""
+_MEETING = 1e-5
+"""Difference [rad or m] below which two are near a double root, which rounding splits by 1e-8 and a
+residual of 1e-12 by 1e-6, so that how many there are is left to the search."""
 _ALIKE = 12 * _MEETING
 """Largest difference of the marks of two configurations that differ by `_MEETING`."""
 
@@ -169,6 +178,7 @@ def drafted(
     every = batch(chain, sequence, p, T)
     scale = max(1.0, arm.length)
     close = every.residual <= _DOUBTFUL * scale
+    # with a digit to spare, so that the processor does not decide what is polished and counts
     doubtful = close & (every.residual > 0.1 * SOLVED * scale)
     if np.any(doubtful):
         doubtful[doubtful] = _polish(arm, T, every, doubtful)
@@ -251,15 +261,10 @@ def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
 # What the general method gives for many poses, and which of them it leaves in doubt.
 
 
-_NEARLY_SINGULAR = 1e-4
-"""Smallest singular value below which a solution next to the one found may be missing."""
-_REGULAR = 1e-9
-
-
 def ready(chain: FrameChain, p: Array) -> General | None:
     """The general method of a chain for parameters p, (np,); None where it hardly holds."""
     found = general_ready(chain, p)
-    return found if found and found.prepared.regularity >= _REGULAR else None
+    return found if found and found.prepared.regularity >= ILL_CONDITIONED else None
 
 
 def general_draft(general: General, T: Array) -> BranchSolutions:
@@ -279,7 +284,7 @@ def general_draft(general: General, T: Array) -> BranchSolutions:
     target = Target(arm, T[pose])
     reached, least = target.residual(q), target.singular_values(q)[:, -1]
     every[pose, column], valid[pose, column], residual[pose, column] = q, True, reached
-    unsure = (least < _NEARLY_SINGULAR) | (reached > target.tolerance)
+    unsure = (least < NEARLY_SINGULAR) | (reached > target.tolerance)
     searched[pose[unsure]] = True
     return BranchSolutions(every, valid, residual, ("",) * shape[1], searched)
 
@@ -289,8 +294,6 @@ def general_draft(general: General, T: Array) -> BranchSolutions:
 
 Repair = Callable[[Arm, Array], Array]
 """All configurations (m, n) of an arm that take its frame to a pose (4, 4)."""
-
-_WITHIN = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -452,7 +455,7 @@ def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
 
 def _wound(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
     """Configurations (N, branches, nq) changed by whole turns, and whether all is within limits."""
-    low, high = allowed.low - _WITHIN, allowed.high + _WITHIN
+    low, high = allowed.low - WITHIN, allowed.high + WITHIN
     missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)
     turns = np.copysign(np.ceil(np.abs(missing)), missing)
     wound = np.where(allowed.turns & (missing != 0), q + 2 * np.pi * turns, q)

@@ -51,6 +51,7 @@ def descend(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
     wanted = np.broadcast_to(T, (len(q), 4, 4))
     q = np.array(q, dtype=float)
     cost, gap, J = examine_arm(arm, wanted, q)
+    # of the cost, at first; what lies between Newton's method and the gradient's
     damping, stalls = np.full(len(q), 0.1), np.zeros(len(q), dtype=int)
     for _ in range(_STEPS):
         going = np.flatnonzero((cost > _FINEST) & (stalls < _STALLS))
@@ -88,10 +89,14 @@ def _settle(
     before, weight = cost[going], damping[going]
     better = tried < before
     gain = 1.0 - tried / before
+    # weights by how much a step brings, as in trust regions: most of the cost, some, or little
     easier = np.where(gain > 0.5, 0.2, np.where(gain > 0.1, 0.5, 2.0)) * weight
+    # a rejected step is shorter: at once where damping had all but gone
     harder = np.where(weight < 1e-3, 1e-2, 4.0 * weight)
     damping[going] = np.where(better, easier, harder)
+    # less than a twentieth of the cost is no progress
     slow = np.where(gain < 5e-2, stalls[going] + 1, 0)
+    # of entries of about one: the step is then below 1e-12 of the gap
     hopeless = (before < _FINE) | (damping[going] * before > 1e12)
     stalls[going] = np.where(better, slow, stalls[going] + hopeless)
 
@@ -100,7 +105,7 @@ def _settle(
 
 
 _SAME, _CLOSE, _BETWEEN = 1e-6, 1e-2, 1e-13  # see `merged`
-_REACHED = 1e-12
+_REACHED = 1e-12  # relative residual of a solution: 1e-16 of rounding, and room for long arms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -288,6 +293,7 @@ def polished_with_numpy(arm: Arm, T: Array, q: Array) -> Polished:
 _STARTS, _KEPT, _REFINEMENTS = 100, 8, 60
 _NUDGE = 1e-5  # of joints, for differences of the slope
 _FLAT = 1e-15  # slopes below it are rounding
+_ENDLESS = 1e6  # shift at which a step is a millionth of the slope, and lowers nothing
 _ALIKE = 1e-14  # relative rounding of costs
 _EQUAL = 1e-6  # costs that are closer, relatively, are of one valley
 
@@ -352,9 +358,10 @@ def _refined(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
     """Newton's method with differences of the slope; the configuration and its cost."""
     cost, slope = _sloped(arm, T, q)
     curvature: Array | None = None
+    # of curvatures of about one: hardly any, and no step is endless where one of them is zero
     shift = 1e-9
     for _ in range(_REFINEMENTS):
-        if cost <= _FINEST or np.linalg.norm(slope) <= _FLAT or shift > 1e6:
+        if cost <= _FINEST or np.linalg.norm(slope) <= _FLAT or shift > _ENDLESS:
             break
         curvature = _curvature(arm, T, q) if curvature is None else curvature
         try:
@@ -365,8 +372,10 @@ def _refined(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
             tried_cost, tried_slope = np.array(np.inf), slope
         if _lower((tried_cost, tried_slope), (cost, slope)):
             q, cost, slope = tried, tried_cost, tried_slope
+            # less would be lost beside curvatures of about one
             shift, curvature = max(0.1 * shift, 1e-12), None
         else:
+            # ten times shorter, and from where a shift is felt
             shift = max(10.0 * shift, 1e-6)
     return q, float(cost)
 

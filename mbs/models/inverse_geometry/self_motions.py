@@ -12,17 +12,27 @@ from numpy.typing import NDArray
 from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.target import Target, TargetReduction
+from mbs.numbers import NONZERO
 
 # Self-motions of an arm whose frame is held: where they start, and the configurations along them.
 
 
 _STEP, _SMALLEST_STEP = 0.1, 1e-3
+"""Lengths of a step along a self-motion [rad or arm lengths]: 63 to a turn, and the shortest: a
+curve that even this does not follow ends there."""
 _MOST_STEPS, _FEW_STEPS = 2000, 60
 _SHORTEST = 1.0
 _AWAY = 0.05
+"""Distance [rad or arm lengths] at which a self-motion must still be there: at a double root the
+residual is then some 1e-3, far above the tolerance, and the null space still points along."""
 _TRIES = 24
 _SEED = 20260108
+_ZERO = 1e-6
+"""Singular values below it are zero: on a self-motion they are known to the root of 1e-12."""
 _INTEGER = 1e-3
+"""Distance from integers within which slopes are rounded to them: a singular configuration is known
+to half its digits or fewer, and so is the null space; where rounding is wrong the residual
+tells."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +69,7 @@ def freedoms(reduced: TargetReduction) -> tuple[int, Array]:
         return c, (probes[0] - reduced.x) / np.linalg.norm(probes[0] - reduced.x)
     for direction in directions if c > 1 else ():
         x = _nearest_on_sphere(reduced, direction)
+        # on the sphere, not fallen back to its centre
         if _solves(target, x) and abs(np.linalg.norm(x - reduced.x) / _AWAY - 1) < 1e-3:
             return 1, (x - reduced.x) / np.linalg.norm(x - reduced.x)
     return 0, np.zeros(reduced.x.size)
@@ -83,10 +94,12 @@ def _nearest_on_sphere(reduced: TargetReduction, direction: Array) -> Array:
         away = x - reduced.x
         rows = np.vstack([J, away / _AWAY])
         right = np.append(e, 0.5 * (away @ away / _AWAY - _AWAY))
+        # rows that a self-motion leaves dependent are so but for rounding, no others are so near
         step = np.linalg.lstsq(rows, -right, rcond=1e-10)[0]
         size = float(np.linalg.norm(step))
-        x = x + step * min(1.0, 0.3 * _AWAY / max(size, 1e-300))
-        if size < 1e-14:
+        # short beside the sphere, so that it is not left for another solution
+        x = x + step * min(1.0, 0.3 * _AWAY / max(size, NONZERO))
+        if size < 1e-14:  # rounding of positions of about one [rad or arm lengths]
             break
     return x
 
@@ -157,6 +170,7 @@ class _Way:
             points.append(x)
             step = min(2 * step, _STEP)
             home = target.wrapped(start - x)
+            # the start lies within the next step, and a tenth for the bend of the curve
             near = np.linalg.norm(home) <= 1.1 * step
             if len(points) > 3 and near and 0 < home @ tangent <= step:
                 return [*points, x + home], True
@@ -173,10 +187,11 @@ def _tangent(target: Target, x: Array, before: Array) -> Array:
     """The direction along which the equations stay solved, nearest the one before."""
     J = target.excess(x)[1]
     _, s, Vt = np.linalg.svd(J)
-    rank = min(int(np.sum(s > 1e-6)), x.size - 1)
+    rank = min(int(np.sum(s > _ZERO)), x.size - 1)
     null = Vt[rank:].T
     along: Array = null @ (null.T @ before)
     size = float(np.linalg.norm(along))
+    # where the null space has turned away, by 84 degrees, straight on
     return along / size if size > 0.1 else before
 
 
@@ -184,7 +199,10 @@ Whole = Callable[[Array], Array]
 """The configuration (nq,) of a robot for one of its chain, (n,); NaN where there is none."""
 
 _MOVES = 1e-6
+"""Way of a joint [rad or arm lengths] along a curve, or slope against the free one, from which it
+moves: points of a curve are solved to 1e-12, of singular ones to the root of it."""
 _SAME = 1e-6
+"""Distance [rad or arm lengths] from a curve of configurations that belong to it, likewise."""
 _REFINEMENTS = 5
 _COMPARABLE = 0.5
 """Part of the widest motion from which a joint nearer the base is the free one."""
@@ -286,6 +304,7 @@ class _SelfMotion:
             near = x[k] + (np.mod(wanted - x[k] + np.pi, 2 * np.pi) - np.pi)
         found = target.corrected(x, held, np.array([near]))
         solved = target.residual(found * target.unit) < target.tolerance
+        # solved to 1e-12 [rad or arm lengths]; where the free joint does not get, it is far off
         if not solved or abs(found[k] - near) > 1e-9:
             return None
         q: Array = found * target.unit
@@ -377,6 +396,7 @@ def _relation(
     turning = not any(target.arm.prismatic[k] for k in pair)
     if turning and abs(factor - round(factor)) < _MOVES:
         constant = math.remainder(constant, 2 * math.pi)
+    # what is left of sums of angles and lengths that cancel
     constant = 0.0 if abs(constant) < 1e-12 else constant
     free = target.arm.names[pair[0]]
     if abs(abs(factor) - 1) < _MOVES:
@@ -432,8 +452,10 @@ def _end(target: Target, curve: ConfigurationCurve, free: int, sign: float) -> f
 
 
 _SURFACE_STEP, _STEPS = 0.15, 150
-_ZERO = 1e-6
+"""Length of a step on a surface of configurations [rad or arm lengths], 9 degrees, which four
+Newton steps bring back to it; all steps together are more than three turns."""
 _ARRIVED = 1e-6
+"""Distance [rad or arm lengths] from the goal, itself known to the root of 1e-12 where singular."""
 
 
 def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
@@ -455,7 +477,7 @@ def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
             break
         _, J = target.excess(x)
         along = _projected(
-            J, difference * np.minimum(1.0, _SURFACE_STEP / np.maximum(size, 1e-300))
+            J, difference * np.minimum(1.0, _SURFACE_STEP / np.maximum(size, NONZERO))
         )
         x = _corrected(target, x + along)
     arrived = np.linalg.norm(target.wrapped(end - x), axis=1) < _ARRIVED

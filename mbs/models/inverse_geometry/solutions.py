@@ -27,7 +27,8 @@ Given = Mapping[str, tuple[float, float] | None]
 """Limits by the name of the coordinate, None for a coordinate without."""
 
 _TURN = 2 * math.pi
-_WITHIN = 1e-9
+WITHIN = 1e-9
+"""Distance beyond a limit [rad or m] that is rounding: solutions that lie on a limit are within."""
 _TURNS = 4
 """To either side of the position nearest the wanted one, at most."""
 _MOST_WINDINGS = 64
@@ -79,7 +80,7 @@ class CoordinateLimits:
 
     def _options(self, k: int, value: float, near: float) -> list[float]:
         """Positions of one coordinate within its limits, the nearest first."""
-        low, high = self.low[k] - _WITHIN, self.high[k] + _WITHIN
+        low, high = self.low[k] - WITHIN, self.high[k] + WITHIN
         if not self.turns[k]:
             return [value] if low <= value <= high else []
         if math.isinf(low) and math.isinf(high):
@@ -291,6 +292,8 @@ def _numbers(system: str, q: object) -> Array:
 
 _REASON_STARTS, _STEPS, _SEED = 40, 60, 20260109
 _REACHED = 1e-9
+"""Largest row, free of units, of equations that have a solution: damped steps end far below, and a
+pose out of reach by less, a nanometre of a metre, is told by its distance."""
 _SMALLEST = 1e-9
 """Distance [m] and angle [rad] that are told; below it is rounding."""
 
@@ -358,6 +361,7 @@ def _reaches(target: Target, rows: slice) -> bool:
     n = target.arm.size
     rng = np.random.default_rng(_SEED)
     x = rng.uniform(-math.pi, math.pi, (_REASON_STARTS, n))
+    # of rows of about one: little, as starts are many
     damping = np.full(_REASON_STARTS, 1e-2)
     e, J = (part[:, rows] for part in target.excess(x))
     for _ in range(_STEPS):
@@ -367,6 +371,7 @@ def _reaches(target: Target, rows: slice) -> bool:
         better = np.sum(e_trial**2, axis=1) < np.sum(e**2, axis=1)
         x = np.where(better[:, None], x - step, x)
         e, J = np.where(better[:, None], e_trial, e), np.where(better[:, None, None], J_trial, J)
+        # less would be rounding beside entries of J'J of about one
         damping = np.where(better, np.maximum(damping / 5, 1e-14), damping * 4)
     return bool(np.min(np.max(np.abs(e), axis=1)) < _REACHED)
 

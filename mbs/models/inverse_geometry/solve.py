@@ -15,10 +15,8 @@ from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_po
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
-from mbs.models.inverse_geometry.target import Target
+from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, Target
 from mbs.models.inverse_geometry.whole_robot import parallel
-
-_NEARLY_SINGULAR = 1e-4
 
 
 def solve(
@@ -104,7 +102,7 @@ def _is_doubtful(target: Target, gathered: Gathered) -> bool:
     """Whether a solution may be missing: none was found, or next to a singular configuration."""
     if gathered.doubtful or not len(gathered.q):
         return True
-    return bool(np.min(target.singular_values(gathered.q)[:, -1]) < _NEARLY_SINGULAR)
+    return bool(np.min(target.singular_values(gathered.q)[:, -1]) < NEARLY_SINGULAR)
 
 
 def _wishes(

@@ -13,11 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbs.closed_forms.arm import Arm, Array, gap_to
+from mbs.numbers import NONZERO
 
 SOLVED = 1e-12
 """Largest residual of a solution, of max(1 m, the arm's length)."""
 
+NEARLY_SINGULAR = 1e-4
+"""Smallest singular value, lengths divided by the arm's length, below which a solution next to the
+one found may be missing: two roots lie about as far apart as it is large. The general method was
+seen to miss one at 5e-7; two orders more cost little, as few poses are so near."""
+
 _LONGEST_STEP, _TARGET_SETTLED = 0.3, 1e-12
+"""Steps [rad or arm lengths]: the longest, 17 degrees, within which the equations are nearly
+linear; and one that is hardly more than rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,10 +84,11 @@ class Target:
         for _ in range(iterations):
             e, J = self.excess(x)
             further = (held @ x[..., None])[..., 0] - values
+            # only exact dependence, 1e-16 by rounding, is left out; nearly dependent rows count
             inverse = np.linalg.pinv(np.concatenate([J, held], axis=-2), rcond=1e-12)
             step = (inverse @ np.concatenate([e, further], axis=-1)[..., None])[..., 0]
             size = np.linalg.norm(step, axis=-1, keepdims=True)
-            x = x - step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
+            x = x - step * np.minimum(1.0, _LONGEST_STEP / np.maximum(size, NONZERO))
             if np.max(size) < _TARGET_SETTLED:
                 break
         return x
@@ -89,6 +98,9 @@ class Target:
 
 
 _SAME, _CLOSE, _BETWEEN = 1e-9, 1e-2, 1e-13
+"""Distances [rad or arm lengths] below which two solutions are one, and may be one; they are if the
+residual half way, of max(1 m, the length), is rounding: it grows with the square of the
+distance."""
 
 
 def distinct(target: Target, q: Array) -> list[list[int]]:
@@ -137,10 +149,13 @@ SINGULAR = 2e-6
 """Singular values below it count as zero: two roots that lie 1e-6 apart are one double root."""
 
 _MEETING = 1e-13
+"""Terms of g, free of units, that are negligible: a tenth of what a solution may miss by."""
+# h [rad or arm lengths] at which g is fitted, each a fourth or fifth of the one before: the first
+# within which Newton's method converges and a polynomial of degree 8 is g but for rounding
 _RADII = (0.05, 0.012, 3e-3, 7e-4, 1.5e-4, 3e-5, 6e-6)
-_ROUNDING = 3e-15
+_ROUNDING = 3e-15  # of g, some tens of 1e-16, with which a fitted polynomial agrees
 _HIGHEST = 4
-_FARTHEST = 0.4
+_FARTHEST = 0.4  # h [rad or arm lengths] of a step: beyond eight radii no polynomial holds
 _DEGREE = 8
 _SEED = 20260107
 
@@ -182,6 +197,7 @@ class TargetReduction:
             right = np.concatenate([e @ self.solved, off], axis=1)
             step = _solved(rows, right)
             x = x - step
+        # after twelve Newton steps either rounding, magnified by the inverse, or no convergence
         found = bool(np.max(np.abs(step)) < 1e-11 and np.max(np.abs(right)) < 1e-11)
         return x, self.target.excess(x)[0] @ self.left, found
 
@@ -230,7 +246,7 @@ def _order(reduced: TargetReduction) -> tuple[int, Array]:
     g = _coefficients(reduced)
     order, middle = 1, 0.0
     for k in range(2, _HIGHEST + 1):
-        size = max(float(g[k] @ g[k]), 1e-300)
+        size = max(float(g[k] @ g[k]), NONZERO)
         radius, shift = (_MEETING / size**0.5) ** (1.0 / k), -float(g[k - 1] @ g[k]) / (k * size)
         if max(radius, abs(shift)) > _RADII[0]:
             continue
@@ -262,6 +278,7 @@ def _simple_roots(g: Array) -> list[float]:
     found = [-float(along[0]) / slope]
     for terms in (along[:3], along):
         every = np.roots(terms[::-1])
+        # fitted coefficients split a double root by a root of their rounding
         real = every.real[np.abs(every.imag) < 1e-6 * np.abs(every)]
         found += [float(real[np.argmin(np.abs(real))])] if len(real) else []
     return found
@@ -295,7 +312,8 @@ def _dual_dimension(reduced: TargetReduction) -> int:
     for degree in range(1, 6):
         matrix = _macaulay(powers, columns, degree, reduced.corank)
         s = np.linalg.svd(matrix, compute_uv=False)
-        nullity = int(matrix.shape[1]) - int(np.sum(s > 1e-4 * max(float(s[0]), 1e-300)))
+        # fitted coefficients, in units of the radius, lack terms beyond degree 6, which are less
+        nullity = int(matrix.shape[1]) - int(np.sum(s > 1e-4 * max(float(s[0]), NONZERO)))
         if nullity == before:
             return nullity
         before = nullity
@@ -316,7 +334,7 @@ def _taylor(reduced: TargetReduction) -> tuple[list[tuple[int, ...]], Array]:
     fit: Array = np.linalg.lstsq(values, g, rcond=None)[0]
     degree = np.array([sum(power) for power in powers])
     fit[degree <= 1] = 0.0
-    return powers, fit / max(float(np.max(np.abs(fit))), 1e-300)
+    return powers, fit / max(float(np.max(np.abs(fit))), NONZERO)
 
 
 def _monomials(c: int, degree: int) -> list[tuple[int, ...]]:

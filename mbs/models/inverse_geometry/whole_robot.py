@@ -39,9 +39,14 @@ from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, Wish
 
 
 _SAME = 1e-7
+"""Difference [rad or m] of two configurations that are one: loops are closed to 1e-12, which
+joints that they determine weakly magnify, and regular branches are farther apart."""
 _SEED = 20260108
 _AGREE = 1e-7
+"""Difference [rad or m] of joints that both the chain and the loops determine, likewise."""
 _MOVED = 1e-5
+"""Move [rad or m] to the nearest closed configuration that only takes rounding away, up to that of
+a double root, 1e-6; more is another configuration."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -259,6 +264,7 @@ def _distinct(
 def _mark(system: System, q: Array) -> float:
     """A number that is the same for the same configuration, and most often for no other one."""
     turns = np.array([coordinate.unit == "rad" for coordinate in system.coordinates])
+    # of a joint, any that differ, none near zero
     weights = np.random.default_rng(_SEED).uniform(0.1, 0.5, (2, system.nq))
     return float(
         weights[0] @ np.where(turns, np.cos(q), np.abs(q)) + weights[1] @ (turns * np.sin(q))
@@ -277,6 +283,8 @@ def _largest(rows: Array) -> float:
 
 
 _SINGULAR = 1e-6
+"""Singular value of pose and loops together at which roots meet and a solution counts for none: two
+roots that lie 1e-6 apart are one."""
 
 
 def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Solutions:

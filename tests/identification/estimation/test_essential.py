@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import f
 from support.measured_arm import equations, noisy_samples
 
 from mbs.errors import ModelError
@@ -76,3 +77,30 @@ def test_bounds_without_sense_are_refused():
     blind = replace(estimate, covariance=np.full_like(estimate.covariance, np.nan))
     with pytest.raises(ModelError, match="least squares has no deviations"):
         essential(blind)
+
+
+def test_as_many_are_dropped_as_sums_of_squares_allow():
+    """F of the dropped ones together, by least squares without them, on both sides of its bound."""
+    given = observations(0.5)
+    full, (W, y) = least_squares(given), given.rows
+    found = essential(full)
+
+    def squares(gone):
+        A = W[:, [name not in gone for name in full.names]]
+        return np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2)
+
+    one_more = [*found.dropped, found.reason.split()[1]]
+    least, free = squares([]), W.shape[0] - W.shape[1]
+    for k in range(1, len(one_more) + 1):
+        F = (squares(one_more[:k]) - least) / k / (least / free)
+        bound = f.isf(0.05, k, free)
+        assert (1.1 * bound < F) if k == len(one_more) else (0.1 * bound < F < 0.9 * bound)
+    assert len(found.dropped) == 3
+
+
+@pytest.mark.parametrize(("significance", "count"), [(0.5, 0), (0.05, 3), (0.005, 4)])
+def test_a_significance_moved_tenfold_drops_others(significance, count):
+    estimate = least_squares(observations(0.5))
+    found = essential(estimate, significance=significance)
+    assert len(found.dropped) == count
+    assert (found.dropped == essential(estimate).dropped) == (significance == 0.05)

@@ -146,6 +146,23 @@ def test_without_a_closed_form_the_general_method_solves():
         solve_many(system, T, method="pieper")
 
 
+def test_the_general_method_leaves_neighbours_of_singular_configurations_to_the_search():
+    """On both sides of the bound within a factor of four, and where it misses one of eight."""
+    system = assembled("crx10")
+    q = np.tile([-0.59762315, 1.06628932, 0.56258902, 2.20500488, 0.07701433, 1.11838127], (3, 1))
+    q[:, 4] += 1.5e-3, 1.5e-4, 3e-6
+    arm = plain_arm(system)
+    T = arm.pose(q)
+    many = solve_many(system, T)
+    assert many.searched.tolist() == [False, True, True]
+    assert many.count.tolist() == [8, 8, 8]
+    answers = [solve(system, pose) for pose in T]
+    assert [len(answer) for answer in answers] == [8, 8, 8]
+    least = [min(solution.sigma_min for solution in answer) for answer in answers]
+    assert least == pytest.approx([2.7e-4, 2.7e-5, 5.4e-7], rel=0.1)
+    assert np.min(distance(arm, answers[2].q, q[2])) < 1e-8
+
+
 def test_repair_solves_what_is_in_doubt():
     asked = []
 

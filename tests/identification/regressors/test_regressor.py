@@ -33,12 +33,12 @@ from mbs.identification import (
 from mbs.operations import count, simplify
 
 BOUNDS = {
-    "general_6r": "892/678",
-    "puma560": "411/328",
+    "general_6r": "904/690",
+    "puma560": "411/330",
     "rx90": "365/293",
-    "iiwa": "656/510",
+    "iiwa": "656/511",
     "stanford": "341/271",
-    "sr400_tree": "459/369",
+    "sr400_tree": "459/373",
 }
 """Multiplications and additions for the ten parameters of every link; lengths are symbols."""
 

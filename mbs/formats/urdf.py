@@ -941,7 +941,9 @@ def add_shapes(
     colours: Mapping[str, Vector],
     meshes: MeshFiles,
 ) -> None:
-    """Give the links their visuals; their collisions where there is none to draw.
+    """Give the links their visuals, or their collisions where none of these can be drawn.
+
+    A link without a visual is not seen, unless the whole file has none.
 
     Args:
         mechanism: that gets the shapes.
@@ -950,7 +952,10 @@ def add_shapes(
         colours: of materials by name.
         meshes: finds the files of meshes.
     """
+    seen = any(element.find("visual") is not None for element in tree.links.values())
     for link, element in tree.links.items():
+        if seen and element.find("visual") is None:
+            continue
         for tag in ("visual", "collision"):
             found = []
             for number, part in enumerate(element.findall(tag), start=1):

@@ -319,7 +319,7 @@ def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> Skelet
     centre = _mass_centre(marks, number)
     segments = _segments(marks, joined, others)
     if not segments and joined:
-        far = _farthest_frame(marks, number, joined[0])
+        far = _farthest_frame(marks, number, joined[0], centre)
         segments = () if far is None else _segments(marks, [*joined, *others], [far])
     if not segments and centre is not None:
         segments = _segments(marks, [*joined, *others], [centre])
@@ -336,24 +336,28 @@ def _segments(
     return tuple((columns[a], columns[b]) for a, b in lines)
 
 
-def _farthest_frame(marks: _Marks, number: int, joint: int) -> int | None:
+def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) -> int | None:
     """The frame of a link, such as a foot, that is farthest from its joint; None where all are there.
 
     Args:
         marks: takes the origin of the frame.
         number: of the link.
         joint: column in the points.
+        centre: column of the centre of mass, which is taken where the frame is there.
     """
     places = [pose for link, pose in marks.system.frames.values() if link == number - 1]
     if not places:
         return None
-    both = casadi.horzcat(marks.points[joint][1].p, *(pose.p for pose in places))
+    columns = [joint] if centre is None else [joint, centre]
+    known = marks.local(columns)
+    every = casadi.horzcat(*(pose.p for pose in places))
     p = marks.system.parameter_values()
-    at = np.array(Function("places", [marks.system.p], [both])(p)).T
-    away = np.linalg.norm(at[1:] - at[0], axis=1)
+    at = np.array(Function("places", [marks.system.p], [every])(p)).T
+    away = np.linalg.norm(at - known[0], axis=1)
     far = int(np.argmax(away))
-    if away[far] <= _SAME * max(float(np.abs(at).max()), 1.0):
-        return None
+    same = np.linalg.norm(known - at[far], axis=1) <= _SAME * max(float(np.abs(at).max()), 1.0)
+    if same.any():
+        return None if same[0] else centre
     return marks.point((number - 1, places[far]))
 
 

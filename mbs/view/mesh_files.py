@@ -5,11 +5,13 @@ from __future__ import annotations
 import importlib
 import io
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,7 @@ from mbs.view.posed import Array
 
 MOST_TRIANGLES = 2000
 """Of one mesh in a picture: a robot of thirty meshes stays under a second and two megabytes."""
+_UNIT = re.compile(rb"<(?:\w+:)?unit\b[^<>]{0,200}?\bmeter\s*=\s*[\"']([^\"']{1,40})[\"']")
 _MOST_READ = 5_000_000
 """Triangles of a file: more are gigabytes in memory."""
 
@@ -73,8 +76,9 @@ def _read(path: str, stamp: int) -> Mesh:
         raise ModelError(str(error)) from None
     try:
         # a file like this one has no folder: what it names cannot be looked for
+        plain = _without_materials(content) if kind == "dae" else content
         scene = trimesh.load_scene(
-            io.BytesIO(content), file_type=kind, process=False, skip_materials=True
+            io.BytesIO(plain), file_type=kind, process=False, skip_materials=True
         )
         points, triangles = _joined(scene)
         if kind == "dae":
@@ -117,11 +121,28 @@ def _joined(scene: Any) -> tuple[Array, NDArray[np.int64]]:
     return np.vstack(points), np.vstack(triangles)
 
 
+def _without_materials(content: bytes) -> bytes:
+    """A COLLADA file of surfaces alone: pycollada drops those whose materials are broken."""
+    root = ElementTree.fromstring(content)
+    for element in list(root.iter()):
+        for inner in list(element):
+            if inner.tag.rpartition("}")[2] in _MATERIALS:
+                element.remove(inner)
+    return ElementTree.tostring(root)
+
+
+_MATERIALS = {"bind_material"} | {
+    f"library_{what}" for what in ("effects", "materials", "images", "cameras", "lights")
+}
+
+
 def _unit(content: bytes) -> float:
     """Metres that a length of 1 in a COLLADA file is."""
-    collada = importlib.import_module("collada")
-    unit = collada.Collada(io.BytesIO(content), ignore=[collada.DaeError]).assetInfo.unitmeter
-    return 1.0 if unit is None else float(unit)
+    found = _UNIT.search(content)
+    unit = float(found[1]) if found else 1.0
+    if not 0 < unit < np.inf:
+        raise ValueError(f"its unit is {unit:g} m")
+    return unit
 
 
 def thinned(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES) -> Mesh:

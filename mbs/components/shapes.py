@@ -51,15 +51,12 @@ class Shape:
             raise DescriptionError(
                 f"shape: kind is {quoted(self.kind)}; {did_you_mean(self.kind, _SIZES)}"
             )
-        wanted = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(self.kind, 3)
         size = _numbers(self.size)
-        least = -math.inf if self.kind == "mesh" else 0.0
-        if len(size) != wanted or not all(math.isfinite(x) and x >= least and x for x in size):
-            if not (self.kind == "capsule" and len(size) == 2 and size[0] > 0 and size[1] == 0):
-                above = "finite and not zero" if self.kind == "mesh" else "above zero"
-                raise DescriptionError(
-                    f"{self.kind}: size is {quoted(self.size)}; give {_SIZES[self.kind]}, {above}"
-                )
+        if not self._is_possible(size):
+            above = "finite and not zero" if self.kind == "mesh" else "above zero"
+            raise DescriptionError(
+                f"{self.kind}: size is {quoted(self.size)}; give {_SIZES[self.kind]}, {above}"
+            )
         object.__setattr__(self, "size", size)
         if self.colour is not None:
             colour = _numbers(self.colour)
@@ -79,6 +76,17 @@ class Shape:
                 f"mesh: {quoted(str(self.mesh))} is of another kind;"
                 f" give a file {', '.join(_MESH_KINDS[:-1])} or {_MESH_KINDS[-1]}"
             )
+
+    def _is_possible(self, size: tuple[float, ...]) -> bool:
+        """Whether a shape of the kind has these lengths."""
+        wanted = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(self.kind, 3)
+        if len(size) != wanted or not all(map(math.isfinite, size)):
+            return False
+        if self.kind == "mesh":
+            return all(size)
+        if self.kind == "capsule":  # a ball where it has no length
+            return size[0] > 0 and size[1] >= 0
+        return all(length > 0 for length in size)
 
 
 def is_mesh_file(name: str) -> bool:

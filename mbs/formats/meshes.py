@@ -61,7 +61,7 @@ class MeshFiles:
         first, line = next(iter(self.missing.items()))
         count = len(self.missing)
         what = f"{quoted(first)} and {count - 1} more are" if count > 1 else f"{quoted(first)} is"
-        why = "not found, or no .stl, .obj or .dae file; give the folders of packages as packages={...}"
+        why = "not found, or no .stl, .obj or .dae file; give folders of packages as packages={...}"
         if self.folder is None:
             why = "not read, for files that were sent name no others"
         notes.add("ignored", "a mesh", f"{what} {why}; bars are drawn instead", line)

@@ -1303,7 +1303,12 @@ def _strip(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
         geom.name = geom.name or f"mesh of the picture {number}"
         assets.of_geoms[geom.name] = asset
         # its size and mass say nothing, since the inertia of the body is given
-        geom.type, geom.meshname, geom.size, geom.mass = mujoco.mjtGeom.mjGEOM_SPHERE, "", [1] * 3, 0
+        geom.type, geom.meshname, geom.size, geom.mass = (
+            mujoco.mjtGeom.mjGEOM_SPHERE,
+            "",
+            [1] * 3,
+            0,
+        )
     meshes = {geom.meshname for geom in spec.geoms}
     fields = {geom.hfieldname for geom in spec.geoms}
     for material in spec.materials:

@@ -913,7 +913,7 @@ _PRIMITIVES = {"box": ("size",), "sphere": ("radius",)} | dict.fromkeys(
 
 
 def material_colours(root: Element) -> dict[str, Vector]:
-    """Red, green, blue and opacity of the materials that have a name; the first of a name counts."""
+    """Red, green, blue and opacity of materials by name; the first of a name counts."""
     found: dict[str, Vector] = {}
     own = (m for tag in ("visual", "collision") for v in root.iter(tag) for m in v.iter("material"))
     for material in (*root.findall("material"), *own):

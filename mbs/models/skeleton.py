@@ -337,7 +337,7 @@ def _segments(
 
 
 def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) -> int | None:
-    """The frame of a link, such as a foot, that is farthest from its joint; None where all are there.
+    """The frame of a link, such as a foot, that is farthest from its joint; None if all are there.
 
     Args:
         marks: takes the origin of the frame.

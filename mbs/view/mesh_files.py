@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import io
 import os
@@ -57,10 +58,8 @@ def read_mesh(path: PathLike) -> Mesh:
         ModelError: trimesh is not installed, the file is missing, or it holds no triangles.
     """
     stamp = 0
-    try:
+    with contextlib.suppress(OSError, ValueError):  # read_bytes says what is wrong
         stamp = os.stat(path).st_mtime_ns
-    except (OSError, ValueError):
-        pass  # read_bytes says what is wrong
     return _read(str(path), stamp)
 
 

@@ -253,7 +253,9 @@ def painter(
     """
     optional_module("matplotlib", "plot")
     figures = optional_module("matplotlib.figure", "plot")
-    roles = frozenset(item.role for item in scene.primitives) - set(scene.hidden(hidden)) | set(shown)
+    roles = frozenset(item.role for item in scene.primitives) - set(scene.hidden(hidden)) | set(
+        shown
+    )
     solid = [
         (item.link, faces)
         for item in scene.primitives

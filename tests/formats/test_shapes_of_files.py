@@ -1,4 +1,4 @@
-"""What robots look like: shapes of URDF and MJCF files stand where pinocchio and MuJoCo put them."""
+"""Shapes of URDF and MJCF files stand where pinocchio and MuJoCo put them."""
 
 import pickle
 import struct
@@ -90,7 +90,9 @@ def test_shapes_of_a_urdf_file_are_where_pinocchio_has_them(tmp_path):
     data, placed = model.createData(), geometry.createData()
     pin.updateGeometryPlacements(model, data, geometry, placed, np.array(list(Q.values())))
     ours = poses(system, Q)
-    theirs = {g.name: T.homogeneous for g, T in zip(geometry.geometryObjects, placed.oMg)}
+    theirs = {
+        g.name: T.homogeneous for g, T in zip(geometry.geometryObjects, placed.oMg, strict=True)
+    }
     names = ["base_0", "upper_0", "lower_0", "lower_1", "hand_0"]
     assert set(theirs) == set(names)
     for name, T in zip(names, ours, strict=True):
@@ -105,7 +107,7 @@ def test_shapes_of_a_urdf_file_are_where_pinocchio_has_them(tmp_path):
     (note,) = [str(note) for note in mechanism.notes if "mesh" in note.element]
     assert "'missing.stl'" in note
     assert "packages" in note
-    with pytest.raises(DescriptionError, match="missing.stl"):
+    with pytest.raises(DescriptionError, match=r"missing\.stl"):
         mbs.load(path, strict=True)
 
 

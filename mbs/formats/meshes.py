@@ -61,10 +61,12 @@ class MeshFiles:
         first, line = next(iter(self.missing.items()))
         count = len(self.missing)
         what = f"{quoted(first)} and {count - 1} more are" if count > 1 else f"{quoted(first)} is"
-        why = "not found, or no .stl, .obj or .dae file; give folders of packages as packages={...}"
+        why = "it is not there, or no .stl, .obj or .dae file; put it where the description says"
         if self.folder is None:
-            why = "not read, for files that were sent name no others"
-        notes.add("ignored", "a mesh", f"{what} {why}; bars are drawn instead", line)
+            why = "files that were sent name no others"
+        elif _PACKAGE.fullmatch(first):
+            why = "it is not there, or no .stl, .obj or .dae file; give its folder as packages={...}"
+        notes.add("ignored", "a mesh", f"{what} not drawn: {why}", line)
 
     def _candidates(self, name: str, folder: Path) -> list[Path]:
         package = _PACKAGE.fullmatch(name)

@@ -106,7 +106,8 @@ def test_shapes_of_a_urdf_file_are_where_pinocchio_has_them(tmp_path):
     ]
     (note,) = [str(note) for note in mechanism.notes if "mesh" in note.element]
     assert "'missing.stl'" in note
-    assert "packages" in note
+    assert "not drawn" in note
+    assert note.startswith("line 9: ")
     with pytest.raises(DescriptionError, match=r"missing\.stl"):
         mbs.load(path, strict=True)
 

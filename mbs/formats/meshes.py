@@ -65,7 +65,9 @@ class MeshFiles:
         if self.folder is None:
             why = "files that were sent name no others"
         elif _PACKAGE.fullmatch(first):
-            why = "it is not there, or no .stl, .obj or .dae file; give its folder as packages={...}"
+            why = (
+                "it is not there, or no .stl, .obj or .dae file; give its folder as packages={...}"
+            )
         notes.add("ignored", "a mesh", f"{what} not drawn: {why}", line)
 
     def _candidates(self, name: str, folder: Path) -> list[Path]:

@@ -979,15 +979,17 @@ class MeshAssets:
     Attributes:
         of_meshes: by names of meshes.
         of_geoms: by names of geoms for which balls stand.
+        others: names of meshes that are not as in a file.
     """
 
     of_meshes: dict[str, tuple[str, tuple[float, ...]]]
     of_geoms: dict[str, tuple[str, tuple[float, ...]]]
+    others: list[str]
 
 
 def _mesh_assets(spec: Any) -> MeshAssets:
     """The meshes that are read as they are in their files."""
-    found = {}
+    found, others = {}, []
     for mesh in spec.meshes:
         moved = any(mesh.refpos) or tuple(mesh.refquat) != (1.0, 0.0, 0.0, 0.0)
         if mesh.file and not moved:
@@ -995,7 +997,9 @@ def _mesh_assets(spec: Any) -> MeshAssets:
             place = (Path(spec.meshdir or "") / file).as_posix()
             scale = tuple(float(factor) for factor in mesh.scale)
             found[mesh.name or Path(mesh.file).stem] = (place, scale)
-    return MeshAssets(found, {})
+        else:
+            others.append(mesh.name)
+    return MeshAssets(found, {}, others)
 
 
 def add_shapes(
@@ -1227,6 +1231,10 @@ def read_mjcf(
     meshes = MeshFiles(Path(path).resolve().parent if other_files else None)
     add_shapes(mechanism, mjcf, points, assets, meshes)
     meshes.note(notes)
+    if assets.others:
+        text = "not drawn: it has a reference frame, or its points stand in the description"
+        names = f"{quoted(assets.others[0])}" + (" and others" if assets.others[1:] else "")
+        notes.add("ignored", f"mesh {names}", text)
     mechanism.notes.extend(notes.taken)
     return mechanism
 

@@ -153,6 +153,10 @@ def test_shapes_of_an_mjcf_file_are_where_mujoco_has_them(tmp_path):
     mechanism = mbs.load(path)
     assert [shape.kind for _, shape in mechanism.shapes].count("mesh") == 0
     assert "'block.stl'" in str(mechanism.notes[-1])
+    path.write_text(light.replace('scale="1 2 .5"', 'refpos="1 0 0"'))
+    mechanism = mbs.load(path)
+    assert [shape.kind for _, shape in mechanism.shapes].count("mesh") == 0
+    assert "mesh 'm': not drawn" in str(mechanism.notes[-1])
 
 
 def test_collisions_are_drawn_where_a_file_has_no_visuals(tmp_path):

@@ -77,7 +77,9 @@ def test_messages_name_extras_that_exist() -> None:
                 named.append(str(extra.value))
     assert len(named) > 15
     assert set(named) <= EXTRAS
-    assert {"app", "cross", "identify", "import", "jax", "plot", "tables", "xacro"} == set(named)
+    assert {
+        *("app", "cross", "identify", "import", "jax", "meshes", "plot", "tables", "xacro")
+    } == set(named)
 
 
 def test_the_command_works_from_an_index_and_in_a_clone() -> None:

@@ -325,6 +325,7 @@ def _with_joints(mechanism: Mechanism, joints: Mapping[str, Joint]) -> Mechanism
     result.components = {name: component(c) for name, c in mechanism.components.items()}
     result.connections = [(point(a), point(b)) for a, b in mechanism.connections]
     result.frames = {name: point(p) for name, p in mechanism.frames.items()}
+    result.shapes = [(point(p), shape) for p, shape in mechanism.shapes]
     return result
 
 

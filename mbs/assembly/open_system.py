@@ -19,6 +19,7 @@ from mbs.assembly.tables import (
     CoordinateCoupling,
     LoopRow,
     Places,
+    ShapeRow,
     attached_forces,
     attached_sensors,
     force_elements,
@@ -107,6 +108,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         ),
         shafts=shaft_rows(line, symbols),
         devices=attached_devices(line, speeds, symbols),
+        shapes=_shapes(mechanism, places, symbols),
     )
 
 
@@ -238,6 +240,16 @@ def _frames(
         link, pose = places[point.owner.name, point.port]
         frames[name] = link, pose @ point.placement.pose(symbols)
     return frames
+
+
+def _shapes(
+    mechanism: Mechanism, places: Places, symbols: Mapping[str, SX]
+) -> tuple[ShapeRow, ...]:
+    rows = []
+    for point, shape in mechanism.shapes:
+        link, pose = places[point.owner.name, point.port]
+        rows.append(ShapeRow(link, pose @ point.placement.pose(symbols), shape))
+    return tuple(rows)
 
 
 def _numbered(

@@ -27,6 +27,7 @@ from mbs.assembly.tables import (
     JointRow,
     LinkRow,
     LoopRow,
+    ShapeRow,
     link_rows,
 )
 from mbs.assembly.tree import Tree, position_rate
@@ -216,6 +217,7 @@ class System:
         described: the components that hold parameters, as they were described.
         numbered: the body of each frame of the table that it was made from, by the number there;
             empty where these are the numbers of the links.
+        shapes: what the links and the base look like.
     """
 
     name: str
@@ -243,6 +245,7 @@ class System:
     bounded: tuple[BoundedField, ...] = ()
     described: tuple[Component, ...] = ()
     numbered: Mapping[int, str] = field(default_factory=dict)
+    shapes: tuple[ShapeRow, ...] = ()
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:

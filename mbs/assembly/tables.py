@@ -32,6 +32,7 @@ from mbs.components.sensors import (
     RelativeSensor,
     Sensor,
 )
+from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError
 from mbs.expressions import to_sx
 from mbs.spatial import Inertia, MatrixTurn, Pose
@@ -119,6 +120,21 @@ class LinkRow:
     theta: float | SX
     r: float | SX
     via: tuple[tuple[float | SX, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeRow:
+    """What a part of a link looks like.
+
+    Attributes:
+        link: that carries it, -1 for the base.
+        pose: of the shape in the frame of the link.
+        shape: what is there.
+    """
+
+    link: int
+    pose: Pose
+    shape: Shape
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,6 +57,7 @@ from mbs.components.sensors import (
     Sensor,
     WrenchSensor,
 )
+from mbs.components.shapes import Shape
 
 __all__ = [
     "AbsoluteSensor",
@@ -110,6 +111,7 @@ __all__ = [
     "Sensor",
     "ShaftDamper",
     "ShaftInertia",
+    "Shape",
     "Spherical",
     "Spring",
     "Torque",

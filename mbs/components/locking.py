@@ -209,6 +209,7 @@ def lock(mechanism: Mechanism, positions: Mapping[str, Any]) -> None:
     mechanism.components = kept
     mechanism.connections = [(moved(a), moved(b)) for a, b in mechanism.connections]
     mechanism.frames = {name: moved(point) for name, point in mechanism.frames.items()}
+    mechanism.shapes = [(moved(point), shape) for point, shape in mechanism.shapes]
     mechanism.cuts = [name for name in mechanism.cuts if name not in welds]
     mechanism.guess = {
         name: value

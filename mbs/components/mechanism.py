@@ -14,6 +14,7 @@ from mbs.components.drives import Flange, flange_pair
 from mbs.components.joints import Joint
 from mbs.components.locking import lock
 from mbs.components.notes import Note
+from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
 from mbs.text import quoted
@@ -98,6 +99,7 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
     )
     for frame, point in inner.frames.items():
         outer.frames[f"{scope}.{frame}"] = moved(point, placed, scope)
+    outer.shapes.extend((moved(point, placed, scope), shape) for point, shape in inner.shapes)
     outer.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
     outer.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
     used = {parameter.name for parameter in outer.used_parameters()}
@@ -131,6 +133,7 @@ class Mechanism:
     Attributes:
         notes: what the reader of a file renamed, ignored, doubted or completed; print them.
         numbered: the body of each frame of the table that it was made from, by its number.
+        shapes: what its bodies look like, and where on them.
     """
 
     def __init__(
@@ -156,6 +159,7 @@ class Mechanism:
         self._counted = 0
         self.shafts: list[tuple[Flange, Flange]] = []
         self.frames: dict[str, Point] = {}
+        self.shapes: list[tuple[Point, Shape]] = []
         self.values: dict[str, Parameter] = {}
         for symbol, value in (parameters or {}).items():
             self.values[symbol] = Parameter(symbol, value)
@@ -247,6 +251,17 @@ class Mechanism:
             )
         self.frames[Component(name).name] = self._point(point)
         return self.frames[name]
+
+    def add_shape(self, point: Point | RigidBody, shape: Shape) -> None:
+        """Say what a body looks like in pictures; nothing else changes.
+
+        Args:
+            point: where the middle of the shape is, or the frame of its mesh.
+            shape: what is there.
+        """
+        if not isinstance(shape, Shape):
+            raise DescriptionError(f"{self.name}: {_what(shape)} is no shape; give a Shape")
+        self.shapes.append((self._point(point), shape))
 
     def cut(self, joint: Joint) -> None:
         """Open the loop that this joint closes here, not where the assembly would choose."""
@@ -368,6 +383,7 @@ class Mechanism:
             for value in component.expressions():
                 yield from parameters_of(value)
         points = [point for pair in self.connections for point in pair]
+        points += [point for point, _ in self.shapes]
         for point in (*points, *self.frames.values()):
             for value in point.placement.expressions():
                 yield from parameters_of(value)

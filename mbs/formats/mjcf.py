@@ -35,12 +35,14 @@ from mbs.components import (
     Revolute,
     RigidBody,
     Rod,
+    Shape,
     Spherical,
     Spring,
 )
 from mbs.components.locking import FREE_JOINT, Base
 from mbs.errors import DescriptionError
 from mbs.formats.files import component_name
+from mbs.formats.meshes import MeshFiles
 from mbs.formats.notes import Notes
 from mbs.formats.xml import parse_xml
 from mbs.text import install_command, quoted
@@ -963,6 +965,127 @@ def _positions(mjcf: MjcfModel, j: int, qpos: Any, all_of_them: bool) -> dict[st
     return values if all_of_them or any(values.values()) else {}
 
 
+# What bodies look like: their geoms, for pictures alone.
+
+
+_SEEN_GROUPS = (0, 1, 2)
+"""Groups of geoms that MuJoCo's viewer shows until others are switched on; files put what only
+touches in the others."""
+_DEFAULT_COLOUR = (0.5, 0.5, 0.5, 1.0)
+"""Of geoms that have none of their own, as MuJoCo has it; then that of their material counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshAssets:
+    """The files of meshes and the factors of their lengths.
+
+    Attributes:
+        of_meshes: by names of meshes.
+        of_geoms: by names of geoms for which balls stand.
+        others: names of meshes that are not as in a file.
+    """
+
+    of_meshes: dict[str, tuple[str, tuple[float, ...]]]
+    of_geoms: dict[str, tuple[str, tuple[float, ...]]]
+    others: list[str]
+
+
+def _mesh_assets(spec: Any) -> MeshAssets:
+    """The meshes that are read as they are in their files."""
+    found, others = {}, []
+    for mesh in spec.meshes:
+        moved = any(mesh.refpos) or tuple(mesh.refquat) != (1.0, 0.0, 0.0, 0.0)
+        if mesh.file and not moved:
+            file = Path(mesh.file).name if getattr(spec, "strippath", False) else mesh.file
+            place = (Path(spec.meshdir or "") / file).as_posix()
+            scale = tuple(float(factor) for factor in mesh.scale)
+            found[mesh.name or Path(mesh.file).stem] = (place, scale)
+        else:
+            others.append(mesh.name)
+    return MeshAssets(found, {}, others)
+
+
+def add_shapes(
+    mechanism: Mechanism,
+    mjcf: MjcfModel,
+    points: Sequence[Point],
+    assets: MeshAssets,
+    meshes: MeshFiles,
+) -> None:
+    """Give the bodies the shapes of their geoms.
+
+    Args:
+        mechanism: that gets them.
+        mjcf: the model.
+        points: frames of the bodies.
+        assets: files of meshes.
+        meshes: finds them.
+    """
+    model = mjcf.data
+    groups = [int(group) for group in model.geom_group]
+    usual = any(
+        group in _SEEN_GROUPS and int(model.geom_bodyid[g]) for g, group in enumerate(groups)
+    )
+    for g, group in enumerate(groups):
+        if usual and group not in _SEEN_GROUPS:
+            continue
+        colour = _geom_colour(mjcf, g)
+        if colour[3] == 0:
+            continue  # it is there to be invisible
+        made = _geom_shape(mjcf, g, colour[:3], assets, meshes)
+        if made is not None:
+            point = placed(points[model.geom_bodyid[g]], model.geom_pos[g], model.geom_quat[g])
+            mechanism.shapes.append((_file_frame(mjcf, g, point), made))
+
+
+def _geom_colour(mjcf: MjcfModel, g: int) -> tuple[float, ...]:
+    model = mjcf.data
+    colour, material = tuple(map(float, model.geom_rgba[g])), int(model.geom_matid[g])
+    if np.allclose(colour, _DEFAULT_COLOUR) and material >= 0:  # MuJoCo keeps single precision
+        colour = tuple(map(float, model.mat_rgba[material]))
+    return tuple(min(max(part, 0.0), 1.0) for part in colour)
+
+
+def _geom_shape(
+    mjcf: MjcfModel,
+    g: int,
+    colour: tuple[float, ...],
+    assets: MeshAssets,
+    meshes: MeshFiles,
+) -> Shape | None:
+    model, kinds = mjcf.data, mjcf.mujoco.mjtGeom
+    asset = assets.of_geoms.get(model.geom(g).name)
+    kind = int(model.geom_type[g])
+    if kind == int(kinds.mjGEOM_MESH):
+        asset = assets.of_meshes.get(model.mesh(int(model.geom_dataid[g])).name)
+    rgb = (colour[0], colour[1], colour[2])
+    if asset is not None:
+        path = meshes.find(asset[0])
+        return None if path is None else Shape("mesh", asset[1], rgb, path)
+    a, b, c = (float(length) for length in model.geom_size[g])
+    if kind == int(kinds.mjGEOM_BOX):
+        return Shape("box", (2 * a, 2 * b, 2 * c), rgb)
+    if kind == int(kinds.mjGEOM_SPHERE):
+        return Shape("sphere", (a,), rgb)
+    if kind == int(kinds.mjGEOM_CYLINDER):
+        return Shape("cylinder", (a, 2 * b), rgb)
+    if kind == int(kinds.mjGEOM_CAPSULE):
+        return Shape("capsule", (a, 2 * b), rgb)
+    if kind == int(kinds.mjGEOM_ELLIPSOID):
+        return Shape("ellipsoid", (a, b, c), rgb)
+    return None
+
+
+def _file_frame(mjcf: MjcfModel, g: int, point: Point) -> Point:
+    """The frame of the file of a mesh, which MuJoCo moves to its centre of mass."""
+    model = mjcf.data
+    if int(model.geom_type[g]) != int(mjcf.mujoco.mjtGeom.mjGEOM_MESH):
+        return point
+    mesh = int(model.geom_dataid[g])
+    R = matrix_of(model.mesh_quat[mesh]).T
+    return placed(point, -R @ model.mesh_pos[mesh], model.mesh_quat[mesh] * [1, -1, -1, -1])
+
+
 # What a compiled MuJoCo model may have that changes the motion and that mbs does not model.
 
 
@@ -1033,7 +1156,9 @@ _LONGEST_REASON = 400
 """Letters of a message of MuJoCo that are repeated: it quotes names of any length."""
 
 
-def read_mjcf(path: str | Path, base: Base | None = None, strict: bool = False) -> Mechanism:
+def read_mjcf(
+    path: str | Path, base: Base | None = None, strict: bool = False, other_files: bool = True
+) -> Mechanism:
     """The mechanism in an MJCF file.
 
     Bodies, joints and sites keep their names, with blanks, dots and quotes replaced by
@@ -1052,11 +1177,15 @@ def read_mjcf(path: str | Path, base: Base | None = None, strict: bool = False) 
     What the flags of the file and its groups of actuators switch off is left out: springs, dampers,
     Coulomb friction, gravity, equalities, ranges of joints and of controls, actuators.
 
+    Pictures show the geoms that MuJoCo's viewer shows at first, those of the groups 0 to 2, and all
+    of a file that has none of them; planes and height fields are not drawn.
+
     Args:
         path: of the file.
         base: "free" gives every root body without a joint a Free joint, `root_joint` and so on,
             "fixed" welds roots with a free joint to the world where they are drawn.
         strict: refuse what would be noted.
+        other_files: look for the meshes that pictures show; not for files of people nobody knows.
 
     Returns:
         the mechanism; its `notes` say what of the file is not in it, or under another name.
@@ -1071,7 +1200,7 @@ def read_mjcf(path: str | Path, base: Base | None = None, strict: bool = False) 
     name = _model_name(path)
     mujoco = _mujoco()
     notes = Notes(str(path), strict)
-    model = _compiled(mujoco, str(path), notes)
+    model, assets = _compiled(mujoco, str(path), notes)
     mjcf = MjcfModel.of(mujoco, model, notes)
     if base == "fixed":
         mjcf = replace(mjcf, locked={**mjcf.locked, **dict.fromkeys(_free_joints(mjcf), 0.0)})
@@ -1102,6 +1231,13 @@ def read_mjcf(path: str | Path, base: Base | None = None, strict: bool = False) 
     closures = add_closures(mechanism, mjcf, points, sites)
     add_forces(mechanism, mjcf, points, sites)
     starting_configuration(mechanism, mjcf, closures)
+    meshes = MeshFiles(Path(path).resolve().parent if other_files else None)
+    add_shapes(mechanism, mjcf, points, assets, meshes)
+    meshes.note(notes)
+    if assets.others:
+        text = "not drawn: it has a reference frame, or its points stand in the description"
+        names = f"{quoted(assets.others[0])}" + (" and others" if assets.others[1:] else "")
+        notes.add("ignored", f"mesh {names}", text)
     mechanism.notes.extend(notes.taken)
     return mechanism
 
@@ -1146,20 +1282,24 @@ def _mujoco() -> Any:
     return mujoco
 
 
-def _compiled(mujoco: Any, path: str, notes: Notes) -> Any:
+def _compiled(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
     """The model without what has no part in the motion; the whole of it where that fails."""
     reasons: list[str] = []
     for stripped in (True, False):
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always")
             try:
-                model = _spec(mujoco, path, stripped).compile()
+                spec = _spec(mujoco, path)
+                assets = _mesh_assets(spec)
+                if stripped:
+                    _strip(mujoco, spec, assets)
+                model = spec.compile()
             except (ValueError, RuntimeError) as error:
                 reasons.append(_sentence(error))
                 continue
         for text in dict.fromkeys(_sentence(warning.message) for warning in heard):
             notes.add("doubted", "the model", f"mujoco says: {text}")
-        return model
+        return model, assets
     raise DescriptionError(f"{path}: mujoco refuses the file: {reasons[0]}; correct it")
 
 
@@ -1170,22 +1310,35 @@ def _sentence(said: object) -> str:
     return text if len(text) <= _LONGEST_REASON else f"{text[:half]} ... {text[-half:]}"
 
 
-def _spec(mujoco: Any, path: str, stripped: bool) -> Any:
+def _spec(mujoco: Any, path: str) -> Any:
     spec = mujoco.MjSpec.from_file(path)
     spec.compiler.fusestatic = False
     spec.compiler.discardvisual = False
-    if stripped:
-        _strip(mujoco, spec)
     return spec
 
 
-def _strip(mujoco: Any, spec: Any) -> None:
-    """Take out what has no part in the motion, and may name files that are missing."""
+def _strip(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
+    """Take out what has no part in the motion, and may name files that are missing.
+
+    A ball stands for a mesh that gives no inertia, so that its place is known.
+    """
     for kind in ("sensors", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
         for element in list(getattr(spec, kind)):
             spec.delete(element)
-    for geom in list(_without_part(mujoco, spec)):
-        spec.delete(geom)
+    for number, geom in enumerate(list(_without_part(mujoco, spec))):
+        asset = assets.of_meshes.get(geom.meshname)
+        if asset is None or geom.type == mujoco.mjtGeom.mjGEOM_SDF:
+            spec.delete(geom)
+            continue
+        geom.name = geom.name or f"mesh of the picture {number}"
+        assets.of_geoms[geom.name] = asset
+        # its size and mass say nothing, since the inertia of the body is given
+        geom.type, geom.meshname, geom.size, geom.mass = (
+            mujoco.mjtGeom.mjGEOM_SPHERE,
+            "",
+            [1] * 3,
+            0,
+        )
     meshes = {geom.meshname for geom in spec.geoms}
     fields = {geom.hfieldname for geom in spec.geoms}
     for material in spec.materials:

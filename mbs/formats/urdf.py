@@ -1,8 +1,8 @@
 """URDF robot files, read as mechanisms; xacro files after `xacrodoc` has expanded them.
 
-Only what moves is read: links, inertials, joints, limits, friction, mimics and the rotors of
-transmissions. Visuals and collisions, and the meshes that they name, are not looked at. A file is
-taken as far as it has a meaning, and what was made of the rest is in the notes of the mechanism.
+What moves is read: links, inertials, joints, limits, friction, mimics and the rotors of
+transmissions; and what links look like, for pictures. A file is taken as far as it has a meaning,
+and what was made of the rest is in the notes of the mechanism.
 
 The reader is our own, without MuJoCo's: see "URDF without MuJoCo" in docs/decisions.md.
 """
@@ -31,12 +31,14 @@ from mbs.components import (
     Point,
     Prismatic,
     Revolute,
+    Shape,
 )
 from mbs.components.locking import FREE_JOINT, Base
 from mbs.components.notes import NoteKind
 from mbs.errors import DescriptionError
 from mbs.expressions import plain_numbers
 from mbs.formats.files import component_name, read_bytes
+from mbs.formats.meshes import MeshFiles
 from mbs.formats.notes import Notes
 from mbs.formats.xml import line_of, parse_content
 from mbs.text import did_you_mean, install_command, quoted
@@ -481,6 +483,7 @@ def read_urdf(
     strict: bool = False,
     xacro: Mapping[str, object] | None = None,
     packages: Mapping[str, str | Path] | None = None,
+    other_files: bool = True,
 ) -> Mechanism:
     """The mechanism in a URDF file, or in a xacro file.
 
@@ -488,14 +491,16 @@ def read_urdf(
     of its name; names that cannot be kept are changed, with a note. The root link is the world
     when it is named "world" or has no mass; otherwise it is a body welded to the world. With a
     free base the root is always a body, on the Free joint "root_joint". One-axis joints are
-    actuated unless they mimic another one; floating ones are not.
+    actuated unless they mimic another one; floating ones are not. Pictures show the visuals of the
+    links, and the collisions of those without.
 
     Args:
         path: of the file; one that ends in .xacro is expanded by the library `xacrodoc`.
         base: "free" for a root that nothing holds; otherwise it is welded to the world.
         strict: refuse the file where a note would be taken.
         xacro: values of the arguments of a xacro file.
-        packages: folders of the packages that a xacro file names.
+        packages: folders of the packages that a xacro file or `package://` names.
+        other_files: look for the meshes that it names; not for files of people nobody knows.
 
     Raises:
         DescriptionError: the file is missing or malformed, its links and joints form no tree, or
@@ -520,7 +525,12 @@ def read_urdf(
     mechanism = Mechanism(name, source=f"URDF file {Path(path).name}")
     mechanism.notes = notes.taken
     base = "free" if base == "free" and not _floats(tree) else None
-    _Building(mechanism, tree, element_names(tree, base), _rotors(root, tree)).build(base)
+    building = _Building(mechanism, tree, element_names(tree, base), _rotors(root, tree))
+    building.build(base)
+    folder = Path(path).resolve().parent if other_files else None
+    meshes = MeshFiles(folder, dict(packages or {}))
+    add_shapes(mechanism, tree, building.points, material_colours(root), meshes)
+    meshes.note(notes)
     return mechanism
 
 
@@ -686,6 +696,7 @@ class _Building:
         rotors: Ia of joints by their names in the file.
         inertials: of the links.
         leaders: of the joints that mimic another one.
+        points: the frames of the links.
     """
 
     mechanism: Mechanism
@@ -694,13 +705,15 @@ class _Building:
     rotors: Mapping[str, float]
     inertials: dict[str, Inertial] = field(default_factory=dict)
     leaders: dict[str, str] = field(default_factory=dict)
+    points: dict[str, Point] = field(default_factory=dict)
 
     def build(self, base: Base | None) -> None:
         tree = self.tree
         for link in tree.links:
             self.inertials[link] = read_inertial(tree.link(link))
         self.leaders = _leaders(tree)
-        points = {tree.root: self._root(base)}
+        points = self.points
+        points[tree.root] = self._root(base)
         for joint in tree.joints:
             points[joint.child] = self._add(joint, points[joint.parent])
         self._note_massless(base)
@@ -887,3 +900,109 @@ def _largest(reader: Reader, key: str) -> float | None:
     if value < 0 or math.isnan(value):
         reader.note("ignored", f"its largest {key} is {value:g}; taken as unlimited", limit)
     return value if 0 < value < math.inf else None
+
+
+# What links look like: visuals, else collisions, for pictures alone.
+
+
+Colour = tuple[float, float, float]
+_PRIMITIVES = {"box": ("size",), "sphere": ("radius",)} | dict.fromkeys(
+    ("cylinder", "capsule"), ("radius", "length")
+)
+"""Attributes of the elements that are shapes of their own."""
+
+
+def material_colours(root: Element) -> dict[str, Vector]:
+    """Red, green, blue and opacity of materials by name; the first of a name counts."""
+    found: dict[str, Vector] = {}
+    own = (m for tag in ("visual", "collision") for v in root.iter(tag) for m in v.iter("material"))
+    for material in (*root.findall("material"), *own):
+        colour = _rgba(material)
+        if colour is not None:
+            found.setdefault((material.get("name") or "").strip(), colour)
+    return found
+
+
+def _rgba(material: Element) -> Vector | None:
+    """The colour that stands in a material."""
+    colour = material.find("color")
+    text = "" if colour is None else colour.get("rgba", "")
+    try:
+        values = tuple(min(max(float(part), 0.0), 1.0) for part in text.split())
+    except ValueError:
+        return None
+    return values if len(values) == 4 and not any(map(math.isnan, values)) else None
+
+
+def add_shapes(
+    mechanism: Mechanism,
+    tree: UrdfTree,
+    points: Mapping[str, Point],
+    colours: Mapping[str, Vector],
+    meshes: MeshFiles,
+) -> None:
+    """Give the links their visuals, or their collisions where none of these can be drawn.
+
+    A link without a visual is not seen, unless the whole file has none.
+
+    Args:
+        mechanism: that gets the shapes.
+        tree: of the file.
+        points: frames of the links.
+        colours: of materials by name.
+        meshes: finds the files of meshes.
+    """
+    seen = any(element.find("visual") is not None for element in tree.links.values())
+    for link, element in tree.links.items():
+        if seen and element.find("visual") is None:
+            continue
+        for tag in ("visual", "collision"):
+            found = []
+            for number, part in enumerate(element.findall(tag), start=1):
+                reader = Reader(f"{tag} {number} of link {quoted(link)}", part, tree.notes)
+                shape = _shape(reader, points[link], colours, meshes)
+                if shape is not None:
+                    found.append(shape)
+            mechanism.shapes.extend(found)
+            if found:
+                break
+
+
+def _shape(
+    reader: Reader, frame: Point, colours: Mapping[str, Vector], meshes: MeshFiles
+) -> tuple[Point, Shape] | None:
+    """A visual or collision and where it is; None, with a note, if it cannot be drawn."""
+    element = reader.element
+    colour = None
+    material = element.find("material")
+    if material is not None:
+        colour = _rgba(material) or colours.get((material.get("name") or "").strip())
+    if colour is not None and colour[3] == 0:
+        return None  # it is there to be invisible
+    geometry = element.find("geometry")
+    kinds = {} if geometry is None else {inner.tag: inner for inner in geometry}
+    kind = next((tag for tag in kinds if tag in _PRIMITIVES or tag == "mesh"), None)
+    if kind is None:
+        reader.note("ignored", "it has no geometry that is known; not drawn")
+        return None
+    path = None
+    if kind == "mesh":
+        path = meshes.find((kinds[kind].get("filename") or "").strip(), line_of(kinds[kind]))
+        if path is None:
+            return None
+    fault = ""
+    try:
+        xyz, turns = origin_of(reader, element)
+        if kind == "mesh":
+            size = reader.vector(kinds[kind], "scale", (1.0, 1.0, 1.0))
+        elif kind == "box":
+            size = reader.vector(kinds[kind], "size", (0.0, 0.0, 0.0))
+        else:
+            size = tuple(reader.number(kinds[kind], key, 0.0) for key in _PRIMITIVES[kind])
+        rgb = None if colour is None else (colour[0], colour[1], colour[2])
+        shape = Shape(kind, size, rgb, path)  # type: ignore[arg-type]
+        return frame.at(*xyz, rotation=turns or None), shape
+    except DescriptionError as error:
+        fault = str(error).removeprefix(f"{reader.where}: ").partition(";")[0]
+    reader.note("ignored", f"{fault}; not drawn")
+    return None

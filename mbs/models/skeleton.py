@@ -125,8 +125,8 @@ class SkeletonLink:
         number: of the link, 0 for the base.
         bodies: names of the bodies that it carries.
         segments: pairs of columns in `points`: a line from joint to joint, a polygon through three
-            joints or more, lines to frames and force elements, or to the centre of mass where one
-            point is all; none of the base.
+            joints or more, lines to frames and force elements; where one point is all, to the
+            frame of the link that is farthest from it, or to the centre of mass; none of the base.
         mass_centre: column in `points`, None without mass.
     """
 
@@ -318,6 +318,9 @@ def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> Skelet
     ]
     centre = _mass_centre(marks, number)
     segments = _segments(marks, joined, others)
+    if not segments and joined:
+        far = _farthest_frame(marks, number, joined[0], centre)
+        segments = () if far is None else _segments(marks, [*joined, *others], [far])
     if not segments and centre is not None:
         segments = _segments(marks, [*joined, *others], [centre])
     return SkeletonLink(number, bodies, segments, centre)
@@ -331,6 +334,31 @@ def _segments(
         return ()
     lines = link_outline(marks.local(columns), len(joined))
     return tuple((columns[a], columns[b]) for a, b in lines)
+
+
+def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) -> int | None:
+    """The frame of a link, such as a foot, that is farthest from its joint; None if all are there.
+
+    Args:
+        marks: takes the origin of the frame.
+        number: of the link.
+        joint: column in the points.
+        centre: column of the centre of mass, which is taken where the frame is there.
+    """
+    places = [pose for link, pose in marks.system.frames.values() if link == number - 1]
+    if not places:
+        return None
+    columns = [joint] if centre is None else [joint, centre]
+    known = marks.local(columns)
+    every = casadi.horzcat(*(pose.p for pose in places))
+    p = marks.system.parameter_values()
+    at = np.array(Function("places", [marks.system.p], [every])(p)).T
+    away = np.linalg.norm(at - known[0], axis=1)
+    far = int(np.argmax(away))
+    same = np.linalg.norm(known - at[far], axis=1) <= _SAME * max(float(np.abs(at).max()), 1.0)
+    if same.any():
+        return None if same[0] else centre
+    return marks.point((number - 1, places[far]))
 
 
 def _mass_centre(marks: _Marks, number: int) -> int | None:

@@ -61,7 +61,7 @@ def load(
         lock: joints by name and the positions that they are welded at, as in `Mechanism.lock`.
         strict: refuse a file where a note would be taken.
         xacro: values of the arguments of a xacro file, by name.
-        packages: folders of the packages that a xacro file names.
+        packages: folders of the packages that a xacro file or `package://` names.
 
     Raises:
         DescriptionError: the name or the suffix is unknown, the description is impossible, a

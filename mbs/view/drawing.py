@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from mbs.view.primitives import (
     SpringShape,
     Vector,
 )
-from mbs.view.scene import HIDDEN, scene
+from mbs.view.scene import scene
 
 Point = tuple[float, float]
 
@@ -149,7 +149,15 @@ def drawing(
     made = scene(system, q, parameters=parameters)
     at = posed(system, made.q, made.parameters)
     eye = _eye(at, np.array(made.views["iso"]))
-    shapes = [item for item in made.primitives if item.role not in HIDDEN]
+    # links as bars, also where the description says what they look like
+    out = made.hidden(("visual",))
+    shapes = [
+        replace(item, role="base" if item.link == 0 else "link")
+        if item.role == "skeleton" and not isinstance(item, (SpanShape, SpringShape))
+        else item
+        for item in made.primitives
+        if item.role not in out
+    ]
     flat = np.vstack([np.reshape(s.points, (-1, 2)) for s in _strokes(shapes, eye)])
     extent = float(np.ptp(flat, axis=0).max())
     eye = _Eye(eye.axes, eye.caption, eye.poses, _SIZE / extent)

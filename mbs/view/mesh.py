@@ -16,6 +16,7 @@ from mbs.view.primitives import (
     BoxShape,
     CylinderShape,
     FrameShape,
+    MeshShape,
     PlateShape,
     Primitive,
     RingShape,
@@ -70,6 +71,10 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
         yield Faces(revolved(profile, 48) @ R.T + np.array(item.at), item.colour)
     elif isinstance(item, BoxShape):
         yield Faces(_posed(_cuboid(np.array(item.size)), item.pose), item.colour)
+    elif isinstance(item, MeshShape):
+        corners = np.reshape(item.points, (-1, 3))[np.reshape(item.triangles, (-1, 3))]
+        # files do not agree on which side is outside
+        yield Faces(_posed(corners[:, [0, 1, 2, 2]], item.pose), item.colour, "open")
     elif isinstance(item, PlateShape):
         yield Faces(_fan(np.array(item.points)), item.colour, "open", item.opacity)
     elif isinstance(item, FrameShape):

@@ -15,7 +15,7 @@ import numpy as np
 from mbs.errors import ModelError
 from mbs.text import did_you_mean
 from mbs.view.posed import Array
-from mbs.view.scene import HIDDEN, Scene
+from mbs.view.scene import Scene
 
 # The files that show a scene in a browser.
 
@@ -48,14 +48,18 @@ class Look:
         view: iso, front, side or top.
         theme: light or dark, or auto: what the browser prefers, and light in other files.
         shown: roles that are shown besides the usual ones: "label", "link frame".
+        hidden: roles that are left out, such as "visual".
     """
 
     view: str = "iso"
     theme: Literal["auto", "light", "dark"] = "auto"
     shown: tuple[str, ...] = ()
+    hidden: tuple[str, ...] = ()
 
 
-def look_of(made: Scene, view: str, theme: str, shown: Collection[str]) -> Look:
+def look_of(
+    made: Scene, view: str, theme: str, shown: Collection[str], hidden: Collection[str] = ()
+) -> Look:
     """How a picture of a scene looks.
 
     Raises:
@@ -64,17 +68,17 @@ def look_of(made: Scene, view: str, theme: str, shown: Collection[str]) -> Look:
     themes: dict[str, Literal["auto", "light", "dark"]]
     themes = {"auto": "auto", "light": "light", "dark": "dark"}
     roles = {item.role for item in made.primitives}
-    given = (shown,) if isinstance(shown, str) else tuple(shown)
+    given, out = ((g,) if isinstance(g, str) else tuple(g) for g in (shown, hidden))
     for what, name, known in (
         ("view", view, made.views),
         ("theme", theme, themes),
-        *(("role", role, roles) for role in given),
+        *(("role", role, roles) for role in (*given, *out)),
     ):
         if name not in known:
             raise ModelError(
                 f"{made.system.name}: there is no {what} {name!r}; {did_you_mean(name, known)}"
             )
-    return Look(view, themes[theme], given)
+    return Look(view, themes[theme], given, out)
 
 
 _POLICY = (
@@ -105,7 +109,7 @@ def page(
     if times is not None and poses is not None:
         motion = {**_packed(times, poses), "speed": speed}
     drawn = scene.as_dict()
-    drawn["hidden"] = [role for role in HIDDEN if role not in look.shown]
+    drawn["hidden"] = [role for role in scene.hidden(look.hidden) if role not in look.shown]
     options = {"view": look.view, "theme": look.theme, "motion": motion}
     start = (
         "mbs.page = mbs.bar(document.querySelector('.mbs-page'),"

@@ -21,7 +21,7 @@ from mbs.text import did_you_mean
 from mbs.view.mesh import Faces, faces_of, stretched
 from mbs.view.posed import Array
 from mbs.view.primitives import PALETTE, LabelShape, SpanShape, SpringShape, Theme, rgb
-from mbs.view.scene import HIDDEN, Scene
+from mbs.view.scene import Scene
 
 # Where a picture is seen from, and how points of space fall on it.
 
@@ -232,7 +232,13 @@ class Painter:
         return np.array(first + 0.6 * part * (second - first))
 
 
-def painter(scene: Scene, view: str, theme: Theme, shown: Collection[str] = ()) -> Painter:
+def painter(
+    scene: Scene,
+    view: str,
+    theme: Theme,
+    shown: Collection[str] = (),
+    hidden: Collection[str] = (),
+) -> Painter:
     """A painter for a scene.
 
     Args:
@@ -240,13 +246,16 @@ def painter(scene: Scene, view: str, theme: Theme, shown: Collection[str] = ()) 
         view: iso, front, side or top.
         theme: light or dark.
         shown: roles that are painted besides the usual ones, such as "label".
+        hidden: roles that are left out, such as "visual".
 
     Raises:
         ModelError: matplotlib is missing, or there is no such view.
     """
     optional_module("matplotlib", "plot")
     figures = optional_module("matplotlib.figure", "plot")
-    roles = frozenset(item.role for item in scene.primitives) - set(HIDDEN) | set(shown)
+    roles = frozenset(item.role for item in scene.primitives) - set(scene.hidden(hidden)) | set(
+        shown
+    )
     solid = [
         (item.link, faces)
         for item in scene.primitives

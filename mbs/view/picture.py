@@ -95,7 +95,7 @@ class Picture:
 
     def _painter(self) -> Painter:
         theme: Theme = "dark" if self.look.theme == "dark" else "light"
-        return painter(self.scene, self.look.view, theme, self.look.shown)
+        return painter(self.scene, self.look.view, theme, self.look.shown, self.look.hidden)
 
 
 def _listed() -> str:
@@ -111,6 +111,7 @@ def show(
     view: str = "iso",
     theme: str = "auto",
     shown: Collection[str] = (),
+    hidden: Collection[str] = (),
 ) -> Picture:
     """A picture of a mechanism at one configuration.
 
@@ -124,7 +125,9 @@ def show(
         view: iso, front, side or top.
         theme: light or dark, or auto: what the browser prefers, and light in other files.
         shown: roles that are shown besides the usual ones: "label" for the names of joints, "link
-            frame" for the frame of every link.
+            frame" for the frame of every link, "joint" and "frame" of a mechanism whose links are
+            drawn as they look.
+        hidden: roles that are left out: without "visual" such a mechanism is its joints and bars.
 
     Raises:
         ModelError: a name is unknown, or a symbol has no value.
@@ -136,7 +139,7 @@ def show(
     if isinstance(q, Mapping) and system.is_closed:
         place = solve(system, q, parameters=parameters).tolist()
     made = scene(system, place, parameters=parameters)
-    look = look_of(made, view, theme, shown)
+    look = look_of(made, view, theme, shown, hidden)
     picture = Picture(made, np.array([made.poses()]), np.zeros(1), look)
     if path is not None:
         picture.save(path)
@@ -154,6 +157,7 @@ def animate(
     view: str = "iso",
     theme: str = "auto",
     shown: Collection[str] = (),
+    hidden: Collection[str] = (),
 ) -> Picture:
     """A film of a simulated or measured motion.
 
@@ -167,6 +171,7 @@ def animate(
         view: as for `show`.
         theme: as for `show`.
         shown: as for `show`.
+        hidden: as for `show`.
 
     Raises:
         ModelError: the result has no system or not the positions of this one, a name is unknown,
@@ -177,7 +182,7 @@ def animate(
     times = _times(result, fps, speed)
     q = _positions(result, whose, times)
     made = scene(whose, q[0].tolist(), parameters=parameters).spanning(q)
-    look = look_of(made, view, theme, shown)
+    look = look_of(made, view, theme, shown, hidden)
     picture = Picture(made, made.motion(q), times, look, speed)
     if path is not None:
         picture.save(path)

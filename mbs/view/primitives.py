@@ -1,6 +1,7 @@
 """What a scene is made of: simple shapes in the frames of links, free of any way to draw them.
 
-Every primitive has a role, by which a viewer shows and hides it, and the name of a colour.
+Every primitive has a role, by which a viewer shows and hides it, and the name of a colour, or
+"#rrggbb".
 """
 
 from __future__ import annotations
@@ -90,6 +91,23 @@ class PlateShape:
 
 
 @dataclass(frozen=True, slots=True)
+class MeshShape:
+    """A surface of triangles: its points [m] in the frame of a pose, and three numbers each.
+
+    Attributes:
+        points: x, y and z of one point after another.
+        triangles: numbers of points, three for each triangle.
+    """
+
+    role: str
+    link: int
+    colour: str
+    pose: Rows
+    points: tuple[float, ...]
+    triangles: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class FrameShape:
     """Three arrows along the axes of a frame: pose, and their length [m]."""
 
@@ -156,6 +174,7 @@ Primitive = (
     | BoxShape
     | RingShape
     | PlateShape
+    | MeshShape
     | FrameShape
     | AxisShape
     | LabelShape
@@ -222,8 +241,15 @@ def link_colour(number: int) -> str:
 
 
 def rgb(name: str, theme: Theme) -> NDArray[np.float64]:
-    """Red, green and blue from 0 to 1 of a colour; "axes.0" is the first colour of the axes."""
-    first, _, number = name.partition(".")
-    value = PALETTE[theme][first]
-    text = value[int(number)] if isinstance(value, list) else str(value)
+    """Red, green and blue from 0 to 1 of a colour.
+
+    Args:
+        name: in the palette; "axes.0" is the first colour of the axes, "#rrggbb" one of its own.
+        theme: light or dark.
+    """
+    text = name
+    if not name.startswith("#"):
+        first, _, number = name.partition(".")
+        value = PALETTE[theme][first]
+        text = value[int(number)] if isinstance(value, list) else str(value)
     return np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -31,6 +31,7 @@ from mbs.view.primitives import (
     BoxShape,
     CylinderShape,
     FrameShape,
+    MeshShape,
     Primitive,
     RingShape,
     Vector,
@@ -43,10 +44,13 @@ from mbs.view.shapes import (
     joint_shapes,
     link_shapes,
     solid_shapes,
+    visual_shapes,
 )
 
 HIDDEN = ("link frame", "label")
 """Roles that are not shown until asked for."""
+COVERED = ("skeleton", "joint", "axis", "frame")
+"""Roles that are not shown either where links are drawn as they look, which they would cover."""
 
 _MARGIN = 0.6  # of the length of the axes of frames, which reach beyond what they stand on
 
@@ -58,7 +62,8 @@ class Scene:
     Attributes:
         system: the mechanism.
         primitives: the shapes, each with its link (0 the base) and its role: link, joint, axis,
-            frame, loop, force, base, label, link frame.
+            frame, loop, force, base, label, link frame; visual for what the description says that
+            a link looks like, and skeleton for the bars of these links.
         links: names of the base and the links.
         up: unit vector against gravity.
         size: of the mechanism [m].
@@ -67,6 +72,7 @@ class Scene:
         views: unit vectors towards who looks: iso, front, side, top.
         q: (nq,) configuration that it was made at.
         parameters: value of every symbol.
+        notes: sentences on meshes that are missing or were thinned out.
     """
 
     system: System
@@ -79,6 +85,18 @@ class Scene:
     views: Mapping[str, Vector]
     q: tuple[float, ...]
     parameters: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+    def hidden(self, left_out: Collection[str] = ()) -> tuple[str, ...]:
+        """Roles that are not shown until asked for.
+
+        Args:
+            left_out: roles that nobody wants to see; without "visual" the mechanism is its joints
+                and bars again.
+        """
+        visual = any(item.role == "visual" for item in self.primitives)
+        covered = COVERED if visual and "visual" not in left_out else ()
+        return tuple(dict.fromkeys([*HIDDEN, *covered, *left_out]))
 
     def poses(self, q: Values = None, parameters: Mapping[str, float] | None = None) -> list[float]:
         """Where the base and the links are: 12 numbers each, the rows of R|p in the base frame.
@@ -124,7 +142,7 @@ class Scene:
             "bounds": asdict(self.bounds),
             "floor": asdict(self.floor),
             "views": {name: list(view) for name, view in self.views.items()},
-            "hidden": list(HIDDEN),
+            "hidden": list(self.hidden()),
             "palette": {theme: dict(colours) for theme, colours in PALETTE.items()},
         }
 
@@ -134,8 +152,9 @@ def scene(
 ) -> Scene:
     """The shapes that stand for a mechanism.
 
-    Bodies that were described by their dimensions are drawn as they are, the other links as bars
-    between their joints. Sizes of joints and frames follow from the size of the mechanism.
+    Links are drawn as their shapes say, where the description has them; bodies that were described
+    by their dimensions as they are, the other links as bars between their joints. Sizes of joints
+    and frames follow from the size of the mechanism.
 
     Args:
         system: open or closed; every symbol in its geometry has a value.
@@ -151,7 +170,10 @@ def scene(
     place = position_of(system, q)
     at = posed(system, place, parameters)
     solids = list(solid_shapes(at))
-    spread = np.vstack([np.zeros((0, 3)), *(corners(at, solid) for solid in solids)])
+    notes: list[str] = []
+    visuals = list(visual_shapes(at, notes))
+    seen = {item.link for item in visuals}
+    spread = np.vstack([np.zeros((0, 3)), *(corners(at, item) for item in (*solids, *visuals))])
     sizes = measures(at, spread)
     points = np.vstack([np.zeros((1, 3)), at.points, spread])
     if not np.isfinite(points).all():
@@ -162,9 +184,10 @@ def scene(
     floor = floor_of(points, at.up, bounds, _gap(at.system) * sizes.joint)
     level = float(np.array(floor.center) @ at.up)
     primitives = (
-        *base_shapes(at, sizes, level),
+        *base_shapes(at, sizes, level, seen),
         *solids,
-        *link_shapes(at, sizes, solids),
+        *visuals,
+        *link_shapes(at, sizes, solids, seen),
         *joint_shapes(at, sizes),
         *force_shapes(at, sizes),
         *frame_shapes(at, sizes),
@@ -182,6 +205,7 @@ def scene(
         views(at),
         tuple(place),
         at.parameters,
+        tuple(notes),
     )
 
 
@@ -203,6 +227,6 @@ def _marks(primitives: tuple[Primitive, ...]) -> list[tuple[int, Array]]:
             found += [(item.link, np.array(item.a)), (item.link, np.array(item.b))]
         elif isinstance(item, (BallShape, RingShape)):
             found.append((item.link, np.array(item.at)))
-        elif isinstance(item, (BoxShape, FrameShape)):
+        elif isinstance(item, (BoxShape, FrameShape, MeshShape)):
             found.append((item.link, np.array(item.pose).reshape(3, 4)[:, 3]))
     return found

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import casadi
 import numpy as np
+from numpy.typing import NDArray
 
 from mbs.assembly.khalil_frames import Cut
 from mbs.components import Box, Cylinder, RollingDisc
 from mbs.components.joints import Motion
+from mbs.components.shapes import Shape
+from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint, SkeletonLink, link_outline
-from mbs.view.mesh import turned_to
+from mbs.text import shortened
+from mbs.view.mesh import revolved, turned_to
+from mbs.view.mesh_files import read_mesh
 from mbs.view.posed import SAME_POINT, Array, Measures, PosedLinks, rows, three
 from mbs.view.primitives import (
     AxisShape,
@@ -22,6 +28,7 @@ from mbs.view.primitives import (
     CylinderShape,
     FrameShape,
     LabelShape,
+    MeshShape,
     PlateShape,
     Primitive,
     RingShape,
@@ -226,21 +233,112 @@ def _solid(
     return BoxShape("link", link, colour, rows(middle), size) if np.isfinite(size).all() else None
 
 
-def corners(scene: PosedLinks, solid: BoxShape | CylinderShape) -> Array:
+Visual = BoxShape | CylinderShape | BarShape | BallShape | MeshShape
+"""What a shape of a description is drawn as."""
+
+
+def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
+    """What the description says that links look like; what cannot be drawn is noted.
+
+    Args:
+        scene: where it is.
+        notes: takes a sentence for each mesh that is missing or was thinned out.
+    """
+    system = scene.system
+    if not system.shapes:
+        return
+    places = [casadi.densify(casadi.horzcat(row.pose.R, row.pose.p)) for row in system.shapes]
+    flat = casadi.Function("places", [system.p], [casadi.horzcat(*places)])
+    poses = np.array(flat(list(scene.parameters.values()))).reshape(3, -1, 4).swapaxes(0, 1)
+    for row, pose in zip(system.shapes, poses, strict=True):
+        colour = link_colour(row.link + 1)
+        if row.shape.colour is not None:
+            colour = "#" + "".join(f"{round(255 * part):02x}" for part in row.shape.colour)
+        try:
+            yield _visual(row.shape, row.link + 1, colour, pose, notes)
+        except ModelError as error:
+            if str(error) not in notes:
+                notes.append(str(error))
+
+
+def _visual(shape: Shape, link: int, colour: str, pose: Array, notes: list[str]) -> Visual:
+    size, middle = shape.size, pose[:, 3]
+    if shape.kind == "box":
+        return BoxShape("visual", link, colour, rows(pose), (size[0], size[1], size[2]))
+    if shape.kind == "sphere":
+        return BallShape("visual", link, colour, three(middle), size[0])
+    if shape.kind in ("cylinder", "capsule"):
+        half = size[1] / 2 * pose[:, 2]
+        ends = three(middle - half), three(middle + half)
+        round_ends = shape.kind == "capsule"
+        return (BarShape if round_ends else CylinderShape)("visual", link, colour, *ends, size[0])
+    if shape.kind == "ellipsoid":
+        points, triangles = _unit_ball()
+    else:
+        assert shape.mesh is not None
+        mesh = read_mesh(shape.mesh)
+        points, triangles = mesh.points, mesh.triangles
+        if mesh.of > len(triangles):
+            name = shortened(str(shape.mesh))
+            text = f"{name}: drawn with {len(triangles)} of its {mesh.of} triangles"
+            if text not in notes:
+                notes.append(text)
+    return _surface(link, colour, pose, points * np.array(size), triangles)
+
+
+def _surface(
+    link: int, colour: str, pose: Array, points: Array, triangles: NDArray[np.int64]
+) -> MeshShape:
+    # six digits of the largest of its lengths, less than a pixel of any picture
+    digits = 6 - int(np.ceil(np.log10(max(float(np.abs(points).max()), 1e-300))))
+    flat = tuple(np.round(points, min(digits, 300)).ravel().tolist())
+    return MeshShape("visual", link, colour, rows(pose), flat, tuple(triangles.ravel().tolist()))
+
+
+def _unit_ball() -> tuple[Array, NDArray[np.int64]]:
+    turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
+    faces = revolved(np.column_stack([np.cos(turn), np.sin(turn)]))
+    numbers = np.arange(4 * len(faces)).reshape(-1, 4)
+    return faces.reshape(-1, 3), np.vstack([numbers[:, :3], numbers[:, [0, 2, 3]]])
+
+
+def corners(scene: PosedLinks, solid: Visual) -> Array:
     """(k, 3) points of the base frame that span a solid."""
     R, p = scene.poses[solid.link, :, :3], scene.poses[solid.link, :, 3]
-    if isinstance(solid, CylinderShape):
+    if isinstance(solid, BallShape):
+        around = solid.radius * np.vstack([np.eye(3), -np.eye(3)])
+        return np.array(R @ np.array(solid.at) + p + around)
+    if isinstance(solid, (CylinderShape, BarShape)):
         return np.array([solid.a, solid.b]) @ R.T + p
     pose = np.array(solid.pose).reshape(3, 4)
+    if isinstance(solid, MeshShape):
+        points = np.reshape(solid.points, (-1, 3))
+        middle, half = (points.min(axis=0) + points.max(axis=0)) / 2, np.ptp(points, axis=0) / 2
+    else:
+        middle, half = np.zeros(3), np.array(solid.size) / 2
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-    ends: Array = (signs * np.array(solid.size) / 2 @ pose[:, :3].T + pose[:, 3]) @ R.T + p
+    ends: Array = ((middle + signs * half) @ pose[:, :3].T + pose[:, 3]) @ R.T + p
     return ends
 
 
 def link_shapes(
-    scene: PosedLinks, sizes: Measures, solids: list[BoxShape | CylinderShape]
+    scene: PosedLinks, sizes: Measures, solids: list[BoxShape | CylinderShape], seen: set[int]
 ) -> Iterator[Primitive]:
-    """Bars from joint to joint, polygons filled, balls where a link is nothing but a point."""
+    """Bars from joint to joint, polygons filled, balls where a link is nothing but a point.
+
+    Args:
+        scene: where it is.
+        sizes: of what has none of its own.
+        solids: the bodies that were described by their dimensions.
+        seen: links that are drawn as they look; their bars are their skeleton.
+    """
+    for item in _bars(scene, sizes, solids):
+        yield replace(item, role="skeleton") if item.link in seen else item
+
+
+def _bars(
+    scene: PosedLinks, sizes: Measures, solids: list[BoxShape | CylinderShape]
+) -> Iterator[BarShape | BallShape | PlateShape]:
     for link in scene.parts.links[1:]:
         own = [solid for solid in solids if solid.link == link.number]
         colour = link_colour(link.number)
@@ -297,8 +395,17 @@ def _point_link(
         yield BarShape("link", number, colour, a, (a[0], a[1], a[2] + 2.2 * sizes.joint), sizes.bar)
 
 
-def base_shapes(scene: PosedLinks, sizes: Measures, floor: float) -> Iterator[Primitive]:
+def base_shapes(
+    scene: PosedLinks, sizes: Measures, floor: float, seen: set[int]
+) -> Iterator[Primitive]:
     """The base: bars between its joints, a column below the only one."""
+    for item in _base_bars(scene, sizes, floor):
+        yield replace(item, role="skeleton") if 0 in seen else item
+
+
+def _base_bars(
+    scene: PosedLinks, sizes: Measures, floor: float
+) -> Iterator[BarShape | CylinderShape]:
     points = [
         scene.points[point]
         for joint in scene.parts.joints

@@ -353,7 +353,8 @@ def test_missing_assets_go_with_all_that_refers_to_them(read):
     text = ASSETS.replace('<contact><pair geom1="g" geom2="g2"/></contact>', "")
     mechanism = read(text)
     assert set(mechanism.frames) == {"o", "s"}
-    assert mechanism.notes == []
+    (note,) = mechanism.notes  # of the picture alone
+    assert note.text.startswith("'nowhere.obj' is not drawn")
     plain = """<mujoco><worldbody><body name="a"><joint name="j"/>
       <inertial pos=".1 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody></mujoco>"""
     assert_same(mechanism, plain)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.components import Box, Free, PointMass, Revolute, Spring
+from mbs.components import Body, Box, Free, PointMass, Revolute, Spring
 from mbs.errors import ModelError
 from mbs.models.skeleton import link_outline, skeleton
 
@@ -159,3 +159,21 @@ def test_joints_in_line_make_a_line_and_equal_points_are_one():
 def test_what_is_no_system_is_refused():
     with pytest.raises(ModelError, match="is not a System"):
         skeleton(mbs.Mechanism("none"))
+
+
+def test_a_link_reaches_its_farthest_frame():
+    """As a leg does its foot, which is welded to it; not its centre of mass."""
+    m = mbs.Mechanism("leg", gravity=(0, 0, -9.81))
+    calf = m.add(Body("calf", mass=1.0, com=(0.1, 0, 0), inertia=(1, 1, 1)))
+    sensor, foot = (m.add(Body(name, mass=0.1)) for name in ("sensor", "foot"))
+    m.connect(m.world, Revolute("j1", axis="y"), calf)
+    m.connect(calf.at(0, 0, -0.1), sensor)
+    m.connect(calf.at(0, 0, -0.5), foot)
+    system = m.assemble()
+    (line,) = skeleton(system).links[1].segments
+    points, _ = placed(system, [0.3])
+    T = np.array(mbs.models.transform(system, "foot")([0.3]))
+    ends = sorted(points[list(line)].tolist(), key=np.linalg.norm)
+    assert np.abs(ends[0]).max() < 1e-12
+    assert np.abs(ends[1] - T[:3, 3]).max() < 1e-12
+    assert abs(np.linalg.norm(ends[1]) - 0.5) < 1e-12

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -16,6 +16,7 @@ from mbs.app.web.session import Handle, assembly_modes, handles, mode_of
 from mbs.app.web.style import VIEW
 from mbs.errors import MbsError
 from mbs.loops import Mode
+from mbs.view.scene import COVERED
 
 # Sliders for the coordinates that can be moved, the others as numbers, and the assembly modes.
 
@@ -186,6 +187,8 @@ def _range(handle: Handle) -> str:
 _ROLES: Mapping[str, tuple[str, bool]] = MappingProxyType(
     {
         "link": ("Links", True),
+        "visual": ("Shapes", True),
+        "skeleton": ("Bars", False),
         "joint": ("Joints", True),
         "axis": ("Axes", True),
         "frame": ("Frames", True),
@@ -205,6 +208,7 @@ class PicturePanel:
 
     def __init__(self, app: App) -> None:
         self._app = app
+        self._paints: list[Callable[[], None]] = []
         with ui.element("div").classes("app-right"):
             with ui.element("div").classes("app-view") as self._view:
                 ui.element("div").classes("app-canvas").props(f"id={VIEW}")
@@ -219,6 +223,8 @@ class PicturePanel:
     def refresh(self) -> None:
         """Say when the picture is not that of the table."""
         session = self._app.session
+        for paint in self._paints:
+            paint()
         stale = session.good is not None and session.good != session.document
         why = session.refusal
         if stale:
@@ -233,7 +239,7 @@ class PicturePanel:
     def _chips(self) -> None:
         with ui.element("div").classes("app-chips"):
             for role, (title, usual) in _ROLES.items():
-                self._toggle(role, title, self._app.session.shown.get(role, usual))
+                self._toggle(role, title, usual)
         with ui.element("div").classes("app-chips"):
             for camera, title in _CAMERAS.items():
                 with ui.element("button").classes("app-chip") as chip:
@@ -243,23 +249,28 @@ class PicturePanel:
                 ui.label("PNG").tooltip("Download the picture as it is")
             chip.on("click", self._app.screenshot)
 
-    def _toggle(self, role: str, title: str, shown: bool) -> None:
+    def _is_shown(self, role: str, usual: bool) -> bool:
+        """As somebody switched it, else as the scene has it."""
+        session = self._app.session
+        covered = session.system is not None and bool(session.system.shapes) and role in COVERED
+        return session.shown.get(role, usual and not covered)
+
+    def _toggle(self, role: str, title: str, usual: bool) -> None:
         with ui.element("button").classes("app-chip") as chip:
             ui.label(title)
-        state = {"shown": shown}
 
         def paint() -> None:
-            if state["shown"]:
+            if self._is_shown(role, usual):
                 chip.classes(add="app-chip-on")
             else:
                 chip.classes(remove="app-chip-on")
 
         def turn() -> None:
-            state["shown"] = not state["shown"]
-            self._app.show(role, state["shown"])
+            self._app.show(role, not self._is_shown(role, usual))
             paint()
 
         chip.on("click", turn)
         paint()
+        self._paints.append(paint)
         if role in self._app.session.shown:
-            self._app.show(role, shown)
+            self._app.show(role, self._app.session.shown[role])

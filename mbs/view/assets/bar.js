@@ -50,6 +50,9 @@
   function toggles(bar, viewer, scene) {
     const roles = new Set(scene.primitives.map((item) => item.role));
     const names = { frame: "frames", "link frame": "link frames", axis: "axes", label: "names" };
+    // where links are drawn as they look, what is below can be seen too
+    const below = { visual: "shapes", skeleton: "bars", joint: "joints" };
+    if (roles.has("visual")) Object.assign(names, below);
     for (const [role, text] of Object.entries({ ...names, loop: "loops", force: "forces" })) {
       if (!roles.has(role)) continue;
       const label = made("label", {}, bar);

@@ -137,6 +137,14 @@
       geometry.computeVertexNormals();
       return mesh(geometry, paint);
     },
+    mesh(item, paint) {
+      const geometry = new T.BufferGeometry();
+      geometry.setAttribute("position", new T.BufferAttribute(new Float32Array(item.points), 3));
+      geometry.setIndex(item.triangles);
+      geometry.computeVertexNormals();
+      paint.flatShading = true;
+      return placed(mesh(geometry, paint), item.pose);
+    },
     frame(item, paint, material, colours) {
       const group = new T.Group();
       const units = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];

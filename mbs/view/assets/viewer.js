@@ -62,8 +62,7 @@
       this.stretched = [];
       for (const item of scene.primitives) this.add(item, colours);
       this.light(scene, colours);
-      for (const role of scene.hidden) this.visible[role] ??= false;
-      for (const [role, shown] of Object.entries(this.visible)) this.setVisible(role, shown);
+      for (const { role, object } of this.parts) object.visible = this.shows(role);
       this.setPoses(scene.poses);
     }
 
@@ -77,7 +76,8 @@
           transparent: opacity < 1,
           opacity,
         });
-      const paint = material(colours[item.colour] || "#888888", item.opacity ?? 1);
+      const own = item.colour.startsWith("#") ? item.colour : "#888888";
+      const paint = material(colours[item.colour] || own, item.opacity ?? 1);
       const shape = FIXED[item.kind] || STRETCHED[item.kind];
       const object = shape(item, paint, material, colours, this.scene.size);
       if (STRETCHED[item.kind]) {
@@ -133,6 +133,11 @@
         between(object, a, b).scale.y = Math.max(a.distanceTo(b), 1e-9 * this.scene.size);
       }
       this.redraw();
+    }
+
+    /** Whether a role is shown: as somebody switched it, else as the scene says. */
+    shows(role) {
+      return this.visible[role] ?? !this.scene.hidden.includes(role);
     }
 
     setVisible(role, shown) {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -79,7 +80,12 @@ LARGEST_UPLOAD = 5_000_000
 """Bytes that an uploaded file may have."""
 
 READERS: Mapping[str, Callable[[Path], RobotTable | Mechanism]] = MappingProxyType(
-    {".toml": read_toml, ".par": read_par, ".urdf": read_urdf, ".xml": read_mjcf}
+    {
+        ".toml": read_toml,
+        ".par": read_par,
+        ".urdf": partial(read_urdf, other_files=False),
+        ".xml": partial(read_mjcf, other_files=False),
+    }
 )
 """Suffixes of files that are read."""
 

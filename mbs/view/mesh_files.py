@@ -1,0 +1,189 @@
+"""Meshes of bodies, read by trimesh, with no more triangles than a picture shows."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mbs.errors import MbsError, ModelError
+from mbs.files import PathLike
+from mbs.formats.files import read_bytes
+from mbs.text import install_command, quoted, shortened
+from mbs.view.posed import Array
+
+MOST_TRIANGLES = 2000
+"""Of one mesh in a picture: a robot of thirty meshes stays under a second and two megabytes."""
+_UNIT = re.compile(rb"<(?:\w+:)?unit\b[^<>]{0,200}?\bmeter\s*=\s*[\"']([^\"']{1,40})[\"']")
+_MOST_READ = 5_000_000
+"""Triangles of a file: more are gigabytes in memory."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """The surface of a body.
+
+    Attributes:
+        points: (n, 3) corners [m].
+        triangles: (m, 3) numbers of points, anticlockwise seen from outside.
+        of: how many triangles the file has, m or more.
+    """
+
+    points: Array
+    triangles: NDArray[np.int64]
+    of: int
+
+
+def read_mesh(path: PathLike) -> Mesh:
+    """The triangles of a mesh file, thinned out where there are many.
+
+    Nothing but this file is read: neither materials nor textures that it names.
+
+    Args:
+        path: a .stl, .obj or .dae file; lengths of the last in the unit that it says, of the
+            others in m.
+
+    Raises:
+        ModelError: trimesh is not installed, the file is missing, or it holds no triangles.
+    """
+    stamp = 0
+    with contextlib.suppress(OSError, ValueError):  # read_bytes says what is wrong
+        stamp = os.stat(path).st_mtime_ns
+    return _read(str(path), stamp)
+
+
+@lru_cache(maxsize=256)
+def _read(path: str, stamp: int) -> Mesh:
+    kind = Path(path).suffix.lower().removeprefix(".")
+    trimesh = _module("trimesh", path)
+    if kind == "dae":
+        _module("collada", path)
+    try:
+        content = read_bytes(path)
+    except MbsError as error:
+        raise ModelError(str(error)) from None
+    try:
+        # a file like this one has no folder: what it names cannot be looked for
+        plain = _without_materials(content) if kind == "dae" else content
+        scene = trimesh.load_scene(
+            io.BytesIO(plain), file_type=kind, process=False, skip_materials=True
+        )
+        points, triangles = _joined(scene)
+        if kind == "dae":
+            points = points * _unit(content)
+    except Exception as error:  # the libraries raise whatever malformed files make of them
+        reason = quoted(str(error) or type(error).__name__)
+        raise ModelError(f"{shortened(path)}: the mesh cannot be read: {reason}") from None
+    if not len(triangles) or len(triangles) > _MOST_READ or not np.isfinite(points).all():
+        raise ModelError(
+            f"{shortened(path)}: the mesh has {len(triangles)} triangles, or corners that are not"
+            f" finite; give one of up to {_MOST_READ}"
+        )
+    return thinned(points, triangles)
+
+
+def _module(name: str, path: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise ModelError(
+            f"{shortened(path)}: {name}, which reads meshes, is not installed; run: "
+            + install_command("meshes")
+        ) from None
+
+
+def _joined(scene: Any) -> tuple[Array, NDArray[np.int64]]:
+    """All meshes of a file in its frame."""
+    points, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
+    for node in scene.graph.nodes_geometry:
+        pose, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if not hasattr(mesh, "faces"):
+            continue  # lines and clouds of points
+        corners, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
+        points.append(corners @ pose[:3, :3].T + pose[:3, 3])
+        # a mirrored mesh is turned inside out
+        turned = faces[:, ::-1] if np.linalg.det(pose[:3, :3]) < 0 else faces
+        triangles.append(turned.astype(np.int64) + count)
+        count += len(corners)
+    return np.vstack(points), np.vstack(triangles)
+
+
+def _without_materials(content: bytes) -> bytes:
+    """A COLLADA file of surfaces alone: pycollada drops those whose materials are broken."""
+    root = ElementTree.fromstring(content)
+    for element in list(root.iter()):
+        for inner in list(element):
+            if inner.tag.rpartition("}")[2] in _MATERIALS:
+                element.remove(inner)
+    return ElementTree.tostring(root)
+
+
+_MATERIALS = {"bind_material"} | {
+    f"library_{what}" for what in ("effects", "materials", "images", "cameras", "lights")
+}
+
+
+def _unit(content: bytes) -> float:
+    """Metres that a length of 1 in a COLLADA file is."""
+    found = _UNIT.search(content)
+    unit = float(found[1]) if found else 1.0
+    if not 0 < unit < np.inf:
+        raise ValueError(f"its unit is {unit:g} m")
+    return unit
+
+
+def thinned(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES) -> Mesh:
+    """The mesh with at most so many triangles: corners in one cell of a grid become one.
+
+    Source: Rossignac & Borrel 1993, vertices clustered in cells, each at their mean.
+
+    Args:
+        points: (n, 3) corners.
+        triangles: (m, 3) numbers of points.
+        most: number of triangles.
+    """
+    count = len(triangles)
+    for cells in _cells(most):
+        if len(triangles) <= most and cells is None:
+            return Mesh(points, triangles, count)
+        if cells is None:
+            continue
+        low = points.min(axis=0)
+        side = float(np.ptp(points, axis=0).max()) / cells
+        keys = np.floor((points - low) / max(side, np.finfo(float).tiny)).astype(np.int64)
+        _, home, many = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        home = home.ravel()
+        means = np.stack([np.bincount(home, weights=points[:, k]) for k in range(3)], axis=1)
+        found = home[triangles]
+        a, b, c = found.T
+        found = found[(a != b) & (b != c) & (c != a)]
+        found = found[np.unique(np.sort(found, axis=1), axis=0, return_index=True)[1]]
+        if len(found) <= most:
+            return Mesh(means / many[:, None], found, count)
+    raise ModelError(f"a mesh of {count} triangles cannot be drawn with {most}; give a simpler one")
+
+
+def _cells(most: int) -> Iterator[int | None]:
+    """None for the mesh as it is, then ever coarser grids, by their cells along the longest side.
+
+    A surface crosses some 6 cells of the square of their number, with two triangles each.
+    """
+    yield None
+    # from a grid that is certainly too fine, for a flat or thin mesh, by a sixth each time
+    cells = 8.0 * np.sqrt(most)
+    while cells > 1:
+        yield int(cells)
+        cells /= 1.2
+    yield 1

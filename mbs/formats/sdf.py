@@ -366,6 +366,11 @@ class _File:
             self.frames.places[scope.key] = reference, T
             self.frames.known = {"world": np.eye(4)}
 
+    def cuts(self, joint: _Part) -> bool:
+        """Whether the file wants a loop to be opened at a joint."""
+        simbody = joint.element.find("physics/simbody")
+        return simbody is not None and self.reader(joint).flag(simbody, "must_be_loop_joint")
+
     def resolved(self, reader: SdfReader, scope: _Scope, name: str, what: str) -> str:
         """The full name of a frame that an element names."""
         if name == "__model__":
@@ -480,7 +485,7 @@ class _Building:
             self.points[key] = self._body(link).frame
         self._add_roots(groups)
         for joint in joints:
-            self._connect(joint, named.get(joint.key, ""))
+            self._connect(joint, named.get(joint.key, ""), groups.closes(joint.key))
         for (key, tag), coordinate in self.coordinates.items():
             joint = file.joints[key]
             start = file.reader(joint).value(joint.element.find(tag), "initial_position", 0.0)
@@ -521,6 +526,7 @@ class _Building:
         groups = _Groups({key: key for key in ("world", *file.links)})
         fixed: list[_Part] = []
         moving: list[_Part] = []
+        last: list[_Part] = []
         for joint in file.joints.values():
             reader = file.reader(joint)
             ends: list[str] = []
@@ -536,7 +542,13 @@ class _Building:
             self.between.setdefault(frozenset(ends), []).append(joint.key)
             if kind != "gearbox":
                 (fixed if kind == "fixed" else moving).append(joint)
+        # joints that the file wants loops cut at come last, and after fixed ones
         for joint in (*fixed, *moving):
+            if file.cuts(joint):
+                last.append(joint)
+            else:
+                groups.join(joint.key, *self.kept[joint.key])
+        for joint in last:
             groups.join(joint.key, *self.kept[joint.key])
         return groups
 
@@ -618,7 +630,7 @@ class _Building:
 
     # Joints.
 
-    def _connect(self, joint: _Part, name: str) -> None:
+    def _connect(self, joint: _Part, name: str, closes: bool) -> None:
         kind, reader = self._kind(joint), self.file.reader(joint)
         if kind == "gearbox":
             return
@@ -627,16 +639,16 @@ class _Building:
             for end in self.kept[joint.key]
         )
         connect = self.mechanism.connect
-        if kind == "fixed":
-            if name:  # it closes a loop
-                connect(a, Fixed(name), b)
-            else:
-                connect(a, b)
-        elif kind == "ball":
-            connect(a, Spherical(name), b)
-        elif kind in _ONE_AXIS:
-            connect(a, self._one_axis(joint, reader, name, kind), b)
-            self.coordinates[joint.key, "axis"] = name
+        if kind == "fixed" and not name:
+            connect(a, b)
+        elif kind in ("fixed", "ball", *_ONE_AXIS):
+            made: Joint = Fixed(name) if kind == "fixed" else Spherical(name)
+            if kind in _ONE_AXIS:
+                made = self._one_axis(joint, reader, name, kind)
+                self.coordinates[joint.key, "axis"] = name
+            connect(a, made, b)
+            if closes and (kind == "fixed" or self.file.cuts(joint)):
+                self.mechanism.cut(made)
         elif kind == "screw":
             between = self.mechanism.add(Body(self._unused(f"{name}_nut")))
             turn = self._one_axis(joint, reader, name, "revolute")
@@ -648,11 +660,13 @@ class _Building:
             self.mechanism.add(Screw(thread, slide.name, name, pitch=pitch))
             self.coordinates[joint.key, "axis"] = name
         else:
-            self._connect_two(joint, reader, name, (a, b))
+            made = self._connect_two(joint, reader, name, (a, b))
+            if closes and self.file.cuts(joint):
+                self.mechanism.cut(made)
 
     def _connect_two(
         self, joint: _Part, reader: SdfReader, name: str, ends: tuple[Point, Point]
-    ) -> None:
+    ) -> Joint:
         """A universal joint, or two revolute ones one after the other."""
         a, b = ends
         first = self._one_axis(joint, reader, f"{name}_1", "revolute")
@@ -672,7 +686,7 @@ class _Building:
                 for suffix, one in (("phi_a", first), ("phi_b", second))
                 if one.limits
             }
-            cross = Universal(
+            cross: Joint = Universal(
                 name,
                 axes=(tuple(u.tolist()), tuple((v / np.linalg.norm(v)).tolist())),
                 limits=limits or None,
@@ -681,7 +695,7 @@ class _Building:
                 actuated=first.actuated,
             )
             self.mechanism.connect(a, cross, b)
-            names = f"{name}.phi_a", f"{name}.phi_b"
+            names, last = (f"{name}.phi_a", f"{name}.phi_b"), cross
         else:
             between = self.mechanism.add(Body(self._unused(f"{name}_between")))
             first, second = (
@@ -689,9 +703,10 @@ class _Building:
             )
             self.mechanism.connect(a, first, between)
             self.mechanism.connect(between, second, b)
-            names = first.name, second.name
+            names, last = (first.name, second.name), second
         for tag, coordinate in zip(("axis", "axis2"), names, strict=True):
             self.coordinates[joint.key, tag] = coordinate
+        return last
 
     def _pitch(self, reader: SdfReader, element: Element) -> float:
         """Advance for a turn [m], positive for a right-hand thread."""

@@ -148,7 +148,10 @@ class _Writing:
     ) -> None:
         name, pose = self._carrier(j, link, places)
         self.frame[j] = name, pose
-        _inertial(SubElement(root, "link", name=name), *inertia_of(self.system.name, link, pose, self.number))
+        _inertial(
+            SubElement(root, "link", name=name),
+            *inertia_of(self.system.name, link, pose, self.number),
+        )
         parent, before = self.frame[link.antecedent]
         kind = {Motion.FREE: "floating", Motion.PRISMATIC: "prismatic"}.get(link.motion, "revolute")
         limits, velocity, effort = limits_of(self.system, link, "URDF")
@@ -214,9 +217,7 @@ class _Writing:
         _origin(joint, inverse(before) @ pose)
 
 
-def inertia_of(
-    system: str, link: Link, pose: Array, number: Numbers
-) -> tuple[float, Array, Array]:
+def inertia_of(system: str, link: Link, pose: Array, number: Numbers) -> tuple[float, Array, Array]:
     """Mass, centre of mass, and inertia about it, in a frame on a link.
 
     Args:

@@ -589,7 +589,9 @@ class _Building:
         if reader.flag(element, "kinematic"):
             reader.fail("it is kinematic, moved from outside; take <kinematic> out")
         decay = element.find("velocity_decay")
-        if decay is not None and (reader.value(decay, "linear", 0) or reader.value(decay, "angular", 0)):
+        if decay is not None and (
+            reader.value(decay, "linear", 0) or reader.value(decay, "angular", 0)
+        ):
             reader.fail("its velocity_decay is not read; give damping to its joint instead")
         inertial = self._inertial(reader, element.find("inertial"))
         name = self._name(link, "link")
@@ -622,7 +624,9 @@ class _Building:
         Ixy, Ixz, Iyz = (reader.value(inertia, tag, 0.0) for tag in moments[3:])
         relative, T = reader.pose(inertial)
         if relative:
-            reader.fail("the pose of its inertial is relative to another frame; give it in the link")
+            reader.fail(
+                "the pose of its inertial is relative to another frame; give it in the link"
+            )
         R = T[:3, :3]
         J = R @ np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]]) @ R.T
         com = tuple(float(x) for x in T[:3, 3])
@@ -698,9 +702,7 @@ class _Building:
             names, last = (f"{name}.phi_a", f"{name}.phi_b"), cross
         else:
             between = self.mechanism.add(Body(self._unused(f"{name}_between")))
-            first, second = (
-                replace(one, name=self._unused(one.name)) for one in (first, second)
-            )
+            first, second = (replace(one, name=self._unused(one.name)) for one in (first, second))
             self.mechanism.connect(a, first, between)
             self.mechanism.connect(between, second, b)
             names, last = (first.name, second.name), second
@@ -806,9 +808,7 @@ class _Building:
         factor = -ratio * one * other
         self.mechanism.add(Coupling(name, driven, driver, (0.0, factor)))
 
-    def _angle(
-        self, reader: SdfReader, third: str, link: str, axis: Array
-    ) -> tuple[str, float]:
+    def _angle(self, reader: SdfReader, third: str, link: str, axis: Array) -> tuple[str, float]:
         """The joint between two links, and the sign of its angle about an axis in the world."""
         file = self.file
         for key in self.between.get(frozenset((third, link)), ()):

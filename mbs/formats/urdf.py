@@ -737,9 +737,7 @@ class _Building:
 
     def _body(self, link: str) -> Body:
         inertial = self.tree.links[link].find("inertial")
-        return body_of(
-            self.tree.link(link), self.names.links[link], self.inertials[link], inertial
-        )
+        return body_of(self.tree.link(link), self.names.links[link], self.inertials[link], inertial)
 
     def _add(self, joint: JointElement, parent: Point) -> Point:
         body = self.mechanism.add(self._body(joint.child))

@@ -95,6 +95,10 @@ def _check(system: System) -> None:
         acts = (link.Fv, link.Fs, link.Ia)
         if link.motion.nv > 1 and not all(value.is_zero() for value in acts):
             raise _refused(system, f"{link.name} has friction or a rotor about several axes")
+    _check_loops(system)
+
+
+def _check_loops(system: System) -> None:
     driven = set()
     for coupling in system.couplings:
         if len(coupling.coefficients) > 2 or coupling.others:
@@ -228,15 +232,15 @@ class _Writing:
         }
         element = SubElement(axis, "dynamics")
         for tag, value in dynamics.items():
-            number = float(self.number(value).item())
-            _say(element, tag, number - zero if tag == "spring_reference" else number)
+            said = float(self.number(value).item())
+            _say(element, tag, said - zero if tag == "spring_reference" else said)
         limits, velocity, effort = limits_of(system, link, "SDF")
         self._limit(axis, limits, zero)
         limit = axis.find("limit")
         assert limit is not None
         motor = system.speeds[link.v.start].actuated
-        for tag, value in (("effort", effort if motor else 0.0), ("velocity", velocity)):
-            _say(limit, tag, math.inf if value >= UNLIMITED else value)
+        for tag, most in (("effort", effort if motor else 0.0), ("velocity", velocity)):
+            _say(limit, tag, math.inf if most >= UNLIMITED else most)
         Ia = float(self.number(link.Ia).item())
         if Ia:
             _say(joint, "drake:rotor_inertia", Ia)

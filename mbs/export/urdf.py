@@ -79,6 +79,7 @@ class Numbers:
         self.p, self.values = system.p, system.p_default
 
     def __call__(self, value: SX) -> Array:
+        """The numbers of an expression, as an array of its shape."""
         function = Function("value", [self.p], [casadi.densify(SX(value))])
         return np.array(function(self.values), dtype=float)
 

@@ -89,7 +89,7 @@ class SdfReader(Reader):
             value = self.numbers(element, tag, text, 1, math.inf)[0]
         return value if not abs(value) >= UNLIMITED else math.copysign(math.inf, value)
 
-    def flag(self, parent: Element, tag: str, default: bool = False) -> bool:
+    def flag(self, parent: Element | None, tag: str, default: bool = False) -> bool:
         """Whether something is so."""
         word = self.word(parent, tag).lower()
         if word in ("true", "1"):
@@ -253,32 +253,36 @@ class _Part:
 
 _ONE_AXIS = ("revolute", "continuous", "prismatic")
 _KINDS = (*_ONE_AXIS, "ball", "universal", "revolute2", "screw", "gearbox", "fixed")
-_SILENT: Mapping[str, frozenset[str]] = {
-    "world": frozenset(
-        "gravity model frame physics scene light gui atmosphere magnetic_field audio road"
-        " spherical_coordinates wind joint include".split()
-    ),
-    "model": frozenset(
-        "link joint frame model pose static self_collide allow_auto_disable enable_wind include"
-        " gripper".split()
-    ),
-    "link": frozenset(
-        "inertial pose visual collision sensor light audio_source audio_sink projector gravity"
-        " self_collide enable_wind kinematic velocity_decay must_be_base_link particle_emitter"
-        " battery".split()
-    ),
-    "joint": frozenset(
-        "parent child pose axis axis2 physics sensor gearbox_ratio gearbox_reference_body"
-        " thread_pitch screw_thread_pitch drake:rotor_inertia drake:gear_ratio".split()
-    ),
-    "frame": frozenset({"pose"}),
+_SILENT: Mapping[str, set[str]] = {
+    "world": {
+        *("gravity", "model", "frame", "physics", "scene", "light", "gui"),
+        *("atmosphere", "magnetic_field", "audio", "road"),
+        *("spherical_coordinates", "wind", "joint", "include"),
+    },
+    "model": {
+        *("link", "joint", "frame", "model", "pose", "static", "self_collide"),
+        *("allow_auto_disable", "enable_wind", "include", "gripper"),
+    },
+    "link": {
+        *("inertial", "pose", "visual", "collision", "sensor", "light"),
+        *("audio_source", "audio_sink", "projector", "gravity", "self_collide"),
+        *("enable_wind", "kinematic", "velocity_decay", "must_be_base_link"),
+        *("particle_emitter", "battery"),
+    },
+    "joint": {
+        *("parent", "child", "pose", "axis", "axis2", "physics", "sensor"),
+        *("gearbox_ratio", "gearbox_reference_body", "thread_pitch"),
+        *("screw_thread_pitch", "drake:rotor_inertia", "drake:gear_ratio"),
+    },
+    "frame": {"pose"},
 }
 """Elements that are read, noted elsewhere, or known to be without effect on the equations."""
 
-_MOVING = frozenset(
-    "joint mimic ball_constraint distance_constraint linear_bushing_rpy linear_spring_damper"
-    " prismatic_spring tendon_constraint".split()
-)
+_MOVING = {
+    *("joint", "mimic", "ball_constraint", "distance_constraint"),
+    *("linear_bushing_rpy", "linear_spring_damper", "prismatic_spring"),
+    *("tendon_constraint",),
+}
 """Elements of other tools that would change the motion, without their prefix."""
 
 
@@ -730,9 +734,9 @@ class _Building:
             reader.fail(f"its {tag} has zero length; give a direction")
         direction = None if element is None else element.find("xyz")
         within = "" if direction is None else direction.get("expressed_in", "").strip()
-        if file.version < (1, 7) and element is not None:
-            if reader.flag(element, "use_parent_model_frame", file.version <= _OLDEST):
-                within = "__model__"
+        old = element is not None and file.version < (1, 7)
+        if old and reader.flag(element, "use_parent_model_frame", file.version <= _OLDEST):
+            within = "__model__"
         if within:
             key = file.resolved(reader, joint.scope, within, "expressed_in")
             xyz = file.frames.seen_from(joint.key, key)[:3, :3] @ xyz

@@ -25,7 +25,7 @@ MISTAKES = [
     ("identify rx90 none.csv", "record 'none.csv' cannot be read (No such file or directory)"),
     (
         "convert sr400 a.stl",
-        "files of this kind are not written; use one of .par, .toml, .urdf, .xml",
+        "are not written; did you mean '.toml'? use one of .par, .toml, .urdf, .sdf, .xml",
     ),
     ("convert sr400 a.urdf", "closes a loop, which URDF cannot say; take it away first"),
     ("convert stewart_platform a.par", "a .par file"),

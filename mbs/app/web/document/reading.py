@@ -25,6 +25,7 @@ from mbs.formats import (
     RobotTable,
     read_mjcf,
     read_par,
+    read_sdf,
     read_toml,
     read_urdf,
     to_mechanism,
@@ -79,7 +80,14 @@ LARGEST_UPLOAD = 5_000_000
 """Bytes that an uploaded file may have."""
 
 READERS: Mapping[str, Callable[[Path], RobotTable | Mechanism]] = MappingProxyType(
-    {".toml": read_toml, ".par": read_par, ".urdf": read_urdf, ".xml": read_mjcf}
+    {
+        ".toml": read_toml,
+        ".par": read_par,
+        ".urdf": read_urdf,
+        ".sdf": read_sdf,
+        ".world": read_sdf,
+        ".xml": read_mjcf,
+    }
 )
 """Suffixes of files that are read."""
 

@@ -56,6 +56,9 @@ _NEWEST = (1, 12)
 _OLDEST = (1, 4)
 _SAME = 1e-15
 """Distance of a rotation from the identity that is rounding of one product."""
+_SHORT = 16
+"""Steps between frames that are multiplied one by one; longer ways lead over the world, so that
+the time stays linear in the size of the file."""
 _PARALLEL = 1e-6
 """Of unit vectors: axes of gears and universal joints are written with six digits or more."""
 
@@ -197,7 +200,9 @@ class _Frames:
         """(4, 4) pose of a frame in another one, without a detour where it is placed in that."""
         wanted = self.in_world(frame)  # and no cycle
         T, name = np.eye(4), frame
-        while name not in (other, "world"):
+        for _ in range(_SHORT):
+            if name in (other, "world"):
+                break
             name, step = self.places[name]
             T = step @ T
         return T if name == other else inverse(self.in_world(other)) @ wanted
@@ -210,6 +215,7 @@ class _Frames:
                 self._cycle(name, "attached to")
             met.add(name)
             name = self.attached[name]
+        self.attached.update(dict.fromkeys(met, name))  # a long chain is walked through once
         return name
 
     def _cycle(self, name: str, how: str) -> NoReturn:
@@ -562,6 +568,7 @@ class _Building:
         children = {child for _, child in self.kept.values()}
         canonical = file.frames.carrier("__model__")
         found: dict[str, list[str]] = {}
+        number = 1
         for key in file.links:
             found.setdefault(groups.root(key), []).append(key)
         for root, links in found.items():
@@ -573,8 +580,7 @@ class _Building:
             if self.static or self.base == "fixed":
                 mechanism.connect(_at(mechanism.world.frame, T), self.points[top])
                 continue
-            name = FREE_JOINT
-            number = 1
+            name = f"{FREE_JOINT}{number}" if number > 1 else FREE_JOINT
             while name in self.names.taken or name in self.names.wanted:
                 number += 1
                 name = f"{FREE_JOINT}{number}"

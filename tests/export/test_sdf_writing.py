@@ -227,6 +227,21 @@ def test_a_coupling_in_a_loop_and_a_limit_of_a_cut(tmp_path):
     same_loops(one, other)
 
 
+def test_a_cut_joint_with_friction_stays_and_its_end_is_welded(tmp_path):
+    m = Mechanism("m", guess={"a": 0.7, "b": 1.5})
+    bars = [m.add(Body(n, mass=1, com=(0.3, 0, 0), inertia=(0.1, 0.1, 0.1))) for n in "uvw"]
+    m.connect(m.world, Revolute("a", actuated=True), bars[0])
+    m.connect(m.world.at(1), Revolute("b"), bars[1])
+    m.connect(bars[0].at(0.5), Revolute("c"), bars[2])
+    closing = Revolute("d", Fv=0.4)
+    m.connect(bars[2].at(0.9), closing, bars[1].at(0.8))
+    m.cut(closing)
+    one, other = m.assemble(active=["a"]), again(m, tmp_path).assemble(active=["a"])
+    assert one.cuts[0].welded
+    assert [c.edge.joint.name for c in other.cuts] == ["d_weld"]
+    same_loops(one, other)
+
+
 def test_a_ball_joint(tmp_path):
     m = arm()
     ball = m.add(Body("bob", mass=1, com=(0.1, 0, 0.3), inertia=(0.1, 0.2, 0.15)))

@@ -6,7 +6,8 @@ from mbs.export.fmu.controller import CController
 from mbs.export.fmu.system_fmu import fmu
 from mbs.export.mjcf import mjcf
 from mbs.export.par import par
+from mbs.export.sdf import sdf
 from mbs.export.ssp import ssp
 from mbs.export.urdf import urdf
 
-__all__ = ["CController", "c_library", "code", "fmu", "mjcf", "par", "ssp", "urdf"]
+__all__ = ["CController", "c_library", "code", "fmu", "mjcf", "par", "sdf", "ssp", "urdf"]

@@ -55,25 +55,31 @@ def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
             f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
         )
     _check(system)
-    root = _Writing(system, _Numbers(system)).robot()
+    root = _Writing(system, Numbers(system, "URDF")).robot()
     indent(root)
     content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
     write_bytes(content, path_of(path))
 
 
-class _Numbers:
-    """Numbers of a system, its symbols at their defaults."""
+class Numbers:
+    """Numbers of a system, its symbols at their defaults.
 
-    def __init__(self, system: System) -> None:
+    Args:
+        system: that is written.
+        file: its kind, for messages.
+    """
+
+    def __init__(self, system: System, file: str) -> None:
         missing = [p.name for p in system.parameters if p.default is None]
         if missing:
             raise ModelError(
-                f"{system.name}: {missing[0]} has no value, and a URDF file has no symbols; give it"
-                " one"
+                f"{system.name}: {missing[0]} has no value, and {file} files have no symbols; give"
+                " it one"
             )
         self.p, self.values = system.p, system.p_default
 
     def __call__(self, value: SX) -> Array:
+        """The numbers of an expression, as an array of its shape."""
         function = Function("value", [self.p], [casadi.densify(SX(value))])
         return np.array(function(self.values), dtype=float)
 
@@ -111,7 +117,7 @@ class _Writing:
     """
 
     system: System
-    number: _Numbers
+    number: Numbers
     frame: dict[int, tuple[str, Array]] = field(default_factory=dict)
 
     def robot(self) -> Element:
@@ -143,23 +149,26 @@ class _Writing:
     ) -> None:
         name, pose = self._carrier(j, link, places)
         self.frame[j] = name, pose
-        _inertial(SubElement(root, "link", name=name), *self._inertia(link, pose))
+        _inertial(
+            SubElement(root, "link", name=name),
+            *inertia_of(self.system.name, link, pose, self.number),
+        )
         parent, before = self.frame[link.antecedent]
         kind = {Motion.FREE: "floating", Motion.PRISMATIC: "prismatic"}.get(link.motion, "revolute")
-        limits, velocity, effort = self._limits(link)
+        limits, velocity, effort = limits_of(self.system, link, "URDF")
         if kind == "revolute" and limits is None:
             kind = "continuous"
         joint = SubElement(root, "joint", name=link.name, type=kind)
         SubElement(joint, "parent", link=parent)
         SubElement(joint, "child", link=name)
-        _origin(joint, _inverse(before) @ self.number(link.pose().matrix) @ pose)
+        _origin(joint, inverse(before) @ self.number(link.pose().matrix) @ pose)
         friction = [float(self.number(value).item()) for value in (link.Fv, link.Fs)]
         if any(friction):
             damping, dry = map(repr, friction)
             SubElement(joint, "dynamics", damping=damping, friction=dry)
         if kind == "floating":
             return
-        SubElement(joint, "axis", xyz=_text(pose[2, :3]))
+        SubElement(joint, "axis", xyz=text_of(pose[2, :3]))
         low, high = limits or (-UNLIMITED, UNLIMITED)
         given = {"effort": repr(effort), "velocity": repr(velocity)}
         if kind != "continuous":
@@ -186,37 +195,6 @@ class _Writing:
             own += "_"
         return own, np.eye(4)
 
-    def _inertia(self, link: Link, pose: Array) -> tuple[float, Array, Array]:
-        """Mass, centre of mass, and inertia about it, in the frame of a link of the file."""
-        ten = self.number(link.inertia.parameters).ravel()
-        J = ten[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
-        mass, moment = float(ten[9]), ten[6:9]
-        if mass == 0 and np.any(moment):
-            raise ModelError(
-                f"{self.system.name}: what {link.name} carries has first moments but no mass, which"
-                " URDF cannot say; give it a mass"
-            )
-        c = moment / mass if mass else np.zeros(3)
-        J = J - mass * (c @ c * np.eye(3) - np.outer(c, c))
-        R, p = pose[:3, :3], pose[:3, 3]
-        return mass, R.T @ (c - p), R.T @ J @ R
-
-    def _limits(self, link: Link) -> tuple[tuple[float, float] | None, float, float]:
-        """Range of the position, largest velocity and largest effort."""
-        if link.motion is Motion.FREE:
-            return None, UNLIMITED, UNLIMITED
-        speed = self.system.speeds[link.v.start]
-        largest = []
-        for what, pair in (("velocity", speed.limits), ("effort", speed.effort)):
-            low, high = pair or (-UNLIMITED, UNLIMITED)
-            if low != -high:
-                raise ModelError(
-                    f"{self.system.name}: {what} of {link.name} is between {low:g} and {high:g},"
-                    " but URDF has one number for both directions; give it one"
-                )
-            largest.append(float(high))
-        return self.system.coordinates[link.q.start].limits, largest[0], largest[1]
-
     def _mimic(self, joint: Element, link: Link) -> None:
         for coupling in self.system.couplings:
             if coupling.driven == link.q.start:
@@ -237,23 +215,73 @@ class _Writing:
         joint = SubElement(root, "joint", name=f"{name}_fixed", type="fixed")
         SubElement(joint, "parent", link=parent)
         SubElement(joint, "child", link=name)
-        _origin(joint, _inverse(before) @ pose)
+        _origin(joint, inverse(before) @ pose)
 
 
-def _text(values: Any) -> str:
+def inertia_of(system: str, link: Link, pose: Array, number: Numbers) -> tuple[float, Array, Array]:
+    """Mass, centre of mass, and inertia about it, in a frame on a link.
+
+    Args:
+        system: its name, for messages.
+        link: that has the inertia.
+        pose: (4, 4) of the frame, in that of the link.
+        number: numbers of the system.
+    """
+    ten = number(link.inertia.parameters).ravel()
+    J = ten[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
+    mass, moment = float(ten[9]), ten[6:9]
+    if mass == 0 and np.any(moment):
+        raise ModelError(
+            f"{system}: what {link.name} carries has first moments but no mass, which no robot file"
+            " can say; give it a mass"
+        )
+    c = moment / mass if mass else np.zeros(3)
+    J = J - mass * (c @ c * np.eye(3) - np.outer(c, c))
+    R, p = pose[:3, :3], pose[:3, 3]
+    return mass, R.T @ (c - p), R.T @ J @ R
+
+
+def limits_of(
+    system: System, link: Link, file: str
+) -> tuple[tuple[float, float] | None, float, float]:
+    """Range of the position, largest velocity and largest effort of the motion of a link.
+
+    Args:
+        system: that is written.
+        link: of it.
+        file: its kind, for messages.
+    """
+    if link.motion in (Motion.FREE, Motion.SPHERICAL):
+        return None, UNLIMITED, UNLIMITED
+    speed = system.speeds[link.v.start]
+    largest = []
+    for what, pair in (("velocity", speed.limits), ("effort", speed.effort)):
+        low, high = pair or (-UNLIMITED, UNLIMITED)
+        if low != -high:
+            raise ModelError(
+                f"{system.name}: {what} of {link.name} is between {low:g} and {high:g},"
+                f" but {file} has one number for both directions; give it one"
+            )
+        largest.append(float(high))
+    return system.coordinates[link.q.start].limits, largest[0], largest[1]
+
+
+def text_of(values: Any) -> str:
+    """Numbers that are read again to the last bit."""
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def _inverse(pose: Array) -> Array:
+def inverse(pose: Array) -> Array:
+    """The (4, 4) transform of the other direction."""
     R, p = pose[:3, :3], pose[:3, 3]
     return np.block([[R.T, -(R.T @ p)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
 
 
 def _origin(element: Element, pose: Array) -> None:
-    SubElement(element, "origin", xyz=_text(pose[:3, 3]), rpy=_text(_angles(pose[:3, :3])))
+    SubElement(element, "origin", xyz=text_of(pose[:3, 3]), rpy=text_of(angles(pose[:3, :3])))
 
 
-def _angles(R: Array) -> tuple[float, float, float]:
+def angles(R: Array) -> tuple[float, float, float]:
     """Roll, pitch and yaw of a rotation, to the last digits also where the pitch is a quarter turn.
 
     Any yaw is right where the other two are taken for it.
@@ -269,7 +297,7 @@ def _inertial(link: Element, mass: float, com: Array, tensor: Array) -> None:
     if mass == 0 and not np.any(tensor):
         return
     inertial = SubElement(link, "inertial")
-    SubElement(inertial, "origin", xyz=_text(com), rpy="0 0 0")
+    SubElement(inertial, "origin", xyz=text_of(com), rpy="0 0 0")
     SubElement(inertial, "mass", value=repr(mass))
     rows = {
         "ixx": (0, 0),

@@ -1,8 +1,9 @@
-"""Robot files: tables of frames (TOML, dict, .par), URDF and MJCF, read as mechanisms."""
+"""Robot files: tables of frames (TOML, dict, .par), URDF, SDFormat and MJCF, read as mechanisms."""
 
 from mbs.formats.mjcf import read_mjcf
 from mbs.formats.par import read_par
 from mbs.formats.par_write import write_par
+from mbs.formats.sdf import read_sdf
 from mbs.formats.table import CutRow, FrameRow, InertiaRow, RobotTable, to_mechanism
 from mbs.formats.toml import from_dict, read_toml, to_dict, write_toml
 from mbs.formats.urdf import read_urdf
@@ -15,6 +16,7 @@ __all__ = [
     "from_dict",
     "read_mjcf",
     "read_par",
+    "read_sdf",
     "read_toml",
     "read_urdf",
     "to_dict",

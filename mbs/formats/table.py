@@ -19,6 +19,7 @@ from mbs.components import (
     KhalilBody,
     Mechanism,
     Planar,
+    Point,
     Prismatic,
     Revolute,
     RigidBody,
@@ -154,7 +155,7 @@ class CutRow:
 
     Attributes:
         cut: (k, k+B): frame k carries the variable of the cut joint, frame k+B is fixed on the
-            other side; they coincide when the loop is closed.
+            other side; they coincide when the loop is closed. Other frames may stand on k+B.
         joint: type of the cut joint.
     """
 
@@ -378,11 +379,12 @@ def _check_loops(table: RobotTable) -> None:
             )
         used |= set(loop.cut)
     for j, row in enumerate(table.frames, 1):
-        if row.antecedent in table.cut_frames:
-            raise DescriptionError(
-                f"{table.name}/frame {j}: antecedent {row.antecedent} is a frame of a cut joint;"
-                " place the frame on a link"
-            )
+        for loop in table.loops:
+            if row.antecedent == loop.cut[0]:
+                raise DescriptionError(
+                    f"{table.name}/frame {j}: antecedent {row.antecedent} moves with a cut joint;"
+                    f" place the frame on a link, or on the other frame of the cut, {loop.cut[1]}"
+                )
     for body in table.bodies:
         driven = body.drive and not _is_moving(table, body.frame)
         if body.frame in table.cut_frames and (driven or _has_inertia(body)):
@@ -474,7 +476,7 @@ def to_mechanism(table: RobotTable) -> Mechanism:
         row = rows.get(j, InertiaRow(j))
         links[j] = mechanism.add(_body(j, row))
         mechanism.numbered[j] = links[j].name
-        point = links[frame.antecedent].at_khalil(**frame.geometry)
+        point = _placed(table, j, links)
         if frame.sigma == 2:
             mechanism.connect(point, links[j])
         else:
@@ -492,15 +494,25 @@ def _close(
     links: dict[int, RigidBody],
     row: InertiaRow,
 ) -> None:
-    moving, fixed = (table.frames[k - 1] for k in loop.cut)
-    scalars = _joint(table, loop.cut[0], row, bool(moving.actuated))
+    moving, fixed = loop.cut
+    scalars = _joint(table, moving, row, bool(table.frames[moving - 1].actuated))
     joint = _CLOSING[loop.joint](**scalars)
-    mechanism.connect(
-        links[moving.antecedent].at_khalil(**moving.geometry),
-        joint,
-        links[fixed.antecedent].at_khalil(**fixed.geometry),
-    )
+    mechanism.connect(_placed(table, moving, links), joint, _placed(table, fixed, links))
     mechanism.cut(joint)
+
+
+def _placed(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
+    """Where frame j is before its joint moves it, on a link that is there already.
+
+    Its antecedent may be the fixed end frame of a loop, which stands on a link in its turn.
+    """
+    rows = [table.frames[j - 1]]
+    while rows[-1].antecedent not in links:
+        rows.append(table.frames[rows[-1].antecedent - 1])
+    point = links[rows[-1].antecedent].at_khalil(**rows[-1].geometry)
+    for row in reversed(rows[:-1]):
+        point = point.at_khalil(**row.geometry)
+    return point
 
 
 def _actuated(table: RobotTable, frame: FrameRow) -> bool | None:

@@ -96,11 +96,25 @@ class Reader:
         text = None if element is None else element.get(key)
         if text is None:
             return default
+        return self.numbers(element, key, text, len(default), largest)
+
+    def numbers(
+        self, element: Element | None, key: str, text: str, count: int, largest: float = _LARGEST
+    ) -> Vector:
+        """The numbers in a text, so many of them.
+
+        Args:
+            element: that they stand in, for notes.
+            key: what they are, for messages.
+            text: as it is written.
+            count: how many there must be.
+            largest: that one of them may be.
+        """
         if "${" in text or "$(" in text:
             self.fail(f"{key} is {quoted(text)}, which xacro has not expanded; {_EXPAND}")
         if "," in text:
             text = self._without_commas(element, key, text)
-        values = plain_numbers(text, len(default), f"{self.where}: {key}")
+        values = plain_numbers(text, count, f"{self.where}: {key}")
         if not max(map(abs, values)) <= largest:
             self.fail(f"{key} is {quoted(text)}; give numbers of at most {largest:g}")
         return values
@@ -735,18 +749,8 @@ class _Building:
         return world
 
     def _body(self, link: str) -> Body:
-        name, inertial = self.names.links[link], self.inertials[link]
-        numbers = {"mass": inertial.mass, "com": inertial.com, "inertia": inertial.tensor}
-        try:
-            return Body(name, **numbers)
-        except DescriptionError as error:
-            reason = str(error).removeprefix(f"{name}: ").partition(";")[0]
-            self.tree.link(link).note(
-                "doubted",
-                f"{reason}, which no body has; taken as it is",
-                self.tree.links[link].find("inertial"),
-            )
-            return Body(name, **numbers, checked=False)
+        inertial = self.tree.links[link].find("inertial")
+        return body_of(self.tree.link(link), self.names.links[link], self.inertials[link], inertial)
 
     def _add(self, joint: JointElement, parent: Point) -> Point:
         body = self.mechanism.add(self._body(joint.child))
@@ -812,6 +816,24 @@ class _Building:
                 name += "_"
             taken.add(name)
             self.mechanism.add(Coupling(name, driven, driver, (offset, factor)))
+
+
+def body_of(reader: Reader, name: str, inertial: Inertial, element: Element | None) -> Body:
+    """A body with an inertia as the file has it; one that no body has is noted.
+
+    Args:
+        reader: of the link.
+        name: of the body.
+        inertial: of the link.
+        element: that says it.
+    """
+    numbers = {"mass": inertial.mass, "com": inertial.com, "inertia": inertial.tensor}
+    try:
+        return Body(name, **numbers)
+    except DescriptionError as error:
+        reason = str(error).removeprefix(f"{name}: ").partition(";")[0]
+        reader.note("doubted", f"{reason}, which no body has; taken as it is", element)
+        return Body(name, **numbers, checked=False)
 
 
 def _leaders(tree: UrdfTree) -> dict[str, str]:

@@ -12,7 +12,7 @@ from mbs.components import Mechanism
 from mbs.components.locking import Base, fix_root, free_root
 from mbs.errors import DescriptionError
 from mbs.expressions import Parameter
-from mbs.formats import from_dict, read_mjcf, read_par, read_toml, read_urdf, to_mechanism
+from mbs.formats import from_dict, read_mjcf, read_par, read_sdf, read_toml, read_urdf, to_mechanism
 from mbs.formats.files import component_name
 from mbs.text import did_you_mean, quoted
 
@@ -22,7 +22,7 @@ _READERS: Mapping[str, Callable[[str | Path], Mechanism]] = MappingProxyType(
         ".par": lambda path: to_mechanism(read_par(path)),
     }
 )
-_URDF, _MJCF = (".urdf", ".xacro"), ".xml"
+_URDF, _SDF, _MJCF = (".urdf", ".xacro"), (".sdf", ".world"), ".xml"
 
 
 @cache
@@ -49,13 +49,14 @@ def load(
     What a reader changed, ignored, doubts or completed is in `mechanism.notes`.
 
     Args:
-        source: a name such as "puma560", a dict, or the path of a .toml, .par, .urdf, .xacro or
-            .xml (MJCF) file.
+        source: a name such as "puma560", a dict, or the path of a .toml, .par, .urdf, .xacro,
+            .sdf, .world or .xml (MJCF) file.
         parameters: values of the symbols that it uses.
         base: "free" connects the root body to the world by the Free joint "root_joint", whose
             positions are root_joint.x .y .z .qw .qx .qy .qz and whose velocities
             root_joint.vx .vy .vz .wx .wy .wz are those of the body in its own axes; "fixed" locks
             a root that the file leaves free where the file puts it; None is as the file says.
+            An SDFormat file leaves a root free that no joint connects with the world.
             A table of frames (dict, .toml, .par) gives no inertia of its base, so that it cannot
             be free.
         lock: joints by name and the positions that they are welded at, as in `Mechanism.lock`.
@@ -121,6 +122,8 @@ def _mechanism(
     suffix = Path(source).suffix.lower()
     if suffix in _URDF:
         return read_urdf(source, base=base, strict=strict, xacro=xacro, packages=packages)
+    if suffix in _SDF:
+        return read_sdf(source, base=base, strict=strict)
     if suffix == _MJCF:
         return read_mjcf(source, base=base, strict=strict)
     if suffix in _READERS:
@@ -128,7 +131,7 @@ def _mechanism(
     if suffix or len(Path(source).parts) > 1:
         raise DescriptionError(
             f"{quoted(str(source))[1:-1]}: files of this kind are not read;"
-            f" {did_you_mean(suffix, [*_READERS, *_URDF, _MJCF])}"
+            f" {did_you_mean(suffix, [*_READERS, *_URDF, *_SDF, _MJCF])}"
         )
     raise DescriptionError(
         f"robot {quoted(str(source))} is not in the catalogue;"

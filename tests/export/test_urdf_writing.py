@@ -123,7 +123,7 @@ def test_what_urdf_cannot_say_is_refused(tmp_path):
     symbol = Mechanism("m")
     body = symbol.add(Body("b", mass="M", inertia=(1, 1, 1)))
     symbol.connect(symbol.world, Free("f"), body)
-    refused(symbol, "M has no value, and a URDF file has no symbols")
+    refused(symbol, "M has no value, and URDF files have no symbols")
     symbol = Mechanism("m", gravity=(0, 0, 0))
     symbol.connect(symbol.world, Free("f"), symbol.add(Body("b", mass=1, inertia=(1, 1, 1))))
     refused(symbol, "gravity is [0.0, 0.0, 0.0]")

@@ -202,7 +202,8 @@ BAD_LOOPS = {
     "twice": (dict(loop=[{"cut": [4, 5]}] * 2), "in another loop too"),
     "antecedent": (
         dict(frame__4=None, frame=[*LOOP["frame"], {"antecedent": 4}]),
-        "frame 6: antecedent 4 is a frame of a cut joint",
+        "frame 6: antecedent 4 moves with a cut joint; place the frame on a link, or on the other"
+        " frame of the cut, 5",
     ),
 }
 

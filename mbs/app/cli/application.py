@@ -52,7 +52,8 @@ def _start(
 ) -> None:
     """Equations of robots and mechanisms with closed loops.
 
-    ROBOT is a name that `mbs robots` lists, or a .toml, .par, .urdf, .xacro or .xml (MJCF) file.
+    ROBOT is a name that `mbs robots` lists, or a .toml, .par, .urdf, .xacro, .sdf, .world or .xml
+    (MJCF) file.
     Units are SI and radians; numbers may be written as pi/2.
 
     Exit codes: 0 fine; 1 refused, with one sentence on the standard error; 2 words that the

@@ -15,7 +15,7 @@ Robot = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT",
-        help="Name in the catalogue, or a .toml, .par, .urdf, .xacro or .xml (MJCF) file.",
+        help="Name in the catalogue, or a .toml, .par, .urdf, .xacro, .sdf, .world or .xml file.",
         autocompletion=completion.robots,
         show_default=False,
     ),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-SUFFIXES = (".toml", ".par", ".urdf", ".xacro", ".xml")
+SUFFIXES = (".toml", ".par", ".urdf", ".xacro", ".sdf", ".world", ".xml")
 """Endings of robot files."""
 
 

@@ -23,9 +23,10 @@ EXAMPLES = examples(
     "mbs convert robot.urdf robot.xml",
     "mbs convert sr400 sr400.toml",
     "mbs convert puma560 puma560.urdf",
+    "mbs convert sr400 sr400.sdf",
 )
 _TABLES = (".par", ".toml")
-_WRITTEN = (*_TABLES, ".urdf", ".xml")
+_WRITTEN = (*_TABLES, ".urdf", ".sdf", ".xml")
 
 
 def convert(
@@ -34,18 +35,18 @@ def convert(
         Path,
         typer.Argument(
             metavar="TARGET",
-            help="File to write: .par (SYMORO), .toml, .urdf or .xml (MJCF).",
+            help="File to write: .par (SYMORO), .toml, .urdf, .sdf or .xml (MJCF).",
             show_default=False,
         ),
     ],
     *,
     parameter: Parameters = None,
 ) -> None:
-    """Convert a robot to a .par, .toml, .urdf or .xml (MJCF) file.
+    """Convert a robot to a .par, .toml, .urdf, .sdf or .xml (MJCF) file.
 
     From .par and .toml to one of them the table of frames is written as it was read, symbols and
-    all. From URDF, MJCF and the catalogue, link j of the assembled robot is frame j. A URDF file
-    has numbers alone, and no loops.
+    all. From URDF, SDF, MJCF and the catalogue, link j of the assembled robot is frame j. URDF and
+    SDF files have numbers alone, and a URDF file no loops.
     """
     suffix = target.suffix.lower()
     if suffix not in _WRITTEN:
@@ -66,7 +67,12 @@ def convert(
         from mbs.files import write_bytes
 
         assembled = mechanism(source, parameter).assemble()
-        writers = {".par": exporting.par, ".toml": exporting.toml, ".urdf": exporting.urdf}
+        writers = {
+            ".par": exporting.par,
+            ".toml": exporting.toml,
+            ".urdf": exporting.urdf,
+            ".sdf": exporting.sdf,
+        }
         content = writers[suffix](assembled)
         write_bytes(content, target)
     note(f"wrote {target}")

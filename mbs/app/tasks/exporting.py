@@ -150,6 +150,15 @@ def urdf(system: System) -> bytes:
     return _written(lambda path: export.urdf(system, path), "robot.urdf")
 
 
+def sdf(system: System) -> bytes:
+    """The system as an SDFormat file; see `mbs.export.sdf`.
+
+    Raises:
+        ModelError: the format cannot say it.
+    """
+    return _written(lambda path: export.sdf(system, path), "robot.sdf")
+
+
 def toml(system: System) -> bytes:
     """The system as a table of frames in TOML, its joints under their names.
 

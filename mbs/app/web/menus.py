@@ -157,7 +157,7 @@ class FilesMenu:
         with ui.dialog() as dialog, ui.card().style("width: 460px"):
             ui.label("Open a robot file").classes("app-robot")
             ui.label(
-                ".toml, SYMORO .par, .urdf, or MJCF .xml; at most"
+                ".toml, SYMORO .par, .urdf, .sdf, .world, or MJCF .xml; at most"
                 f" {LARGEST_UPLOAD // 1_000_000} MB. Meshes are not needed."
             ).classes("app-note")
 

@@ -83,6 +83,12 @@ def test_notes_of_a_file_are_said_beside_the_output(command) -> None:
     assert answer.out == ""
 
 
+def test_a_closed_robot_is_converted_to_sdf(command) -> None:
+    command("convert", "sr400", "sr400.sdf")
+    one, other = (mbs.load(name).assemble() for name in ("sr400", "sr400.sdf"))
+    assert (one.nv, one.closure.mobility) == (other.nv, other.closure.mobility)
+
+
 def test_a_robot_is_converted_to_urdf(command) -> None:
     command("convert", "puma560", "puma560.urdf")
     one, other = (mbs.load(name).assemble() for name in ("puma560", "puma560.urdf"))

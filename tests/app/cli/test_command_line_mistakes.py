@@ -23,7 +23,10 @@ MISTAKES = [
     ("solve-ik rx90", "solve-ik: say the pose in one way: --pose, --xyz"),
     ("solve-ik rx90 --xyz 0 0 a", "--xyz: 'a' is not a number; write one, such as 0.3 or pi/2"),
     ("identify rx90 none.csv", "record 'none.csv' cannot be read (No such file or directory)"),
-    ("convert sr400 a.stl", "use one of .par, .toml, .urdf, .xml"),
+    (
+        "convert sr400 a.stl",
+        "are not written; did you mean '.toml'? use one of .par, .toml, .urdf, .sdf, .xml",
+    ),
     ("convert sr400 a.urdf", "closes a loop, which URDF cannot say; take it away first"),
     ("convert stewart_platform a.par", "a .par file"),
     ("export fmu four_bar none/x.fmu", "folder none does not exist; create it"),

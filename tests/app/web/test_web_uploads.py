@@ -22,10 +22,15 @@ MJCF = b"""<mujoco model="arm"><compiler angle="radian"/><option gravity="0 0 -9
 <inertial pos="0 0 0.1" mass="1" diaginertia="0.1 0.1 0.05"/><body name="b" pos="0 0 0.5">
 <joint name="j2" type="slide" axis="1 0 0" range="-1 1"/><geom type="sphere" size="0.1"/></body>
 </body></worldbody><actuator><motor joint="j1"/></actuator></mujoco>"""
+SDF = b"""<sdf version="1.9"><model name="arm"><link name="a"><inertial><pose>0 0 .1 0 0 0</pose>
+<mass>1</mass><inertia><ixx>.1</ixx><iyy>.1</iyy><izz>.1</izz></inertia></inertial></link>
+<joint name="j" type="revolute"><parent>world</parent><child>a</child><axis><xyz>0 1 0</xyz>
+</axis></joint></model></sdf>"""
 FILES = {
     ".toml": Document.of_name("sr400").toml().encode(),
     ".par": Document.of_name("sr400").par().encode(),
     ".urdf": URDF,
+    ".sdf": SDF,
     ".xml": MJCF,
 }
 SPARE = [b"nan", b"-1e309", b"1/0", b"{", b"}", b"\x00", b"[[", b'"', b"<", b">", b"&a;", b"9" * 40]
@@ -69,7 +74,7 @@ def mutated(draw, content):
 def test_the_files_themselves_are_read(suffix):
     document = opened(FILES[suffix], suffix)
     assert document is not None
-    assert document.system().nq in (2, 8)
+    assert document.system().nq in (1, 2, 8)
 
 
 @pytest.mark.parametrize("suffix", FILES)

@@ -190,7 +190,7 @@ class Document:
 
     @staticmethod
     def of_upload(content: bytes, suffix: str) -> Document:
-        """The robot in a file: .toml, .par, .urdf or .xml (MJCF).
+        """The robot in a file: .toml, .par, .urdf, .sdf, .world or .xml (MJCF).
 
         Raises:
             DescriptionError: the file is too large, of another kind, or malformed.

@@ -26,6 +26,7 @@ from mbs.formats import (
     RobotTable,
     read_mjcf,
     read_par,
+    read_sdf,
     read_toml,
     read_urdf,
     to_mechanism,
@@ -84,6 +85,8 @@ READERS: Mapping[str, Callable[[Path], RobotTable | Mechanism]] = MappingProxyTy
         ".toml": read_toml,
         ".par": read_par,
         ".urdf": partial(read_urdf, other_files=False),
+        ".sdf": read_sdf,
+        ".world": read_sdf,
         ".xml": partial(read_mjcf, other_files=False),
     }
 )

@@ -1,0 +1,353 @@
+"""SDFormat robot files from mechanisms, with their loops."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import casadi
+import numpy as np
+from casadi import DM
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.khalil_frames import Cut
+from mbs.assembly.tree import Link, zero_position
+from mbs.components import Fixed, Mechanism, Prismatic, Revolute, Spherical, Universal
+from mbs.components.joints import Motion
+from mbs.errors import ModelError
+from mbs.export.urdf import Numbers, angles, inertia_of, inverse, limits_of, text_of
+from mbs.files import path_of, write_bytes
+from mbs.formats.urdf import UNLIMITED
+from mbs.spatial.rotation import quaternion_rotation
+from mbs.text import quoted
+
+Array = NDArray[np.float64]
+
+_DOWN = (0.0, 0.0, -9.81)
+_NAMESPACE = "http://drake.mit.edu"
+_GROUND = "ground"
+_TYPES = {
+    Motion.REVOLUTE: "revolute",
+    Motion.PRISMATIC: "prismatic",
+    Motion.SPHERICAL: "ball",
+}
+_CLOSING = {
+    Fixed: "fixed",
+    Revolute: "revolute",
+    Prismatic: "prismatic",
+    Spherical: "ball",
+    Universal: "universal",
+}
+
+
+def sdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
+    """Write a mechanism as an SDFormat file, symbols at their default values.
+
+    Every link of the tree is a link with the name and the frame of a body that it carries, and the
+    inertia of all of them; other bodies and named frames are frames. Joints that close loops are
+    joints with a second parent. An SDF file has joints at zero where it is drawn: mechanisms with
+    loops are drawn in `system.configuration`, from which their positions then count, others at
+    zero. Free links start in it, and have the free joint `root_joint` when the file is read again.
+    Couplings of degree one are mimics, Ia is Drake's rotor inertia, a joint without a motor has an
+    effort of zero.
+
+    Args:
+        system: of revolute, prismatic, ball and free motions; a Mechanism is assembled first.
+        path: of the .sdf file.
+
+    Raises:
+        ModelError: it is neither, it has rotors, force elements, a drive line, a free joint that
+            is not on the world, couplings of a higher degree, a loop that closes by another joint
+            than a fixed, revolute, prismatic, ball or universal one, or a symbol has no value.
+        ExportError: the file cannot be written.
+    """
+    if isinstance(system, Mechanism):
+        system = system.assemble()
+    if not isinstance(system, System):
+        raise ModelError(
+            f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
+        )
+    _check(system)
+    root = _Writing(system, Numbers(system, "SDF")).file()
+    indent(root)
+    content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    write_bytes(content, path_of(path))
+
+
+def _refused(system: System, what: str) -> ModelError:
+    return ModelError(f"{system.name}: {what}, which SDF cannot say; take it away first")
+
+
+def _check(system: System) -> None:
+    """Refuse what the format cannot say."""
+    if system.forces or system.shafts or system.devices:
+        raise _refused(system, "it has force elements or a drive line")
+    for link in system.tree.links:
+        if link.motion is Motion.FREE and link.antecedent >= 0:
+            raise _refused(system, f"{link.name} is a free joint that is not on the world")
+        if link.rotor is not None:
+            raise _refused(system, f"{link.name} has a rotor with an axis of its own")
+        acts = (link.Fv, link.Fs, link.Ia)
+        if link.motion.nv > 1 and not all(value.is_zero() for value in acts):
+            raise _refused(system, f"{link.name} has friction or a rotor about several axes")
+    _check_loops(system)
+
+
+def _check_loops(system: System) -> None:
+    driven = set()
+    for coupling in system.couplings:
+        if len(coupling.coefficients) > 2 or coupling.others:
+            raise _refused(system, f"{coupling.name} is not a line between two joints")
+        if coupling.driven in driven:
+            raise _refused(system, f"{coupling.name} leads a joint that another coupling leads")
+        driven.add(coupling.driven)
+    for cut in system.cuts:
+        joint = cut.edge.joint
+        if not cut.welded and type(joint) not in _CLOSING:
+            raise _refused(system, f"a {type(joint).__name__} closes the loop at {joint.name}")
+
+
+@dataclass(slots=True)
+class _Writing:
+    """Writes the elements of one file.
+
+    Attributes:
+        system: that is written.
+        number: numbers of its expressions.
+        start: positions at which it is drawn.
+        frame: of each link (-1 for the world): its name, and its (4, 4) pose in that of the tree.
+        drawn: (4, 4) pose of each frame of the tree in the world.
+        joints: the element of each joint of the tree, by where its position stands in q.
+        names: those that were given, by those of the system.
+    """
+
+    system: System
+    number: Numbers
+    start: Array = field(init=False)
+    frame: dict[int, tuple[str, Array]] = field(default_factory=dict)
+    drawn: dict[int, Array] = field(default_factory=dict)
+    joints: dict[int, Element] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+
+    def file(self) -> Element:
+        system = self.system
+        self.start = np.array(system.configuration if system.cuts else zero_position(system.tree))
+        for link in system.tree.links:
+            if link.motion is Motion.FREE:
+                self.start[link.q] = system.configuration[link.q]
+        root = Element("sdf", {"version": "1.11", "xmlns:drake": _NAMESPACE})
+        gravity = self.number(system.tree.gravity).ravel()
+        place = root
+        if not np.array_equal(gravity, _DOWN):
+            place = SubElement(root, "world", name="default")
+            _say(place, "gravity", text_of(gravity))
+        model = SubElement(place, "model", name=self._name(system.name))
+        self.names.clear()
+        self.frame[-1], self.drawn[-1] = ("world", np.eye(4)), np.eye(4)
+        places = {
+            name: (link, self.number(pose.matrix))
+            for name, (link, pose) in system.frames.items()
+            if name not in ("base", "world")
+        }
+        for j, link in enumerate(system.tree.links):
+            self._add_link(model, j, link, places)
+        for cut in system.cuts:
+            self._close(model, cut)
+        self._couple()
+        self._add_frames(model, places)
+        return root
+
+    def _name(self, name: str) -> str:
+        """A name that the format takes, of its own."""
+        if name not in self.names:
+            plain = name.replace("::", "_").replace(".", "_")
+            while plain in self.names.values() or plain in ("world", "__model__"):
+                plain += "_"
+            self.names[name] = plain
+        return self.names[name]
+
+    def _unused(self, name: str) -> str:
+        """A name that nothing of the system has."""
+        system = self.system
+        while name in self.names or name in system.frames or name in self.names.values():
+            name += "_"
+        return self._name(name)
+
+    # Links and the joints that move them.
+
+    def _add_link(
+        self, model: Element, j: int, link: Link, places: Mapping[str, tuple[int, Array]]
+    ) -> None:
+        system = self.system
+        bodies = [row.name for row in system.bodies if row.link == j + 1 and row.name in places]
+        if bodies:
+            name, pose = self._name(bodies[0]), places[bodies[0]][1]
+        else:
+            name, pose = self._unused(f"{link.name.replace('.', '_')}_link"), np.eye(4)
+        parent, before = self.frame[link.antecedent]
+        moved = self.number(link.pose().matrix) @ self._motion(link)
+        self.frame[j], self.drawn[j] = (name, pose), self.drawn[link.antecedent] @ moved
+        element = SubElement(model, "link", name=name)
+        above = {} if parent == "world" else {"relative_to": parent}
+        _pose(element, inverse(before) @ moved @ pose, above)
+        _inertial(element, *inertia_of(system.name, link, pose, self.number))
+        if link.motion is Motion.FREE:
+            return
+        joint = _joint(model, self._name(link.name), _TYPES[link.motion], parent, name)
+        _pose(joint, inverse(pose), {})
+        if link.motion is Motion.SPHERICAL:
+            return
+        self.joints[link.q.start] = joint
+        self._drive(joint, link)
+
+    def _motion(self, link: Link) -> Array:
+        """(4, 4) displacement of a link from its placement, where it is drawn."""
+        T, q = np.eye(4), self.start[link.q]
+        if link.motion is Motion.REVOLUTE:
+            c, s = math.cos(q[0]), math.sin(q[0])
+            T[:2, :2] = [[c, -s], [s, c]]
+        elif link.motion is Motion.PRISMATIC:
+            T[2, 3] = q[0]
+        else:
+            T[:3, :3] = np.array(DM(quaternion_rotation(casadi.SX(DM(q[-4:])))))
+            if link.motion is Motion.FREE:
+                T[:3, 3] = q[:3]
+        return T
+
+    def _drive(self, joint: Element, link: Link) -> None:
+        """Axis, dynamics, limits and motor of a joint of one axis."""
+        system, zero = self.system, float(self.start[link.q.start])
+        axis = SubElement(joint, "axis")
+        _say(axis, "xyz", "0 0 1")
+        dynamics = {
+            "damping": link.Fv,
+            "friction": link.Fs,
+            "spring_reference": link.rest,
+            "spring_stiffness": link.stiffness,
+        }
+        element = SubElement(axis, "dynamics")
+        for tag, value in dynamics.items():
+            said = float(self.number(value).item())
+            _say(element, tag, said - zero if tag == "spring_reference" else said)
+        limits, velocity, effort = limits_of(system, link, "SDF")
+        self._limit(axis, limits, zero)
+        limit = axis.find("limit")
+        assert limit is not None
+        motor = system.speeds[link.v.start].actuated
+        for tag, most in (("effort", effort if motor else 0.0), ("velocity", velocity)):
+            _say(limit, tag, math.inf if most >= UNLIMITED else most)
+        Ia = float(self.number(link.Ia).item())
+        if Ia:
+            _say(joint, "drake:rotor_inertia", Ia)
+
+    def _limit(self, axis: Element, limits: tuple[float, float] | None, zero: float) -> None:
+        limit = SubElement(axis, "limit")
+        for tag, value in zip(("lower", "upper"), limits or (-math.inf, math.inf), strict=True):
+            _say(limit, tag, value - zero)
+
+    # Loops, couplings, named frames.
+
+    def _close(self, model: Element, cut: Cut) -> None:
+        """A joint with a second parent: at zero where the loop is drawn."""
+        joint = cut.edge.joint
+        ends = [(number, self.number(pose.matrix)) for number, pose in cut.frames]
+        # the world is no child
+        (a, at_a), (b, at_b) = ends if ends[1][0] >= 0 else ends[::-1]
+        parent, child = self.frame[a][0], self.frame[b][0]
+        kind = "fixed" if cut.welded else _CLOSING[type(joint)]
+        name = self._unused(f"{joint.name}_weld") if cut.welded else self._name(joint.name)
+        element = _joint(model, name, kind, parent, child)
+        _pose(element, inverse(self.frame[b][1]) @ at_b, {})
+        opening = inverse(self.drawn[a] @ at_a) @ self.drawn[b] @ at_b
+        if cut.welded or kind in ("fixed", "ball"):
+            if not cut.welded and joint.limits:
+                raise _refused(self.system, f"{joint.name} has limits")
+        elif isinstance(joint, Universal):
+            # the first axis is fixed on frame_a, the second on frame_b
+            first, second = (np.array(axis, dtype=float) for axis in joint.axes)
+            if ends[1][0] < 0:
+                first, second = second, first
+            if joint.limits:
+                raise _refused(self.system, f"{joint.name} has limits and closes a loop")
+            _say(SubElement(element, "axis"), "xyz", text_of(opening[:3, :3].T @ first))
+            _say(SubElement(element, "axis2"), "xyz", text_of(second))
+        else:
+            assert isinstance(joint, (Revolute, Prismatic))
+            u = np.array(joint.axis, dtype=float)
+            axis = SubElement(element, "axis")
+            _say(axis, "xyz", text_of(u if ends[1][0] >= 0 else -u))
+            if joint.limits:
+                forward = opening if ends[1][0] >= 0 else inverse(opening)
+                self._limit(axis, joint.limits[0][1], _position(forward, u, kind))
+        simbody = SubElement(SubElement(element, "physics"), "simbody")
+        _say(simbody, "must_be_loop_joint", "true")
+
+    def _couple(self) -> None:
+        for coupling in self.system.couplings:
+            terms = [float(self.number(c).item()) for c in coupling.coefficients]
+            offset, factor = (*terms, 0.0, 0.0)[:2]
+            offset += factor * self.start[coupling.driver] - self.start[coupling.driven]
+            axis = self.joints[coupling.driven].find("axis")
+            assert axis is not None
+            leader = self.joints[coupling.driver].get("name", "")
+            mimic = SubElement(axis, "mimic", joint=leader, axis="axis")
+            for tag, value in (("multiplier", factor), ("offset", offset), ("reference", 0.0)):
+                _say(mimic, tag, value)
+
+    def _add_frames(self, model: Element, places: Mapping[str, tuple[int, Array]]) -> None:
+        """Bodies that are no links of the file, and named frames."""
+        written = {name for name, _ in self.frame.values()}
+        ground = ""
+        for name, (number, pose) in places.items():
+            if self._name(name) in written:
+                continue
+            carrier, before = self.frame[number]
+            if number < 0:  # no frame of a model is attached to the world but through a link
+                if not ground:
+                    ground = self._unused(_GROUND)
+                    _inertial(SubElement(model, "link", name=ground), 1.0, np.zeros(3), np.eye(3))
+                    _joint(model, self._unused(f"{_GROUND}_joint"), "fixed", "world", ground)
+                carrier = ground
+            frame = SubElement(model, "frame", name=self._name(name), attached_to=carrier)
+            _pose(frame, inverse(before) @ pose, {})
+
+
+def _position(T: Array, axis: Array, kind: str) -> float:
+    """Of a revolute or prismatic joint about or along a unit axis, by the pose of its frames."""
+    if kind == "prismatic":
+        return float(axis @ T[:3, 3])
+    R = T[:3, :3]
+    twice = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return math.atan2(float(twice @ axis), float(np.trace(R)) - 1)
+
+
+def _say(element: Element, tag: str, value: Any) -> None:
+    SubElement(element, tag).text = value if isinstance(value, str) else repr(float(value) + 0.0)
+
+
+def _pose(element: Element, T: Array, attributes: dict[str, str]) -> None:
+    pose = SubElement(element, "pose", attributes)
+    pose.text = text_of([*T[:3, 3], *angles(T[:3, :3])])
+
+
+def _joint(model: Element, name: str, kind: str, parent: str, child: str) -> Element:
+    joint = SubElement(model, "joint", name=name, type=kind)
+    _say(joint, "parent", parent)
+    _say(joint, "child", child)
+    return joint
+
+
+def _inertial(link: Element, mass: float, com: Array, tensor: Array) -> None:
+    inertial = SubElement(link, "inertial")
+    _say(inertial, "pose", text_of([*com, 0.0, 0.0, 0.0]))
+    _say(inertial, "mass", mass)
+    inertia = SubElement(inertial, "inertia")
+    for i, row in enumerate("xyz"):
+        for k, column in enumerate("xyz"):
+            if i <= k:
+                _say(inertia, f"i{row}{column}", tensor[i, k])

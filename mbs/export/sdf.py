@@ -28,7 +28,7 @@ from mbs.text import quoted
 
 Array = NDArray[np.float64]
 
-_DOWN = (0.0, 0.0, -9.81)
+_DOWN = (0.0, 0.0, -9.81)  # [m/s^2] what SDF files without a world suppose of gravity
 _NAMESPACE = "http://drake.mit.edu"
 _GROUND = "ground"
 _TYPES = {
@@ -73,7 +73,7 @@ def sdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
             f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
         )
     _check(system)
-    root = _Writing(system, Numbers(system, "SDF")).file()
+    root = _SdfWriting(system, Numbers(system, "SDF")).file()
     indent(root)
     content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
     write_bytes(content, path_of(path))
@@ -113,7 +113,7 @@ def _check_loops(system: System) -> None:
 
 
 @dataclass(slots=True)
-class _Writing:
+class _SdfWriting:
     """Writes the elements of one file.
 
     Attributes:

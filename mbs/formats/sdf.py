@@ -293,7 +293,7 @@ _MOVING = {
 
 
 @dataclass(slots=True)
-class _File:
+class _SdfFile:
     """What a file says, before it is a mechanism.
 
     Attributes:
@@ -454,7 +454,7 @@ class _File:
 
 
 @dataclass(slots=True)
-class _Building:
+class _SdfBuilding:
     """Puts the links and joints of a file into a mechanism.
 
     Attributes:
@@ -471,7 +471,7 @@ class _Building:
     """
 
     mechanism: Mechanism
-    file: _File
+    file: _SdfFile
     base: Base | None
     static: bool
     gravity: Vector
@@ -939,13 +939,13 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
         raise DescriptionError(
             f"{path}: the root element is <{quoted(root.tag)[1:-1]}>, not <sdf>; give an SDF file"
         )
-    file = _File(notes, _version(root, notes), _Frames(str(path)))
+    file = _SdfFile(notes, _version(root, notes), _Frames(str(path)))
     world, model = _chosen(root, notes)
     name = component_name(model.get("name") or "")
     if not name:
         name = component_name(Path(path).stem) or "robot"
         notes.add("completed", "<model>", f"it has no name; named {quoted(name)}", line_of(model))
-    gravity: Vector = (0.0, 0.0, -9.81)
+    gravity: Vector = (0.0, 0.0, -9.81)  # [m/s^2] a model without a world says nothing: as of URDF
     if world is not None:
         gravity = _read_world(file, world)
     mechanism = Mechanism(name, gravity=gravity, source=f"SDF file {Path(path).name}")
@@ -962,7 +962,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
         reader.note("ignored", f"it is static; {still}")
     parts = (*file.links.values(), *file.joints.values(), *file.named.values())
     names = KeptNames({"world", "base"}, {component_name(part.name) for part in parts})
-    _Building(mechanism, file, base, static and base is None, gravity, names).build()
+    _SdfBuilding(mechanism, file, base, static and base is None, gravity, names).build()
     return mechanism
 
 
@@ -1015,7 +1015,7 @@ def _is_static(model: Element) -> bool:
     return (model.findtext("static") or "").strip().lower() in ("true", "1")
 
 
-def _read_world(file: _File, world: Element) -> Vector:
+def _read_world(file: _SdfFile, world: Element) -> Vector:
     """Gravity of a world; its frames are taken, and what is not read is noted."""
     reader = SdfReader(f"world {quoted(world.get('name', ''))}", world, file.notes)
     if world.find("joint") is not None:

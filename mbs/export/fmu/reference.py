@@ -30,7 +30,7 @@ FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 """Where the files stand in the FMU."""
 
 _MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
-_TIGHTEST = 1e-10
+_TIGHTEST = 1e-10  # relative tolerance of a reference: below what users compare with it
 _DIGITS = ".13g"
 
 

@@ -22,6 +22,8 @@ from mbs.text import quoted
 _TOLERANCE = 1e-6
 """Part of the largest moment of inertia by which one may be negative, and relative difference of
 elements of a tensor that are equal: files give them with six or seven digits."""
+_LARGEST = 1e30
+"""Of masses, lengths and moments in SI units: products of four of them stay finite."""
 _ZERO = 1e-12
 """Element of a tensor [kg m^2] that is the rounding of zero, as where a file of a symmetric tensor
 was turned: bodies that small are not described in kg and m."""
@@ -239,7 +241,14 @@ class KhalilBody(RigidBody):
         if len(numbers) < len(TEN_PARAMETERS) or numbers[-1] == 0:
             return
         J = tensor_matrix(numbers[:6])
-        c = np.array(numbers[6:9]) / numbers[9]
+        with np.errstate(over="ignore"):
+            c = np.array(numbers[6:9]) / numbers[9]
+        largest = float(np.abs([*numbers, *c]).max())
+        if largest > _LARGEST:
+            raise DescriptionError(
+                f"{self.name}: its parameters, or first moments by mass, reach {largest:g};"
+                f" {_LARGEST:g} in SI units are the most; check them and their units"
+            )
         J -= numbers[9] * (c @ c * np.eye(3) - np.outer(c, c))
         check_tensor(
             self.name,

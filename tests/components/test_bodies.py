@@ -191,6 +191,8 @@ def test_grouped_bodies_are_not_checked():
             lambda: Body("arm", 1, com=(0, "1+", 0)),
             ["arm, com, y: cannot read '1+'", "write numbers"],
         ),
+        (lambda: KhalilBody("k", MX=1e200, M=1.0), ("k", "reach 1e+200", "check them")),
+        (lambda: KhalilBody("k", XX=1e200, M=1e-300), ("k", "reach 1e+200", "check them")),
         (
             lambda: KhalilBody("k", XX=1, YY=1, ZZ=1, MX=5, M=1),
             ["k: ", "negative principal moment", "give"],

@@ -21,8 +21,9 @@ OTHER_KERNELS := tests/solvers/test_shortest_steps.py tests/solvers/test_partial
     tests/identification/exciting/test_excitation.py::test_a_platform_that_follows_keeps_its_height
 
 # What needs no compiler, no browser and no long motion.
-FAST := tests/assembly tests/components tests/expressions tests/formats tests/operations \
-    tests/recursions tests/spatial tests/structure tests/view
+FAST := tests/assembly tests/components tests/formats tests/operations \
+    tests/recursions tests/spatial tests/test_expressions.py tests/structure/test_class_names.py \
+    tests/structure/test_number_reasons.py tests/view
 
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --editable
 

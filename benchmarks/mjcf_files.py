@@ -153,7 +153,7 @@ class Twin:
         total = np.zeros(self.system.nv)
         for link in self.system.tree.links:
             total[link.v] = float(link.Fs) * np.tanh(v[link.v] / float(link.Fs_width))
-        for force in self.system.forces:
+        for force in self.system.parts:
             if isinstance(force.element, FixedTendon):
                 size, width = (to_float(x) for x in (force.element.friction, force.element.width))
                 levers = {lever.velocity: float(lever.factor) for lever in force.levers}

@@ -129,7 +129,7 @@ def plain(
         R, p = placed(cut.link_a, cut.pose_a)
         axis = R @ np.array(cut.edge.joint.axis, dtype=float)
         cuts.append(PlainJoint("revolute", cut.link_a, cut.link_b, p, axis))
-    springs = tuple(_spring(force, placed) for force in system.forces)
+    springs = tuple(_spring(force, placed) for force in system.parts)
     names = [link.name for link in tree.links]
     body, local = system.frame(names.index(output) + 1 if output in names else output)
     tracked = body, placed(body, local)[1]

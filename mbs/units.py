@@ -1,12 +1,13 @@
 """Units of every quantity that mbs names: one table for documentation, results and FMUs.
 
 Everything is SI. A `Unit` carries its exponents of the base units, which is what an FMU declares,
-and a display unit where people read another one (degrees).
+and a display unit where people read another one (degrees). Products such as "kg/m" or "m3/s" are
+read from the units they are made of.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,5 +57,65 @@ _UNITS = (
     Unit("N.m/rad", {"kg": 1, "m": 2, "s": -2, "rad": -1}),
 )
 
-UNITS: Mapping[str, Unit] = MappingProxyType({unit.name: unit for unit in _UNITS})
-"""Every unit by its name."""
+_FACTORS: Mapping[str, Mapping[str, int]] = {
+    **{unit.name: unit.exponents for unit in _UNITS if unit.name.isalpha()},
+    **{name: {name: 1} for name in ("K", "mol", "cd")},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Hz": {"s": -1},
+    "Wb": {"kg": 1, "m": 2, "s": -2, "A": -1},
+    "F": {"kg": -1, "m": -2, "s": 4, "A": 2},
+    "C": {"A": 1, "s": 1},
+    "T": {"kg": 1, "s": -2, "A": -1},
+}
+"""Units of which products are made."""
+
+_FACTOR = re.compile(r"([A-Za-z]+)(\d?)")
+
+
+class _Units(Mapping[str, Unit]):
+    """Units by name: those of the table, and products such as "N.s2/m" of what is in it."""
+
+    def __init__(self, table: tuple[Unit, ...]) -> None:
+        self._known = {unit.name: unit for unit in table}
+
+    def __getitem__(self, name: str) -> Unit:
+        if name not in self._known:
+            self._known[name] = Unit(name, _exponents(name))
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter([unit.name for unit in _UNITS])
+
+    def __len__(self) -> int:
+        return len(_UNITS)
+
+
+def _exponents(name: str) -> dict[str, int]:
+    """Exponents of base units of a product such as "kg/m" or "m3/s".
+
+    Raises:
+        KeyError: it is not made of units.
+    """
+    total: dict[str, int] = {}
+    over, *under = name.split("/") if isinstance(name, str) else [""]
+    if len(under) > 1:
+        raise KeyError(name)
+    for sign, part in ((1, over), *((-1, text) for text in under)):
+        for factor in part.split("."):
+            match = _FACTOR.fullmatch(factor)
+            if factor == "1" and sign == 1:
+                continue
+            if match is None or match[1] not in _FACTORS:
+                raise KeyError(name)
+            for base, exponent in _FACTORS[match[1]].items():
+                total[base] = total.get(base, 0) + sign * exponent * int(match[2] or 1)
+    return {base: exponent for base, exponent in total.items() if exponent}
+
+
+UNITS: Mapping[str, Unit] = _Units(_UNITS)
+"""Every unit by its name; it lists those of the table, and knows their products."""
+
+
+def rate_unit(unit: str) -> str:
+    """The unit of the rate of a quantity of this unit."""
+    return f"{unit}.s" if "/" in unit else f"{unit}/s"

@@ -17,10 +17,9 @@ from copy import copy
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-import casadi
 from casadi import SX
 
-from mbs.assembly.tables import Coordinate
+from mbs.assembly.parts import as_fast, number_or_sx
 from mbs.components import (
     Component,
     Coupling,
@@ -32,7 +31,8 @@ from mbs.components import (
     ShaftInertia,
 )
 from mbs.components.bodies import Mount
-from mbs.components.drives import Device, ElasticGear, Flange, Flanged, Quantity, ShaftForce
+from mbs.components.custom import Custom, Flange
+from mbs.components.drives import ElasticGear, ShaftForce
 from mbs.components.joints import Motion
 from mbs.errors import AssemblyError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -40,7 +40,7 @@ from mbs.expressions import Expression, Number, Scalar, expression, to_float, to
 # What is refused in a drive line, and how it is said.
 
 
-def check_flanges(mechanism: Mechanism, parts: Sequence[Flanged]) -> None:
+def check_flanges(mechanism: Mechanism, parts: Sequence[Custom]) -> None:
     """Refuse flanges that are connected to nothing, or to a joint that slides.
 
     Raises:
@@ -145,7 +145,7 @@ class DriveLine:
 
     mechanism: Mechanism
     turns: Mapping[Key, FlangeTurn]
-    parts: tuple[Flanged, ...]
+    parts: tuple[Custom, ...]
     links: Mapping[str, str]
 
 
@@ -156,7 +156,7 @@ def drive_line(mechanism: Mechanism) -> DriveLine:
         AssemblyError: a flange is connected to nothing, or to one that moves otherwise; a shaft
             has no inertia; gears lock each other.
     """
-    parts = tuple(c for c in mechanism.components.values() if isinstance(c, Flanged))
+    parts = tuple(c for c in mechanism.components.values() if isinstance(c, Custom) and c.flanges)
     if not parts and not mechanism.shafts:
         return DriveLine(mechanism, {}, (), {})
     check_flanges(mechanism, parts)
@@ -170,7 +170,7 @@ def drive_line(mechanism: Mechanism) -> DriveLine:
 
 
 def _turns(
-    mechanism: Mechanism, parts: tuple[Flanged, ...]
+    mechanism: Mechanism, parts: tuple[Custom, ...]
 ) -> tuple[dict[str, Flange], dict[Key, FlangeTurn]]:
     """The flange that leads each rigid group, by the name of its coordinate, and all turns."""
     ties = _ties(mechanism, parts)
@@ -206,7 +206,7 @@ def _generic(mechanism: Mechanism) -> dict[str, float]:
     }
 
 
-def _candidates(mechanism: Mechanism, parts: tuple[Flanged, ...]) -> Iterator[tuple[str, Flange]]:
+def _candidates(mechanism: Mechanism, parts: tuple[Custom, ...]) -> Iterator[tuple[str, Flange]]:
     """Flanges whose angle may be the coordinate of a group, the best ones first."""
     used = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     joints = [joint for joint in mechanism.joints() if joint.name in used]
@@ -216,12 +216,12 @@ def _candidates(mechanism: Mechanism, parts: tuple[Flanged, ...]) -> Iterator[tu
         if isinstance(part, ShaftInertia) and part.own_inertia != _ZERO:
             yield part.name, part.flange_a
     for part in parts:
-        if isinstance(part, Device) and part.own_inertia != _ZERO:
-            yield f"{part.name}.rotor", part.flange
+        if part.drives and part.own_inertia != _ZERO:
+            yield f"{part.name}.rotor", part.flanges[0]
 
 
 def _ties(
-    mechanism: Mechanism, parts: tuple[Flanged, ...]
+    mechanism: Mechanism, parts: tuple[Custom, ...]
 ) -> dict[Key, list[tuple[Key, Expression]]]:
     """For each flange those that turn with it, and how often for one turn of it."""
     ties: dict[Key, list[tuple[Key, Expression]]] = {}
@@ -263,11 +263,11 @@ def _driven(
     mechanism: Mechanism,
     name: str,
     lead: Flange,
-    parts: Iterable[Flanged],
+    parts: Iterable[Custom],
     turns: Mapping[Key, FlangeTurn],
 ) -> Joint:
     """The joint that leads a group, with the inertias and motors of the group."""
-    devices = [part for part in parts if isinstance(part, Device)]
+    devices = [part for part in parts if part.drives]
     total: Expression = _ZERO
     for part in parts:
         factor = turns[part.flanges[0].key].factor
@@ -368,78 +368,10 @@ class ShaftRow:
         """What it is and how it turns."""
         if self.own:
             return f"{self.kind} {self.name} has a coordinate of its own, {self.coordinate}."
-        turns = f"turns {_as_fast(self.factor, self.coordinate)}"
+        turns = f"turns {as_fast(self.factor, self.coordinate)}"
         if self.kind == IdealGear.__name__:
             return f"{self.kind} {self.name} is rigid: its flange_a {turns}."
         return f"{self.kind} {self.name} {turns}, which has its inertia."
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AttachedDevice:
-    """A device that drives a shaft; z (n, 1) are its states, u (1, 1) its input.
-
-    Attributes:
-        device: its description.
-        coordinate: the coordinate that it turns.
-        velocity: number in v of this coordinate.
-        factor: speed of its flange for a unit velocity of the coordinate.
-        symbols: CasADi symbol of every parameter.
-    """
-
-    device: Device
-    coordinate: str
-    velocity: int
-    factor: SX
-    symbols: Mapping[str, SX]
-
-    @property
-    def name(self) -> str:
-        """The name of the component."""
-        return self.device.name
-
-    @property
-    def states(self) -> tuple[Quantity, ...]:
-        """Full name and unit of every state."""
-        return tuple((f"{self.name}.{state}", unit) for state, unit in self.device.states)
-
-    @property
-    def input(self) -> Quantity:
-        """Full name and unit of its input."""
-        name, unit = self.device.input
-        return f"{self.name}.{name}", unit
-
-    @property
-    def outputs(self) -> tuple[Quantity, ...]:
-        """Full name and unit of what else a result shows of it."""
-        z, u = SX.sym("z", len(self.states)), SX.sym("u")
-        shown = self.device.shown(z, u, SX.sym("w"), self.symbols)
-        return tuple((f"{self.name}.{name}", unit) for name, unit in shown)
-
-    def rate(self, z: SX, u: SX, v: SX) -> SX:
-        """(n, 1) time derivatives of its states; v (nv, 1) are the velocities."""
-        return self.device.rate(z, u, self._speed(v), self.symbols)
-
-    def effort(self, z: SX, u: SX, v: SX) -> SX:
-        """What it delivers at its coordinate [N m or N]."""
-        return self.factor * self.device.torque(z, u, self._speed(v), self.symbols)
-
-    def shown(self, z: SX, u: SX, v: SX) -> SX:
-        """The values of its outputs."""
-        return casadi.vertcat(*self.device.shown(z, u, self._speed(v), self.symbols).values())
-
-    @property
-    def sentence(self) -> str:
-        """What it is, what it drives and by which input."""
-        states = "".join(f", state {name} [{unit}]" for name, unit in self.states)
-        name, unit = self.input
-        turns = _as_fast(_number(self.factor), self.coordinate)
-        return (
-            f"{type(self.device).__name__} {self.name} drives {self.coordinate} and turns {turns}:"
-            f" input {name} [{unit}]{states}."
-        )
-
-    def _speed(self, v: SX) -> SX:
-        return self.factor * v[self.velocity]
 
 
 def shaft_rows(line: DriveLine, symbols: Mapping[str, SX]) -> tuple[ShaftRow, ...]:
@@ -449,31 +381,6 @@ def shaft_rows(line: DriveLine, symbols: Mapping[str, SX]) -> tuple[ShaftRow, ..
         turn = line.turns[part.flanges[0].key]
         own = line.links.get(turn.coordinate) == part.name
         if own or isinstance(part, (ShaftInertia, IdealGear)):
-            factor = _number(to_sx(turn.factor, symbols))
+            factor = number_or_sx(to_sx(turn.factor, symbols))
             rows.append(ShaftRow(part.name, type(part).__name__, turn.coordinate, own, factor))
     return tuple(rows)
-
-
-def attached_devices(
-    line: DriveLine, speeds: Sequence[Coordinate], symbols: Mapping[str, SX]
-) -> tuple[AttachedDevice, ...]:
-    """Every device with the coordinate that it turns, in the order added."""
-    numbers = {speed.name: number for number, speed in enumerate(speeds)}
-    rows = []
-    for part in line.parts:
-        if isinstance(part, Device):
-            turn = line.turns[part.flange.key]
-            where = turn.coordinate, numbers[turn.coordinate]
-            rows.append(AttachedDevice(part, *where, to_sx(turn.factor, symbols), symbols))
-    return tuple(rows)
-
-
-def _number(factor: SX) -> float | SX:
-    return float(factor) if factor.is_constant() else factor
-
-
-def _as_fast(factor: float | SX, coordinate: str) -> str:
-    if isinstance(factor, float) and factor == 1:
-        return f"with {coordinate}"
-    text = format(factor, "g") if isinstance(factor, float) else str(factor)
-    return f"{text} times as fast as {coordinate}"

@@ -35,9 +35,9 @@ _QUANTITIES = {
     "a": "acceleration",
     "tau": "effort",
     "p": "parameter",
-    "z": "state of a device",
-    "u": "input of a device",
-    "y": "output of a device",
+    "z": "state",
+    "u": "input",
+    "y": "output",
 }
 
 
@@ -465,8 +465,9 @@ def model_function(
 
     def make() -> Function:
         inputs, outputs, *between = build()
-        every = [*inputs, *([("p", system.p)] if system.parameters else [])]
-        options: dict[str, Any] = {"cse": True, "default_in": default_in(system, len(inputs))}
+        every = [*inputs, *signals_in(system, inputs, outputs)]
+        options: dict[str, Any] = {"cse": True, "default_in": default_in(system, len(every))}
+        every += [("p", system.p)] if system.parameters else []
 
         def function(results: Named) -> Function:
             values = [casadi.densify(value) for _, value in results]
@@ -478,6 +479,24 @@ def model_function(
 
     function: Function = system.cached(key, make)
     return function
+
+
+def signals_in(system: System, inputs: Named, outputs: Named) -> Named:
+    """The states z and inputs u of components, where they are no inputs yet and outputs need them.
+
+    Args:
+        system: whose components they are.
+        inputs: named ones of a model.
+        outputs: likewise.
+    """
+    given = {name for name, _ in inputs}
+    found = [("z", system.z), ("u", system.u)]
+    needed = casadi.veccat(*(value for _, value in outputs))
+    return [
+        (name, symbols)
+        for name, symbols in found
+        if name not in given and symbols.numel() and casadi.depends_on(needed, symbols)
+    ]
 
 
 def default_in(system: System, others: int) -> list[float]:
@@ -513,7 +532,5 @@ def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
         result[name] = every
         result[f"{name}_a"] = [every[k] for k in system.active]
     result["tau_m"] = [result["tau"][k] for k in system.motors]
-    result["z"] = [state for device in system.devices for state in device.states]
-    result["u"] = [device.input for device in system.devices]
-    result["y"] = [output for device in system.devices for output in device.outputs]
+    result |= {"z": list(system.states), "u": list(system.inputs), "y": list(system.outputs)}
     return result

@@ -7,10 +7,11 @@ from collections.abc import Collection, Mapping, Sequence
 import casadi
 from casadi import SX
 
-from mbs.assembly.drive_line import attached_devices, drive_line, shaft_rows
+from mbs.assembly.drive_line import drive_line, shaft_rows
 from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
 from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
+from mbs.assembly.parts import attached_parts, coordinates_needed, symbols_in_order
 from mbs.assembly.proof import prove
 from mbs.assembly.system import System
 from mbs.assembly.tables import (
@@ -20,9 +21,7 @@ from mbs.assembly.tables import (
     LoopRow,
     Places,
     ShapeRow,
-    attached_forces,
     attached_sensors,
-    force_elements,
     joint_rows,
     position_coordinates,
     velocity_coordinates,
@@ -56,11 +55,10 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
     coupled = [name for c in mechanism.couplings() for name in c.coordinates]
-    pushed = [name for force in force_elements(mechanism) for name, _ in force.levers]
     spanning = spanning_tree(
         mechanism.name,
         graph,
-        need=_owners(mechanism, (*coupled, *pushed)),
+        need=_owners(mechanism, (*coupled, *coordinates_needed(mechanism))),
         keep=_owners(mechanism, guessed),
         cut=mechanism.cuts,
         given_order=mechanism.keep_order,
@@ -81,6 +79,9 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     cut = _cut_coordinates(framed.cuts)
     frames = _frames(mechanism, places, symbols)
     joints_found = joint_rows(mechanism, places, framed.cuts, symbols)
+    tables = coordinates, speeds, cut
+    sensors = attached_sensors(mechanism, places, joints_found, tables, symbols)
+    parts = attached_parts(mechanism, places, tables, symbols, line.turns, sensors)
     return System(
         name=mechanism.name,
         source=mechanism.source,
@@ -101,13 +102,14 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         numbered=_numbered(mechanism, frames, len(framed.tree.links)),
         loops=_loop_rows(mechanism, framed),
         configuration=tuple(zero_position(framed.tree)),
-        forces=attached_forces(mechanism, places, (coordinates, speeds, cut), symbols),
-        joints=joints_found,
-        sensors=attached_sensors(
-            mechanism, places, joints_found, (coordinates, speeds, cut), symbols
+        parts=parts,
+        z=symbols_in_order(symbol for part in parts for symbol in part.states.values()),
+        u=symbols_in_order(
+            given for part in parts for given in part.inputs.values() if isinstance(given, SX)
         ),
+        joints=joints_found,
+        sensors=sensors,
         shafts=shaft_rows(line, symbols),
-        devices=attached_devices(line, speeds, symbols),
         shapes=_shapes(mechanism, places, symbols),
     )
 

@@ -14,11 +14,11 @@ import casadi
 import numpy as np
 from casadi import DM, SX, Function
 
-from mbs.assembly.drive_line import AttachedDevice, ShaftRow
+from mbs.assembly.drive_line import ShaftRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.parameter_bounds import BoundedField, Bounds
+from mbs.assembly.parts import AttachedPart, Quantity
 from mbs.assembly.tables import (
-    AttachedForce,
     AttachedSensor,
     BodyRow,
     Closure,
@@ -171,7 +171,7 @@ def _acting(system: System) -> list[str]:
     driving = {device.name for device in system.devices}
     return [
         *(row.sentence for row in system.shafts if row.name not in driving),
-        *(force.sentence for force in system.forces),
+        *(part.sentence for part in system.parts if not part.element.drives),
         *(device.sentence for device in system.devices),
         *(sensor.sentence for sensor in system.sensors),
     ]
@@ -207,11 +207,12 @@ class System:
         loops: one row for each loop or coupling.
         configuration: a position q that closes the loops, or all zero.
         closure: how the loops constrain velocities; None for an open chain.
-        forces: springs, dampers and other force elements.
+        parts: force elements, drives and all other components by their equations.
         joints: every joint and constraint, those of the tree and those that were cut.
         sensors: what reads the motion and changes nothing.
         shafts: inertias and rigid gears of drive lines, and the coordinates that they turn with.
-        devices: motors and torques that drive shafts, with states and inputs of their own.
+        z: (nz, 1) symbols of the states of parts.
+        u: (nu, 1) symbols of the inputs of parts.
         bounds: least and greatest value of the parameters that have one, by name.
         bounded: what is computed from parameters and has bounds.
         described: the components that hold parameters, as they were described.
@@ -236,11 +237,12 @@ class System:
     loops: tuple[LoopRow, ...]
     configuration: tuple[float, ...]
     closure: Closure | None = None
-    forces: tuple[AttachedForce, ...] = ()
+    parts: tuple[AttachedPart, ...] = ()
     joints: tuple[JointRow, ...] = ()
     sensors: tuple[AttachedSensor, ...] = ()
     shafts: tuple[ShaftRow, ...] = ()
-    devices: tuple[AttachedDevice, ...] = ()
+    z: SX = field(default_factory=lambda: SX(0, 1))
+    u: SX = field(default_factory=lambda: SX(0, 1))
     bounds: Mapping[str, Bounds] = field(default_factory=dict)
     bounded: tuple[BoundedField, ...] = ()
     described: tuple[Component, ...] = ()
@@ -267,6 +269,41 @@ class System:
     def nv(self) -> int:
         """Number of velocities."""
         return self.tree.nv
+
+    @property
+    def devices(self) -> tuple[AttachedPart, ...]:
+        """The motors and torques that drive shafts."""
+        return tuple(part for part in self.parts if part.element.drives)
+
+    @property
+    def states(self) -> tuple[Quantity, ...]:
+        """Name and unit of the elements of z, the states of parts."""
+        return tuple(row for part in self.parts for row in part.state_quantities)
+
+    @property
+    def inputs(self) -> tuple[Quantity, ...]:
+        """Name and unit of the elements of u, the inputs of parts."""
+        return tuple(row for part in self.parts for row in part.input_quantities)
+
+    @property
+    def outputs(self) -> tuple[Quantity, ...]:
+        """Name and unit of what parts show: forces, speeds and other outputs."""
+        return tuple(row for part in self.parts for row in part.output_quantities)
+
+    @property
+    def z_start(self) -> list[float]:
+        """The starts of z that the components have."""
+        return [getattr(part.element, name) for part in self.parts for name in part.states]
+
+    @property
+    def u_default(self) -> list[float]:
+        """The values of u where nothing gives them."""
+        return [
+            float(part.element.declared[name].default)
+            for part in self.parts
+            for name, given in part.inputs.items()
+            if isinstance(given, SX)
+        ]
 
     @property
     def links(self) -> tuple[LinkRow, ...]:

@@ -10,11 +10,11 @@ from mbs.components.constraints import (
     RollingDisc,
 )
 from mbs.components.couplings import Coupling, Gear, RackAndPinion, Screw
+from mbs.components.custom import Custom, Flange
 from mbs.components.drives import (
     DCMotor,
     ElasticGear,
     ElasticShaft,
-    Flange,
     IdealGear,
     ShaftDamper,
     ShaftInertia,
@@ -69,6 +69,7 @@ __all__ = [
     "ConstantVelocity",
     "CoulombFriction",
     "Coupling",
+    "Custom",
     "Cylinder",
     "Cylindrical",
     "DCMotor",

@@ -12,7 +12,9 @@ from typing import Any
 
 from casadi import SX
 
-from mbs.components.component import Component, SymbolTable
+from mbs.components import custom
+from mbs.components.component import Component
+from mbs.components.custom import Custom, Flange, Load
 from mbs.components.forces import CoordinateForce
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -20,74 +22,18 @@ from mbs.text import quoted
 
 
 @dataclass(frozen=True, slots=True)
-class Flange:
-    """An end of a shaft that another one can be connected to.
-
-    Attributes:
-        owner: the component that it belongs to: a part of a drive line, or a joint.
-        port: which flange of it, "a" or "b"; nothing where there is only one.
-    """
-
-    owner: Component
-    port: str = ""
-
-    @property
-    def key(self) -> tuple[str, str]:
-        """The name of its component, and which flange of it."""
-        return self.owner.name, self.port
-
-    def __str__(self) -> str:
-        return f"{self.owner.name}.flange{'_' if self.port else ''}{self.port}"
-
-
-@dataclass(frozen=True, slots=True)
-class Flanged(Component):
-    """A part of a drive line: it turns, or acts on what turns, but has no place in space."""
-
-    @property
-    def flanges(self) -> tuple[Flange, ...]:
-        """All its flanges."""
-        raise NotImplementedError
-
-    @property
-    def own_inertia(self) -> Expression:
-        """Inertia that it adds to its shaft [kg m^2]."""
-        return Number(0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class OneFlange(Flanged):
+class OneFlange(Custom):
     """A part at one place of a shaft."""
 
-    @property
-    def flange(self) -> Flange:
-        """Its flange."""
-        return Flange(self)
-
-    @property
-    def flanges(self) -> tuple[Flange, ...]:
-        """The flange alone."""
-        return (self.flange,)
+    flange = custom.flange()
 
 
 @dataclass(frozen=True, slots=True)
-class TwoFlanges(Flanged):
-    """A part between two shafts, or between the ends of one."""
+class TwoFlanges(Custom):
+    """A part between two shafts, or between the ends of one; of a gear a turns `ratio` times b."""
 
-    @property
-    def flange_a(self) -> Flange:
-        """One flange; of a gear the one that turns `ratio` times as much."""
-        return Flange(self, "a")
-
-    @property
-    def flange_b(self) -> Flange:
-        """The other flange."""
-        return Flange(self, "b")
-
-    @property
-    def flanges(self) -> tuple[Flange, ...]:
-        """The two."""
-        return self.flange_a, self.flange_b
+    flange_a = custom.flange()
+    flange_b = custom.flange()
 
 
 def flange_pair(where: str, *given: Any) -> tuple[Flange, Flange]:
@@ -122,6 +68,8 @@ class ShaftInertia(TwoFlanges):
         inertia: about the axis of the shaft [kg m^2].
     """
 
+    lowered = True
+
     inertia: Scalar
 
     def __post_init__(self) -> None:
@@ -144,6 +92,7 @@ class IdealGear(TwoFlanges):
             prismatic joint; less than zero when they turn in opposite ways.
     """
 
+    lowered = True
     ratio: Scalar
 
     def __post_init__(self) -> None:
@@ -171,52 +120,32 @@ def check_ratio(name: str, ratio: Scalar) -> None:
 # What drives a drive line: torques that follow from an input and from states of their own.
 
 
-Quantity = tuple[str, str]
-"""A name inside the device, and its unit."""
-
-
 @dataclass(frozen=True, slots=True)
 class Device(OneFlange):
-    """A device that turns a shaft; z are its states, u its input, w the speed of the shaft."""
+    """A motor: it turns its shaft, and the efforts tau of models have what it delivers.
 
-    @property
-    def input(self) -> Quantity:
-        """What it is driven by."""
-        raise NotImplementedError
+    A class of a user's own drives a shaft where it derives from this one and its `loads` are
+    those of the port "flange".
+    """
 
-    @property
-    def states(self) -> tuple[Quantity, ...]:
-        """Its own states, such as a current."""
-        return ()
-
-    def rate(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> SX:
-        """Time derivatives of its states, as many as there are."""
-        return SX(0, 1)
-
-    def torque(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> SX:
-        """What it turns the shaft with [N m]."""
-        raise NotImplementedError
-
-    def shown(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> dict[Quantity, SX]:
-        """What a result has of it, beside its input and its states."""
-        return {("w", "rad/s"): w}
+    drives = True
 
 
-@dataclass(frozen=True, slots=True)
 class TorqueSource(Device):
     """A given torque on a shaft: the input `tau` [N m]."""
 
-    @property
-    def input(self) -> Quantity:
-        """The torque."""
-        return "tau", "N.m"
+    tau = custom.input("N.m")
+    w = custom.output("rad/s")
 
-    def torque(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> SX:
+    def loads(self, at: Any) -> Mapping[str, Load]:
         """The input."""
-        return u
+        return {"flange": at.tau}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The speed of the shaft."""
+        return {"w": at.flange.speed}
 
 
-@dataclass(frozen=True, slots=True)
 class DCMotor(Device):
     """A motor with permanent magnets: the input is its voltage, its torque follows the current.
 
@@ -231,73 +160,58 @@ class DCMotor(Device):
         inertia: of the rotor [kg m^2].
     """
 
-    resistance: Scalar
-    inductance: Scalar
-    constant: Scalar
-    inertia: Scalar = 0.0
-
-    def __post_init__(self) -> None:
-        Component.__post_init__(self)
-        self._normalise("resistance", "inductance", "constant", "inertia")
-        for name in ("resistance", "constant"):
-            value = to_float(getattr(self, name))
-            if value is not None and value <= 0:
-                raise DescriptionError(f"{self.name}: {name} is {value:g}; give more than zero")
-        value = to_float(self.inductance)
-        if value is not None and value < 0:
-            raise DescriptionError(f"{self.name}: inductance is {value:g} H; give zero or more")
-        check_inertia(self.name, self.inertia)
+    resistance = custom.parameter("ohm", positive=True)
+    inductance = custom.parameter("H", min=0)
+    constant = custom.parameter("N.m/A", positive=True)
+    inertia = custom.parameter("kg.m2", 0.0, min=0)
+    voltage = custom.input("V")
+    i = custom.state("A")
+    tau = custom.output("N.m")
+    w = custom.output("rad/s")
 
     def check_values(self, values: Mapping[str, float]) -> None:
         """Refuse values that the motor itself would refuse, and a symbol of no inductance."""
         Component.check_values(self, values)
-        if self.states and to_float(self.inductance, values) == 0:
+        if self.state_names and to_float(self.inductance, values) == 0:
             raise DescriptionError(
                 f"{self.name}: inductance is {self.inductance}, which has the value 0, but a"
                 " current that is a state needs more; give it one, or write the number 0 for none"
             )
 
     @property
-    def input(self) -> Quantity:
-        """The voltage at its terminals."""
-        return "voltage", "V"
-
-    @property
-    def states(self) -> tuple[Quantity, ...]:
-        """The current, unless there is no inductance."""
-        return () if self.inductance == Number(0.0) else (("i", "A"),)
-
-    @property
     def own_inertia(self) -> Expression:
         """That of the rotor."""
         return expression(self.inertia)
 
-    def rate(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> SX:
-        """Of the current."""
-        if not self.states:
-            return SX(0, 1)
-        left = self._left(u, w, symbols) - to_sx(self.resistance, symbols) * z
-        return left / to_sx(self.inductance, symbols)
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The current, unless there is no inductance."""
+        return () if self.inductance == Number(0.0) else ("i",)
 
-    def torque(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> SX:
-        """In proportion to the current."""
-        return to_sx(self.constant, symbols) * self._current(z, u, w, symbols)
-
-    def shown(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> dict[Quantity, SX]:
+    @property
+    def output_names(self) -> tuple[str, ...]:
         """Torque and speed, and the current where it is no state."""
-        current = {} if self.states else {("i", "A"): self._current(z, u, w, symbols)}
-        return {
-            **current,
-            ("tau", "N.m"): self.torque(z, u, w, symbols),
-            ("w", "rad/s"): w,
-        }
+        return ("tau", "w") if self.state_names else ("i", "tau", "w")
 
-    def _current(self, z: SX, u: SX, w: SX, symbols: SymbolTable) -> SX:
-        return z if self.states else self._left(u, w, symbols) / to_sx(self.resistance, symbols)
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Of the current."""
+        left = at.voltage - at.constant * at.flange.speed - at.resistance * at.i
+        return {"i": left / at.inductance} if self.state_names else {}
 
-    def _left(self, u: SX, w: SX, symbols: SymbolTable) -> SX:
-        """What the induced voltage leaves of the voltage."""
-        return u - to_sx(self.constant, symbols) * w
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """In proportion to the current."""
+        return {"flange": at.constant * self._current(at)}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it delivers, and how fast it turns."""
+        i = self._current(at)
+        values = {"i": i, "tau": at.constant * i, "w": at.flange.speed}
+        return {name: values[name] for name in self.output_names}
+
+    def _current(self, at: Any) -> SX:
+        if self.state_names:
+            return SX(at.i)
+        return SX((at.voltage - at.constant * at.flange.speed) / at.resistance)
 
 
 # Elastic and damping parts of a drive line: forces on the coordinates of its shafts.
@@ -313,15 +227,26 @@ class ShaftForce(CoordinateForce):
 
     levers: tuple[tuple[str, Scalar], ...] = field(default=(), kw_only=True, repr=False)
 
+    torque = custom.output("N.m")
+
     @property
     def shares(self) -> Iterable[tuple[Flange, Expression]]:
         """What every flange contributes to x for a unit of its angle."""
         raise NotImplementedError
 
     @property
+    def shaft_ports(self) -> tuple[str, ...]:
+        """None beside x."""
+        return ()
+
+    @property
     def needs_position(self) -> bool:
         """A twist is one of positions."""
         return True
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it needs to be twisted."""
+        return {"torque": self.resistance(at)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,15 +274,14 @@ class ElasticShaft(ShaftForce, TwoFlanges):
         """The difference of the two angles."""
         return (self.flange_a, Number(1.0)), (self.flange_b, Number(-1.0))
 
-    def effort(self, x: SX | None, rate: SX, symbols: SymbolTable) -> SX:
+    def resistance(self, at: Any) -> SX:
         """The torque that twists it."""
-        assert x is not None
-        return to_sx(self.stiffness, symbols) * x + to_sx(self.damping, symbols) * rate
+        stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
+        return SX(stiffness * at.x.q + damping * at.x.v)
 
-    def energy(self, x: SX | None, symbols: SymbolTable) -> SX:
+    def energy(self, at: Any) -> SX:
         """What its twist stores."""
-        assert x is not None
-        return 0.5 * to_sx(self.stiffness, symbols) * x**2
+        return SX(0.5 * to_sx(self.stiffness, at.symbols) * at.x.q**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -407,10 +331,10 @@ class ShaftDamper(ShaftForce, OneFlange):
         """The angle of its flange."""
         return ((self.flange, Number(1.0)),)
 
-    def effort(self, x: SX | None, rate: SX, symbols: SymbolTable) -> SX:
+    def resistance(self, at: Any) -> SX:
         """The torque that the bearing takes."""
-        return to_sx(self.damping, symbols) * rate
+        return SX(to_sx(self.damping, at.symbols) * at.x.v)
 
-    def energy(self, x: SX | None, symbols: SymbolTable) -> SX:
-        """A bearing stores nothing."""
-        return SX(0)
+    def dissipation(self, at: Any) -> SX:
+        """All its power."""
+        return SX(self.resistance(at) * at.x.v)

@@ -6,96 +6,29 @@ law is written once, on CasADi scalars; the recursions know where its points are
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import casadi
 from casadi import SX
 
+from mbs.components import custom
 from mbs.components.bodies import three
 from mbs.components.component import Component, Point, SymbolTable, named_scalars
-from mbs.components.on_points import OnPair, OnPoints
+from mbs.components.custom import Custom, Load, RelativeMotion
+from mbs.components.on_points import OnPair
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
-from mbs.spatial import cross, vector, zeros
+from mbs.spatial import cross, vector
 from mbs.text import quoted
 
 J = TypeVar("J", bound="JointForce")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RelativeMotion:
-    """How a frame b moves, seen from a frame a and in its axes.
-
-    Attributes:
-        p: (3, 1) origin of b [m].
-        R: (3, 3) orientation of b.
-        V: (3, 1) rate of p [m/s].
-        w: (3, 1) angular velocity of b relative to a [rad/s].
-    """
-
-    p: SX
-    R: SX
-    V: SX
-    w: SX
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pull:
-    """What an element between the frames a and b does to the body of a, in the axes of a.
-
-    The body of b gets the opposite force at its origin.
-
-    Attributes:
-        force: (3, 1) on a [N].
-        moment_a: (3, 1) on a about the origin of a [N m].
-        moment_b: (3, 1) on b about the origin of b [N m].
-    """
-
-    force: SX
-    moment_a: SX
-    moment_b: SX
-
-
 @dataclass(frozen=True, slots=True)
-class ForceElement(OnPoints):
+class ForceElement(Custom):
     """A component that acts on others without constraining them."""
-
-    @property
-    def levers(self) -> tuple[tuple[str, Scalar], ...]:
-        """The joint coordinates that it acts on, and how much of each; none for one on points."""
-        return ()
-
-    @property
-    def scope(self) -> str:
-        """Where it counts, in words; nothing for an element of all models."""
-        return ""
-
-    def _require_magnitudes(self, *names: str) -> None:
-        """Refuse numbers below zero in these fields."""
-        for name in names:
-            given = getattr(self, name)
-            for scalar in given if isinstance(given, tuple) else (given,):
-                value = to_float(scalar)
-                if value is not None and value < 0:
-                    raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
-
-    def _require_positive(self, *names: str) -> None:
-        """Refuse zero and numbers below it in these fields."""
-        for name in names:
-            value = to_float(getattr(self, name))
-            if value is not None and value <= 0:
-                raise DescriptionError(f"{self.name}: {name} is {value:g}; give more than zero")
-
-    def _require_effect(self, *names: str) -> None:
-        """Refuse an element all of whose strengths are zero."""
-        values = [getattr(self, name) for name in names]
-        flat = [v for value in values for v in (value if isinstance(value, tuple) else (value,))]
-        if all(value == Number(0.0) for value in flat):
-            raise DescriptionError(
-                f"{self.name}: {' and '.join(names)} {'are' if len(names) > 1 else 'is'} zero, so"
-                f" that the {type(self).__name__} does nothing; give a strength or leave it out"
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,31 +39,33 @@ class PairForce(OnPair, ForceElement):
         a, b: the points, or bodies for their reference frames.
     """
 
-    def pull(self, motion: RelativeMotion, symbols: SymbolTable) -> Pull:
-        """What it does to the body of a."""
-        raise NotImplementedError
-
-    def energy(self, motion: RelativeMotion, symbols: SymbolTable) -> SX:
-        """Elastic energy stored in it [J]."""
-        raise NotImplementedError
+    @property
+    def frames(self) -> Mapping[str, Point]:
+        """The two points."""
+        return {"a": self.a, "b": self.b}
 
 
 @dataclass(frozen=True, slots=True)
 class CoordinateForce(ForceElement):
     """An element that acts on x, the sum of some joint coordinates, each times its lever."""
 
-    def effort(self, x: SX | None, rate: SX, symbols: SymbolTable) -> SX:
-        """What x needs of effort to overcome it [N m or N]; every coordinate its lever times it."""
-        raise NotImplementedError
-
-    def energy(self, x: SX | None, symbols: SymbolTable) -> SX:
-        """Elastic energy stored in it [J]."""
+    @property
+    def levers(self) -> tuple[tuple[str, Scalar], ...]:
+        """The joint coordinates that it acts on, and how much of each."""
         raise NotImplementedError
 
     @property
-    def needs_position(self) -> bool:
-        """Whether the coordinates must be positions, which those of a ball joint are not."""
-        return False
+    def coordinates(self) -> Mapping[str, tuple[tuple[str, Scalar], ...]]:
+        """Those of `levers`, as the port x."""
+        return {"x": self.levers}
+
+    def resistance(self, at: Any) -> SX:
+        """What at.x needs of effort to overcome it [N m or N]."""
+        raise NotImplementedError
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The opposite of what x needs; every coordinate gets its lever times it."""
+        return {"x": -self.resistance(at)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,22 +127,13 @@ class PointSource(ForceElement):
     point: Any
 
     @property
-    def points(self) -> tuple[Point, ...]:
+    def frames(self) -> Mapping[str, Point]:
         """The one point."""
-        return (self.point,)
+        return {"point": self.point}
 
     @property
     def follows(self) -> bool:
         """Whether its direction turns with the body."""
-        raise NotImplementedError
-
-    def wrench(self, R: SX, symbols: SymbolTable) -> tuple[SX, SX]:
-        """Force and moment on the body about the point, in its axes.
-
-        Args:
-            R: (3, 3) orientation of the point's frame in the world.
-            symbols: CasADi symbol of every parameter.
-        """
         raise NotImplementedError
 
     def _settle(self, name: str) -> None:
@@ -244,9 +170,9 @@ class Force(PointSource):
         """Whether its direction turns with the body."""
         return self.axes == "body"
 
-    def wrench(self, R: SX, symbols: SymbolTable) -> tuple[SX, SX]:
+    def loads(self, at: Any) -> Mapping[str, Load]:
         """The force, without a moment about its point."""
-        return _turned(self.force, self.follows, R, symbols), zeros()
+        return {"point": custom.force(_turned(self.force, self.follows, at), own_axes=True)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,23 +195,19 @@ class Torque(PointSource):
         """Whether its direction turns with the body."""
         return self.axes == "body"
 
-    def wrench(self, R: SX, symbols: SymbolTable) -> tuple[SX, SX]:
+    def loads(self, at: Any) -> Mapping[str, Load]:
         """The torque alone."""
-        return zeros(), _turned(self.torque, self.follows, R, symbols)
+        return {"point": custom.torque(_turned(self.torque, self.follows, at), own_axes=True)}
 
 
-def _turned(components: tuple[Expression, ...], follows: bool, R: SX, symbols: SymbolTable) -> SX:
-    value = vector(to_sx(component, symbols) for component in components)
-    return value if follows else casadi.densify(casadi.mtimes(R.T, value))
+def _turned(components: tuple[Expression, ...], follows: bool, at: Any) -> SX:
+    value = vector(to_sx(component, at.symbols) for component in components)
+    return value if follows else casadi.densify(casadi.mtimes(at.point.R.T, value))
 
 
 # Forces along the line between two points: springs, dampers, attraction of two masses.
 #
 # Source: Haug 1989 for translational springs, dampers and actuators.
-
-
-SHORTEST = 1e-12
-"""Length [m] that is added to every distance as the root of a sum of squares."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,6 +218,8 @@ class LineForce(PairForce):
     direction is not defined, and the force is zero there instead of not a number.
     """
 
+    force = custom.output("N")
+
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
         """Force that draws the points together [N] at this distance [m] and rate [m/s]."""
         raise NotImplementedError
@@ -304,21 +228,21 @@ class LineForce(PairForce):
         """Energy [J] whose slope in the distance is the tension at rest."""
         raise NotImplementedError
 
-    def pull(self, motion: RelativeMotion, symbols: SymbolTable) -> Pull:
-        """The tension, towards b."""
-        length = regular_length(motion.p)
-        along = motion.p / length
-        rate = casadi.dot(along, motion.V)
-        return Pull(along * self.tension(length, rate, symbols), zeros(), zeros())
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The tension, each point towards the other."""
+        return custom.pull(at.a, at.b, self._tension(at))
 
-    def energy(self, motion: RelativeMotion, symbols: SymbolTable) -> SX:
+    def energy(self, at: Any) -> SX:
         """The potential of the distance."""
-        return self.potential(regular_length(motion.p), symbols)
+        return self.potential(at.a.to(at.b).length, at.symbols)
 
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension."""
+        return {"force": self._tension(at)}
 
-def regular_length(p: SX) -> SX:
-    """Length of a vector (3, 1), regular where it is zero."""
-    return casadi.sqrt(casadi.dot(p, p) + SHORTEST**2)
+    def _tension(self, at: Any) -> SX:
+        motion = at.a.to(at.b)
+        return self.tension(motion.length, motion.rate, at.symbols)
 
 
 @dataclass(frozen=True, slots=True)
@@ -430,6 +354,13 @@ class Bushing(PairForce):
         angular_damping: [N m s/rad], likewise.
     """
 
+    force_x = custom.output("N")
+    force_y = custom.output("N")
+    force_z = custom.output("N")
+    moment_x = custom.output("N.m")
+    moment_y = custom.output("N.m")
+    moment_z = custom.output("N.m")
+
     stiffness: Any = 0.0
     damping: Any = 0.0
     angular_stiffness: Any = 0.0
@@ -445,22 +376,35 @@ class Bushing(PairForce):
         self._require_magnitudes(*_STRENGTHS)
         self._require_effect(*_STRENGTHS)
 
-    def pull(self, motion: RelativeMotion, symbols: SymbolTable) -> Pull:
+    def loads(self, at: Any) -> Mapping[str, Load]:
         """Force and moment at the origin of b, carried to the origin of a."""
+        motion, force, moment = self._at_b(at)
+        on_a = custom.FrameLoad(force, moment + cross(motion.p, force))
+        return custom.between(at.a, at.b, on_a, -moment)
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The force on a at the origin of b, and the moment about it, in axes of a."""
+        _, force, moment = self._at_b(at)
+        values = (*casadi.vertsplit(force), *casadi.vertsplit(moment))
+        return dict(zip(self.output_names, values, strict=True))
+
+    def _at_b(self, at: Any) -> tuple[RelativeMotion, SX, SX]:
+        motion, symbols = at.a.to(at.b), at.symbols
         half, cosine = _half_turn(motion.R)
         w = motion.w
         rate = cosine * w + cross(w, half)
         force = self._sum("stiffness", motion.p, "damping", motion.V, symbols)
         torque = self._sum("angular_stiffness", 2 * half, "angular_damping", rate, symbols)
         moment = cosine * torque + cross(half, torque)
-        return Pull(force, moment + cross(motion.p, force), -moment)
+        return motion, force, moment
 
-    def energy(self, motion: RelativeMotion, symbols: SymbolTable) -> SX:
+    def energy(self, at: Any) -> SX:
         """The energy p' K p / 2 + phi' K_phi phi / 2."""
+        motion = at.a.to(at.b)
         half, _ = _half_turn(motion.R)
         total = SX(0)
         for name, x in (("stiffness", motion.p), ("angular_stiffness", 2 * half)):
-            total += 0.5 * casadi.dot(x, self._vector(name, symbols) * x)
+            total += 0.5 * casadi.dot(x, self._vector(name, at.symbols) * x)
         return total
 
     def _sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
@@ -520,6 +464,8 @@ class JointStop(JointForce):
     damping: Scalar = 0.0
     width: Scalar
 
+    effort = custom.output(custom.EFFORT)
+
     def __post_init__(self) -> None:
         JointForce.__post_init__(self)
         self._take_limits()
@@ -532,24 +478,27 @@ class JointStop(JointForce):
         """A limit is one of a position."""
         return True
 
-    def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it does to the joint."""
+        return {"effort": -self.resistance(at)}
+
+    def resistance(self, at: Any) -> SX:
         """Stiffness times the depth, and damping where the stop is touched."""
-        stiffness, damping = to_sx(self.stiffness, symbols), to_sx(self.damping, symbols)
+        stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         total = SX(0)
-        for sign, depth, width in self._sides(q, symbols):
+        for sign, depth, width in self._sides(at.x.q, at.symbols):
             share, ramp, _ = _ramp(depth, width)
-            total += sign * stiffness * ramp + damping * share * v
+            total += sign * stiffness * ramp + damping * share * at.x.v
         return total
 
-    def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
+    def energy(self, at: Any) -> SX:
         """What the stops store."""
-        stiffness = to_sx(self.stiffness, symbols)
-        areas = (_ramp(depth, width)[2] for _, depth, width in self._sides(q, symbols))
+        stiffness = to_sx(self.stiffness, at.symbols)
+        areas = (_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols))
         return stiffness * sum(areas, SX(0))
 
-    def _sides(self, q: SX | None, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
+    def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
         """Direction, depth beyond the limit and width of every stop."""
-        assert q is not None
         width = to_sx(self.width, symbols)
         sides = []
         if self.upper is not None:
@@ -594,6 +543,8 @@ class JointFriction(JointForce):
     viscous: Scalar = 0.0
     width: Scalar = 1e-3
 
+    effort = custom.output(custom.EFFORT)
+
     def __post_init__(self) -> None:
         JointForce.__post_init__(self)
         self._normalise("coulomb", "stribeck", "velocity", "viscous", "width")
@@ -601,18 +552,23 @@ class JointFriction(JointForce):
         self._require_positive("velocity", "width")
         self._require_effect("coulomb", "stribeck", "viscous")
 
-    def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it does to the joint."""
+        return {"effort": -self.resistance(at)}
+
+    def resistance(self, at: Any) -> SX:
         """Coulomb friction that falls from rest to sliding, and viscous friction."""
+        v, symbols = at.x.v, at.symbols
         dry = to_sx(self.coulomb, symbols)
         if self.stribeck != Number(0.0):
             falling = casadi.exp(-((v / to_sx(self.velocity, symbols)) ** 2))
             dry = dry + to_sx(self.stribeck, symbols) * falling
-        total = to_sx(self.viscous, symbols) * v
+        total: SX = to_sx(self.viscous, symbols) * v
         return total + dry * smooth_sign(v, to_sx(self.width, symbols))
 
-    def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
-        """Friction stores nothing."""
-        return SX(0)
+    def dissipation(self, at: Any) -> SX:
+        """All its power."""
+        return SX(self.resistance(at) * at.x.v)
 
 
 # Tendons that are led over joints without a path in space.
@@ -640,6 +596,8 @@ class FixedTendon(CoordinateForce):
     damping: Scalar = 0.0
     friction: Scalar = 0.0
     width: Scalar = 1e-3
+
+    tension = custom.output("N")
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
@@ -673,9 +631,9 @@ class FixedTendon(CoordinateForce):
         inner = Component.scoped(self, prefix)
         return replace(inner, levers=tuple((f"{prefix}.{n}", c) for n, c in inner.levers))
 
-    def effort(self, x: SX | None, rate: SX, symbols: SymbolTable) -> SX:
+    def resistance(self, at: Any) -> SX:
         """The tension."""
-        assert x is not None
+        x, rate, symbols = at.x.q, at.x.v, at.symbols
         total = to_sx(self.stiffness, symbols) * self._stretch(x, symbols)
         total += to_sx(self.damping, symbols) * rate
         if self.friction != Number(0.0):
@@ -683,10 +641,13 @@ class FixedTendon(CoordinateForce):
             total += to_sx(self.friction, symbols) * smooth_sign(rate, width)
         return total
 
-    def energy(self, x: SX | None, symbols: SymbolTable) -> SX:
+    def energy(self, at: Any) -> SX:
         """Half the stiffness times the square of the stretch."""
-        assert x is not None
-        return 0.5 * to_sx(self.stiffness, symbols) * self._stretch(x, symbols) ** 2
+        return 0.5 * to_sx(self.stiffness, at.symbols) * self._stretch(at.x.q, at.symbols) ** 2
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension."""
+        return {"tension": self.resistance(at)}
 
     def _stretch(self, x: SX, symbols: SymbolTable) -> SX:
         low, high = (to_sx(end, symbols) for end in self.length)
@@ -720,12 +681,8 @@ class JointContact(JointForce):
         """Which models know it."""
         return ", in simulations; the other models leave it out"
 
-    def effort(self, q: SX | None, v: SX, symbols: SymbolTable) -> SX:
+    def resistance(self, at: Any) -> SX:
         """Nothing in smooth models."""
-        return SX(0)
-
-    def energy(self, q: SX | None, symbols: SymbolTable) -> SX:
-        """A contact stores nothing."""
         return SX(0)
 
 

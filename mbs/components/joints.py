@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mbs.components.component import Component, Point, in_plane, unit_axis
-from mbs.components.drives import Flange
+from mbs.components.custom import Flange
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar, expression, to_float
 from mbs.text import quoted

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 from mbs.components.bodies import Mount, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.couplings import Coupling
-from mbs.components.drives import Flange, flange_pair
+from mbs.components.custom import Custom, Flange, Signal
+from mbs.components.drives import flange_pair
 from mbs.components.joints import Joint
 from mbs.components.locking import lock
 from mbs.components.notes import Note
+from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, parameters_of
@@ -97,6 +99,10 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
         (replace(a, owner=placed[a.owner.name]), replace(b, owner=placed[b.owner.name]))
         for a, b in inner.shafts
     )
+    outer.wires.extend(
+        (f"{scope}.{source}", replace(target, owner=placed[target.owner.name]))
+        for source, target in inner.wires
+    )
     for frame, point in inner.frames.items():
         outer.frames[f"{scope}.{frame}"] = moved(point, placed, scope)
     outer.shapes.extend((moved(point, placed, scope), shape) for point, shape in inner.shapes)
@@ -158,6 +164,7 @@ class Mechanism:
         self._ports: set[tuple[str, str]] = set()  # of the first `_counted` connections
         self._counted = 0
         self.shafts: list[tuple[Flange, Flange]] = []
+        self.wires: list[tuple[str, Signal]] = []
         self.frames: dict[str, Point] = {}
         self.shapes: list[tuple[Point, Shape]] = []
         self.values: dict[str, Parameter] = {}
@@ -192,6 +199,7 @@ class Mechanism:
                 f"{self.name}: {quoted(component)} is no component; add a body, a joint, a coupling"
                 " or a mechanism"
             )
+        self._require_use(component)
         if component.name in self.frames:
             raise DescriptionError(
                 f"{self.name}: {component.name!r} is the name of a frame already; rename the"
@@ -242,6 +250,31 @@ class Mechanism:
                 " write connect(point, joint, point)"
             )
         self._weld(self._point(a), self._point(joint_or_point))
+
+    def wire(self, source: Signal | str, target: Signal) -> None:
+        """Feed an input of a component from an output of another one, or from a sensor.
+
+        Args:
+            source: an output such as `controller.u`, or what a sensor reads, by its name in
+                results, such as "encoder.q".
+            target: an input such as `motor.voltage`.
+
+        Raises:
+            DescriptionError: they are no output and no input.
+        """
+        is_output = isinstance(source, Signal) and source.kind == "output"
+        if not (isinstance(source, str) or is_output):
+            raise DescriptionError(
+                f"{self.name}: a wire comes from {_what(source)},"
+                " which is no output; give an output of a component, or the name of a reading such"
+                " as 'encoder.q'"
+            )
+        if not isinstance(target, Signal) or target.kind != "input":
+            raise DescriptionError(
+                f"{self.name}: a wire leads to {_what(target)},"
+                " which is no input; give an input of a component, such as motor.voltage"
+            )
+        self.wires.append((str(source), target))
 
     def add_frame(self, name: str, point: Point | RigidBody) -> Point:
         """Name a point, so that models can be asked for it (a tool, a sensor)."""
@@ -320,6 +353,21 @@ class Mechanism:
                 f"{self.name}: active is the text {active!r}; give a list of names, [{active!r}]"
             )
         return assemble(self, {**self.guess, **(guess or {})}, active)
+
+    def _require_use(self, component: Component) -> None:
+        """Refuse a component that no equation would know."""
+        if isinstance(component, Custom):
+            if component.lowered or component.has_equations:
+                return
+            remedy = "write one of its methods loads, energy, rates, rows, velocity_rows or outputs"
+        elif isinstance(component, (RigidBody, Joint, Coupling, Sensor)):
+            return
+        else:
+            remedy = "derive it from Custom, and write what it does"
+        raise DescriptionError(
+            f"{self.name}: {type(component).__name__} {component.name!r} says nothing that"
+            f" equations could use; {remedy}"
+        )
 
     def __repr__(self) -> str:
         bodies, joints = len(list(self.bodies())), len(list(self.joints()))

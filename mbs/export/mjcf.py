@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
-from mbs.assembly.tables import AttachedForce
+from mbs.assembly.parts import AttachedPart
 from mbs.assembly.tree import Frame, Link, quaternion_slices
 from mbs.components import (
     Damper,
@@ -133,7 +133,7 @@ class _Writer:
         for cut in system.cuts:
             self._close(equalities, cut)
         self._couple(equalities)
-        for force in system.forces:
+        for force in system.parts:
             self._add_force(force)
         root.extend(part for part in (self.tendons, equalities, self._motors()) if len(part))
         frame = SubElement(root, "keyframe")
@@ -415,7 +415,7 @@ class _Writer:
 
     # Forces and motors.
 
-    def _add_force(self, force: AttachedForce) -> None:
+    def _add_force(self, force: AttachedPart) -> None:
         element = force.element
 
         def text(*values: Any) -> str:

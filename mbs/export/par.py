@@ -138,9 +138,9 @@ def _length(p: SX) -> float:
 
 
 def _check(system: System, file: str) -> None:
-    if system.forces:
+    if system.parts:
         raise ModelError(
-            f"{system.name}: force element {system.forces[0].element.name!r} cannot be said in a"
+            f"{system.name}: force element {system.parts[0].name!r} cannot be said in a"
             f" {file} file; take it out"
         )
     for link in system.tree.links:

@@ -85,7 +85,7 @@ def _refused(system: System, what: str) -> ModelError:
 
 def _check(system: System) -> None:
     """Refuse what the format cannot say."""
-    if system.forces or system.shafts or system.devices:
+    if system.parts or system.shafts:
         raise _refused(system, "it has force elements or a drive line")
     for link in system.tree.links:
         if link.motion is Motion.FREE and link.antecedent >= 0:

@@ -92,7 +92,7 @@ def _check(system: System) -> None:
 
     if system.cuts:
         fail(f"{system.cuts[0].edge.joint.name} closes a loop")
-    if system.forces or system.shafts or system.devices:
+    if system.parts or system.shafts:
         fail("it has force elements or a drive line")
     for link in system.tree.links:
         if link.motion is Motion.SPHERICAL:

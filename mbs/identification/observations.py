@@ -149,7 +149,7 @@ def _is_reduced(model: Any) -> bool:
 
 def _has_elements(system: System) -> bool:
     springs = any(not link.stiffness.is_zero() for link in system.tree.links)
-    return springs or bool(system.forces)
+    return springs or bool(system.parts)
 
 
 def evaluated(model: Any, samples: Samples) -> list[Array]:

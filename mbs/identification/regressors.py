@@ -30,6 +30,7 @@ from mbs.recursions.newton_euler import (
     rotor_moments,
     spring_effort,
 )
+from mbs.recursions.parts import parts_at
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regressor import (
     PathTwist,
@@ -554,7 +555,7 @@ def known_efforts(system: System, coordinates: str = "independent") -> Function:
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
-        acting = element_efforts(system.tree, system.forces, s.poses, s.q, s.v_tree)
+        acting = element_efforts(parts_at(system, s.q, s.v_tree), s.poses)
         tau = s.reduced_effort(acting + spring_effort(system.tree, s.q))
         return [("q", s.q), ("v" + s.suffix, s.v)], [("tau" + s.suffix, tau)]
 

@@ -16,7 +16,7 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.assembly.tables import AttachedForce
+from mbs.assembly.parts import AttachedPart
 from mbs.components.forces import CoulombFriction, JointContact, RigidStop
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_sx
@@ -76,8 +76,8 @@ class Contacts:
     names: tuple[str, ...]
     velocities: tuple[int, ...]
     positions: tuple[int | None, ...]
-    stops: tuple[AttachedForce | None, ...]
-    frictions: tuple[AttachedForce | None, ...]
+    stops: tuple[AttachedPart | None, ...]
+    frictions: tuple[AttachedPart | None, ...]
     bounds: tuple[SX, SX]
     has_lower: DM
     has_upper: DM
@@ -181,7 +181,7 @@ def require_no_contacts(system: System, what: str) -> None:
     Raises:
         ModelError: names the element, and what to use instead.
     """
-    for force in system.forces:
+    for force in system.parts:
         if isinstance(force.element, JointContact):
             kind = type(force.element).__name__
             smooth = "JointStop" if isinstance(force.element, RigidStop) else "JointFriction"
@@ -232,7 +232,7 @@ def require_lasting_rows(system: System, contacts: Contacts) -> None:
 
 
 def _contacts(system: System) -> Contacts:
-    acting = [force for force in system.forces if isinstance(force.element, JointContact)]
+    acting = [force for force in system.parts if isinstance(force.element, JointContact)]
     velocities = tuple(sorted({force.levers[0].velocity for force in acting}))
     stops = tuple(_only(system, acting, number, RigidStop) for number in velocities)
     frictions = tuple(_only(system, acting, number, CoulombFriction) for number in velocities)
@@ -255,8 +255,8 @@ def _contacts(system: System) -> Contacts:
 
 
 def _only(
-    system: System, acting: list[AttachedForce], number: int, kind: type[JointContact]
-) -> AttachedForce | None:
+    system: System, acting: list[AttachedPart], number: int, kind: type[JointContact]
+) -> AttachedPart | None:
     """The element of a kind on a velocity."""
     found = [f for f in acting if f.levers[0].velocity == number and isinstance(f.element, kind)]
     if len(found) > 1:
@@ -268,10 +268,10 @@ def _only(
     return found[0] if found else None
 
 
-_Elements = tuple[AttachedForce | None, ...]
+_Elements = tuple[AttachedPart | None, ...]
 
 
-def _field(force: AttachedForce | None, name: str) -> Scalar | None:
+def _field(force: AttachedPart | None, name: str) -> Scalar | None:
     value: Scalar | None = None if force is None else getattr(force.element, name)
     return value
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, position_rate
-from mbs.components.forces import RelativeMotion
+from mbs.components.custom import RelativeMotion
 from mbs.errors import ModelError, Unclosable
 from mbs.loops.closure import closure_rows
 from mbs.loops.configuration import Values, smallest_velocity

@@ -16,9 +16,10 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
-from mbs.recursions.force_elements import coordinate_efforts, element_efforts
+from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.names import newton_euler_names
 from mbs.recursions.newton_euler import Dynamics, joint_efforts, newton_euler, spring_effort
+from mbs.recursions.parts import parts_at
 from mbs.recursions.velocities import resting_base
 
 
@@ -148,7 +149,7 @@ def tree_efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -
 
 def own_efforts(system: System, s: ModelSymbols, a: SX) -> SX:
     """(nv, 1) what the joints need themselves: drives, friction, springs and stops."""
-    acting = coordinate_efforts(system.tree, system.forces, s.q, s.v_tree)
+    acting = parts_at(system, s.q, s.v_tree).efforts()
     return joint_efforts(system.tree, s.q, s.v_tree, a) + acting
 
 
@@ -168,5 +169,5 @@ def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> 
 def static_efforts(system: System, s: ModelSymbols) -> SX:
     """(nv, 1) efforts of the tree that hold its springs, stops and sources at rest."""
     rest = SX.zeros(system.nv)
-    acting = element_efforts(system.tree, system.forces, s.poses, s.q, rest)
+    acting = element_efforts(parts_at(system, s.q, rest), s.poses)
     return spring_effort(system.tree, s.q) + acting

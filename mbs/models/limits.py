@@ -91,7 +91,7 @@ def _positions(system: System) -> tuple[Array, Array]:
             lower[k], upper[k] = -1.0, 1.0
         if coordinate.limits is not None:
             lower[k], upper[k] = coordinate.limits
-    for force in system.forces:
+    for force in system.parts:
         place = force.levers[0].position if force.levers else None
         if isinstance(force.element, (JointStop, RigidStop)) and place is not None:
             lower[place] = max(lower[place], _number(force.element.lower, -np.inf))

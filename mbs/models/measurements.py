@@ -12,7 +12,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import AttachedSensor
 from mbs.assembly.tree import Frame
-from mbs.components.forces import RelativeMotion, regular_length
+from mbs.components.custom import RelativeMotion, regular_length
 from mbs.components.sensors import (
     AbsoluteSensor,
     DistanceSensor,

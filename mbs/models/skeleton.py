@@ -240,7 +240,7 @@ def _built(system: System) -> Skeleton:
             (force.frames[0][0] + 1, force.frames[1][0] + 1),
             (marks.point(force.frames[0]), marks.point(force.frames[1])),
         )
-        for force in system.forces
+        for force in system.parts
         if len(force.frames) == 2
     )
     frames = tuple(_frame(marks, name) for name in _shown_frames(system))

@@ -14,6 +14,7 @@ from mbs.loops.examine import LED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
+from mbs.recursions.parts import parts_at
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.velocities import Acceleration, moving_base, resting_base
 from mbs.spatial import Wrench, carried
@@ -182,7 +183,7 @@ def exerted(
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
     """
-    return sum_wrenches(around.external, element_wrenches(system.tree, system.forces, poses, q, v))
+    return sum_wrenches(around.external, element_wrenches(parts_at(system, q, v)))
 
 
 def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
@@ -198,8 +199,9 @@ def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
 
 
 def outputs_of(system: System, model: Function, *values: SX) -> list[SX]:
-    """The outputs of a model on symbols, its parameters passed on when it has any."""
-    arguments = [*values, *([system.p] if system.parameters else [])]
+    """The outputs of a model on symbols, those of states, inputs and parameters passed on."""
+    own = {"z": system.z, "u": system.u, "p": system.p}
+    arguments = [*values, *(own[name] for name in model.name_in()[len(values) :])]
     return [SX(output) for output in model.call(arguments)]
 
 
@@ -208,21 +210,23 @@ def dense_function(name: str, inputs: list[SX], outputs: list[SX]) -> Function:
     return Function(name, inputs, [casadi.densify(o) for o in outputs], {"cse": True})
 
 
-# The devices that drive shafts: what they deliver, and how their own states change.
+# The drives of shafts, and all states and outputs of parts.
 
 
 def devices(system: System) -> Function:
     """``devices(v, z, u) -> tau, zdot, y``: the motors and torques of the drive lines.
 
-    The elements of z, u and y are those that `devices(system).elements("z")` names: currents of
-    motors; voltages and torques; what a simulation shows beside them.
+    The elements of z, u and y are those that `devices(system).elements("z")` names: states such as
+    currents; inputs such as voltages and torques; what a simulation shows beside them; of all
+    components that have some.
 
     Args:
         system: open or closed, with devices.
 
     Returns:
-        Function of v (nv, 1) velocities of the tree, z (nz, 1) states and u (nu, 1) inputs; tau
-        (nv, 1) what they deliver at the coordinates [N m or N], zdot (nz, 1), y (ny, 1).
+        Function of v (nv, 1) velocities of the tree, z (nz, 1) states and u (nu, 1) inputs, and of
+        q (nq, 1) before them where something depends on positions; tau (nv, 1) what drives deliver
+        at the coordinates [N m or N], zdot (nz, 1), y (ny, 1).
 
     Raises:
         ModelError: the system has no device.
@@ -235,35 +239,31 @@ def devices(system: System) -> Function:
         )
 
     def build() -> tuple[Named, Named]:
-        nz, nu = state_count(system), len(system.devices)
-        v, z, u = SX.sym("v", system.nv), SX.sym("z", nz), SX.sym("u", nu)
-        tau, zdot, y = device_equations(system, v, z, u)
-        return [("v", v), ("z", z), ("u", u)], [("tau", tau), ("zdot", zdot), ("y", y)]
+        q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+        tau, zdot, y = part_equations(system, q, v)
+        every = casadi.vertcat(tau, zdot, y)
+        inputs = [("v", v), ("z", system.z), ("u", system.u)]
+        if casadi.depends_on(every, q):
+            inputs.insert(0, ("q", q))
+        return inputs, [("tau", tau), ("zdot", zdot), ("y", y)]
 
     return model_function(system, ("devices",), build)
 
 
 def state_count(system: System) -> int:
-    """Number of the states of all devices."""
-    return sum(len(device.states) for device in system.devices)
+    """Number of the states of all parts."""
+    return int(system.z.numel())
 
 
-def device_equations(system: System, v: SX, z: SX, u: SX) -> tuple[SX, SX, SX]:
-    """What all devices deliver at the coordinates, the rates of their states, and their outputs.
+def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, SX]:
+    """What drives deliver at the coordinates, the rates of all states, and all outputs.
+
+    They are of the symbols `system.z`, `system.u` and `system.p` besides.
 
     Args:
-        system: with devices or without any.
+        system: with parts or without any.
+        q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
-        z: (nz, 1) states, device by device.
-        u: (nu, 1) inputs, one for each device.
     """
-    tau = SX.zeros(system.nv)
-    rates, shown, first = [SX(0, 1)], [SX(0, 1)], 0
-    for number, device in enumerate(system.devices):
-        last = first + len(device.states)
-        own = z[first:last], u[number], v
-        tau[device.velocity] += device.effort(*own)
-        rates.append(device.rate(*own))
-        shown.append(device.shown(*own))
-        first = last
-    return tau, casadi.vertcat(*rates), casadi.vertcat(*shown)
+    at = parts_at(system, q, v)
+    return at.delivered(), at.rates(), at.outputs()

@@ -5,23 +5,19 @@ Source: Khalil & Creusot 1997, eq. 15-20, for how wrenches on links become joint
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Mapping
 
 import casadi
 from casadi import SX
 
-from mbs.assembly.tables import AttachedForce
-from mbs.assembly.tree import Frame, Tree
-from mbs.components.forces import CoordinateForce, PairForce, PointSource, RelativeMotion
+from mbs.assembly.tree import Tree
 from mbs.recursions.newton_euler import inertial_wrench, rotor_moments
+from mbs.recursions.parts import PartsAt
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.route import BASE, relative_motion, relative_pose
 from mbs.recursions.velocities import (
     Acceleration,
-    Velocity,
     effort,
     link_accelerations,
-    link_velocities,
 )
 from mbs.spatial import PseudoInertia, Wrench, add_wrenches, carried, zeros
 
@@ -82,98 +78,33 @@ def sum_wrenches(*parts: Mapping[int, Wrench]) -> dict[int, Wrench]:
 
 
 def element_wrenches(
-    tree: Tree,
-    forces: Sequence[AttachedForce],
-    poses: list[LinkPose],
-    q: SX,
-    v: SX,
-    held: Container[tuple[str, str]] | None = None,
+    acting: PartsAt, held: Container[tuple[str, str]] | None = None
 ) -> dict[int, Wrench]:
-    """For some links, the wrench that they exert on force elements, about and in their frames.
+    """For some links, the wrench that they exert on components, about and in their frames.
 
     Args:
-        tree: the links.
-        forces: those that act on joints are left out.
-        poses: each with respect to its antecedent.
-        q: (nq, 1) positions.
-        v: (nv, 1) velocities.
+        acting: the components at positions and velocities.
         held: points, by component and port, whose wrenches alone count, those on the base (-1)
             too; without it all on moving links.
     """
-    on_points = [force for force in forces if force.frames]
-    if not on_points:
-        return {}
-    moving = link_velocities(tree, poses, v)
     exerted: list[dict[int, Wrench]] = []
-    for force in on_points:
-        acting = zip(force.element.points, _on_frames(tree, force, q, moving), strict=True)
-        for point, ((link, pose), wrench) in acting:
-            if link >= 0 if held is None else (point.owner.name, point.port) in held:
-                f, m = carried(pose, wrench)
-                exerted.append({link: (-f, -m)})
+    for part in acting.parts:
+        if part.frames and part.element.acts:
+            for port, (link, pose), load in acting.frame_loads(part):
+                point = part.element.frames[port]
+                if link >= 0 if held is None else (point.owner.name, point.port) in held:
+                    f, m = carried(pose, (load.force, load.moment))
+                    exerted.append({link: (-f, -m)})
     return sum_wrenches(*exerted)
 
 
-def coordinate_efforts(tree: Tree, forces: Sequence[AttachedForce], q: SX, v: SX) -> SX:
-    """(nv, 1) what joints need of effort to overcome stops, friction, elastic shafts."""
-    total = SX.zeros(tree.nv)
-    for force in forces:
-        if isinstance(force.element, CoordinateForce):
-            rate = sum((lever.factor * v[lever.velocity] for lever in force.levers), SX(0))
-            own = force.element.effort(_position(force, q), rate, force.symbols)
-            for lever in force.levers:
-                total[lever.velocity] += lever.factor * own
-    return total
-
-
-def element_efforts(
-    tree: Tree, forces: Sequence[AttachedForce], poses: list[LinkPose], q: SX, v: SX
-) -> SX:
-    """(nv, 1) joint efforts that hold all force elements, the links at rest or not [N m or N].
+def element_efforts(acting: PartsAt, poses: list[LinkPose]) -> SX:
+    """(nv, 1) joint efforts that hold all components, the links at rest or not [N m or N].
 
     It is the part that they have in the efforts of the inverse dynamic model.
     """
-    wrenches = element_wrenches(tree, forces, poses, q, v)
-    return wrench_efforts(tree, poses, wrenches) + coordinate_efforts(tree, forces, q, v)
-
-
-def element_energy(tree: Tree, forces: Sequence[AttachedForce], q: SX) -> SX:
-    """Energy stored in force elements [J]; dampers, friction and sources store nothing."""
-    total = SX(0)
-    for force in forces:
-        if isinstance(force.element, CoordinateForce):
-            total += force.element.energy(_position(force, q), force.symbols)
-        elif isinstance(force.element, PairForce):
-            T = relative_pose(tree, q, *force.frames)
-            still = RelativeMotion(T.p, T.R, zeros(), zeros())
-            total += force.element.energy(still, force.symbols)
-    return total
-
-
-def _position(force: AttachedForce, q: SX) -> SX | None:
-    """What an element on coordinates acts on, None where one of them is no position."""
-    total = SX(0)
-    for lever in force.levers:
-        if lever.position is None:
-            return None
-        total += lever.factor * q[lever.position]
-    return total
-
-
-def _on_frames(
-    tree: Tree, force: AttachedForce, q: SX, moving: list[Velocity]
-) -> list[tuple[Frame, Wrench]]:
-    """What an element does to each of its frames: force and moment about it, in its axes."""
-    if isinstance(force.element, PointSource):
-        (frame,) = force.frames
-        R = relative_pose(tree, q, BASE, frame).R
-        return [(frame, force.element.wrench(R, force.symbols))]
-    assert isinstance(force.element, PairForce)
-    a, b = force.frames
-    motion = relative_motion(tree, a, b, q, moving)
-    pull = force.element.pull(motion, force.symbols)
-    opposite = casadi.mtimes(motion.R.T, -pull.force), casadi.mtimes(motion.R.T, pull.moment_b)
-    return [(a, (pull.force, pull.moment_a)), (b, opposite)]
+    wrenches = element_wrenches(acting)
+    return wrench_efforts(acting.tree, poses, wrenches) + acting.efforts()
 
 
 def wrench_efforts(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:

@@ -16,7 +16,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly.tree import Frame, Link, Tree
-from mbs.components.forces import RelativeMotion
+from mbs.components.custom import RelativeMotion
 from mbs.components.joints import Motion
 from mbs.operations import count
 from mbs.recursions.velocities import Acceleration, Velocity

@@ -189,17 +189,19 @@ def input_function(system: System, u: Effort) -> Function | None:
     """
     if u is None:
         return None
-    signal = Signal("u", "inputs", [device.input[0] for device in system.devices])
-    if not system.devices:
+    signal = Signal("u", "inputs", [name for name, _ in system.inputs])
+    if not system.inputs:
         raise ModelError(
-            f"{system.name}: u is given, but no motor and no torque is connected to a flange;"
-            " leave u out, or give the efforts tau of the joints"
+            f"{system.name}: u is given, but no motor and no torque is connected to a flange, and"
+            " no other component has an input; leave u out, or give the efforts tau of the joints"
         )
     if callable(u):
         return signal_function(system, signal, u)
     if isinstance(u, Mapping):
-        names = [device.name for device in system.devices]
-        return signal_function(system, signal, SX(DM(_by_name(system, "u", u, names))))
+        names = [name for name, _ in system.inputs]
+        by_name = {full_name(system, str(name)): value for name, value in u.items()}
+        values = _by_name(system, "u", by_name, names, system.u_default)
+        return signal_function(system, signal, SX(DM(values)))
     return signal_function(system, signal, SX(DM(_numbers(system, "u", u))))
 
 
@@ -213,9 +215,9 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
     Raises:
         ModelError: a name is unknown, or a value is no number.
     """
-    names = [name for device in system.devices for name, _ in device.states]
+    names = [name for name, _ in system.states]
     if z0 is None or isinstance(z0, Mapping):
-        return _by_name(system, "z0", z0 or {}, names)
+        return _by_name(system, "z0", z0 or {}, names, system.z_start)
     values = _numbers(system, "z0", z0)
     if len(values) != len(names):
         raise ModelError(
@@ -237,22 +239,35 @@ def device_columns(
         y: (m, ny) outputs.
     """
     tables = (
-        ([device.input for device in system.devices], u),
-        ([state for device in system.devices for state in device.states], z),
-        ([output for device in system.devices for output in device.outputs], y),
+        (system.inputs, u),
+        (system.states, z),
+        (system.outputs, y),
     )
     for quantities, values in tables:
         for column, (name, unit) in enumerate(quantities):
             yield name, unit, values[:, column]
 
 
+def full_name(system: System, name: str) -> str:
+    """An input by its own name, or by that of its component where this has no other."""
+    inputs = [full for full, _ in system.inputs]
+    owned = [full for full in inputs if full.rpartition(".")[0] == name]
+    return owned[0] if name not in inputs and len(owned) == 1 else name
+
+
 def _by_name(
-    system: System, what: str, values: Mapping[str, float], names: Sequence[str]
+    system: System,
+    what: str,
+    values: Mapping[str, float],
+    names: Sequence[str],
+    otherwise: Sequence[float],
 ) -> list[float]:
-    result = [0.0] * len(names)
+    result = list(otherwise)
     for name, value in values.items():
         if name not in names:
-            raise ModelError(f"{system.name}: {what} names {name!r}; {did_you_mean(name, names)}")
+            owners = [full.rpartition(".")[0] for full in names] if what == "u" else []
+            known = [*(one for one in owners if owners.count(one) == 1), *names]
+            raise ModelError(f"{system.name}: {what} names {name!r}; {did_you_mean(name, known)}")
         (result[names.index(name)],) = _numbers(system, f"{what} of {name}", [value])
     return result
 

@@ -298,7 +298,7 @@ def test_a_joint_that_must_be_cut_is_named():
         tuple(replace(p, owner=replaced) if p.owner.name == "j2" else p for p in pair)
         for pair in m.connections
     ]
-    assert len(m.assemble(guess=guess).forces) == 4
+    assert len(m.assemble(guess=guess).parts) == 4
 
 
 def test_a_stop_needs_a_position():
@@ -342,7 +342,7 @@ def test_elements_of_a_mechanism_inside_another_one():
         placed = outer.add(inner, name)
         outer.connect(outer.world.at(0, 0, 1), placed.base)
     whole, alone = outer.assemble(), inner.assemble()
-    assert [force.element.name for force in whole.forces] == [
+    assert [force.element.name for force in whole.parts] == [
         "left.s",
         "left.p",
         "right.s",

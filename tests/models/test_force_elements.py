@@ -153,7 +153,7 @@ def viscous(system, v):
 def damped(seed, system, q, v):
     """What the dampers take, from the rates of poses alone."""
     total = 0.0
-    for force in system.forces:
+    for force in system.parts:
         law = force.element
         if isinstance(law, JointFriction):
             u = v[force.levers[0].velocity]

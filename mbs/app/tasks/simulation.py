@@ -28,7 +28,7 @@ from mbs.expressions import (
 from mbs.models.state.signals import effort_function
 from mbs.result import Result
 from mbs.simulate import run
-from mbs.simulate.run import input_function
+from mbs.simulate.run import full_name, input_function
 from mbs.text import did_you_mean, quoted
 
 # Laws that a user writes as texts: numbers, and functions of time, positions and velocities.
@@ -341,8 +341,9 @@ def _inputs(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
     if not laws:
         return None
     input_function(system, dict.fromkeys(laws, 0.0))  # refuses devices that are not there
-    names = [device.name for device in system.devices]
-    return law_of_motion(system, laws, names, known, "input")
+    names = [name for name, _ in system.inputs]
+    given = {full_name(system, name): law for name, law in laws.items()}
+    return law_of_motion(system, given, names, known, "input")
 
 
 # A simulated motion with the configurations that a picture needs to play it.

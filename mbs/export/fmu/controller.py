@@ -378,7 +378,7 @@ def _outputs(system: System, law: Function) -> dict[str, int]:
     places = {name: k for k, name in enumerate(names)}
     if len(names) == 1 and names != ["u"]:
         places = {"tau": 0}
-    sizes = {"tau": system.nv, "u": len(system.devices)}
+    sizes = {"tau": system.nv, "u": system.u.numel()}
     if not set(places) <= set(sizes):
         raise ExportError(
             f"{system.name}: the controller {law.name()} has outputs {', '.join(names)}; call them"

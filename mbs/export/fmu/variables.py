@@ -16,6 +16,7 @@ from mbs.models.state.drive import InputMotion
 from mbs.models.state.events import element_names
 from mbs.models.state.independent import MinimalState
 from mbs.text import did_you_mean
+from mbs.units import rate_unit
 
 POSE = ("x", "y", "z", *(f"R{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)))
 """Elements of the pose of a frame in the base."""
@@ -53,18 +54,18 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
         )
         for speed in (system.speeds[k] for k in state.velocities)
     ]
-    devices = [
+    own = [
         State(
             name=name,
             unit=unit,
-            description=f"state of {device.name}",
-            derivative_unit=f"{unit}/s",
+            description=f"state of {name.rpartition('.')[0]}",
+            derivative_unit=rate_unit(unit),
+            start=value,
             output=True,
         )
-        for device in system.devices
-        for name, unit in device.states
+        for (name, unit), value in zip(system.states, system.z_start, strict=True)
     ]
-    return (*positions, *velocities, *devices)
+    return (*positions, *velocities, *own)
 
 
 def dependents(
@@ -83,9 +84,9 @@ def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterat
         name = system.speeds[k].name
         yield _effort(system.speeds[k], f"effort of the motor of {name}")
     for k in state.devices:
-        device = system.devices[k]
-        name, unit = device.input
-        yield FmuVariable(name=name, unit=unit, description=f"input of {device.name}")
+        name, unit = system.inputs[k]
+        text = f"input of {name.rpartition('.')[0]}"
+        yield FmuVariable(name=name, unit=unit, start=system.u_default[k], description=text)
     for label in labels:
         for element in WRENCH:
             unit, noun = ("N", "force") if element[0] == "f" else ("N.m", "torque")
@@ -126,9 +127,8 @@ def outputs(
         yield velocity
     yield from (_acceleration(speeds[k]) for k in state.passive)
     yield from pose("tool", frame_text(terminal_frame(system)))
-    for device in system.devices:
-        for name, unit in device.outputs:
-            yield FmuVariable(name=name, unit=unit, description=f"of {device.name}")
+    for name, unit in system.outputs:
+        yield FmuVariable(name=name, unit=unit, description=f"of {name.rpartition('.')[0]}")
     for k in state.efforts:
         yield _effort(speeds[k], f"effort that drives {speeds[k].name}")
     for contact in state.contacts:

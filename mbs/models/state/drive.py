@@ -139,7 +139,7 @@ def further_inputs(system: System, drive: DriveInputs) -> int:
         _further(system, name, law, size)
         for name, law, size in (
             ("effort", drive.effort, system.nv),
-            ("device", drive.device, len(system.devices)),
+            ("device", drive.device, system.u.numel()),
         )
         if law is not None
     ]

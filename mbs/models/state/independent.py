@@ -50,7 +50,7 @@ from mbs.models.state.events import (
     minimal_jump,
     standstill,
 )
-from mbs.models.symbols import dense_function, device_equations, outputs_of, state_count
+from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
 from mbs.recursions.route import relative_pose
 from mbs.solvers.linear import newton_step
 from mbs.spatial import Wrench, quaternion_rate, quaternion_rotation
@@ -258,7 +258,7 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
         dependents=tuple(k for k in range(system.nq) if k not in free or k in solved),
         shown=tuple(k for k in range(system.nq) if k not in free),
         inputs=() if drive.effort else motors,
-        devices=() if drive.device else tuple(range(len(system.devices))),
+        devices=() if drive.device else tuple(range(system.u.numel())),
         wrenches=drive.wrenches,
         frames=frames_of(system, drive),
         motions=motions,
@@ -605,9 +605,10 @@ def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> St
         motors: numbers in v of the efforts in u.
     """
     in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
-    in_u = [len(motors), len(system.devices), 6 * len(layout.frames)]
+    in_u = [len(motors), system.u.numel(), 6 * len(layout.frames)]
     in_u.append(sum(motion.size for motion in layout.motions))
-    x, u = SX.sym("x", sum(in_x)), SX.sym("u", sum(in_u))
+    x = casadi.vertcat(SX.sym("x", sum(in_x[:2])), system.z)
+    u = casadi.vertcat(SX.sym("u", in_u[0]), system.u, SX.sym("w", sum(in_u[2:])))
     parts = (*_split(x, in_x), *_split(u, in_u))
     return StatePoint(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)
 
@@ -624,7 +625,7 @@ def _equations(
     s = point_of(system, layout, motors)
     laws = input_motions(layout.motions, s.motions)
     motion = motion_of(system, layout, s, laws)
-    tau, rates, shown = device_equations(system, motion.v, s.states, s.inputs)
+    tau, rates, shown = part_equations(system, motion.q, motion.v)
     for column, number in enumerate(motors):
         tau[number] += s.efforts[column]
     external = wrenches_of(system, motion.q, layout.frames, s.wrenches)
@@ -651,7 +652,7 @@ def _equations(
         rhs=dense_function("rhs", point, [rate, y]),
         motion=dense_function("motion", [s.t, s.x, s.z, s.u, system.p], [motion.q, motion.v]),
         events=events,
-        sizes=(len(motors), len(system.devices), s.u.numel() - len(motors) - len(system.devices)),
+        sizes=(len(motors), system.u.numel(), s.u.numel() - len(motors) - system.u.numel()),
     )
 
 
@@ -751,8 +752,8 @@ def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Func
 def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float], list[float]]:
     """State x and dependents z of the assembled configuration at rest."""
     configuration = np.array(system.configuration)
-    rest = [0.0] * (len(state.velocities) + state_count(system))
-    x = [*configuration[list(state.positions)], *rest]
+    rest = [0.0] * len(state.velocities)
+    x = [*configuration[list(state.positions)], *rest, *system.z_start]
     return [float(value) for value in x], [
         float(value) for value in configuration[list(state.dependents)]
     ]

@@ -43,7 +43,7 @@ from mbs.models.state.independent import (
     point_of,
 )
 from mbs.models.state.signals import Prescribed
-from mbs.models.symbols import dense_function, device_equations, outputs_of, state_count
+from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
 from mbs.solvers.linear import partial_ldl
 from mbs.solvers.problem import Passage
 
@@ -189,6 +189,7 @@ def passage(
     motions: Sequence[Prescribed] = (),
     contact: ContactEquations | None = None,
     inputs: SX | None = None,
+    given_inputs: SX | None = None,
 ) -> Passage | None:
     """The functions of passages; None where nothing is lost, or rows bind velocities alone.
 
@@ -200,6 +201,7 @@ def passage(
         motions: coordinates that drives move along laws.
         contact: what rigid stops and Coulomb friction do.
         inputs: u, where the functions are to take (t, x, z, u, p), z empty.
+        given_inputs: (nu, 1) values of the inputs of parts, where they are no inputs here.
     """
     closure = system.closure
     if closure is None or closure.slips:
@@ -259,13 +261,16 @@ def passage(
     rows = casadi.substitute([casadi.densify(row) for row in rows], [q, v], at)
     (M,) = outputs_of(system, inertia_matrix(system, "tree"), at[0])
     (H,) = outputs_of(system, bias(system, "tree"), *at)
+    forces = [M, braked - H, rates]
+    if given_inputs is not None:
+        forces = with_inputs(system, forces, given_inputs)
     measure = _regularity(system, q, unit[drives, :])
     regularity = casadi.substitute(measure, q, at[0])
     txp = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
     sizes = (nq, nv, rates.numel(), places.numel(), len(anchors))
     return Passage(
         rows=dense_function("rows", txp, rows),
-        forces=dense_function("forces", txp, [M, braked - H, rates]),
+        forces=dense_function("forces", txp, forces),
         regularity=dense_function("regularity", txp, [regularity]),
         size=(*sizes, speeds.shape[0], int(bool(laws))),
         typical=_typical(system, q, measure),
@@ -351,9 +356,9 @@ def tree_state(
     s = point_of(system, layout, motors)
     nq, nv = system.nq, system.nv
     n = nq + nv
-    X, none = SX.sym("X", n + state_count(system)), SX.sym("z", 0)
+    X, none = casadi.vertcat(SX.sym("X", n), system.z), SX.sym("z", 0)
     q, v = X[:nq], X[nq:n]
-    tau, rates, shown = device_equations(system, v, X[n:], s.inputs)
+    tau, rates, shown = part_equations(system, q, v)
     for column, number in enumerate(motors):
         tau[number] += s.efforts[column]
     external = wrenches_of(system, q, layout.frames, s.wrenches)
@@ -394,7 +399,7 @@ def tree_state(
         )
     if drive.effort is not None or drive.device is not None:
         at = dense_function("motion", point, [q, v])
-        sizes = (len(motors), len(system.devices))
+        sizes = (len(motors), system.u.numel())
         sizes3 = (*sizes, s.u.numel() - sum(sizes))
         pushed = controlled(StateEquations(forces, at, None, sizes3), drive, layout.extra)
         moving = controlled(StateEquations(rhs, at, events, sizes3), drive, layout.extra)
@@ -471,11 +476,11 @@ def full_state(
         motions: coordinates that drives move along laws; their efforts are added to tau.
     """
     nq, n = system.nq, system.nq + system.nv
-    t, x = SX.sym("t"), SX.sym("x", n + state_count(system))
+    t, x = SX.sym("t"), casadi.vertcat(SX.sym("x", n), system.z)
     q, v, z, p = x[:nq], x[nq:n], x[n:], system.p
     tau = SX.zeros(system.nv) if effort is None else casadi.densify(effort(t, q, v, p))
-    u = SX.zeros(len(system.devices)) if inputs is None else SX(inputs(t, q, v, p))
-    delivered, z_rate, y = device_equations(system, v, z, u)
+    u = SX(DM(system.u_default)) if inputs is None else SX(inputs(t, q, v, p))
+    delivered, z_rate, y = part_equations(system, q, v)
     tau += delivered
     given = SX(tau)
     contact = contact_equations(
@@ -483,7 +488,7 @@ def full_state(
     )
     a, tau = (contact.a, contact.tau) if contact else _accelerations(system, q, v, tau, motions, t)
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, z_rate)
-    through = passage(system, (t, x, p), given, z_rate, motions, contact)
+    through = passage(system, (t, x, p), given, z_rate, motions, contact, given_inputs=u)
     touch = (contact.contacts, contact.modes) if contact else None
     *kept, residual = projected(system, q, v, motions, t, touch)
     rows = closure_rows(system, q)
@@ -494,23 +499,35 @@ def full_state(
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     moved = [casadi.vertcat(*kept, z), residual]
     p = casadi.vertcat(p, contact.values) if contact else p
+    rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
         project=dense_function("project", [t, x, p], moved) if keeps else None,
         observe=dense_function("observe", [t, x, p], observed),
-        events=_events(system, contact, [t, x, p]) if contact else None,
+        events=_events(system, contact, [t, x, p], u) if contact else None,
         passage=through,
     )
 
 
-def _events(system: System, contact: ContactEquations, txp: list[SX]) -> tuple[Function, Function]:
+def _events(
+    system: System, contact: ContactEquations, txp: list[SX], u: SX
+) -> tuple[Function, Function]:
     """The functions of `FullState.events`."""
     fired = SX.sym("fired", contact.indicators.numel())
     after, modes = tree_jump(system, contact, txp[1], fired)
+    indicators, after, modes = with_inputs(system, [contact.indicators, after, modes], u)
     return (
-        dense_function("indicators", txp, [contact.indicators]),
+        dense_function("indicators", txp, [indicators]),
         dense_function("jump", [*txp, fired], [after, modes]),
     )
+
+
+def with_inputs(system: System, values: Sequence[SX], u: SX) -> list[SX]:
+    """Expressions with values (nu, 1) in place of the inputs of parts."""
+    if not system.u.numel():
+        return [SX(value) for value in values]
+    dense = [casadi.densify(SX(value)) for value in values]
+    return [SX(value) for value in casadi.substitute(dense, [system.u], [casadi.densify(u)])]
 
 
 def _accelerations(

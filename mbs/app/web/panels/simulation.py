@@ -84,7 +84,7 @@ def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) ->
         v0=_given(texts, "v0", [name for name, *_ in rows]),
         tau={n: law for n, law in laws.items() if law and kinds[n] in ("", "tau")},
         motion={f"{n}.{kinds[n]}": x for n, x in laws.items() if x and kinds[n] in ("q", "v", "a")},
-        inputs=_given(texts, "u", [device.name for device in system.devices]),
+        inputs=_given(texts, "u", [name for name, _ in system.inputs]),
     )
 
 
@@ -130,9 +130,8 @@ def build_form(system: System, texts: Texts) -> ui.button:
             ui.label(title).classes("app-note")
         for row in rows:
             _joint(texts, start, row)
-    for device in system.devices:
-        name, unit = device.input
-        _text(texts, f"u.{device.name}", f"{name} [{unit}]", "220px")
+    for name, unit in system.inputs:
+        _text(texts, f"u.{name}", f"{name} [{unit}]", "220px")
     if rows:
         ui.label(_LAWS.format(rows[0][0])).classes("app-note")
     return button

@@ -1,0 +1,333 @@
+"""Components by their equations in a system: where their ports are, their states and signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi
+from casadi import SX
+
+from mbs.assembly.tables import EFFORT_UNIT, AttachedSensor, Coordinate, Places, require_part
+from mbs.assembly.tree import Frame
+from mbs.components import Custom, Mechanism
+from mbs.components.custom import EFFORT, port_of_flange
+from mbs.errors import AssemblyError
+from mbs.expressions import Scalar, to_sx
+from mbs.text import did_you_mean
+
+if TYPE_CHECKING:
+    from mbs.assembly.drive_line import FlangeTurn
+
+_Rows = Sequence[Coordinate]
+Quantity = tuple[str, str]
+"""Full name and unit."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lever:
+    """How much of a coordinate a component acts on.
+
+    Attributes:
+        position: number in q of the coordinate, None where it is no position.
+        velocity: number in v of the coordinate.
+        factor: what a unit of the coordinate contributes.
+        name: of the coordinate.
+        unit: of its velocity.
+    """
+
+    position: int | None
+    velocity: int
+    factor: SX
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What feeds an input: an output of a component, or a reading of a sensor.
+
+    Attributes:
+        owner: name of the component.
+        signal: its output, or the reading without the name of the sensor, such as "q" or "p.x".
+    """
+
+    owner: str
+    signal: str
+
+    def __str__(self) -> str:
+        return f"{self.owner}.{self.signal}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttachedPart:
+    """A component by its equations, and where it is.
+
+    Attributes:
+        element: its description.
+        frames: link (-1 for the base) and pose in the link's frame, of each of its points.
+        coordinates: for each of its ports on coordinates and shafts, and each unknown, the
+            coordinates whose sum it is.
+        states: symbols of its states, by their names in it.
+        inputs: symbols of its inputs, or where they come from.
+        symbols: CasADi symbol of every parameter.
+        where: the components that it acts on, in words.
+    """
+
+    element: Custom
+    frames: tuple[Frame, ...]
+    coordinates: Mapping[str, tuple[Lever, ...]]
+    states: Mapping[str, SX]
+    inputs: Mapping[str, SX | Source]
+    symbols: Mapping[str, SX]
+    where: str
+
+    @property
+    def name(self) -> str:
+        """The name of the component."""
+        return self.element.name
+
+    @property
+    def levers(self) -> tuple[Lever, ...]:
+        """The coordinates that it acts on; none where it acts on points."""
+        return tuple(lever for levers in self.coordinates.values() for lever in levers)
+
+    @property
+    def state_quantities(self) -> tuple[Quantity, ...]:
+        """Full name and unit of every state."""
+        return tuple((f"{self.name}.{n}", self._unit(n)) for n in self.states)
+
+    @property
+    def input_quantities(self) -> tuple[Quantity, ...]:
+        """Full name and unit of every input that nothing feeds."""
+        free = (n for n, given in self.inputs.items() if isinstance(given, SX))
+        return tuple((f"{self.name}.{n}", self._unit(n)) for n in free)
+
+    @property
+    def output_quantities(self) -> tuple[Quantity, ...]:
+        """Full name and unit of every output."""
+        return tuple((f"{self.name}.{n}", self._unit(n)) for n in self.element.output_names)
+
+    @property
+    def velocity(self) -> int:
+        """Number in v of the coordinate that a drive turns."""
+        return self.levers[0].velocity
+
+    @property
+    def factor(self) -> SX:
+        """Speed of the flange of a drive for a unit velocity of its coordinate."""
+        return self.levers[0].factor
+
+    def _unit(self, name: str) -> str:
+        unit = self.element.declared[name].unit
+        return EFFORT_UNIT[self.levers[0].unit] if unit == EFFORT else unit
+
+    @property
+    def sentence(self) -> str:
+        """What it is, where it acts, what it takes and gives."""
+        kind, name = type(self.element).__name__, self.name
+        signals = [f"input {n} [{u}]" for n, u in self.input_quantities]
+        signals += [
+            f"input {name}.{n} from {given}"
+            for n, given in self.inputs.items()
+            if isinstance(given, Source)
+        ]
+        signals += [f"state {n} [{u}]" for n, u in self.state_quantities]
+        if self.element.drives:
+            turns = as_fast(number_or_sx(self.factor), self.levers[0].name)
+            does = f"drives {self.levers[0].name} and turns {turns}"
+        else:
+            verb = "acts" if self.element.acts else "is"
+            does = f"{verb} {self.where}" if self.where else "works on signals alone"
+            does += self.element.scope
+        return f"{kind} {name} {does}{': ' if signals else ''}{', '.join(signals)}."
+
+
+def number_or_sx(factor: SX) -> float | SX:
+    """A constant as a number."""
+    return float(factor) if factor.is_constant() else factor
+
+
+def as_fast(factor: float | SX, coordinate: str) -> str:
+    """How often something turns for a turn of a coordinate, in words."""
+    if isinstance(factor, float) and factor == 1:
+        return f"with {coordinate}"
+    text = format(factor, "g") if isinstance(factor, float) else str(factor)
+    return f"{text} times as fast as {coordinate}"
+
+
+def parts_of(mechanism: Mechanism) -> list[Custom]:
+    """Every component by its equations, in the order added."""
+    return [c for c in mechanism.components.values() if isinstance(c, Custom) and c.has_equations]
+
+
+def coordinates_needed(mechanism: Mechanism) -> list[str]:
+    """The coordinates that components by their equations refer to."""
+    return [
+        name
+        for part in parts_of(mechanism)
+        for levers in part.coordinates.values()
+        for name, _ in levers
+    ]
+
+
+def attached_parts(
+    mechanism: Mechanism,
+    places: Places,
+    tables: tuple[_Rows, _Rows, _Rows],
+    symbols: Mapping[str, SX],
+    turns: Mapping[tuple[str, str], FlangeTurn],
+    sensors: Sequence[AttachedSensor],
+) -> tuple[AttachedPart, ...]:
+    """Every component by its equations, with the links of its points and its coordinates.
+
+    Args:
+        mechanism: the components.
+        places: where bodies and joints are.
+        tables: the coordinates of q, of v, and of cut joints.
+        symbols: CasADi symbol of every parameter.
+        turns: how flanges turn, by their keys.
+        sensors: what wires may come from.
+
+    Raises:
+        AssemblyError: one acts on nothing that is there, or on nothing that moves; or a wire comes
+            from nothing.
+    """
+    wires = _wires(mechanism, sensors)
+    return tuple(
+        _attached(mechanism, part, places, tables, symbols, turns, wires)
+        for part in parts_of(mechanism)
+    )
+
+
+def _attached(
+    mechanism: Mechanism,
+    part: Custom,
+    places: Places,
+    tables: tuple[_Rows, _Rows, _Rows],
+    symbols: Mapping[str, SX],
+    turns: Mapping[tuple[str, str], FlangeTurn],
+    wires: Mapping[tuple[str, str], Source],
+) -> AttachedPart:
+    # where its points are
+    frames = []
+    for point in part.points:
+        require_part(mechanism, part, point, "acts on")
+        link, pose = places[point.owner.name, point.port]
+        frames.append((link, pose @ point.placement.pose(symbols)))
+    # which coordinates its other ports are
+    given: dict[str, Iterable[tuple[str, Scalar]]] = dict(part.coordinates)
+    for name in part.shaft_ports:
+        turn = turns[part.name, port_of_flange(name)]
+        given[name] = ((turn.coordinate, turn.factor),)
+    given |= {name: ((f"{part.name}.{name}", 1.0),) for name in part.names_of("unknown")}
+    coordinates = {
+        port: tuple(_lever(part, name, to_sx(factor, symbols), tables) for name, factor in levers)
+        for port, levers in given.items()
+    }
+    names = [point.owner.name for point in part.points]
+    names += [lever.name for port in given for lever in coordinates[port]]
+    _require_moving(part, frames, coordinates, names)
+    return AttachedPart(
+        element=part,
+        frames=tuple(frames),
+        coordinates=coordinates,
+        states={name: SX.sym(f"{part.name}.{name}") for name in part.state_names},
+        inputs={
+            name: wires.get((part.name, name), SX.sym(f"{part.name}.{name}"))
+            for name in part.input_names
+        },
+        symbols=symbols,
+        where=_where(names) if names else "",
+    )
+
+
+def _require_moving(
+    part: Custom,
+    frames: Sequence[Frame],
+    coordinates: Mapping[str, tuple[Lever, ...]],
+    names: Sequence[str],
+) -> None:
+    """Refuse loads on what cannot move."""
+    links = {link for link, _ in frames}
+    if not part.acts or not frames or coordinates:
+        return
+    if links == {-1} or (len(links) == 1 and len(frames) > 1):
+        still = "does not move" if links == {-1} else "is one rigid body"
+        raise AssemblyError(
+            f"{part.name}: what it acts on, {' and '.join(names)}, {still}, so that the"
+            f" {type(part).__name__} does nothing; let it act on another body"
+        )
+
+
+def _where(names: Sequence[str]) -> str:
+    return f"between {' and '.join(names)}" if len(names) > 1 else f"on {names[0]}"
+
+
+def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]) -> Lever:
+    """Where a coordinate of a component stands in q and in v."""
+    coordinates, speeds, cut = tables
+    q, v = ([row.name for row in table] for table in (coordinates, speeds))
+    known = [speed for speed in v if speed in q or not part.needs_position]
+    if name not in known and name in [coordinate.name for coordinate in cut]:
+        raise AssemblyError(
+            f"{part.name}: the joint of {name!r} is cut to open a loop, so that a"
+            f" {type(part).__name__} cannot act on it; give that joint some friction Fv of its"
+            " own, which keeps it in the tree"
+        )
+    if name not in known:
+        raise AssemblyError(
+            f"{part.name}: there is no coordinate {name!r} in the tree that a"
+            f" {type(part).__name__} can act on; {did_you_mean(name, known)}"
+        )
+    position = q.index(name) if name in q else None
+    return Lever(position, v.index(name), factor, name, speeds[v.index(name)].unit)
+
+
+# Wires: what feeds the inputs of components.
+
+
+def _wires(
+    mechanism: Mechanism, sensors: Sequence[AttachedSensor]
+) -> dict[tuple[str, str], Source]:
+    """The source of every input that is wired, by component and name.
+
+    Raises:
+        AssemblyError: a wire comes from nothing that gives a signal.
+    """
+    outputs = {
+        f"{part.name}.{name}": Source(part.name, name)
+        for part in parts_of(mechanism)
+        for name in part.output_names
+    }
+    for attached in sensors:
+        for column, _ in attached.columns:
+            name = attached.sensor.name
+            outputs[column] = Source(name, column.removeprefix(f"{name}."))
+    found: dict[tuple[str, str], Source] = {}
+    for source, target in mechanism.wires:
+        if str(source) not in outputs:
+            raise AssemblyError(
+                f"{mechanism.name}: {target} is wired to {str(source)!r}, which gives no signal;"
+                f" {did_you_mean(str(source), outputs)}"
+            )
+        known = mechanism.components.get(target.owner.name)
+        if not isinstance(known, Custom) or target.name not in known.input_names:
+            raise AssemblyError(
+                f"{mechanism.name}: {str(source)!r} is wired to {target}, which is no input of a"
+                " component of the mechanism; add that component"
+            )
+        if (known.name, target.name) in found:
+            raise AssemblyError(
+                f"{mechanism.name}: {target} is wired to {found[known.name, target.name]} and to"
+                f" {source}; an input has one source, so take one wire away"
+            )
+        found[known.name, target.name] = outputs[str(source)]
+    return found
+
+
+def symbols_in_order(symbols: Iterable[SX]) -> SX:
+    """(n, 1) symbols one after the other; (0, 1) where there are none."""
+    every = list(symbols)
+    return casadi.vertcat(*every) if every else SX(0, 1)

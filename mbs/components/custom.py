@@ -1,0 +1,722 @@
+"""Components by their equations: ports, parameters, states, inputs, outputs, and what they do.
+
+A class that derives from `Custom` declares what it has, and says by methods what it does:
+
+    class Drag(Custom):
+        \"\"\"Air drag on a point: force -c |v| v.\"\"\"
+
+        point = custom.frame()
+        c = custom.parameter("kg/m", min=0)
+
+        def loads(self, at):
+            v = at.point.v
+            return {"point": custom.force(-at.c * casadi.norm_2(v) * v)}
+
+        def dissipation(self, at):
+            return at.c * casadi.norm_2(at.point.v) ** 3
+
+Every method gets `at`, which has all that was declared under its name as CasADi expressions.
+Assembling a mechanism checks what they return and brings it into every model. Force elements,
+drives and frictions of this package are written in the same way.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
+from functools import cached_property
+from typing import Any, ClassVar, TypeVar
+
+import casadi
+from casadi import SX
+
+from mbs.components.component import Component, Point
+from mbs.components.on_points import OnPoints
+from mbs.errors import DescriptionError
+from mbs.expressions import (
+    MORE_THAN_ZERO,
+    Expression,
+    Number,
+    Scalar,
+    out_of_bounds,
+    to_float,
+)
+from mbs.expressions.expression import finite
+from mbs.spatial import zeros
+from mbs.text import did_you_mean, quoted
+from mbs.units import UNITS
+
+# What a component declares.
+
+
+EFFORT = "effort"
+"""The unit of an effort along a coordinate: N m or N."""
+
+REQUIRED: Any = object()
+"""Stands where there is no default."""
+
+_KINDS_OF_FIELDS = ("frame", "coordinate", "parameter", "state", "unknown")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Declared:
+    """One thing that a component has.
+
+    Attributes:
+        kind: frame, flange, coordinate, parameter, state, unknown, input or output.
+        unit: of its value.
+        default: of a parameter or an input; the start of a state, the guess of an unknown.
+        low, high: least and greatest value of a parameter.
+        nominal: typical size of a state.
+    """
+
+    kind: str
+    unit: str = "1"
+    default: Any = REQUIRED
+    low: float | None = None
+    high: float | None = None
+    nominal: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS and self.unit != EFFORT:
+            raise DescriptionError(
+                f"a declared {self.kind} has the unit {quoted(self.unit)}; give a product of SI"
+                " units such as 'kg/m', 'N.s/m' or 'm3/s'"
+            )
+
+
+def frame() -> Any:
+    """A port on a point of a body: the component is made with a body or `body.at(...)` for it."""
+    return Declared("frame")
+
+
+def flange() -> Any:
+    """A port on a shaft: `m.connect(component.name_of_it, joint.flange)` connects it."""
+    return Declared("flange")
+
+
+def coordinate() -> Any:
+    """A port on a coordinate of a joint: the component is made with its name, such as "j1"."""
+    return Declared("coordinate")
+
+
+def parameter(
+    unit: str = "1",
+    default: Scalar | None = None,
+    *,
+    min: float | None = None,
+    max: float | None = None,
+    positive: bool = False,
+) -> Any:
+    """A number, a text or an `mbs.Parameter`; it stays a symbol where one is in it.
+
+    Args:
+        unit: of its value.
+        default: where the component is made without it; it must be given when left out.
+        min: the least value that is taken.
+        max: the greatest.
+        positive: take what is more than zero only.
+    """
+    low = MORE_THAN_ZERO if positive and min is None else min
+    return Declared("parameter", unit, REQUIRED if default is None else default, low, max)
+
+
+def state(unit: str = "1", *, start: float = 0.0, nominal: float = 1.0) -> Any:
+    """A quantity with a rate of its own, which `rates` gives; `start` may be given by its name.
+
+    Args:
+        unit: of its value.
+        start: where a motion begins when nothing else is said.
+        nominal: typical size, by which solvers measure errors.
+    """
+    return Declared("state", unit, start, nominal=nominal)
+
+
+def unknown(unit: str = "m", *, guess: float = 0.0) -> Any:
+    """A quantity that the rows of the component determine together with the configuration.
+
+    It is a coordinate of the system, without mass, named NAME.of_it; its rate is an element of v.
+
+    Args:
+        unit: "m" or "rad".
+        guess: near which assembling looks for it.
+    """
+    if unit not in ("m", "rad"):
+        raise DescriptionError(
+            f"an unknown is declared with the unit {quoted(unit)}; use 'm' or 'rad'"
+        )
+    return Declared("unknown", unit, guess)
+
+
+def input(unit: str = "1", *, default: float = 0.0) -> Any:
+    """A signal from outside: of `run`, an FMU, an optimal control problem, or `m.wire`.
+
+    Args:
+        unit: of its value.
+        default: where nothing gives it.
+    """
+    return Declared("input", unit, default)
+
+
+def output(unit: str = "1") -> Any:
+    """A signal that `outputs` gives: a column of results, an output of FMUs, a source of wires."""
+    return Declared("output", unit)
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """An input or output of a component, which `Mechanism.wire` takes.
+
+    Attributes:
+        owner: the component.
+        name: of the signal in it.
+        kind: "input" or "output".
+    """
+
+    owner: Component
+    name: str
+    kind: str
+
+    def __str__(self) -> str:
+        return f"{self.owner.name}.{self.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class Flange:
+    """An end of a shaft that another one can be connected to.
+
+    Attributes:
+        owner: the component that it belongs to: a part of a drive line, or a joint.
+        port: which flange of it, "a" or "b"; nothing where there is only one.
+    """
+
+    owner: Component
+    port: str = ""
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """The name of its component, and which flange of it."""
+        return self.owner.name, self.port
+
+    def __str__(self) -> str:
+        if self.port in ("", "a", "b"):
+            return f"{self.owner.name}.flange{'_' if self.port else ''}{self.port}"
+        return f"{self.owner.name}.{self.port}"
+
+
+class _Handle:
+    """What stands in a class for a flange, an input or an output: `motor.voltage` is a Signal."""
+
+    def __init__(self, kind: str, name: str) -> None:
+        self.kind, self.name = kind, name
+
+    def __get__(self, owner: Any, kind: type | None = None) -> Any:
+        if owner is None:
+            return self
+        if self.kind == "flange":
+            return Flange(owner, port_of_flange(self.name))
+        return Signal(owner, self.name, self.kind)
+
+
+def port_of_flange(name: str) -> str:
+    """The port of the flange that a component declares under a name: "a" for flange_a."""
+    return name.removeprefix("flange").removeprefix("_") if name.startswith("flange") else name
+
+
+# What the methods of a component see: its ports where they are, its numbers as expressions.
+
+
+SHORTEST = 1e-12
+"""Length [m] that is added to every distance as the root of a sum of squares."""
+
+
+def regular_length(p: SX) -> SX:
+    """Length of a vector (3, 1), regular where it is zero."""
+    return casadi.sqrt(casadi.dot(p, p) + SHORTEST**2)
+
+
+@dataclass(frozen=True, eq=False)
+class RelativeMotion:
+    """How a frame b moves, seen from a frame a and in its axes.
+
+    Attributes:
+        p: (3, 1) origin of b [m].
+        R: (3, 3) orientation of b.
+        V: (3, 1) rate of p [m/s].
+        w: (3, 1) angular velocity of b relative to a [rad/s].
+    """
+
+    p: SX
+    R: SX
+    V: SX
+    w: SX
+
+    @cached_property
+    def length(self) -> SX:
+        """Distance of the origins [m], regular where it is zero."""
+        return regular_length(self.p)
+
+    @cached_property
+    def along(self) -> SX:
+        """(3, 1) unit vector from a to b."""
+        return self.p / self.length
+
+    @cached_property
+    def rate(self) -> SX:
+        """Rate of the distance [m/s]."""
+        return casadi.dot(self.along, self.V)
+
+
+class FrameAt:
+    """A frame of a component in a configuration, in motion.
+
+    Attributes:
+        port: the name that the component gave it.
+        p: (3, 1) its origin in the world [m].
+        R: (3, 3) its orientation in the world.
+        v: (3, 1) velocity of its origin, in axes of the world [m/s].
+        w: (3, 1) angular velocity, in axes of the world [rad/s].
+    """
+
+    def __init__(self, port: str, seen_from: Callable[[FrameAt | None], RelativeMotion]) -> None:
+        self.port = port
+        self._seen_from = seen_from
+
+    @cached_property
+    def _in_world(self) -> RelativeMotion:
+        return self._seen_from(None)
+
+    @property
+    def p(self) -> SX:
+        """(3, 1) its origin in the world [m]."""
+        return self._in_world.p
+
+    @property
+    def R(self) -> SX:
+        """(3, 3) its orientation in the world."""
+        return self._in_world.R
+
+    @property
+    def v(self) -> SX:
+        """(3, 1) velocity of its origin, in axes of the world [m/s]."""
+        return self._in_world.V
+
+    @property
+    def w(self) -> SX:
+        """(3, 1) angular velocity, in axes of the world [rad/s]."""
+        return self._in_world.w
+
+    def to(self, other: FrameAt) -> RelativeMotion:
+        """How another frame moves, seen from this one and in its axes."""
+        return other._seen_from(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoordinateAt:
+    """A coordinate, or a sum of several, each times a factor.
+
+    Attributes:
+        q: its position [rad or m]; None where it is none, as the rates of a spherical joint.
+        v: its rate.
+    """
+
+    q: SX | None
+    v: SX
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlangeAt:
+    """A flange.
+
+    Attributes:
+        angle: of its shaft [rad].
+        speed: its rate [rad/s].
+    """
+
+    angle: SX
+    speed: SX
+
+
+class At:
+    """What a component has, at a state: every declared name is an attribute.
+
+    Frames are `FrameAt`, flanges `FlangeAt`, coordinates `CoordinateAt`; parameters, states,
+    inputs and unknowns are (1, 1) expressions. `outputs` has `lam` besides, the efforts of the
+    rows by their labels. `symbols` are those of all parameters of the mechanism, by name.
+    """
+
+    def __init__(
+        self, component: str, symbols: Mapping[str, SX], values: Mapping[str, Callable[[], Any]]
+    ) -> None:
+        self.symbols = symbols
+        self._component = component
+        self._values = values
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        if name not in self._values:
+            raise DescriptionError(
+                f"{self._component}: there is no at.{name} here; {did_you_mean(name, self._values)}"
+            )
+        value = self._values[name]()
+        self.__dict__[name] = value
+        return value
+
+
+# What the methods of a component return.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameLoad:
+    """What a component does to a frame.
+
+    Attributes:
+        force: (3, 1) [N].
+        moment: (3, 1) about the origin of the frame [N m].
+        own_axes: both are in the axes of the frame, not of the world.
+    """
+
+    force: SX
+    moment: SX
+    own_axes: bool = False
+
+
+def force(value: Any, *, own_axes: bool = False) -> FrameLoad:
+    """A force (3, 1) [N] at the origin of a frame, in axes of the world or of the frame."""
+    return FrameLoad(SX(value), zeros(), own_axes)
+
+
+def torque(value: Any, *, own_axes: bool = False) -> FrameLoad:
+    """A torque (3, 1) [N m] on a frame, in axes of the world or of the frame."""
+    return FrameLoad(zeros(), SX(value), own_axes)
+
+
+def between(
+    a: FrameAt, b: FrameAt, on_a: FrameLoad, moment_b: SX | None = None
+) -> dict[str, FrameLoad]:
+    """A wrench on frame a in its axes, and the opposite force on frame b.
+
+    Args:
+        a: a frame of the component.
+        b: another one.
+        on_a: force and moment on a, in its own axes.
+        moment_b: (3, 1) moment on b about its origin, in the axes of a; none when left out.
+    """
+    R = a.to(b).R
+    turned = zeros() if moment_b is None else moment_b
+    opposite = casadi.mtimes(R.T, -on_a.force), casadi.mtimes(R.T, turned)
+    return {a.port: replace(on_a, own_axes=True), b.port: FrameLoad(*opposite, own_axes=True)}
+
+
+def pull(a: FrameAt, b: FrameAt, tension: SX) -> dict[str, FrameLoad]:
+    """A tension [N] that draws the origins of two frames together."""
+    return between(a, b, FrameLoad(a.to(b).along * tension, zeros()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """Something that must be zero.
+
+    Attributes:
+        value: (1, 1).
+        unit: "m" for a length, "1" for what has no size, such as a cosine or an angle.
+    """
+
+    value: SX
+    unit: str = "m"
+
+
+Load = FrameLoad | SX | float
+"""A wrench on a frame; a force [N] or torque [N m] along a coordinate or on a flange."""
+
+C = TypeVar("C", bound="Custom")
+
+
+@dataclass(frozen=True, slots=True)
+class Custom(OnPoints):
+    """A component by its equations; derive from it, declare ports and numbers, write methods.
+
+    What a component does:
+
+    - `loads(at)`: what it does to its ports, by their names. Where it is left out and `energy` is
+      there, the loads are the slopes of the energy, with the opposite sign.
+    - `energy(at)`: what it stores [J]; of positions and states alone.
+    - `dissipation(at)`: what it turns into heat [W], never negative.
+    - `rates(at)`: the rate of every state, by name.
+    - `rows(at)`: what must be zero, by label: `Row`s of positions, unknowns and parameters.
+    - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
+    - `outputs(at)`: the value of every output, by name.
+
+    Source: Haug 1989 for forces and rows; Modelica Association 2023 for the equations that a
+    connection stands for.
+
+    Attributes:
+        name: unique in its mechanism.
+    """
+
+    declared: ClassVar[Mapping[str, Declared]] = {}
+    """What the class and its bases declare, by name."""
+
+    drives: ClassVar[bool] = False
+    """Whether it is a motor on its flange: models of efforts leave what it delivers to tau."""
+
+    lowered: ClassVar[bool] = False
+    """Whether the assembly turns it into joints and couplings, so that nothing is left of it."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super(Custom, cls).__init_subclass__(**kwargs)
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Declared)}
+        inherited = [base.__dict__.get("declared", {}) for base in reversed(cls.__mro__)]
+        cls.declared = {n: what for one in (*inherited, own) for n, what in one.items()}
+        if own:
+            _make_fields(cls, own)
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        for name, what in self.declared.items():
+            if what.kind in _KINDS_OF_FIELDS:
+                _CHECKS[what.kind](self, name, what)
+
+    # Ports.
+
+    def names_of(self, *kinds: str) -> tuple[str, ...]:
+        """The names of what is declared of some kinds, in order."""
+        return tuple(name for name, what in self.declared.items() if what.kind in kinds)
+
+    @property
+    def frames(self) -> Mapping[str, Point]:
+        """Its points, by port."""
+        return {name: getattr(self, name) for name in self.names_of("frame")}
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """Its points."""
+        return tuple(self.frames.values())
+
+    @property
+    def coordinates(self) -> Mapping[str, tuple[tuple[str, Scalar], ...]]:
+        """By port, the coordinates whose sum it is, each with its factor."""
+        return {name: ((getattr(self, name), Number(1.0)),) for name in self.names_of("coordinate")}
+
+    @property
+    def shaft_ports(self) -> tuple[str, ...]:
+        """The flanges that its methods ask for, by name."""
+        return self.names_of("flange")
+
+    @property
+    def flanges(self) -> tuple[Flange, ...]:
+        """All its flanges."""
+        return tuple(getattr(self, name) for name in self.names_of("flange"))
+
+    @property
+    def own_inertia(self) -> Expression:
+        """Inertia that it adds to its shaft [kg m^2]."""
+        return Number(0.0)
+
+    @property
+    def needs_position(self) -> bool:
+        """Whether its coordinates must be positions, which those of a spherical joint are not."""
+        return False
+
+    @property
+    def scope(self) -> str:
+        """Where it counts, in words; nothing for a component of all models."""
+        return ""
+
+    def scoped(self: C, prefix: str) -> C:
+        """The same component inside a mechanism that is placed in another one."""
+        inner = OnPoints.scoped(self, prefix)
+        changed: dict[str, Any] = {
+            name: f"{prefix}.{getattr(self, name)}" for name in self.names_of("coordinate")
+        }
+        return replace(inner, **changed) if changed else inner
+
+    # What it does.
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """What it does to its ports, by their names: wrenches on frames, efforts on the others."""
+        return {}
+
+    def energy(self, at: Any) -> SX:
+        """What it stores [J]."""
+        return SX(0)
+
+    def dissipation(self, at: Any) -> SX:
+        """What it turns into heat [W]."""
+        return SX(0)
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """The rate of every state, by its name."""
+        return {}
+
+    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+        """What must be zero, by label, of positions, unknowns and parameters."""
+        return {}
+
+    def velocity_rows(self, at: Any) -> Mapping[str, Row | SX]:
+        """What must be zero, by label, linear in velocities."""
+        return {}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The value of every output, by its name."""
+        return {}
+
+    # What the assembly asks.
+
+    def has(self, *methods: str) -> bool:
+        """Whether the class says something by one of these methods."""
+        return any(getattr(type(self), name) is not getattr(Custom, name) for name in methods)
+
+    @property
+    def has_equations(self) -> bool:
+        """Whether anything is left of it in the models."""
+        return not self.lowered and self.has(*_METHODS)
+
+    @property
+    def acts(self) -> bool:
+        """Whether it puts loads on its ports."""
+        return self.has("loads", "energy")
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Its states."""
+        return self.names_of("state")
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Its inputs."""
+        return self.names_of("input")
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Its outputs."""
+        return self.names_of("output")
+
+    def _require_magnitudes(self, *names: str) -> None:
+        """Refuse numbers below zero in these fields."""
+        for name in names:
+            given = getattr(self, name)
+            for scalar in given if isinstance(given, tuple) else (given,):
+                value = to_float(scalar)
+                if value is not None and value < 0:
+                    raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
+
+    def _require_positive(self, *names: str) -> None:
+        """Refuse zero and numbers below it in these fields."""
+        for name in names:
+            value = to_float(getattr(self, name))
+            if value is not None and value <= 0:
+                raise DescriptionError(f"{self.name}: {name} is {value:g}; give more than zero")
+
+    def _require_effect(self, *names: str) -> None:
+        """Refuse an element all of whose strengths are zero."""
+        values = [getattr(self, name) for name in names]
+        flat = [v for value in values for v in (value if isinstance(value, tuple) else (value,))]
+        if all(value == Number(0.0) for value in flat):
+            raise DescriptionError(
+                f"{self.name}: {' and '.join(names)} {'are' if len(names) > 1 else 'is'} zero, so"
+                f" that the {type(self).__name__} does nothing; give a strength or leave it out"
+            )
+
+
+_METHODS = ("loads", "energy", "rates", "rows", "velocity_rows", "outputs")
+"""What a component can say that models ask for."""
+
+_RESERVED = frozenset({"name", "declared", "symbols", "lam", *vars(Custom)})
+"""Names that a declaration must not take, since components or `at` have them already."""
+
+
+def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
+    """Turn what a class declares into fields of a frozen dataclass, and into handles."""
+    annotations: dict[str, Any] = dict(inspect.get_annotations(cls))
+    for name, what in own.items():
+        if name in _RESERVED or name.startswith("_"):
+            raise DescriptionError(
+                f"{cls.__name__}: a {what.kind} cannot be named {name!r}; choose another name"
+            )
+        if what.kind not in _KINDS_OF_FIELDS:
+            setattr(cls, name, _Handle(what.kind, name))
+            continue
+        annotations[name] = Any
+        if what.kind in ("state", "unknown"):
+            setattr(cls, name, dataclass_field(default=what.default, kw_only=True))
+        elif what.default is REQUIRED:
+            delattr(cls, name)
+        else:
+            setattr(cls, name, what.default)
+    if not any(what.kind in _KINDS_OF_FIELDS for what in own.values()):
+        return
+    cls.__annotations__ = annotations
+    try:
+        dataclass(frozen=True)(cls)
+    except TypeError as error:
+        raise DescriptionError(
+            f"{cls.__name__}: {error}; declare what has a default after what has none"
+        ) from None
+
+
+def _check_frame(component: Custom, name: str, what: Declared) -> None:
+    component._take_point(name)
+
+
+def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
+    given = getattr(component, name)
+    if isinstance(given, Component) and not isinstance(given, OnPoints):
+        given = given.name
+    if not isinstance(given, str) or not given:
+        raise DescriptionError(
+            f"{component.name}: {name} is {quoted(given)}; give the name of a coordinate, such as"
+            " 'j1' or 'slide.s'"
+        )
+    object.__setattr__(component, name, given)
+
+
+def _check_parameter(component: Custom, name: str, what: Declared) -> None:
+    component._normalise(name)
+    value = to_float(getattr(component, name))
+    fault = "" if value is None else out_of_bounds(value, what.low, what.high)
+    if fault:
+        unit = "" if what.unit == "1" else f" {what.unit}"
+        raise DescriptionError(f"{component.name}: {name} is {value:g}{unit}; {fault}")
+
+
+def _check_number(component: Custom, name: str, what: Declared) -> None:
+    object.__setattr__(
+        component, name, finite(getattr(component, name), f"{component.name}, {name}")
+    )
+
+
+_CHECKS: Mapping[str, Callable[[Custom, str, Declared], None]] = {
+    "frame": _check_frame,
+    "coordinate": _check_coordinate,
+    "parameter": _check_parameter,
+    "state": _check_number,
+    "unknown": _check_number,
+}
+
+__all__ = [
+    "At",
+    "CoordinateAt",
+    "Custom",
+    "FlangeAt",
+    "FrameAt",
+    "FrameLoad",
+    "RelativeMotion",
+    "Row",
+    "Signal",
+    "between",
+    "coordinate",
+    "flange",
+    "force",
+    "frame",
+    "input",
+    "output",
+    "parameter",
+    "pull",
+    "state",
+    "torque",
+    "unknown",
+]

@@ -1,0 +1,375 @@
+"""Components by their equations, evaluated in a tree: loads, energy, rates, rows, signals.
+
+A component's methods see an `At`: its ports where they are at positions q and velocities v, and
+its numbers. Signals run along wires, each output following from states, ports and inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import casadi
+from casadi import DM, SX
+
+from mbs.assembly import System
+from mbs.assembly.parts import AttachedPart, Source
+from mbs.assembly.tables import AttachedSensor, Coordinate
+from mbs.assembly.tree import Frame, Tree
+from mbs.components.custom import (
+    At,
+    CoordinateAt,
+    FlangeAt,
+    FrameAt,
+    FrameLoad,
+    Load,
+    RelativeMotion,
+    Row,
+    regular_length,
+)
+from mbs.components.sensors import AbsoluteSensor, DistanceSensor, JointSensor, RelativeSensor
+from mbs.errors import AssemblyError
+from mbs.expressions import to_sx
+from mbs.recursions.poses import link_poses
+from mbs.recursions.route import BASE, relative_motion, relative_pose
+from mbs.recursions.velocities import Velocity, link_velocities
+from mbs.spatial import Pose, skew, zeros
+from mbs.text import did_you_mean
+
+
+class PartsAt:
+    """The components of a system at positions and velocities of its tree.
+
+    Args:
+        tree: the links.
+        parts: every component by its equations.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities; at rest when left out.
+        sensors: what wires may come from.
+        coordinates: names of the elements of q and of v, for sensors on joints.
+        shifts: by how much the ports on coordinates are moved, by their names; not when left out.
+    """
+
+    def __init__(
+        self,
+        tree: Tree,
+        parts: Sequence[AttachedPart],
+        q: SX,
+        v: SX | None = None,
+        sensors: Sequence[AttachedSensor] = (),
+        coordinates: tuple[Sequence[Coordinate], Sequence[Coordinate]] = ((), ()),
+        shifts: Mapping[str, SX] | None = None,
+    ) -> None:
+        self.tree, self.parts, self.q, self.v = tree, parts, q, v
+        self._sensors = {attached.sensor.name: attached for attached in sensors}
+        self._coordinates = coordinates
+        self._shifts = shifts or {}
+        self._loads: dict[str, Mapping[str, Load]] = {}
+        self._moving: list[Velocity] | None = None
+        self._found: dict[str, At] = {}
+        self._outputs: dict[str, tuple[Mapping[str, SX], Mapping[str, SX]]] = {}
+        self._signals: dict[Source, SX | None] = {}
+
+    @property
+    def moving(self) -> list[Velocity]:
+        """Velocities of the links, each in its frame."""
+        if self._moving is None:
+            assert self.v is not None
+            self._moving = link_velocities(self.tree, link_poses(self.tree, self.q), self.v)
+        return self._moving
+
+    # What a component sees.
+
+    def at(self, part: AttachedPart) -> At:
+        """What the methods of a component get, signals of wires included."""
+        if part.name not in self._found:
+            inputs = {name: partial(self._input, part, name) for name in part.inputs}
+            self._found[part.name] = self._seen(part, inputs)
+        return self._found[part.name]
+
+    def _seen(self, part: AttachedPart, inputs: Mapping[str, Callable[[], Any]]) -> At:
+        element, values = part.element, dict[str, Callable[[], Any]](inputs)
+        # ports on points of bodies
+        for port, frame in zip(element.frames, part.frames, strict=True):
+            values[port] = partial(self._frame, port, frame)
+        # ports on coordinates, and unknowns
+        for port in part.coordinates:
+            values[port] = partial(self._coordinate, part, port)
+        # numbers
+        for name in element.names_of("parameter"):
+            values[name] = partial(to_sx, getattr(element, name), part.symbols)
+        for name, symbol in part.states.items():
+            values[name] = partial(_same, symbol)
+        return At(part.name, part.symbols, values)
+
+    def _frame(self, port: str, frame: Frame) -> FrameAt:
+        made = FrameAt(port, lambda seen_from: self._relative(seen_from, frame))
+        made.frame = frame  # type: ignore[attr-defined]
+        return made
+
+    def _relative(self, seen_from: FrameAt | None, frame: Frame) -> RelativeMotion:
+        a: Frame = BASE if seen_from is None else seen_from.frame  # type: ignore[attr-defined]
+        if self.v is None:
+            T = relative_pose(self.tree, self.q, a, frame)
+            return RelativeMotion(T.p, T.R, zeros(), zeros())
+        return relative_motion(self.tree, a, frame, self.q, self.moving)
+
+    def _coordinate(self, part: AttachedPart, port: str) -> CoordinateAt | FlangeAt | SX:
+        levers = part.coordinates[port]
+        q: SX | None = self._shifts.get(port, SX(0))
+        for lever in levers:
+            if q is not None:
+                at = lever.position
+                q = None if at is None else q + lever.factor * self.q[at]
+        v = SX(0)
+        if self.v is not None:
+            v = sum((lever.factor * self.v[lever.velocity] for lever in levers), SX(0))
+        kind = part.element.declared[port].kind if port in part.element.declared else "coordinate"
+        if kind == "flange":
+            assert q is not None
+            return FlangeAt(q, v)
+        if kind == "unknown":
+            assert q is not None
+            return q
+        return CoordinateAt(q, v)
+
+    # Signals.
+
+    def _input(self, part: AttachedPart, name: str) -> SX:
+        given = part.inputs[name]
+        return given if isinstance(given, SX) else self.signal(given)
+
+    def signal(self, source: Source) -> SX:
+        """What an output of a component, or a sensor, gives.
+
+        Raises:
+            AssemblyError: it follows from itself, or from what equations of motion determine.
+        """
+        if source.owner in self._sensors:
+            return self._reading(self._sensors[source.owner], source)
+        if source in self._signals:
+            found = self._signals[source]
+            if found is None:
+                ring = [str(one) for one, value in self._signals.items() if value is None]
+                ring = ring[ring.index(str(source)) :]
+                raise AssemblyError(
+                    f"wires form the ring {' -> '.join([*ring, str(source)])}, in which a signal"
+                    " follows from itself; put a component into it whose output is made of states"
+                    " alone, or take a wire away"
+                )
+            return found
+        self._signals[source] = None
+        part = next(part for part in self.parts if part.name == source.owner)
+        outputs, placeholders = self._with_placeholders(part)
+        value = outputs[source.signal]
+        for name, symbol in placeholders.items():
+            if casadi.depends_on(value, symbol):
+                value = casadi.substitute(value, symbol, self._input(part, name))
+        self._signals[source] = value
+        return value
+
+    def _with_placeholders(self, part: AttachedPart) -> tuple[Mapping[str, SX], Mapping[str, SX]]:
+        """The outputs of a component, and the symbols of its inputs in them."""
+        if part.name not in self._outputs:
+            symbols = {name: SX.sym(name) for name in part.inputs}
+            inputs = {name: partial(_same, symbol) for name, symbol in symbols.items()}
+            seen = self._seen(part, inputs)
+            self._outputs[part.name] = outputs_at(part, seen), symbols
+        return self._outputs[part.name]
+
+    def _reading(self, attached: AttachedSensor, source: Source) -> SX:
+        """What a sensor reads of positions and velocities."""
+        sensor = attached.sensor
+        name, _, element = source.signal.partition(".")
+        readings: Mapping[str, SX] = {}
+        if isinstance(sensor, JointSensor):
+            readings = self._on_coordinate(attached.coordinate)
+        elif isinstance(sensor, (AbsoluteSensor, RelativeSensor, DistanceSensor)):
+            a, b = attached.frames if len(attached.frames) == 2 else (BASE, *attached.frames)
+            motion = relative_motion(self.tree, a, b, self.q, self.moving)
+            if isinstance(sensor, DistanceSensor):
+                length = regular_length(motion.p)
+                readings = {"L": length, "Ld": casadi.dot(motion.p, motion.V) / length}
+            else:
+                axes = {"world": BASE, "body": b, "a": a, "b": b}[sensor.axes]
+                R = relative_pose(self.tree, self.q, axes, a).R
+                vectors = {"p": motion.p, "v": motion.V, "w": motion.w}
+                readings = {n: casadi.mtimes(R, vector) for n, vector in vectors.items()}
+                readings = {**readings, "R": motion.R}
+        if name not in readings:
+            raise AssemblyError(
+                f"a wire comes from {source}, which follows from the accelerations or forces of the"
+                f" motion itself; wire what positions and velocities tell, such as"
+                f" {did_you_mean(name, readings) if readings else 'an angle'}"
+            )
+        quantity = next(q for q in attached.quantities if q.name == name)
+        number = quantity.elements.index(element)
+        return casadi.vec(readings[name])[number]
+
+    def _on_coordinate(self, name: str) -> Mapping[str, SX]:
+        found = {}
+        q, v = self._coordinates
+        for number, row in enumerate(q):
+            if row.name == name:
+                found["q"] = self.q[number]
+        for number, row in enumerate(v):
+            if row.name == name and self.v is not None:
+                found["v"] = self.v[number]
+        return found
+
+    # What components do.
+
+    def loads(self, part: AttachedPart) -> Mapping[str, Load]:
+        """What a component does to its ports: as it says, or by the slopes of its energy."""
+        if part.name not in self._loads:
+            element = part.element
+            if element.has("loads"):
+                self._loads[part.name] = element.loads(self.at(part))
+            elif element.has("energy"):
+                self._loads[part.name] = self.slopes(part, lambda at: -SX(element.energy(at)))
+            else:
+                self._loads[part.name] = {}
+        return self._loads[part.name]
+
+    def slopes(self, part: AttachedPart, value: Callable[[At], SX]) -> Mapping[str, Load]:
+        """What loads do the work of a value where ports move a little, by port.
+
+        Frames are moved by x and turned by y in their own axes, coordinates by s; the slopes are
+        forces, moments and efforts.
+
+        Source: Haug 1989, the principle of virtual work.
+
+        Args:
+            part: the component.
+            value: (1, 1) of positions.
+        """
+        small = [SX.sym("d", 6) for _ in part.frames]
+        frames = tuple(
+            (link, pose @ Pose(SX(DM.eye(3)) + skew(d[3:]), d[:3]))
+            for (link, pose), d in zip(part.frames, small, strict=True)
+        )
+        shifts = {port: SX.sym("s") for port in part.coordinates}
+        moved = PartsAt(self.tree, self.parts, self.q, None, shifts=shifts)
+        every = casadi.vertcat(SX(0, 1), *small, *shifts.values())
+        found = value(moved.at(replace(part, frames=frames)))
+        slopes = casadi.gradient(found, every)
+        slopes = casadi.densify(casadi.substitute(slopes, every, SX.zeros(every.numel())))
+        result: dict[str, Load] = {}
+        for number, port in enumerate(part.element.frames):
+            d = slopes[6 * number : 6 * number + 6]
+            result[port] = FrameLoad(d[:3], d[3:], own_axes=True)
+        first = 6 * len(part.frames)
+        return {**result, **{port: slopes[first + k] for k, port in enumerate(shifts)}}
+
+    def efforts(self) -> SX:
+        """(nv, 1) what the coordinates need of effort to overcome the components on them."""
+        total = SX.zeros(self.tree.nv)
+        for part in self.parts:
+            if part.coordinates and not part.element.drives:
+                self._add_efforts(total, part, -1)
+        return total
+
+    def delivered(self) -> SX:
+        """(nv, 1) what drives deliver at the coordinates [N m or N]."""
+        total = SX.zeros(self.tree.nv)
+        for part in self.parts:
+            if part.element.drives:
+                self._add_efforts(total, part, 1)
+        return total
+
+    def _add_efforts(self, total: SX, part: AttachedPart, sign: int) -> None:
+        loads = self.loads(part)
+        for port, levers in part.coordinates.items():
+            if port in loads:
+                load = loads[port]
+                assert not isinstance(load, FrameLoad)  # checked at assembly
+                own = sign * SX(load)
+                for lever in levers:
+                    total[lever.velocity] += lever.factor * own
+
+    def energy(self) -> SX:
+        """What the components store [J]."""
+        total = SX(0)
+        for part in self.parts:
+            if part.element.has("energy"):
+                total += part.element.energy(self.at(part))
+        return total
+
+    def frame_loads(self, part: AttachedPart) -> list[tuple[str, Frame, FrameLoad]]:
+        """Port, frame, and the load on it in axes of the frame, about its origin."""
+        loads, result = self.loads(part), []
+        for port, frame in zip(part.element.frames, part.frames, strict=True):
+            load = loads.get(port)
+            if isinstance(load, FrameLoad):
+                if not load.own_axes:
+                    R = getattr(self.at(part), port).R
+                    force, moment = (casadi.mtimes(R.T, x) for x in (load.force, load.moment))
+                    load = FrameLoad(force, moment, own_axes=True)
+                result.append((port, frame, load))
+        return result
+
+    def rates(self) -> SX:
+        """(nz, 1) rates of the states of all components."""
+        rates = [SX(0, 1)]
+        for part in self.parts:
+            if part.states:
+                found = part.element.rates(self.at(part))
+                rates += [SX(found[name]) for name in part.states]
+        return casadi.vertcat(*rates)
+
+    def outputs(self, lam: Mapping[str, Mapping[str, SX]] | None = None) -> SX:
+        """(ny, 1) outputs of all components.
+
+        Args:
+            lam: efforts of the rows of each component, by its name and their labels.
+        """
+        values = [SX(0, 1)]
+        for part in self.parts:
+            names = part.element.output_names
+            if names:
+                at = self.at(part)
+                at.__dict__["lam"] = (lam or {}).get(part.name, {})
+                found = outputs_at(part, at)
+                values += [SX(found[name]) for name in names]
+        return casadi.vertcat(*values)
+
+
+def outputs_at(part: AttachedPart, at: At) -> Mapping[str, SX]:
+    """The outputs that a component says, each one there."""
+    return part.element.outputs(at)
+
+
+def _same(value: SX) -> SX:
+    return value
+
+
+def parts_at(system: System, q: SX, v: SX | None = None) -> PartsAt:
+    """The components of a system at positions q (nq, 1) and velocities v (nv, 1), or at rest."""
+    tables = system.coordinates, system.speeds
+    return PartsAt(system.tree, system.parts, q, v, system.sensors, tables)
+
+
+# Rows by which components bind positions, unknowns and velocities.
+
+
+def part_rows(at: PartsAt, *, velocities: bool = False) -> list[tuple[str, list[tuple[str, Row]]]]:
+    """For each component with rows its name, and labels and rows.
+
+    Args:
+        at: the components.
+        velocities: rows that bind velocities alone.
+    """
+    method = "velocity_rows" if velocities else "rows"
+    result = []
+    for part in at.parts:
+        if part.element.has(method):
+            rows = getattr(part.element, method)(at.at(part))
+            result.append((part.name, [(label, as_row(row)) for label, row in rows.items()]))
+    return result
+
+
+def as_row(row: Row | SX) -> Row:
+    """A row; an expression alone is a length."""
+    return row if isinstance(row, Row) else Row(SX(row))

@@ -11,7 +11,13 @@ from mbs.assembly.drive_line import drive_line, shaft_rows
 from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
 from mbs.assembly.khalil_frames import Cut, Framed, khalil_frames
 from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
-from mbs.assembly.parts import attached_parts, coordinates_needed, symbols_in_order
+from mbs.assembly.parts import (
+    AttachedPart,
+    attached_parts,
+    coordinates_needed,
+    symbols_in_order,
+    with_unknowns,
+)
 from mbs.assembly.proof import prove
 from mbs.assembly.system import System
 from mbs.assembly.tables import (
@@ -51,7 +57,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     described = [c for c in mechanism.components.values() if c.parameters()]
     bounds = parameter_bounds(described, parameters)
     line = drive_line(mechanism)
-    mechanism = line.mechanism
+    mechanism = with_unknowns(line.mechanism)
     symbols = {parameter.name: SX.sym(parameter.name) for parameter in parameters}
     graph = connection_graph(mechanism, symbols, _trial_values(parameters))
     coupled = [name for c in mechanism.couplings() for name in c.coordinates]
@@ -100,7 +106,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         frames=frames,
         named_frames=tuple(mechanism.frames),
         numbered=_numbered(mechanism, frames, len(framed.tree.links)),
-        loops=_loop_rows(mechanism, framed),
+        loops=_loop_rows(mechanism, framed, parts),
         configuration=tuple(zero_position(framed.tree)),
         parts=parts,
         z=symbols_in_order(symbol for part in parts for symbol in part.states.values()),
@@ -165,7 +171,9 @@ def _driven_joints(mechanism: Mechanism) -> set[str]:
     return _owners(mechanism, driven)
 
 
-def _loop_rows(mechanism: Mechanism, framed: Framed) -> tuple[LoopRow, ...]:
+def _loop_rows(
+    mechanism: Mechanism, framed: Framed, parts: Sequence[AttachedPart]
+) -> tuple[LoopRow, ...]:
     loops = [
         LoopRow(
             name=cut.edge.joint.name,
@@ -176,7 +184,19 @@ def _loop_rows(mechanism: Mechanism, framed: Framed) -> tuple[LoopRow, ...]:
         for cut in framed.cuts
     ]
     couplings = [LoopRow(c.name, "coupling", c.coordinates, ()) for c in mechanism.couplings()]
-    return (*loops, *couplings)
+    binding = [
+        LoopRow(part.name, type(part.element).__name__.lower(), _bound_joints(framed, part), ())
+        for part in sorted(parts, key=lambda part: not part.element.has("rows"))
+        if part.element.binds
+    ]
+    return (*loops, *couplings, *binding)
+
+
+def _bound_joints(framed: Framed, part: AttachedPart) -> tuple[str, ...]:
+    """The joints that move what a component binds."""
+    links = [k for link, _ in part.frames for k in framed.tree.path(link)]
+    names = [framed.joints[k] for k in sorted(set(links))]
+    return tuple(dict.fromkeys([*names, *(lever.name for lever in part.levers)]))
 
 
 def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,8 @@ from casadi import SX
 
 from mbs.assembly.tables import EFFORT_UNIT, AttachedSensor, Coordinate, Places, require_part
 from mbs.assembly.tree import Frame
-from mbs.components import Custom, Mechanism
+from mbs.components import Custom, Mechanism, Prismatic, Revolute
+from mbs.components.bodies import Mount
 from mbs.components.custom import EFFORT, port_of_flange
 from mbs.errors import AssemblyError
 from mbs.expressions import Scalar, to_sx
@@ -138,7 +140,7 @@ class AttachedPart:
             turns = as_fast(number_or_sx(self.factor), self.levers[0].name)
             does = f"drives {self.levers[0].name} and turns {turns}"
         else:
-            verb = "acts" if self.element.acts else "is"
+            verb = "acts" if self.element.acts else "binds what is" if self.element.binds else "is"
             does = f"{verb} {self.where}" if self.where else "works on signals alone"
             does += self.element.scope
         return f"{kind} {name} {does}{': ' if signals else ''}{', '.join(signals)}."
@@ -162,6 +164,34 @@ def parts_of(mechanism: Mechanism) -> list[Custom]:
     return [c for c in mechanism.components.values() if isinstance(c, Custom) and c.has_equations]
 
 
+def with_unknowns(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with a coordinate for every unknown: a joint that moves nothing."""
+    unknowns = [
+        (f"{part.name}.{name}", part.declared[name].unit)
+        for part in parts_of(mechanism)
+        for name in part.names_of("unknown")
+    ]
+    if not unknowns:
+        return mechanism
+    result = copy(mechanism)
+    result.components = dict(mechanism.components)
+    result.connections = list(mechanism.connections)
+    for name, unit in unknowns:
+        joint = Prismatic if unit == "m" else Revolute
+        carried = result.add(Mount(f"{name}.value"))
+        result.connect(result.world, joint(name, axis="z", actuated=False), carried)
+    return result
+
+
+def guesses_of_unknowns(mechanism: Mechanism) -> dict[str, float]:
+    """Where assembling looks for the unknowns, by the names of their coordinates."""
+    return {
+        f"{part.name}.{name}": float(getattr(part, name))
+        for part in parts_of(mechanism)
+        for name in part.names_of("unknown")
+    }
+
+
 def coordinates_needed(mechanism: Mechanism) -> list[str]:
     """The coordinates that components by their equations refer to."""
     return [
@@ -169,7 +199,7 @@ def coordinates_needed(mechanism: Mechanism) -> list[str]:
         for part in parts_of(mechanism)
         for levers in part.coordinates.values()
         for name, _ in levers
-    ]
+    ] + list(guesses_of_unknowns(mechanism))
 
 
 def attached_parts(

@@ -125,12 +125,19 @@ def _loops(system: System) -> list[str]:
     if system.closure is None:
         return ["No loop: every coordinate is independent."]
     closure = system.closure
+    parts = {part.name: type(part.element).__name__ for part in system.parts}
     lines = []
     for loop in system.loops:
         if loop.closing == "coupling":
             lines.append(f"Coupling {loop.name}: {followed(loop.joints)}.")
             continue
         kept = len(loop.rows) - len(loop.dropped)
+        if loop.name in parts:
+            lines.append(
+                f"{parts[loop.name]} {loop.name} binds {' and '.join(loop.joints)}: {kept} of"
+                f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
+            )
+            continue
         lines.append(
             f"1 loop cut at {loop.name} ({loop.closing}), through {', '.join(loop.joints)}:"
             f" {kept} of {len(loop.rows)} rows are independent."

@@ -581,6 +581,11 @@ class Custom(OnPoints):
         return self.has("loads", "energy")
 
     @property
+    def binds(self) -> bool:
+        """Whether it has rows."""
+        return self.has("rows", "velocity_rows")
+
+    @property
     def state_names(self) -> tuple[str, ...]:
         """Its states."""
         return self.names_of("state")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbs.assembly import Closure, Coordinate, LoopRow, System
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.closing import Closing, closure_parameters, constraint_sizes, mechanism_size
-from mbs.loops.closure import SLIPS, rolling_discs, row_labels
+from mbs.loops.closure import row_groups
 from mbs.loops.configuration import closed_configuration
 from mbs.loops.velocity import constraint_jacobian
 from mbs.solvers.rank import independent_rows, null_space_of, rank
@@ -260,8 +260,10 @@ _Labels = list[tuple[list[str], tuple[str, ...]]]
 
 
 def _labels(system: System) -> _Labels:
-    rolling = [disc.name for _, disc in rolling_discs(system)]
-    return [(rows, SLIPS if name in rolling else ()) for name, rows in row_labels(system)]
+    return [
+        ([label for label, _ in group.positions], tuple(label for label, _ in group.velocities))
+        for group in row_groups(system)
+    ]
 
 
 def _with_rows(loops: Sequence[LoopRow], labels: _Labels, kept: _Kept) -> tuple[LoopRow, ...]:

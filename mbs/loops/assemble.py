@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from mbs.assembly import System
 from mbs.assembly.open_system import open_system
+from mbs.assembly.parts import guesses_of_unknowns
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError
 from mbs.loops.analysis import analyse
@@ -27,10 +28,11 @@ def assemble(
         AssemblyError: the components do not form a mechanism, or a guess names no coordinate.
         Unclosable: no configuration closes the loops.
     """
+    guess = {**guesses_of_unknowns(mechanism), **guess}
     system = open_system(mechanism, (*guess, *active))
     _check_guess(system, guess)
     chosen = _chosen(system, active)
-    if system.cuts or system.couplings:
+    if system.cuts or system.couplings or any(p.element.binds for p in system.parts):
         return analyse(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
     start = {name: value for name, value in guess.items() if name in known}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.tree import norm_rows, quaternion_slices
 from mbs.errors import Unclosable
-from mbs.loops.closure import SLIPS, closure_rows, facing, rolling_discs, row_labels
+from mbs.loops.closure import closure_rows, facing, position_rows, velocity_row_units
 from mbs.solvers.least_squares import gauss_newton
 
 # What rows of a closure are measured by: lengths by the size of the mechanism, cosines as such.
@@ -67,8 +67,9 @@ def row_sizes(system: System) -> SX:
 
 def constraint_sizes(system: System) -> SX:
     """(m, 1) the same of the rows of J: those of the closure, then slips of discs [m or 1]."""
-    slips = len(SLIPS) * sum(1 for _ in rolling_discs(system))
-    return casadi.vertcat(row_sizes(system), *(mechanism_size(system) for _ in range(slips)))
+    slips = velocity_row_units(system)
+    size = mechanism_size(system)
+    return casadi.vertcat(row_sizes(system), *(size if u == "m" else SX(1) for u in slips))
 
 
 def relative_rows(system: System, q: SX) -> SX:
@@ -78,12 +79,7 @@ def relative_rows(system: System, q: SX) -> SX:
 
 def _lengths(system: System) -> list[bool]:
     """Whether each closure row is a length."""
-    driven = iter(system.coordinates[coupling.driven].unit for coupling in system.couplings)
-    return [
-        next(driven).startswith("m") if label == "coordinate" else label.startswith("force")
-        for _, labels in row_labels(system)
-        for label in labels
-    ]
+    return [unit == "m" for *_, unit in position_rows(system)]
 
 
 def _configurations(system: System) -> list[list[float]]:
@@ -202,7 +198,7 @@ class Closing:
 
     def gap(self, q: Vector) -> str:
         """Which joint stays open most at q, in words and figures."""
-        labels = [(name, row) for name, rows in row_labels(self.system) for row in rows]
+        labels = [(name, label) for name, label, _ in position_rows(self.system)]
         gaps: dict[str, list[float]] = {}
         for (name, label), value in zip(labels, self.rows(q)[0], strict=False):
             gap = gaps.setdefault(name, [0.0, 0.0])

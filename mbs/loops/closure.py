@@ -33,8 +33,10 @@ from mbs.components import (
     Spherical,
     Universal,
 )
+from mbs.components.custom import Row
 from mbs.errors import ModelError
 from mbs.expressions import to_sx
+from mbs.recursions.parts import part_rows, parts_at
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, align_z, cross
 
@@ -101,7 +103,7 @@ def contact(pose: Pose, disc: RollingDisc, radius: SX) -> Contact:
 
 
 def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
-    """The joint, and the rows (2, nv) on the velocities of the tree, of every rolling disc."""
+    """By name, the rows (k, nv) on velocities of every rolling disc and component that has some."""
     v = SX.sym("v", system.nv)
     result = []
     for cut, disc in rolling_discs(system):
@@ -110,6 +112,9 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
         touching = contact(pose, disc, radius_of(system, disc)).point
         slip = V + cross(w, touching)
         result.append((disc.name, casadi.jacobian(slip[:2], v)))
+    for name, rows in part_rows(parts_at(system, q, v), velocities=True):
+        values = casadi.vertcat(*(row.value for _, row in rows))
+        result.append((name, casadi.jacobian(values, v)))
     return result
 
 
@@ -199,9 +204,49 @@ def square_closure(system: System, q: SX, passive: Sequence[int], ties: SX | Non
     return casadi.densify(casadi.mtimes(slopes.T, rows))
 
 
-def row_labels(system: System) -> list[tuple[str, list[str]]]:
-    """For each loop and coupling its name and what its rows are."""
-    return _equations(system).labels
+@dataclass(frozen=True, slots=True)
+class RowGroup:
+    """The rows of a loop, a coupling or a component.
+
+    Attributes:
+        name: of the cut joint, the coupling or the component.
+        positions: label and unit of each row that binds positions.
+        velocities: likewise of those that bind velocities alone.
+    """
+
+    name: str
+    positions: tuple[tuple[str, str], ...]
+    velocities: tuple[tuple[str, str], ...] = ()
+
+
+def row_groups(system: System) -> tuple[RowGroup, ...]:
+    """The rows of all loops, couplings and components, in their order."""
+
+    def build() -> tuple[RowGroup, ...]:
+        slips = {
+            disc.name: tuple((label, "m") for label in SLIPS) for _, disc in rolling_discs(system)
+        }
+        q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+        for name, rows in part_rows(parts_at(system, q, v), velocities=True):
+            slips[name] = tuple((label, row.unit) for label, row in rows)
+        groups = [
+            RowGroup(name, tuple(rows), slips.pop(name, ()))
+            for name, rows in _equations(system).labels
+        ]
+        return (*groups, *(RowGroup(name, (), rows) for name, rows in slips.items()))
+
+    groups: tuple[RowGroup, ...] = system.cached("row groups", build)
+    return groups
+
+
+def position_rows(system: System) -> list[tuple[str, str, str]]:
+    """Name of the group, label and unit of every row that binds positions."""
+    return [(g.name, label, unit) for g in row_groups(system) for label, unit in g.positions]
+
+
+def velocity_row_units(system: System) -> list[str]:
+    """The unit of every row that binds velocities alone, as if it were integrated."""
+    return [unit for group in row_groups(system) for _, unit in group.velocities]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,13 +255,13 @@ class _Equations:
 
     Attributes:
         q: (nq, 1) the symbols.
-        labels: of the rows, by loop.
+        labels: of the rows, each with its unit, by loop.
         rows: (m, 1) all of them.
         cosines: (k, 1) that must be positive.
     """
 
     q: SX
-    labels: list[tuple[str, list[str]]]
+    labels: list[tuple[str, list[tuple[str, str]]]]
     rows: SX
     cosines: SX
 
@@ -224,21 +269,29 @@ class _Equations:
 def _equations(system: System) -> _Equations:
     def build() -> _Equations:
         q = SX.sym("q", system.nq)
-        loops, cosines = list[tuple[str, Rows]](), list[SX]()
+        loops, cosines = list[tuple[str, list[tuple[str, Row]]]](), list[SX]()
         for cut in system.cuts:
             pose = relative_pose(system.tree, q, *cut.frames)
-            loops.append((cut.edge.joint.name, _cut_rows(system, q, cut, pose)))
+            rows = _cut_rows(system, q, cut, pose)
+            loops.append((cut.edge.joint.name, [(n, Row(x, _unit(n))) for n, x in rows]))
             cosines.extend(_facing(cut, pose))
         for coupling in system.couplings:
+            unit = "m" if system.coordinates[coupling.driven].unit == "m" else "1"
             value = q[coupling.driven] - coupling.value(q)
-            loops.append((coupling.name, [("coordinate", value)]))
-        labels = [(name, [label for label, _ in rows]) for name, rows in loops]
-        values = [value for _, rows in loops for _, value in rows]
+            loops.append((coupling.name, [("coordinate", Row(value, unit))]))
+        loops += part_rows(parts_at(system, q))
+        labels = [(name, [(label, row.unit) for label, row in rows]) for name, rows in loops]
+        values = [row.value for _, rows in loops for _, row in rows]
         every = casadi.densify(casadi.vertcat(SX(0, 1), *values))
         return _Equations(q, labels, every, casadi.vertcat(SX(0, 1), *cosines))
 
     equations: _Equations = system.cached("closure equations", build)
     return equations
+
+
+def _unit(label: str) -> str:
+    """The unit of a row of a cut joint: forces act along lengths, moments along cosines."""
+    return "1" if label.startswith("moment") else "m"
 
 
 def facing(system: System, q: SX) -> SX:

@@ -45,6 +45,7 @@ from mbs.components.constraints import Constraint
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import OPEN, Closing, Vector, closure_parameters, difference
 from mbs.recursions.chain import Ring, free_pose
+from mbs.recursions.parts import part_rows, parts_at
 from mbs.recursions.route import relative_pose
 from mbs.solvers.rank import null_space, rank
 from mbs.spatial import Pose
@@ -336,7 +337,8 @@ def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
         NoClosedForm: a loop cannot be solved, or no loop gives a position.
     """
     work = _Work(system, q, SX(q), set(known))
-    pending = list(range(len(system.cuts) + len(system.couplings)))
+    binding = [part for part in system.parts if part.element.has("rows")]
+    pending = list(range(len(system.cuts) + len(system.couplings) + len(binding)))
     reasons = dict[int, str]()
     while pending:
         before, waiting = len(work.stages), list[int]()
@@ -361,6 +363,8 @@ def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
 def _attempt(work: _Work, number: int) -> Stage | str | None:
     """A loop, or a coupling, solved with what is known; why not; None where nothing is unknown."""
     system = work.system
+    if number >= len(system.cuts) + len(system.couplings):
+        return _bound_by_part(work, number - len(system.cuts) - len(system.couplings))
     if number >= len(system.cuts):
         return _coupling_stage(work, system.couplings[number - len(system.cuts)])
     cut = system.cuts[number]
@@ -397,6 +401,18 @@ def _is_bound(system: System, number: int) -> bool:
     return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
 
 
+def _bound_by_part(work: _Work, number: int) -> str | None:
+    """Why the rows of a component have no closed form; None where nothing in them is unknown."""
+    binding = [part for part in work.system.parts if part.element.has("rows")]
+    part = binding[number]
+    q = SX.sym("q", work.system.nq)
+    rows = dict(part_rows(parts_at(work.system, q)))[part.name]
+    depends = casadi.which_depends(casadi.vertcat(*(row.value for _, row in rows)), q, 1, False)
+    if all(k in work.known for k, felt in enumerate(depends) if felt):
+        return None
+    return f"the rows of a {type(part.element).__name__} bind it"
+
+
 def _coupling_stage(work: _Work, coupling: CoordinateCoupling) -> Stage | str | None:
     if work.known.issuperset(coupling.coordinates):
         return None
@@ -418,6 +434,7 @@ def _stage(work: _Work, name: str, root: Root) -> Stage:
 def _refusal(system: System, waiting: Sequence[int], reasons: dict[int, str]) -> str:
     names = [cut.edge.joint.name for cut in system.cuts]
     names += [coupling.name for coupling in system.couplings]
+    names += [part.name for part in system.parts if part.element.has("rows")]
     first = waiting[0]
     return (
         f"{system.name}: the loop of {names[first]} has no closed form known here,"

@@ -22,12 +22,14 @@ from mbs.loops.closure import (
     contact,
     independent_closure,
     pose_on_plane,
+    position_rows,
     radius_of,
     rolling_discs,
-    row_labels,
+    row_groups,
     slip_rows,
 )
 from mbs.recursions.force_elements import sum_wrenches
+from mbs.recursions.parts import parts_at
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, Wrench, add_wrenches, carried, cross, skew, vector
 
@@ -77,7 +79,7 @@ def kept_rows(system: System) -> list[int]:
     """The numbers of the independent rows among all; none in an open chain."""
     if system.closure is None:
         return []
-    positions = sum(len(rows) for _, rows in row_labels(system))
+    positions = len(position_rows(system))
     return [*system.closure.rows, *(positions + k for k in system.closure.slips)]
 
 
@@ -175,6 +177,33 @@ def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wr
     return sum_wrenches(*exerted)
 
 
+def part_wrenches(system: System, q: SX, lam: SX) -> dict[int, Wrench]:
+    """For some links the wrench that they exert on components with rows, in their frames.
+
+    Args:
+        system: with components that have rows, or without any.
+        q: (nq, 1) symbols of positions that close the loops.
+        lam: (m, 1) efforts of all rows, those of velocities last.
+    """
+    parts = {part.name: part for part in system.parts if part.element.binds}
+    if not parts:
+        return {}
+    still, moving = parts_at(system, q), parts_at(system, q, SX.sym("v", system.nv))
+    exerted: list[dict[int, Wrench]] = []
+    first = 0
+    for kind in ("positions", "velocities"):
+        for group in row_groups(system):
+            last = first + len(getattr(group, kind))
+            if group.name in parts and last > first:
+                part, at = parts[group.name], moving if kind == "velocities" else still
+                loads = at.loads_of_rows(part, lam[first:last], velocities=kind == "velocities")
+                for (link, pose), load in zip(part.frames, loads, strict=True):
+                    f, m = carried(pose, (load.force, load.moment))
+                    exerted.append({link: (-f, -m)} if link >= 0 else {})
+            first = last
+    return sum_wrenches(*exerted)
+
+
 def _displaced(d: SX) -> Pose:
     """A frame moved by d[:3] and turned by d[3:], both small."""
     return Pose(SX(DM.eye(3)) + skew(d[3:]), d[:3])
@@ -229,8 +258,7 @@ def scales(system: System) -> Scales:
         if J.size == 0 or not np.all(np.isfinite(J)):
             return Scales(np.ones(len(J)), 1.0)
         units = [speed.unit for speed in system.speeds]
-        labels = [label for _, loop in row_labels(system) for label in loop]
-        length = _length(J, labels, units)
+        length = _length(J, [unit for *_, unit in position_rows(system)], units)
         sizes = np.linalg.norm(J * Scales(np.ones(0), length).columns(units), axis=1)
         usual = float(np.median(sizes[sizes > 0])) if np.any(sizes > 0) else 1.0
         return Scales(1 / np.where(sizes > _VANISHING * usual, sizes, usual), length)
@@ -239,10 +267,10 @@ def scales(system: System) -> Scales:
     return found
 
 
-def _length(J: NDArray[np.float64], labels: list[str], units: list[str]) -> float:
+def _length(J: NDArray[np.float64], rows: list[str], units: list[str]) -> float:
     """How far an angle moves the rows of positions, the largest of them."""
     turns = [k for k, unit in enumerate(units) if unit.startswith("rad")]
-    places = [k for k, label in enumerate(labels) if label.startswith("force")]
+    places = [k for k, unit in enumerate(rows) if unit == "m"]
     moved = np.abs(J[np.ix_(places, turns)])
     largest = float(np.max(moved, initial=0.0))
     return largest if largest > 0 else 1.0

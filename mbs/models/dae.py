@@ -18,7 +18,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT, RATE_UNIT
 from mbs.assembly.tree import norm_rows, position_rate, quaternion_slices
 from mbs.assembly.validity import plain_rows
 from mbs.errors import ModelError, NoClosedForm, Unclosable
-from mbs.loops.closure import SLIPS, independent_closure
+from mbs.loops.closure import independent_closure, row_groups
 from mbs.loops.configuration import Values, start
 from mbs.loops.function import function
 from mbs.loops.plan import plan, ways_at
@@ -344,19 +344,16 @@ def _rows(system: System) -> tuple[Elements, Elements]:
     if system.closure is None:
         return (), ()
     driven = {c.name: system.coordinates[c.driven].unit for c in system.couplings}
-    every = [
-        (label, (f"{loop.name}: {label}", driven.get(loop.name, _row_unit(label))))
-        for loop in system.loops
-        for label in loop.rows
-    ]
-    positions = [row for label, row in every if label not in SLIPS]
-    slips = [row for label, row in every if label in SLIPS]
+    positions, slips = (
+        [
+            (f"{group.name}: {label}", driven.get(group.name, unit))
+            for group in row_groups(system)
+            for label, unit in getattr(group, kind)
+        ]
+        for kind in ("positions", "velocities")
+    )
     kept = system.closure
     return tuple(positions[k] for k in kept.rows), tuple(slips[k] for k in kept.slips)
-
-
-def _row_unit(label: str) -> str:
-    return "1" if label.startswith("moment") else "m"
 
 
 def _of(what: str, rows: Elements, unit: Mapping[str, str], end: str = ")") -> Elements:

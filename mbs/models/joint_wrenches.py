@@ -9,12 +9,14 @@ from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import JointRow, WeldedPart
 from mbs.assembly.tree import Tree
+from mbs.loops.closure import row_groups
 from mbs.loops.velocity import (
     constraint_jacobian,
     cut_wrenches,
     determining_rows,
     kept_rows,
     on_links,
+    part_wrenches,
 )
 from mbs.models.actuation import motors_apart, shared_efforts
 from mbs.models.inverse_dynamics import tree_efforts
@@ -24,6 +26,7 @@ from mbs.models.symbols import (
     check_coordinates,
     configuration_check,
     exerted,
+    outputs_of,
     surroundings,
     symbols_of,
     wrenches_on_links,
@@ -35,7 +38,7 @@ from mbs.recursions.force_elements import (
     transmitted_wrenches,
 )
 from mbs.recursions.newton_euler import inertial_wrench
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt, parts_at
 from mbs.recursions.route import relative_pose
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.solvers.linear import solve_saddle, solve_square
@@ -198,8 +201,10 @@ def wrenches_of_joints(
         exerted(system, around, s.poses, s.q, s.v_tree),
     ]
     if system.is_closed:
-        cut = cut_wrenches(system, s.q, _closure_efforts(system, s, a, tau, around))
+        lam = closure_efforts(system, s, a, tau, around)
+        cut = cut_wrenches(system, s.q, lam)
         loads.append(on_links(system, s.q, cut))
+        loads.append(part_wrenches(system, s.q, lam))
     through = transmitted_wrenches(system.tree, s.poses, sum_wrenches(*loads))
     between = {
         joint.name: cut[joint.name] if joint.cut else _at_frame_b(system.tree, s.q, joint, through)
@@ -214,7 +219,48 @@ def wrenches_of_joints(
     ]
 
 
-def _closure_efforts(
+def row_efforts(system: System) -> Function:
+    """``row_efforts(q, v, a, tau) -> lam``: the effort of every row of the loops.
+
+    Args:
+        system: with closed loops; the motion fulfils them, and tau fits it.
+
+    Returns:
+        Function of q (nq, 1), v, a and tau (nv, 1); lam (m, 1) of all rows, dropped ones included.
+    """
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system, "tree")
+        a, tau = SX.sym("a", system.nv), SX.sym("tau", system.nv)
+        lam = closure_efforts(system, s, a, tau, surroundings(system))
+        return [("q", s.q), ("v", s.v), ("a", a), ("tau", tau)], [("lam", lam)]
+
+    return model_function(system, ("row_efforts",), build)
+
+
+def shown_outputs(system: System, parts: PartsAt, a: SX, tau: SX) -> SX:
+    """(ny, 1) outputs of components, the efforts of their rows known from the motion.
+
+    Args:
+        system: open or closed.
+        parts: its components at positions and velocities.
+        a: (nv, 1) accelerations of the tree.
+        tau: (nv, 1) efforts of the tree, what drives deliver and external loads included.
+    """
+    y, symbols = parts.outputs(), parts.effort_symbols
+    if not symbols.numel() or not casadi.depends_on(y, symbols):
+        return y
+    assert parts.v is not None
+    (lam,) = outputs_of(system, row_efforts(system), parts.q, parts.v, a, tau)
+    names = [part.name for part in system.parts if part.element.binds]
+    groups = row_groups(system)
+    every = [g.name for g in groups for _ in g.positions]
+    every += [g.name for g in groups for _ in g.velocities]
+    own = [k for k, name in enumerate(every) if name in names]
+    return casadi.substitute(y, symbols, casadi.densify(lam[own]))
+
+
+def closure_efforts(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: Surroundings
 ) -> SX:
     """(m, 1) efforts of all rows: J' lam is what the motors leave of the efforts.

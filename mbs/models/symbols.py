@@ -14,7 +14,7 @@ from mbs.loops.examine import LED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt, parts_at
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.velocities import Acceleration, moving_base, resting_base
 from mbs.spatial import Wrench, carried
@@ -240,7 +240,8 @@ def devices(system: System) -> Function:
 
     def build() -> tuple[Named, Named]:
         q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-        tau, zdot, y = part_equations(system, q, v)
+        tau, zdot, parts = part_equations(system, q, v)
+        y = parts.outputs()
         every = casadi.vertcat(tau, zdot, y)
         inputs = [("v", v), ("z", system.z), ("u", system.u)]
         if casadi.depends_on(every, q):
@@ -255,8 +256,8 @@ def state_count(system: System) -> int:
     return int(system.z.numel())
 
 
-def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, SX]:
-    """What drives deliver at the coordinates, the rates of all states, and all outputs.
+def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, PartsAt]:
+    """What drives deliver at the coordinates, the rates of all states, and the parts themselves.
 
     They are of the symbols `system.z`, `system.u` and `system.p` besides.
 
@@ -266,4 +267,4 @@ def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, SX]:
         v: (nv, 1) velocities of the tree.
     """
     at = parts_at(system, q, v)
-    return at.delivered(), at.rates(), at.outputs()
+    return at.delivered(), at.rates(), at

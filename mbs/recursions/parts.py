@@ -6,7 +6,7 @@ its numbers. Signals run along wires, each output following from states, ports a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -35,7 +35,7 @@ from mbs.expressions import to_sx
 from mbs.recursions.poses import link_poses
 from mbs.recursions.route import BASE, relative_motion, relative_pose
 from mbs.recursions.velocities import Velocity, link_velocities
-from mbs.spatial import Pose, skew, zeros
+from mbs.spatial import Pose, cross, skew, zeros
 from mbs.text import did_you_mean
 
 
@@ -58,7 +58,7 @@ class PartsAt:
         parts: Sequence[AttachedPart],
         q: SX,
         v: SX | None = None,
-        sensors: Sequence[AttachedSensor] = (),
+        sensors: Iterable[AttachedSensor] = (),
         coordinates: tuple[Sequence[Coordinate], Sequence[Coordinate]] = ((), ()),
         shifts: Mapping[str, SX] | None = None,
     ) -> None:
@@ -68,7 +68,9 @@ class PartsAt:
         self._shifts = shifts or {}
         self._loads: dict[str, Mapping[str, Load]] = {}
         self._moving: list[Velocity] | None = None
+        self._twists: dict[str, SX] = {}
         self._found: dict[str, At] = {}
+        self._efforts: dict[str, dict[str, SX]] | None = None
         self._outputs: dict[str, tuple[Mapping[str, SX], Mapping[str, SX]]] = {}
         self._signals: dict[Source, SX | None] = {}
 
@@ -92,8 +94,9 @@ class PartsAt:
     def _seen(self, part: AttachedPart, inputs: Mapping[str, Callable[[], Any]]) -> At:
         element, values = part.element, dict[str, Callable[[], Any]](inputs)
         # ports on points of bodies
-        for port, frame in zip(element.frames, part.frames, strict=True):
-            values[port] = partial(self._frame, port, frame)
+        frames = dict(zip(element.frames, part.frames, strict=True))
+        for port in frames:
+            values[port] = partial(self._frame, port, frames)
         # ports on coordinates, and unknowns
         for port in part.coordinates:
             values[port] = partial(self._coordinate, part, port)
@@ -104,17 +107,25 @@ class PartsAt:
             values[name] = partial(_same, symbol)
         return At(part.name, part.symbols, values)
 
-    def _frame(self, port: str, frame: Frame) -> FrameAt:
-        made = FrameAt(port, lambda seen_from: self._relative(seen_from, frame))
-        made.frame = frame  # type: ignore[attr-defined]
-        return made
+    def _frame(self, port: str, frames: Mapping[str, Frame]) -> FrameAt:
+        return FrameAt(port, lambda seen_from: self._relative(seen_from, port, frames))
 
-    def _relative(self, seen_from: FrameAt | None, frame: Frame) -> RelativeMotion:
-        a: Frame = BASE if seen_from is None else seen_from.frame  # type: ignore[attr-defined]
+    def _relative(
+        self, seen_from: FrameAt | None, port: str, frames: Mapping[str, Frame]
+    ) -> RelativeMotion:
+        a = BASE if seen_from is None else frames[seen_from.port]
+        frame = frames[port]
         if self.v is None:
             T = relative_pose(self.tree, self.q, a, frame)
             return RelativeMotion(T.p, T.R, zeros(), zeros())
-        return relative_motion(self.tree, a, frame, self.q, self.moving)
+        motion = relative_motion(self.tree, a, frame, self.q, self.moving)
+        if not self._twists:
+            return motion
+        zero = SX.zeros(6)
+        t_a = zero if seen_from is None else self._twists[seen_from.port]
+        t_b, R = self._twists[port], motion.R
+        V = motion.V + casadi.mtimes(R, t_b[:3]) - t_a[:3] - cross(t_a[3:], motion.p)
+        return RelativeMotion(motion.p, R, V, motion.w + casadi.mtimes(R, t_b[3:]) - t_a[3:])
 
     def _coordinate(self, part: AttachedPart, port: str) -> CoordinateAt | FlangeAt | SX:
         levers = part.coordinates[port]
@@ -164,6 +175,11 @@ class PartsAt:
         part = next(part for part in self.parts if part.name == source.owner)
         outputs, placeholders = self._with_placeholders(part)
         value = outputs[source.signal]
+        if part.element.binds and casadi.depends_on(value, self.effort_symbols):
+            raise AssemblyError(
+                f"a wire comes from {source}, which follows from the forces that the motion itself"
+                " determines; wire what positions, velocities and states tell"
+            )
         for name, symbol in placeholders.items():
             if casadi.depends_on(value, symbol):
                 value = casadi.substitute(value, symbol, self._input(part, name))
@@ -176,7 +192,8 @@ class PartsAt:
             symbols = {name: SX.sym(name) for name in part.inputs}
             inputs = {name: partial(_same, symbol) for name, symbol in symbols.items()}
             seen = self._seen(part, inputs)
-            self._outputs[part.name] = outputs_at(part, seen), symbols
+            seen.__dict__["lam"] = self.row_efforts().get(part.name, {})
+            self._outputs[part.name] = part.element.outputs(seen), symbols
         return self._outputs[part.name]
 
     def _reading(self, attached: AttachedSensor, source: Source) -> SX:
@@ -263,6 +280,39 @@ class PartsAt:
         first = 6 * len(part.frames)
         return {**result, **{port: slopes[first + k] for k, port in enumerate(shifts)}}
 
+    def loads_of_rows(
+        self, part: AttachedPart, lam: SX, *, velocities: bool = False
+    ) -> list[FrameLoad]:
+        """What the rows of a component do to its frames, each in its axes, about its origin.
+
+        Args:
+            part: the component.
+            lam: (k, 1) efforts of its rows.
+            velocities: of those that bind velocities alone.
+        """
+
+        def work(at: At) -> SX:
+            method = part.element.velocity_rows if velocities else part.element.rows
+            return casadi.dot(lam, casadi.vertcat(*(as_row(r).value for r in method(at).values())))
+
+        if not velocities:
+            loads = self.slopes(part, work)
+            return [self._own_load(loads[port]) for port in part.element.frames]
+        # the power of rows of velocities, where frames have twists beside those of the tree
+        twists = {port: SX.sym("t", 6) for port in part.element.frames}
+        moved = PartsAt(
+            self.tree, self.parts, self.q, self.v, self._sensors.values(), self._coordinates
+        )
+        moved._twists = twists
+        every = casadi.vertcat(*twists.values())
+        slopes = casadi.densify(casadi.gradient(work(moved.at(part)), every))
+        return [FrameLoad(t[:3], t[3:], own_axes=True) for t in casadi.vertsplit(slopes, 6)]
+
+    @staticmethod
+    def _own_load(load: Load) -> FrameLoad:
+        assert isinstance(load, FrameLoad)
+        return load
+
     def efforts(self) -> SX:
         """(nv, 1) what the coordinates need of effort to overcome the components on them."""
         total = SX.zeros(self.tree.nv)
@@ -319,26 +369,45 @@ class PartsAt:
                 rates += [SX(found[name]) for name in part.states]
         return casadi.vertcat(*rates)
 
-    def outputs(self, lam: Mapping[str, Mapping[str, SX]] | None = None) -> SX:
+    def outputs(self, lam: SX | None = None) -> SX:
         """(ny, 1) outputs of all components.
 
         Args:
-            lam: efforts of the rows of each component, by its name and their labels.
+            lam: efforts of the rows of components, as `row_efforts` has them.
         """
+        efforts = self.row_efforts()
         values = [SX(0, 1)]
         for part in self.parts:
             names = part.element.output_names
             if names:
                 at = self.at(part)
-                at.__dict__["lam"] = (lam or {}).get(part.name, {})
-                found = outputs_at(part, at)
+                at.__dict__["lam"] = efforts.get(part.name, {})
+                found = part.element.outputs(at)
                 values += [SX(found[name]) for name in names]
-        return casadi.vertcat(*values)
+        every = casadi.vertcat(*values)
+        return every if lam is None else casadi.substitute(every, self.effort_symbols, lam)
 
+    def row_efforts(self) -> Mapping[str, Mapping[str, SX]]:
+        """Symbols of the efforts of rows, by component and label; `effort_symbols` is all."""
+        if self._efforts is None:
+            self._efforts = {}
+            for velocities in (False, True):
+                for name, rows in part_rows(self, velocities=velocities):
+                    own = self._efforts.setdefault(name, {})
+                    own |= {label: SX.sym(f"{name}.lam.{label}") for label, _ in rows}
+        return self._efforts
 
-def outputs_at(part: AttachedPart, at: At) -> Mapping[str, SX]:
-    """The outputs that a component says, each one there."""
-    return part.element.outputs(at)
+    @property
+    def effort_symbols(self) -> SX:
+        """(r, 1) all of `row_efforts`, those of positions first, each by component."""
+        found = self.row_efforts()
+        order = [
+            found[name][label]
+            for velocities in (False, True)
+            for name, rows in part_rows(self, velocities=velocities)
+            for label, _ in rows
+        ]
+        return casadi.vertcat(SX(0, 1), *order)
 
 
 def _same(value: SX) -> SX:
@@ -363,7 +432,7 @@ def part_rows(at: PartsAt, *, velocities: bool = False) -> list[tuple[str, list[
     """
     method = "velocity_rows" if velocities else "rows"
     result = []
-    for part in at.parts:
+    for part in sorted(at.parts, key=lambda part: not part.element.has("rows")):
         if part.element.has(method):
             rows = getattr(part.element, method)(at.at(part))
             result.append((part.name, [(label, as_row(row)) for label, row in rows.items()]))

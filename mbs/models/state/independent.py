@@ -27,6 +27,7 @@ from mbs.models.contacts import (
 from mbs.models.direct_dynamics import hybrid_dynamics, independent_dynamics, inertia_matrix
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_dynamics import bias
+from mbs.models.joint_wrenches import shown_outputs
 from mbs.models.state.drive import (
     DriveInputs,
     InputMotion,
@@ -625,7 +626,7 @@ def _equations(
     s = point_of(system, layout, motors)
     laws = input_motions(layout.motions, s.motions)
     motion = motion_of(system, layout, s, laws)
-    tau, rates, shown = part_equations(system, motion.q, motion.v)
+    tau, rates, parts = part_equations(system, motion.q, motion.v)
     for column, number in enumerate(motors):
         tau[number] += s.efforts[column]
     external = wrenches_of(system, motion.q, layout.frames, s.wrenches)
@@ -633,6 +634,7 @@ def _equations(
     load = load_of(system, motion.q, external)
     moved = minimal_accelerations(system, motion, tau, load, given)
     rate = _rate(system, layout, motion, moved, rates)
+    shown = shown_outputs(system, parts, moved.a, moved.every_effort + load)
     y = outputs_vector(system, layout, motion, moved, shown)
     if observe is not None:
         vectors = motion.q, motion.v, moved.a, motion.v_a, moved.a_a, moved.every_effort

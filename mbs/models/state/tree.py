@@ -29,6 +29,7 @@ from mbs.models.contacts import ContactEquations, Contacts, Modes, contact_equat
 from mbs.models.direct_dynamics import direct_dynamics, hybrid_dynamics, inertia_matrix
 from mbs.models.energy import energy
 from mbs.models.inverse_dynamics import bias
+from mbs.models.joint_wrenches import shown_outputs
 from mbs.models.state.drive import DriveInputs, TreeMotion, load_of, wrenches_of
 from mbs.models.state.events import MinimalEvents, few_modes, minimal_events
 from mbs.models.state.independent import (
@@ -358,7 +359,7 @@ def tree_state(
     n = nq + nv
     X, none = casadi.vertcat(SX.sym("X", n), system.z), SX.sym("z", 0)
     q, v = X[:nq], X[nq:n]
-    tau, rates, shown = part_equations(system, q, v)
+    tau, rates, parts = part_equations(system, q, v)
     for column, number in enumerate(motors):
         tau[number] += s.efforts[column]
     external = wrenches_of(system, q, layout.frames, s.wrenches)
@@ -376,6 +377,7 @@ def tree_state(
         a = contact.a
     active = list(system.active)
     moved = Accelerations(a[active], a, tau, contact)
+    shown = shown_outputs(system, parts, a, moved.every_effort + load)
     motion = TreeMotion(q, q, v[active], v, None, SX.zeros(nv))
     y = outputs_vector(system, layout, motion, moved, shown)
     if observe is not None:
@@ -480,7 +482,7 @@ def full_state(
     q, v, z, p = x[:nq], x[nq:n], x[n:], system.p
     tau = SX.zeros(system.nv) if effort is None else casadi.densify(effort(t, q, v, p))
     u = SX(DM(system.u_default)) if inputs is None else SX(inputs(t, q, v, p))
-    delivered, z_rate, y = part_equations(system, q, v)
+    delivered, z_rate, parts = part_equations(system, q, v)
     tau += delivered
     given = SX(tau)
     contact = contact_equations(
@@ -495,6 +497,7 @@ def full_state(
     openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
     E, U = outputs_of(system, energy(system, "tree"), q, v)
     held = contact.efforts if contact else SX(0, 1)
+    y = shown_outputs(system, parts, a, Accelerations(a, a, tau, contact).every_effort)
     observed = [a, tau, u, y, held, E, U, openness]
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     moved = [casadi.vertcat(*kept, z), residual]

@@ -11,6 +11,7 @@ from mbs.assembly.parts import guesses_of_unknowns
 from mbs.components import Mechanism
 from mbs.errors import AssemblyError
 from mbs.loops.analysis import analyse
+from mbs.recursions.part_checks import check_parts
 from mbs.text import did_you_mean
 
 
@@ -30,6 +31,7 @@ def assemble(
     """
     guess = {**guesses_of_unknowns(mechanism), **guess}
     system = open_system(mechanism, (*guess, *active))
+    check_parts(system)
     _check_guess(system, guess)
     chosen = _chosen(system, active)
     if system.cuts or system.couplings or any(p.element.binds for p in system.parts):

@@ -1,0 +1,330 @@
+"""What is asked of components by their equations when a mechanism is assembled.
+
+A mistake is said at once, by component and method, and not by a solver later on: shapes, names and
+symbols of what the methods return, loads against the energy, heat that is negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.parts import AttachedPart
+from mbs.assembly.tree import position_rate, quaternion_slices
+from mbs.components.custom import At, FlangeAt, FrameLoad, Row
+from mbs.errors import AssemblyError, MbsError
+from mbs.recursions.parts import PartsAt, parts_at
+from mbs.text import did_you_mean, one_line, quoted
+
+Array = NDArray[np.float64]
+
+_PROBES, _SEED = 4, 20261123
+"""Random states at which powers are compared: a law that is wrong is wrong at almost all."""
+_SAME = 1e-8
+"""Difference of powers, in parts of the largest: formulas agree to 1e-12, mistakes are of size one;
+laws with steep slopes lose some digits."""
+_NEGATIVE = 1e-9
+"""Heat below zero that is rounding, in parts of the other powers."""
+
+
+def check_parts(system: System) -> None:
+    """Refuse components whose equations contradict what they declare, or each other.
+
+    Args:
+        system: open, or with loops that are not analysed yet.
+
+    Raises:
+        AssemblyError: names the component, the method and what to change.
+    """
+    if not system.parts:
+        return
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    at = parts_at(system, q, v)
+    for part in system.parts:
+        _Check(system, part, at, q, v).run()
+
+
+class _Check:
+    """The questions to one component.
+
+    Args:
+        system: that it is in.
+        part: the component.
+        at: all components at the symbols q and v.
+        q, v: these symbols.
+    """
+
+    def __init__(self, system: System, part: AttachedPart, at: PartsAt, q: SX, v: SX) -> None:
+        self.system, self.part, self.at, self.q, self.v = system, part, at, q, v
+        self.element = part.element
+        self.used: list[SX] = []
+
+    def run(self) -> None:
+        """All questions."""
+        loads = self._loads()
+        rates = self._named("rates", self.part.states)
+        self._rows()
+        energy, heat = self._scalar("energy"), self._scalar("dissipation")
+        if energy is not None:
+            self._require_free_of(energy, "energy", self.v, "velocities")
+        seen = self._outputs()
+        self.used += [*seen.values(), *rates.values()]
+        self._require_use_of_inputs()
+        if loads and (energy is not None or heat is not None):
+            self._compare_powers(loads, energy, heat)
+
+    # What the methods return.
+
+    def _returned(self, method: str, at: At | None = None) -> Any:
+        """What a method returns; an error in it is told by its name."""
+        try:
+            return getattr(self.element, method)(self.at.at(self.part) if at is None else at)
+        except MbsError:
+            raise
+        except Exception as error:
+            raise AssemblyError(
+                f"{self._title}: {method} raises {type(error).__name__}: {one_line(str(error))};"
+                " correct it"
+            ) from error
+
+    def _mapping(self, method: str, at: At | None = None) -> Mapping[str, Any]:
+        found = self._returned(method, at)
+        if not isinstance(found, Mapping):
+            raise AssemblyError(
+                f"{self._title}: {method} returns {_kind(found)}; return a dict by name"
+            )
+        return found
+
+    def _loads(self) -> Mapping[str, Any]:
+        if not self.element.acts:
+            return {}
+        if not self.element.has("loads"):
+            return self.at.loads(self.part)
+        found = self._mapping("loads")
+        ports = [*self.element.frames, *self.part.coordinates]
+        for port, load in found.items():
+            if port not in ports:
+                raise AssemblyError(
+                    f"{self._title}: loads names {quoted(port)}, which is no port;"
+                    f" {did_you_mean(str(port), ports)}"
+                )
+            if port in self.element.frames:
+                self._require_wrench(port, load)
+            else:
+                self._value(f"loads at {port}", load)
+        return found
+
+    def _require_wrench(self, port: str, load: Any) -> None:
+        if not isinstance(load, FrameLoad):
+            raise AssemblyError(
+                f"{self._title}: loads gives {_kind(load)} at the frame {port}; give"
+                " custom.force(...), custom.torque(...) or what custom.pull(...) returns"
+            )
+        for what, value in (("force", load.force), ("moment", load.moment)):
+            if SX(value).shape != (3, 1):
+                raise AssemblyError(
+                    f"{self._title}: the {what} at {port} has the shape {SX(value).shape}; give"
+                    " (3, 1)"
+                )
+            self._require_known(SX(value), f"loads at {port}")
+
+    def _named(self, method: str, names: Iterable[str]) -> Mapping[str, SX]:
+        """The values of a method that must give one for each name."""
+        wanted = list(names)
+        if not wanted and not self.element.has(method):
+            return {}
+        found = self._mapping(method)
+        for name in wanted:
+            if name not in found:
+                raise AssemblyError(
+                    f"{self._title}: {method} gives nothing for {name!r}; return one value for"
+                    f" each of {', '.join(wanted)}"
+                )
+        for name in found:
+            if name not in wanted:
+                raise AssemblyError(
+                    f"{self._title}: {method} gives {quoted(name)}, which is not declared;"
+                    f" {did_you_mean(str(name), wanted) if wanted else 'declare it'}"
+                )
+        return {name: self._value(f"{method} of {name}", found[name]) for name in wanted}
+
+    def _outputs(self) -> Mapping[str, SX]:
+        at = self.at.at(self.part)
+        at.__dict__["lam"] = self.at.row_efforts().get(self.part.name, {})
+        return self._named("outputs", self.element.output_names)
+
+    def _rows(self) -> None:
+        count = 0
+        for method in ("rows", "velocity_rows"):
+            if not self.element.has(method):
+                continue
+            found = self._mapping(method)
+            if not found:
+                raise AssemblyError(f"{self._title}: {method} returns no row; give one by a label")
+            for label, row in found.items():
+                unit = row.unit if isinstance(row, Row) else "m"
+                if unit not in ("m", "1"):
+                    raise AssemblyError(
+                        f"{self._title}: the row {label!r} has the unit {quoted(unit)}; use 'm' or"
+                        " '1'"
+                    )
+                value = self._value(f"row {label!r}", row.value if isinstance(row, Row) else row)
+                signals = casadi.vertcat(self.system.z, self.system.u)
+                self._require_free_of(value, f"the row {label!r}", signals, "states or inputs")
+                if method == "rows":
+                    self._require_free_of(value, f"the row {label!r}", self.v, "velocities")
+                else:
+                    self._require_linear(label, value)
+            count += len(found)
+        unknowns = self.element.names_of("unknown")
+        if len(unknowns) > count:
+            raise AssemblyError(
+                f"{self._title}: {len(unknowns)} unknowns have {count} rows, which do not determine"
+                " them; give a row for each at least"
+            )
+
+    def _scalar(self, method: str) -> SX | None:
+        if not self.element.has(method):
+            return None
+        return self._value(method, self._returned(method))
+
+    def _value(self, what: str, value: Any) -> SX:
+        """A number or an expression (1, 1) of known symbols."""
+        try:
+            found = SX(value)
+        except Exception:
+            found = SX(0, 0)
+        if found.shape != (1, 1):
+            shape = "" if found.shape == (0, 0) else f" of the shape {found.shape}"
+            raise AssemblyError(
+                f"{self._title}: {what} is {_kind(value)}{shape}; give one number or expression"
+            )
+        self._require_known(found, what)
+        self.used.append(found)
+        return found
+
+    # What they may depend on.
+
+    def _require_known(self, value: SX, what: str) -> None:
+        known = casadi.vertcat(
+            self.q, self.v, self.system.z, self.system.u, self.system.p, self.at.effort_symbols
+        )
+        names = {symbol.element_hash() for symbol in casadi.vertsplit(known)}
+        for symbol in casadi.symvar(value):
+            if symbol.element_hash() not in names:
+                raise AssemblyError(
+                    f"{self._title}: {what} holds the symbol {symbol.name()!r}, which is none of"
+                    " the component; declare it as a parameter, state or input"
+                )
+        self.used.append(casadi.vec(value))
+
+    def _require_free_of(self, value: SX, what: str, symbols: SX, name: str) -> None:
+        if symbols.numel() and casadi.depends_on(value, symbols):
+            remedy = "; use velocity_rows" if "row" in what and name == "velocities" else ""
+            raise AssemblyError(
+                f"{self._title}: {what} depends on {name}, on which it must not depend{remedy}"
+            )
+
+    def _require_linear(self, label: str, value: SX) -> None:
+        slopes = casadi.jacobian(value, self.v)
+        rest = casadi.substitute(value, self.v, SX.zeros(self.v.numel()))
+        if casadi.depends_on(slopes, self.v) or not casadi.simplify(rest).is_zero():
+            raise AssemblyError(
+                f"{self._title}: the row {label!r} of velocity_rows is not linear in velocities"
+                " alone, or does not vanish at rest; write a sum of velocities, each with a factor"
+            )
+
+    def _require_use_of_inputs(self) -> None:
+        every = casadi.veccat(*self.used) if self.used else SX(0, 1)
+        for name, given in self.part.inputs.items():
+            if isinstance(given, SX) and not casadi.depends_on(every, given):
+                raise AssemblyError(
+                    f"{self._title}: nothing depends on the input {name!r}; use it in a method, or"
+                    " leave it out"
+                )
+
+    # Loads against the energy and the heat.
+
+    def _compare_powers(self, loads: Mapping[str, Any], energy: SX | None, heat: SX | None) -> None:
+        """P, the power of the loads, is what the energy and the heat leave: -dE/dt - D."""
+        system, symbols = self.system, casadi.vertcat(self.system.z, self.system.u)
+        E = SX(0) if energy is None else energy
+        rate = casadi.jtimes(E, self.q, position_rate(system.tree, self.q, self.v))
+        if self.part.states and system.z.numel():
+            rate += casadi.jtimes(E, system.z, self.at.rates())
+        D = SX(0) if heat is None else heat
+        powers = casadi.vertcat(self._power(loads), rate, D)
+        given = [self.q, self.v, symbols, system.p]
+        found = Function("powers", given, [casadi.densify(powers)])
+        free_inputs = any(isinstance(one, SX) for one in self.part.inputs.values())
+        for q, v, s, p in self._probes():
+            P, dE, heat_at = np.array(found(q, v, s, p))[:, 0]
+            back = np.array(found(q, -v, s, p))[:, 0]
+            sizes = np.abs([P, dE, heat_at])
+            if not np.all(np.isfinite([*sizes, *back])):
+                continue
+            if heat_at < -_NEGATIVE * sizes.max():
+                raise AssemblyError(
+                    f"{self._title}: dissipation is {heat_at:.6g} W at a random state; what turns"
+                    " into heat is never negative, so correct its sign"
+                )
+            if heat is not None and not self.part.inputs:
+                self._require_balance(P, dE, heat_at, sizes.max())
+            elif energy is not None and not self.part.states and not free_inputs:
+                # friction and damping give the same power both ways, the energy the opposite
+                self._require_balance((P - back[0]) / 2, (dE - back[1]) / 2, 0.0, sizes.max())
+
+    def _require_balance(self, P: float, dE: float, heat: float, size: float) -> None:
+        if abs(P + dE + heat) > _SAME * size:
+            raise AssemblyError(
+                f"{self._title}: its loads have the power {P:.6g} W at a random state, but its"
+                f" energy and dissipation say {-dE - heat:.6g} W; make them agree, or leave loads"
+                " out, which then follow from the energy"
+            )
+
+    def _power(self, loads: Mapping[str, Any]) -> SX:
+        at, total = self.at.at(self.part), SX(0)
+        for port, load in loads.items():
+            seen = getattr(at, port)
+            if isinstance(load, FrameLoad):
+                R = seen.R if load.own_axes else SX.eye(3)
+                total += casadi.dot(casadi.mtimes(R, load.force), seen.v)
+                total += casadi.dot(casadi.mtimes(R, load.moment), seen.w)
+            elif isinstance(seen, SX):  # an unknown
+                lever = self.part.coordinates[port][0]
+                total += load * self.v[lever.velocity]
+            else:
+                total += load * (seen.speed if isinstance(seen, FlangeAt) else seen.v)
+        return total
+
+    def _probes(self) -> Iterable[tuple[Array, Array, Array, Array]]:
+        """Random positions, velocities, states with inputs, and parameters."""
+        system, rng = self.system, np.random.default_rng(_SEED)
+        p = np.array([1.0 if x.default is None else x.default for x in system.parameters])
+        for _ in range(_PROBES):
+            q = rng.uniform(-1.0, 1.0, system.nq)
+            for part in quaternion_slices(system.tree):
+                q[part] /= np.linalg.norm(q[part])
+            states = np.array(system.z_start) + rng.uniform(-1.0, 1.0, len(system.z_start))
+            inputs = rng.uniform(-1.0, 1.0, system.u.numel())
+            v = rng.uniform(-1.0, 1.0, system.nv)
+            yield q, v, np.concatenate([states, inputs]), p
+
+    @property
+    def _title(self) -> str:
+        return f"{self.part.name} ({type(self.element).__name__})"
+
+
+def _kind(value: Any) -> str:
+    """What something is, in a few words."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, SX):
+        return "an expression"
+    return f"a {type(value).__name__}" if not isinstance(value, (int, float)) else quoted(value)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -27,8 +27,9 @@ from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.contacts import require_no_contacts
 from mbs.models.direct_dynamics import direct_dynamics, independent_dynamics
 from mbs.models.inverse_dynamics import inverse_dynamics, own_efforts
-from mbs.models.symbols import ModelSymbols, outputs_of, symbols_of
-from mbs.text import quoted
+from mbs.models.symbols import ModelSymbols, devices, outputs_of, part_equations, symbols_of
+from mbs.numbers import doubles
+from mbs.text import did_you_mean, quoted
 
 # What loops ask of a motion, on the levels of positions, velocities and accelerations.
 
@@ -114,9 +115,10 @@ class DaeEquations:
     """dx/dt = ode(x, z, u, p), 0 = alg(x, z, u, p), on symbols x, z, u, p.
 
     Attributes:
-        x: differential states.
+        x: differential states, those of components last.
         z: algebraic states; (0, 1) where there are none.
-        u: efforts of the motors, in the order of the actuated `system.speeds`.
+        u: efforts of the motors, in the order of the actuated `system.speeds` that no device
+            drives, then the inputs of components, `system.inputs`.
         p: parameters, in the order of `system.parameters`.
         ode: rates of x.
         alg: as many rows as z has elements.
@@ -140,8 +142,9 @@ class DaeEquations:
 
 
 def motors(system: System) -> list[int]:
-    """Numbers of the actuated speeds."""
-    return [k for k, speed in enumerate(system.speeds) if speed.actuated]
+    """Numbers of the actuated speeds but those that devices drive."""
+    driven = [device.velocity for device in system.devices]
+    return [k for k, s in enumerate(system.speeds) if s.actuated and k not in driven]
 
 
 def implicit(system: System, form: str, held: Held | None = None) -> DaeEquations:
@@ -161,7 +164,7 @@ def implicit(system: System, form: str, held: Held | None = None) -> DaeEquation
     if held is not None:
         rows = rows.joined(held(s, a))
     lam, mu = SX.sym("lam", rows.J.shape[0]), SX(0, 1)
-    u, tau = motor_efforts(system)
+    u, tau, rates = driving(system, q, v)
     (needed,) = outputs_of(system, inverse_dynamics(system, "tree"), q, v, a)
     speed = v
     if form == "ggl":
@@ -169,8 +172,8 @@ def implicit(system: System, form: str, held: Held | None = None) -> DaeEquation
         speed = v + casadi.mtimes(rows.J_positions.T, mu)
     return equations(
         system,
-        states=(casadi.vertcat(q, v), casadi.vertcat(a, lam, mu), u),
-        ode=casadi.vertcat(position_rate(system.tree, q, speed), a),
+        states=(casadi.vertcat(q, v, system.z), casadi.vertcat(a, lam, mu), u),
+        ode=casadi.vertcat(position_rate(system.tree, q, speed), a, rates),
         alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _kept(rows, form)),
         invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),
         motion=(q, v),
@@ -192,12 +195,12 @@ def _kept(rows: Rows, form: str) -> SX:
 def open_chain(system: System) -> DaeEquations:
     """Open chains, x = [q; v] and no z: the accelerations are those of the direct dynamic model."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    u, tau = motor_efforts(system)
+    u, tau, rates = driving(system, q, v)
     (a,) = outputs_of(system, direct_dynamics(system), q, v, tau)
     return equations(
         system,
-        states=(casadi.vertcat(q, v), SX(0, 1), u),
-        ode=casadi.vertcat(position_rate(system.tree, q, v), a),
+        states=(casadi.vertcat(q, v, system.z), SX(0, 1), u),
+        ode=casadi.vertcat(position_rate(system.tree, q, v), a, rates),
         alg=SX(0, 1),
         invariants=norm_rows(system.tree, q),
         motion=(q, v),
@@ -213,11 +216,11 @@ def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
     active = list(system.active)
     q_a, v_a = SX.sym("q_a", len(active)), SX.sym("v_a", len(active))
     (q,) = outputs_of(system, function(system, branch), q_a)
-    u, v, a = _independent_motion(system, q, v_a)
+    u, v, a, rates = _independent_motion(system, q, v_a)
     return equations(
         system,
-        states=(casadi.vertcat(q_a, v_a), SX(0, 1), u),
-        ode=casadi.vertcat(v_a, a),
+        states=(casadi.vertcat(q_a, v_a, system.z), SX(0, 1), u),
+        ode=casadi.vertcat(v_a, a, rates),
         alg=SX(0, 1),
         invariants=SX(0, 1),
         motion=(q, v),
@@ -227,32 +230,41 @@ def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
 def carried_positions(system: System) -> DaeEquations:
     """Other loops, x = [q; v_a] and no z: all positions are integrated, phi(q) is an invariant."""
     q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.active))
-    u, v, a = _independent_motion(system, q, v_a)
+    u, v, a, rates = _independent_motion(system, q, v_a)
     return equations(
         system,
-        states=(casadi.vertcat(q, v_a), SX(0, 1), u),
-        ode=casadi.vertcat(position_rate(system.tree, q, v), a),
+        states=(casadi.vertcat(q, v_a, system.z), SX(0, 1), u),
+        ode=casadi.vertcat(position_rate(system.tree, q, v), a, rates),
         alg=SX(0, 1),
         invariants=casadi.vertcat(independent_closure(system, q), norm_rows(system.tree, q)),
         motion=(q, v),
     )
 
 
-def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX]:
-    """Symbols u, velocities of the tree, and accelerations of the independent joints."""
-    u, tau = motor_efforts(system)
+def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]:
+    """Symbols u, velocities of the tree, accelerations of the independent joints, rates of z."""
     (G,) = outputs_of(system, reduction_matrix(system), q)
+    v = casadi.densify(casadi.mtimes(G, v_a))
+    u, tau, rates = driving(system, q, v)
     pushed = casadi.mtimes(G.T, tau) if system.motors != system.active else tau[list(system.active)]
     (a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
-    return u, casadi.mtimes(G, v_a), a
+    return u, v, a, rates
 
 
-def motor_efforts(system: System) -> tuple[SX, SX]:
-    """Symbols u, and the efforts tau (nv, 1) that they are."""
+def driving(system: System, q: SX, v: SX) -> tuple[SX, SX, SX]:
+    """Symbols u, the efforts tau (nv, 1) that they and devices give, and the rates of the states.
+
+    Args:
+        system: open or closed.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities of the tree.
+    """
     driven = motors(system)
-    u, tau = SX.sym("u", len(driven)), SX.zeros(system.nv)
-    tau[driven] = u
-    return u, tau
+    u = SX.sym("u", len(driven))
+    tau, rates, _ = part_equations(system, q, v)
+    for k, number in enumerate(driven):
+        tau[number] += u[k]
+    return casadi.vertcat(u, system.u), tau, rates
 
 
 def equations(
@@ -293,12 +305,13 @@ def elements_of(
             alone.
     """
     q, v, a, tau = _coordinates(system)
+    own = system.states
     norms = tuple(
         (f"{system.coordinates[part.start].joint}: unit quaternion", "1")
         for part in quaternion_slices(system.tree)
     )
     fixed = {
-        "u": tuple(tau[k] for k in motors(system)),
+        "u": (*(tau[k] for k in motors(system)), *system.inputs),
         "p": tuple((parameter.name, parameter.unit) for parameter in system.parameters),
     }
     v_a = tuple(v[k] for k in system.active)
@@ -313,7 +326,7 @@ def elements_of(
     }
     if form in explicit:
         x, invariants = explicit[form]
-        return {**fixed, "x": x, "z": (), "alg": (), "invariants": invariants}
+        return {**fixed, "x": x + own, "z": (), "alg": (), "invariants": invariants}
     kept = {
         "index1": _of("der(der", rows, _RATE_OF_RATE, "))"),
         "index2": speeds,
@@ -323,7 +336,7 @@ def elements_of(
     mu = _of("mu", phi, dict.fromkeys(RATE_UNIT, "1")) if form == "ggl" else ()
     return {
         **fixed,
-        "x": q + v,
+        "x": q + v + own,
         "z": a + _of("lam", rows, _EFFORT) + mu,
         "alg": tau + kept,
         "invariants": phi + speeds + norms,
@@ -402,6 +415,8 @@ def dae(
     q0: Values = None,
     v0: Values = None,
     tau0: Values = None,
+    states: Mapping[str, float] | None = None,
+    inputs: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Dae:
     """Equations of motion dx/dt = ode, 0 = alg, with everything that acts in `direct_dynamics`.
@@ -417,8 +432,9 @@ def dae(
 
     In an open chain the last four are the same: z = a, of index 1. d(alg)/d(z) of "index1" is
     regular where the rows are independent; in the others it is once `alg` has been differentiated
-    index - 1 times. Of a joint or shaft that a device drives u has the effort, such as j.tau;
-    currents and voltages of devices are not part of the equations.
+    index - 1 times. States of components, such as the current of a motor, stand at the end of x,
+    and their inputs, such as its voltage, at the end of u; of a joint that a motor of a drive line
+    turns u has no effort.
 
     Source: Gear, Leimkuhler and Gupta 1985; Brenan, Campbell and Petzold 1996.
 
@@ -428,6 +444,8 @@ def dae(
         q0: positions at the start by name, as in `mbs.simulate.run`: the assembled configuration.
         v0: velocities at the start by name; at rest when left out.
         tau0: efforts of motors at the start by name, the others zero; they tell u0 and z0.
+        states: of components at the start by name, such as `motor.i`, the others as described.
+        inputs: of components at the start by name, such as `motor.voltage`, likewise.
         parameters: values of symbols at the start, the others at their defaults.
 
     Raises:
@@ -442,12 +460,42 @@ def dae(
     p = np.array(system.parameter_values(parameters), dtype=float)
     q, v = start(system, q0, v0, parameters)
     tau = start_efforts(system, tau0)
+    z = by_name(system, "states", states, system.states, system.z_start)
+    u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
     kind = _kind(system, form, q, p)
     equations, elements = _built(system, kind)
     parts = {field.name: getattr(equations, field.name) for field in fields(equations)}
-    x0 = _start_states(system, kind[0], q, v)
-    z0 = _start_algebraic(system, q, v, tau, p, equations.z.numel())
-    return Dae(**parts, form=form, elements=elements, x0=x0, z0=z0, u0=tau[motors(system)], p0=p)
+    x0 = np.concatenate([_start_states(system, kind[0], q, v), z])
+    z0 = _start_algebraic(system, (q, v, tau, z, u, p), equations.z.numel())
+    u0 = np.concatenate([tau[motors(system)], u])
+    return Dae(**parts, form=form, elements=elements, x0=x0, z0=z0, u0=u0, p0=p)
+
+
+def by_name(
+    system: System,
+    what: str,
+    values: Mapping[str, float] | None,
+    quantities: Sequence[tuple[str, str]],
+    otherwise: Sequence[float],
+) -> Array:
+    """Values of states or inputs, those that are not named as they are otherwise.
+
+    Raises:
+        ModelError: a name is unknown, or a value is no finite number.
+    """
+    names, result = [name for name, _ in quantities], np.array(otherwise, dtype=float)
+    for name, value in (values or {}).items():
+        if name not in names:
+            raise ModelError(
+                f"{system.name}: {what} names {quoted(name)}; {did_you_mean(str(name), names)}"
+            )
+        number = doubles(value)
+        if isinstance(number, str) or number.size != 1 or not np.isfinite(number).all():
+            raise ModelError(
+                f"{system.name}: {what} gives {quoted(value)} for {name}; give a finite number"
+            )
+        result[names.index(name)] = float(number.ravel()[0])
+    return result
 
 
 _Kind = tuple[str, tuple[str, ...]]
@@ -540,14 +588,25 @@ def _start_states(system: System, form: str, q: Array, v: Array) -> Array:
     return np.concatenate([q, v[active] if form == "carried" else v])
 
 
-def _start_algebraic(system: System, q: Array, v: Array, tau: Array, p: Array, size: int) -> Array:
-    """The first of: accelerations, efforts of the closure rows, zeros for mu."""
+def _start_algebraic(system: System, point: tuple[Array, ...], size: int) -> Array:
+    """The first of: accelerations, efforts of the closure rows, zeros for mu.
+
+    Args:
+        system: open or closed.
+        point: q, v, efforts of motors, states and inputs of components, parameters.
+        size: how many there are.
+    """
     z0 = np.zeros(size)
     if size:
+        q, v, tau, z, u, p = point
+        if system.devices:
+            found = devices(system)
+            at = {"q": q, "v": v, "z": z, "u": u, "p": p}
+            tau = tau + np.array(found.call([at[name] for name in found.name_in()])[0]).ravel()
         ddm = direct_dynamics(system, coordinates="tree")
-        result = ddm(q, v, tau, *([p] if system.parameters else []))
-        found = casadi.vertcat(*result) if isinstance(result, tuple) else result
-        z0[: found.numel()] = np.array(found).ravel()
+        at = {"q": q, "v": v, "tau": tau, "z": z, "u": u, "p": p}
+        determined = casadi.vertcat(*ddm.call([at[name] for name in ddm.name_in()]))
+        z0[: determined.numel()] = np.array(determined).ravel()
     return z0
 
 

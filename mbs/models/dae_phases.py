@@ -27,10 +27,10 @@ from mbs.models.dae import (
     Elements,
     Held,
     Rows,
+    driving,
     elements_of,
     equations,
     implicit,
-    motor_efforts,
     motors,
     rows_of,
     start_efforts,
@@ -427,10 +427,20 @@ def _numbers(standing: Standing) -> Function:
         A = inertia_matrix(system.tree, s.poses)
         H = tree_efforts(system, s, SX.zeros(system.nv), surroundings(system))
         outputs = [casadi.densify(x) for x in (A, H, J, psi, rows.J, rows.bias)]
+        outputs = with_starts(system, outputs)
         return Function("numbers", [s.q, s.v, system.p], outputs, {"cse": True})
 
     function: Function = system.cached(("standing", standing.points), build)
     return function
+
+
+def with_starts(system: System, values: Sequence[SX]) -> list[SX]:
+    """Expressions with the starts of states of components, and the defaults of their inputs."""
+    signals = casadi.vertcat(system.z, system.u)
+    if not signals.numel():
+        return list(values)
+    numbers = SX(DM([*system.z_start, *system.u_default]))
+    return [SX(value) for value in casadi.substitute(list(values), [signals], [numbers])]
 
 
 def _touching(standing: Standing) -> Function:
@@ -507,9 +517,9 @@ def phase_dae(standing: Standing, explicit: Function, form: str, begin: PhaseSta
         **parts,
         form=form,
         elements=elements,
-        x0=np.concatenate([q, v]),
+        x0=np.concatenate([q, v, system.z_start]),
         z0=z0,
-        u0=tau[motors(system)],
+        u0=np.concatenate([tau[motors(system)], system.u_default]),
         p0=p,
         f=f,
     )
@@ -539,13 +549,14 @@ def _explicit(
 ) -> tuple[DaeEquations, SX]:
     """States [q; v] and no z: accelerations and forces are solved for."""
     system = standing.system
-    s, (u, tau) = symbols_of(system, "tree"), motor_efforts(system)
+    s = symbols_of(system, "tree")
+    u, tau, rates = driving(system, s.q, s.v)
     a, f, *_ = outputs_of(system, explicit, s.q, s.v, tau)
     rows = rows_of(system, s.q, s.v, a).joined(standing.rows(kept)(s, a))
     made = equations(
         system,
-        states=(casadi.vertcat(s.q, s.v), SX(0, 1), u),
-        ode=casadi.vertcat(position_rate(system.tree, s.q, s.v), a),
+        states=(casadi.vertcat(s.q, s.v, system.z), SX(0, 1), u),
+        ode=casadi.vertcat(position_rate(system.tree, s.q, s.v), a, rates),
         alg=SX(0, 1),
         invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),
         motion=(s.q, s.v),

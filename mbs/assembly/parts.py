@@ -47,7 +47,7 @@ class Lever:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class WireSource:
     """What feeds an input: an output of a component, or a reading of a sensor.
 
     Attributes:
@@ -81,7 +81,7 @@ class AttachedPart:
     frames: tuple[Frame, ...]
     coordinates: Mapping[str, tuple[Lever, ...]]
     states: Mapping[str, SX]
-    inputs: Mapping[str, SX | Source]
+    inputs: Mapping[str, SX | WireSource]
     symbols: Mapping[str, SX]
     where: str
 
@@ -133,7 +133,7 @@ class AttachedPart:
         signals += [
             f"input {name}.{n} from {given}"
             for n, given in self.inputs.items()
-            if isinstance(given, Source)
+            if isinstance(given, WireSource)
         ]
         signals += [f"state {n} [{u}]" for n, u in self.state_quantities]
         if self.element.drives:
@@ -238,7 +238,7 @@ def _attached(
     tables: tuple[_Rows, _Rows, _Rows],
     symbols: Mapping[str, SX],
     turns: Mapping[tuple[str, str], FlangeTurn],
-    wires: Mapping[tuple[str, str], Source],
+    wires: Mapping[tuple[str, str], WireSource],
 ) -> AttachedPart:
     # where its points are
     frames = []
@@ -320,22 +320,22 @@ def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Row
 
 def _wires(
     mechanism: Mechanism, sensors: Sequence[AttachedSensor]
-) -> dict[tuple[str, str], Source]:
+) -> dict[tuple[str, str], WireSource]:
     """The source of every input that is wired, by component and name.
 
     Raises:
         AssemblyError: a wire comes from nothing that gives a signal.
     """
     outputs = {
-        f"{part.name}.{name}": Source(part.name, name)
+        f"{part.name}.{name}": WireSource(part.name, name)
         for part in parts_of(mechanism)
         for name in part.output_names
     }
     for attached in sensors:
         for column, _ in attached.columns:
             name = attached.sensor.name
-            outputs[column] = Source(name, column.removeprefix(f"{name}."))
-    found: dict[tuple[str, str], Source] = {}
+            outputs[column] = WireSource(name, column.removeprefix(f"{name}."))
+    found: dict[tuple[str, str], WireSource] = {}
     for source, target in mechanism.wires:
         if str(source) not in outputs:
             raise AssemblyError(

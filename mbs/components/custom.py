@@ -450,8 +450,7 @@ class Custom(OnPoints):
     - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
     - `outputs(at)`: the value of every output, by name.
 
-    Source: Haug 1989 for forces and rows; Modelica Association 2023 for the equations that a
-    connection stands for.
+    Source: Haug 1989 for forces, rows and the work that they do.
 
     Attributes:
         name: unique in its mechanism.

@@ -24,6 +24,7 @@ from mbs.models.kinematics import (
 )
 from mbs.models.lagrange import lagrange
 from mbs.models.limits import Limits, limits
+from mbs.models.linearise import Linearisation, LinearModel, linearise
 from mbs.models.loop_kinematics import acceleration_closure, velocity_closure
 from mbs.models.measurements import measurements
 from mbs.models.singularities import singularities
@@ -35,6 +36,8 @@ __all__ = [
     "ContactPoint",
     "Dae",
     "Limits",
+    "LinearModel",
+    "Linearisation",
     "acceleration_closure",
     "actuation_matrix",
     "actuation_null_space",
@@ -61,6 +64,7 @@ __all__ = [
     "joint_wrenches",
     "lagrange",
     "limits",
+    "linearise",
     "link_accelerations",
     "link_velocities",
     "measurements",

@@ -15,7 +15,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.parts import AttachedPart, Source
+from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import At, FlangeAt, FrameLoad, Row
 from mbs.errors import AssemblyError, MbsError
@@ -48,7 +48,7 @@ def check_parts(system: System) -> None:
     at = parts_at(system, q, v)
     for part in system.parts:
         for given in part.inputs.values():
-            if isinstance(given, Source):
+            if isinstance(given, WireSource):
                 at.signal(given)
         if not type(part.element).__module__.startswith("mbs."):  # ours are asked in tests
             check_part(system, part, at)

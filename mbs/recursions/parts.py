@@ -15,7 +15,7 @@ import casadi
 from casadi import DM, SX
 
 from mbs.assembly import System
-from mbs.assembly.parts import AttachedPart, Source
+from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tables import AttachedSensor, Coordinate
 from mbs.assembly.tree import Frame, Tree
 from mbs.components.custom import (
@@ -72,7 +72,7 @@ class PartsAt:
         self._found: dict[str, At] = {}
         self._efforts: dict[str, dict[str, SX]] | None = None
         self._outputs: dict[str, tuple[Mapping[str, SX], Mapping[str, SX]]] = {}
-        self._signals: dict[Source, SX | None] = {}
+        self._signals: dict[WireSource, SX | None] = {}
 
     @property
     def moving(self) -> list[Velocity]:
@@ -152,7 +152,7 @@ class PartsAt:
         given = part.inputs[name]
         return given if isinstance(given, SX) else self.signal(given)
 
-    def signal(self, source: Source) -> SX:
+    def signal(self, source: WireSource) -> SX:
         """What an output of a component, or a sensor, gives.
 
         Raises:
@@ -196,7 +196,7 @@ class PartsAt:
             self._outputs[part.name] = part.element.outputs(seen), symbols
         return self._outputs[part.name]
 
-    def _reading(self, attached: AttachedSensor, source: Source) -> SX:
+    def _reading(self, attached: AttachedSensor, source: WireSource) -> SX:
         """What a sensor reads of positions and velocities."""
         sensor = attached.sensor
         name, _, element = source.signal.partition(".")

@@ -27,8 +27,8 @@ from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
 from mbs.models.state.signals import (
     Effort,
+    LawArgument,
     Prescribed,
-    Signal,
     effort_function,
     signal_function,
     untraceable,
@@ -189,7 +189,7 @@ def input_function(system: System, u: Effort) -> Function | None:
     """
     if u is None:
         return None
-    signal = Signal("u", "inputs", [name for name, _ in system.inputs])
+    signal = LawArgument("u", "inputs", [name for name, _ in system.inputs])
     if not system.inputs:
         raise ModelError(
             f"{system.name}: u is given, but no motor and no torque is connected to a flange, and"

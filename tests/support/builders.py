@@ -55,6 +55,7 @@ BUILDERS = {
     "jacobian_dot_velocity": last(models.jacobian_dot_velocity),
     "joint_wrenches": models.joint_wrenches,
     "lagrange": models.lagrange,
+    "linearise": lambda s: models.linearise(s).function,
     "link_accelerations": models.link_accelerations,
     "link_velocities": models.link_velocities,
     "transform": last(models.transform),

@@ -19,7 +19,7 @@ _LONGEST_REASON = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Signal:
+class LawArgument:
     """What a user gives to drive a mechanism with.
 
     Attributes:
@@ -35,7 +35,7 @@ class Signal:
 
 def signal_function(
     system: System,
-    signal: Signal,
+    signal: LawArgument,
     given: SX | Function | Callable[[Any, Any, Any], Any],
     driven: Collection[str] | None = None,
 ) -> Function:
@@ -77,7 +77,7 @@ def signal_function(
 
 
 def _traced(
-    system: System, signal: Signal, function: Callable[..., Any], point: tuple[SX, SX, SX]
+    system: System, signal: LawArgument, function: Callable[..., Any], point: tuple[SX, SX, SX]
 ) -> tuple[SX, bool]:
     """The values as an expression of t, q and v, and whether they were given by name."""
     _check_inputs(system, signal, function, point)
@@ -101,7 +101,7 @@ def _traced(
     return result, by_name
 
 
-def _in_order(system: System, signal: Signal, values: Mapping[str, Any]) -> list[Any]:
+def _in_order(system: System, signal: LawArgument, values: Mapping[str, Any]) -> list[Any]:
     """Every element, zero where it is not named."""
     for name in values:
         if name not in signal.elements:
@@ -110,7 +110,9 @@ def _in_order(system: System, signal: Signal, values: Mapping[str, Any]) -> list
     return [values.get(name, 0) for name in signal.elements]
 
 
-def _require_driven(system: System, signal: Signal, values: SX, driven: Collection[str]) -> None:
+def _require_driven(
+    system: System, signal: LawArgument, values: SX, driven: Collection[str]
+) -> None:
     for name, value in zip(signal.elements, casadi.vertsplit(casadi.densify(values)), strict=True):
         if name not in driven and not value.is_zero():
             raise ModelError(
@@ -137,7 +139,7 @@ def _column(values: Any) -> SX:
 
 
 def _check_inputs(
-    system: System, signal: Signal, function: Callable[..., Any], point: tuple[SX, SX, SX]
+    system: System, signal: LawArgument, function: Callable[..., Any], point: tuple[SX, SX, SX]
 ) -> None:
     if isinstance(function, Function):
         sizes = [function.numel_in(k) for k in range(function.n_in())]
@@ -191,7 +193,7 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     """
     if tau is None:
         return None
-    signal = Signal("tau", "efforts", [speed.name for speed in system.speeds])
+    signal = LawArgument("tau", "efforts", [speed.name for speed in system.speeds])
     driven = [speed.name for speed in system.speeds if speed.actuated]
     if callable(tau):
         return signal_function(system, signal, tau, driven)

@@ -1,0 +1,285 @@
+"""Linear equations of small motions about any state: A, B, C and D.
+
+The states are displacements of the free coordinates, rotations of quaternion joints as small turns
+in their own axes, then independent velocities, then states of components. They stay on the loops.
+
+Source: Haug 1989 for coordinates on a manifold; Meijaard, Papadopoulos, Ruina and Schwab 2007 for
+rolling, where more positions are free than velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import DM, SX, Function
+from numpy.typing import NDArray
+
+from mbs.assembly import System
+from mbs.assembly.model_function import Named, model_function, require_system
+from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
+from mbs.assembly.tree import position_rate
+from mbs.errors import ModelError
+from mbs.loops.closure import closure_rows, independent_closure
+from mbs.loops.configuration import Values, start
+from mbs.loops.velocity import velocity_rows
+from mbs.models.contacts import require_no_contacts
+from mbs.models.dae import by_name, driving, motors, start_efforts
+from mbs.models.direct_dynamics import independent_dynamics
+from mbs.models.joint_wrenches import shown_outputs
+from mbs.models.measurements import readings
+from mbs.models.symbols import (
+    ModelSymbols,
+    configuration_check,
+    outputs_of,
+    part_equations,
+    surroundings,
+    symbols_of,
+)
+from mbs.solvers.linear import solve_square
+from mbs.text import did_you_mean, quoted
+
+Array = NDArray[np.float64]
+Quantity = tuple[str, str]
+"""Name and unit."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearModel:
+    """dx/dt = A x + B u, y = C x + D u, of small changes about a state.
+
+    Where the state is no equilibrium, x is the difference between two motions near it.
+
+    Attributes:
+        A: (n, n).
+        B: (n, m).
+        C: (k, n).
+        D: (k, m).
+        x, u, y: name and unit of the elements.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    x: tuple[Quantity, ...]
+    u: tuple[Quantity, ...]
+    y: tuple[Quantity, ...]
+
+    @property
+    def eigenvalues(self) -> NDArray[np.complex128]:
+        """(n,) of A [1/s], by real part and then imaginary part."""
+        values = np.linalg.eigvals(self.A).astype(complex)
+        return values[np.lexsort((values.imag, values.real))]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearisation:
+    """The linear equations of a system at any state; `at` gives them in numbers.
+
+    Attributes:
+        system: whose small motions they are.
+        function: `linear(q, v, tau) -> A, B, C, D` on numbers or symbols, and of states z and
+            inputs u of components and parameters p where there are any; tau (nv, 1) are the efforts
+            of the tree.
+        x, u, y: name and unit of states, inputs and outputs.
+    """
+
+    system: System
+    function: Function
+    x: tuple[Quantity, ...]
+    u: tuple[Quantity, ...]
+    y: tuple[Quantity, ...]
+
+    def at(
+        self,
+        q0: Values = None,
+        v0: Values = None,
+        tau0: Values = None,
+        states: Mapping[str, float] | None = None,
+        inputs: Mapping[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> LinearModel:
+        """The equations about one state.
+
+        Args:
+            q0: positions by name, the others as assembled; loops are closed at them.
+            v0: velocities by name; at rest when left out.
+            tau0: efforts of motors by name, the others zero.
+            states: of components by name, such as `motor.i`, the others as described.
+            inputs: of components by name, such as `motor.voltage`, likewise.
+            parameters: values of symbols, the others at their defaults.
+
+        Raises:
+            ModelError: a name is unknown, or a symbol has no value.
+            Unclosable: the loops cannot be closed at q0.
+        """
+        system = self.system
+        q, v = start(system, q0, v0, parameters)
+        point = {
+            "q": q,
+            "v": v,
+            "v_a": v[list(system.active)],
+            "tau": start_efforts(system, tau0),
+            "z": by_name(system, "states", states, system.states, system.z_start),
+            "u": by_name(system, "inputs", inputs, system.inputs, system.u_default),
+            "p": system.parameter_values(parameters),
+        }
+        found = self.function(*(point[name] for name in self.function.name_in()))
+        A, B, C, D = (np.array(value) for value in found)
+        return LinearModel(A, B, C, D, self.x, self.u, self.y)
+
+
+def linearise(system: System, outputs: Sequence[str] | None = None) -> Linearisation:
+    """Linear equations of small motions about any state, loops and rolling discs included.
+
+    Args:
+        system: open or closed, without rigid stops and Coulomb friction.
+        outputs: names of y: positions "j1.q", velocities "j1.v", accelerations "j1.a", what
+            sensors read such as "tip.p.x", outputs of components such as "spring.force"; the
+            positions and velocities of all coordinates when left out.
+
+    Raises:
+        ModelError: an output is unknown, or contacts act.
+    """
+    require_system(system)
+    require_no_contacts(system, "linearise")
+    known = _output_units(system)
+    names = list(known)[: system.nq + system.nv] if outputs is None else list(outputs)
+    for name in names:
+        if name not in known:
+            raise ModelError(
+                f"{system.name}: there is no output {quoted(name)} to linearise;"
+                f" {did_you_mean(str(name), known)}"
+            )
+
+    def build() -> tuple[Named, Named]:
+        s = symbols_of(system)
+        tau = SX.sym("tau", system.nv)
+        A, B, C, D = _matrices(system, s, tau, names)
+        inputs = [("q", s.q), ("v" + s.suffix, s.v), ("tau", tau)]
+        return inputs, [("A", A), ("B", B), ("C", C), ("D", D)]
+
+    check = configuration_check(system, "independent")
+    function = model_function(system, ("linear", *names), build, check)
+    free = [system.speeds[k] for k in system.free]
+    active = [system.speeds[k] for k in system.active]
+    x = [(f"{row.name}.q", row.unit.removesuffix("/s")) for row in free]
+    x += [(f"{row.name}.v", row.unit) for row in active]
+    driven = [system.speeds[k] for k in motors(system)]
+    u = [(f"{row.name}.tau", EFFORT_UNIT[row.unit]) for row in driven]
+    return Linearisation(
+        system,
+        function,
+        (*x, *system.states),
+        (*u, *system.inputs),
+        tuple((name, known[name]) for name in names),
+    )
+
+
+def _output_units(system: System) -> dict[str, str]:
+    """Everything that can be an output, with its unit."""
+    found = {f"{row.name}.q": row.unit for row in system.coordinates}
+    found |= {f"{row.name}.v": row.unit for row in system.speeds}
+    found |= {f"{row.name}.a": ACCELERATION_UNIT[row.unit] for row in system.speeds}
+    found |= {name: unit for sensor in system.sensors for name, unit in sensor.columns}
+    return found | dict(system.outputs)
+
+
+def _matrices(
+    system: System, s: ModelSymbols, tau: SX, names: Sequence[str]
+) -> tuple[SX, SX, SX, SX]:
+    q, v_a, v = s.q, s.v, s.v_tree
+    efforts, given, rates = driving(system, q, v)
+    motor_efforts = efforts[: efforts.numel() - system.u.numel()]
+    every = tau + given
+    # the independent accelerations
+    pushed = s.reduced_effort(every) if s.reduction is not None else every
+    (a_a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
+    a = s.tree_acceleration(a_a)
+    # how positions move: dq = T dxi for small displacements xi of the free coordinates
+    speed = SX.sym("v", system.nv)
+    N = casadi.jacobian(position_rate(system.tree, q, speed), speed)
+    T = casadi.mtimes(N, _tangents(system, q))
+    rate = position_rate(system.tree, q, v)
+    back = _selected(system, N)
+    # T' xi + T xi' = d(rate)/dq T xi + d(rate)/dv_a dv_a, seen in the free coordinates
+    turning = casadi.jtimes(casadi.vec(T), q, rate)
+    A11 = casadi.mtimes(
+        back, casadi.mtimes(casadi.jacobian(rate, q), T) - casadi.reshape(turning, *T.shape)
+    )
+    A12 = casadi.mtimes(back, casadi.jacobian(rate, v_a))
+
+    def slopes(value: SX) -> tuple[SX, SX]:
+        """Of an expression along states and along inputs."""
+        along = [
+            casadi.mtimes(casadi.jacobian(value, q), T),
+            casadi.jacobian(value, v_a),
+            casadi.jacobian(value, system.z),
+        ]
+        inputs = [casadi.jacobian(value, motor_efforts), casadi.jacobian(value, system.u)]
+        return casadi.horzcat(*along), casadi.horzcat(*inputs)
+
+    A2, B2 = slopes(casadi.densify(a_a))
+    A3, B3 = slopes(casadi.densify(rates))
+    C, D = slopes(casadi.densify(_outputs(system, s, a, every, names)))
+    first = casadi.horzcat(A11, A12, SX(A11.shape[0], system.z.numel()))
+    A = casadi.vertcat(first, A2, A3)
+    B = casadi.vertcat(SX(A11.shape[0], efforts.numel()), B2, B3)
+    # tau has what motors give; their symbols were for slopes alone
+    zero = SX.zeros(motor_efforts.numel())
+    return tuple(  # type: ignore[return-value]
+        SX(value) for value in casadi.substitute([A, B, C, D], [motor_efforts], [zero])
+    )
+
+
+def _tangents(system: System, q: SX) -> SX:
+    """(nv, m) velocities of the tree for unit rates of the free coordinates, loops kept closed."""
+    free = list(system.free)
+    if system.closure is None:
+        return SX(DM.eye(system.nv))
+    others = [k for k in range(system.nv) if k not in free]
+    phi = closure_rows(system, q) if system.closure.varies else independent_closure(system, q)
+    J = velocity_rows(system, q, phi)
+    T = SX.zeros(system.nv, len(free))
+    T[free, :] = SX(DM.eye(len(free)))
+    if others:
+        left = J[:, others]
+        mixed = left.T if system.closure.varies else SX(DM.eye(J.shape[0]))
+        T[others, :] = -solve_square(
+            casadi.mtimes(mixed, left), casadi.mtimes(mixed, casadi.densify(J[:, free]))
+        )
+    return T
+
+
+def _selected(system: System, N: SX) -> SX:
+    """(m, nq) the rates of the free coordinates from those of positions: a left inverse of N."""
+    # columns of N are orthogonal: those of a quaternion have the squared length 1/4
+    sizes = casadi.sum1(N * N)
+    inverse = casadi.mtimes(casadi.diag(1 / sizes.T), N.T)
+    return inverse[list(system.free), :]
+
+
+def _outputs(system: System, s: ModelSymbols, a: SX, tau: SX, names: Sequence[str]) -> SX:
+    """(k, 1) the outputs that were asked for."""
+    values: dict[str, SX] = {}
+    for k, coordinate in enumerate(system.coordinates):
+        values[f"{coordinate.name}.q"] = s.q[k]
+    for k, row in enumerate(system.speeds):
+        values[f"{row.name}.v"], values[f"{row.name}.a"] = s.v_tree[k], a[k]
+    if any(name not in values for name in names):
+        if system.sensors:
+            in_tree = tau if system.is_closed else None
+            read = dict(readings(system, s, a, in_tree, surroundings(system)))
+            for sensor in system.sensors:
+                columns = iter(sensor.columns)
+                for output, quantity in sensor.outputs:
+                    elements = casadi.vertsplit(casadi.vec(casadi.densify(read[output])))
+                    for element in elements[: len(quantity.elements)]:
+                        values[next(columns)[0]] = element
+        *_, parts = part_equations(system, s.q, s.v_tree)
+        shown = casadi.vertsplit(shown_outputs(system, parts, a, tau))
+        values |= dict(zip((name for name, _ in system.outputs), shown, strict=True))
+    return casadi.vertcat(SX(0, 1), *(values[name] for name in names))

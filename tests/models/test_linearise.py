@@ -1,0 +1,172 @@
+"""Linear equations of small motions: published eigenvalues, slopes of the motion itself."""
+
+import casadi
+import numpy as np
+import pytest
+from support.messages import refused
+
+import mbs
+from mbs.components import (
+    AbsoluteSensor,
+    Body,
+    Box,
+    CoulombFriction,
+    Custom,
+    DCMotor,
+    Free,
+    IdealGear,
+    JointSensor,
+    Revolute,
+    Spherical,
+    Spring,
+    custom,
+)
+from mbs.errors import ModelError
+from mbs.models import dae, linearise
+
+
+class Integral(Custom):
+    """A controller with an integral of its error."""
+
+    gain = custom.parameter("V/rad")
+    error = custom.state("rad.s")
+    reference = custom.input("rad")
+    measured = custom.input("rad")
+    u = custom.output("V")
+
+    def rates(self, at):
+        return {"error": at.reference - at.measured}
+
+    def outputs(self, at):
+        return {"u": at.gain * (at.reference - at.measured + 0.5 * at.error)}
+
+
+@pytest.mark.parametrize(
+    ("speed", "weave", "capsize", "caster"),
+    [
+        (0.0, 3.13164324790656, -3.13164324790656, -5.53094371765393),
+        (1.0, 3.52696170990070 + 0.80774027519930j, -3.13423125066578, -7.11008014637442),
+        (5.0, -0.77534188219585 + 4.46486771378823j, -0.32286642900409, -14.07838969279822),
+        (10.0, -3.72016840372880 + 10.90681139476287j, 0.16105338653172, -24.62459635017404),
+    ],
+)
+def test_bicycle(speed, weave, capsize, caster):
+    """Eigenvalues of the benchmark bicycle: Meijaard et al. 2007, table 2."""
+    system = mbs.load("whipple_bicycle").assemble()
+    v0 = {"x": speed, "rear_spin": -speed / 0.3, "front_spin": -speed / 0.35}
+    model = linearise(system).at(v0=v0)
+    own = model.eigenvalues[np.abs(model.eigenvalues) > 1e-6]
+    assert len(own) == 4
+    for value in (weave, np.conj(weave), capsize, caster):
+        assert np.abs(own - value).min() < 1e-10 * max(1, abs(value))
+    assert [name for name, _ in model.x][-3:] == ["lean.v", "steer.v", "rear_spin.v"]
+
+
+def driven_arm():
+    m = mbs.Mechanism("driven_arm", gravity=(0, -9.81, 0))
+    first = m.add(Box("first", length=0.6, mass=2.0))
+    second = m.add(Box("second", length=0.5, mass=1.0))
+    j1 = Revolute("j1", axis="z", Fv=0.1)
+    m.connect(m.world, j1, first.left)
+    m.connect(first.right, Revolute("j2", axis="z", actuated=True), second.left)
+    m.add(Spring("spring", m.world.at(0.3, 0.9, 0), second.right, "k", 0.4, 2.0))
+    m.values["k"] = mbs.Parameter("k", 30.0)
+    motor = m.add(DCMotor("motor", 1.2, 0.02, 0.05, 1e-5))
+    gear = m.add(IdealGear("gear", 40.0))
+    m.connect(motor.flange, gear.flange_a)
+    m.connect(gear.flange_b, j1.flange)
+    control = m.add(Integral("control", gain=20.0))
+    m.add(JointSensor("encoder", "j1"))
+    m.wire("encoder.q", control.measured)
+    m.wire(control.u, motor.voltage)
+    return m.assemble()
+
+
+@pytest.mark.parametrize("name", ["driven_arm", "four_bar", "slider_crank", "rx90"])
+def test_slopes_are_those_of_the_equations_of_motion(name):
+    """A and B are the Jacobians of the explicit equations, whose states are the same."""
+    system = driven_arm() if name == "driven_arm" else mbs.load(name).assemble()
+    rng = np.random.default_rng(3)
+    free = [system.speeds[k].name for k in system.free]
+    q0 = dict(zip(free, system.configuration + 0.2 * rng.uniform(size=system.nq), strict=False))
+    q0 = {
+        n: system.configuration[[c.name for c in system.coordinates].index(n)] + 0.1 for n in free
+    }
+    v0 = dict(zip(free, rng.uniform(-1, 1, len(free)), strict=True))
+    tau0 = {s.name: 1.3 for k, s in enumerate(system.speeds) if s.actuated and s.name != "j1"}
+    model = linearise(system).at(q0=q0, v0=v0, tau0=tau0)
+    d = dae(system, q0=q0, v0=v0, tau0=tau0)
+    assert [n for n, _ in d.elements["x"]] == [n for n, _ in model.x]
+    assert [n for n, _ in d.elements["u"]] == [n for n, _ in model.u]
+    slopes = casadi.Function(
+        "slopes", [d.x, d.u, d.p], [casadi.jacobian(d.ode, d.x), casadi.jacobian(d.ode, d.u)]
+    )
+    A, B = (np.array(x) for x in slopes(d.x0, d.u0, d.p0))
+    np.testing.assert_allclose(model.A, A, rtol=0, atol=1e-9 * np.abs(A).max())
+    np.testing.assert_allclose(model.B, B, rtol=0, atol=1e-9 * np.abs(B).max())
+
+
+def test_outputs_are_slopes_of_what_a_motion_shows():
+    """C and D by differences of sensors, forces and accelerations."""
+    system = driven_arm()
+    names = ["spring.force", "encoder.a", "j2.a", "motor.tau", "control.u"]
+    model = linearise(system, names).at(q0={"j1": 0.4, "j2": 0.7}, v0={"j1": 0.5})
+    assert [unit for _, unit in model.y] == ["N", "rad/s2", "rad/s2", "N.m", "V"]
+
+    def shown(change, tau=0.0, reference=0.0):
+        q0, v0 = {"j1": 0.4 + change[0], "j2": 0.7 + change[1]}, {"j1": 0.5 + change[2]}
+        z0 = dict(zip((n for n, _ in system.states), change[4:], strict=True))
+        result = mbs.simulate.run(
+            system, 1e-6, step=1e-6, q0=q0, v0={**v0, "j2": change[3]}, tau={"j2": tau},
+            z0=z0, u={"control.reference": reference}, quiet=True,
+        )  # fmt: skip
+        return np.array([result[name][0] for name in names])
+
+    h, n = 1e-5, len(model.x)
+    for k, row in enumerate(np.eye(n)):
+        slope = (shown(h * row) - shown(-h * row)) / (2 * h)
+        np.testing.assert_allclose(model.C[:, k], slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
+    slope = (shown(np.zeros(n), tau=h) - shown(np.zeros(n), tau=-h)) / (2 * h)
+    np.testing.assert_allclose(model.D[:, 0], slope, rtol=1e-6, atol=1e-8)
+    slope = (shown(np.zeros(n), reference=h) - shown(np.zeros(n), reference=-h)) / (2 * h)
+    np.testing.assert_allclose(model.D[:, 1], slope, rtol=1e-6, atol=1e-8)
+
+
+def test_spherical_pendulum():
+    """Hanging at rest it swings in two directions at one frequency, and turns freely."""
+    m = mbs.Mechanism("pendulum")
+    bob = m.add(Body("bob", mass=2.0, com=(0, 0, -0.5), inertia=(0.1, 0.1, 0.02)))
+    m.connect(m.world, Spherical("ball"), bob)
+    model = linearise(m.assemble()).at()
+    omega = np.sqrt(2.0 * 9.81 * 0.5 / (0.1 + 2.0 * 0.25))
+    values = model.eigenvalues
+    assert sorted(np.abs(values.imag))[-4:] == pytest.approx([omega] * 4, rel=1e-12)
+    assert np.abs(values.real).max() < 1e-7
+
+
+def test_small_turns_of_a_body_that_spins():
+    """Two attitudes that differ by a small turn turn with the body: xi' = -w x xi + dw."""
+    m = mbs.Mechanism("top", gravity=(0, 0, 0))
+    top = m.add(Body("top", mass=1.0, inertia=(0.2, 0.3, 0.4)))
+    m.connect(m.world, Free("free"), top)
+    m.add(AbsoluteSensor("pose", top, quantities=("w",)))
+    w = np.array([0.3, -0.2, 0.9])
+    v0 = {f"free.w{axis}": value for axis, value in zip("xyz", w, strict=True)}
+    model = linearise(m.assemble()).at(v0=v0)
+    turns = [
+        k for k, (name, _) in enumerate(model.x) if name.startswith("free.w") and name[-1] == "q"
+    ]
+    skew = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    np.testing.assert_allclose(model.A[np.ix_(turns, turns)], -skew, atol=1e-14)
+
+
+def test_what_is_refused():
+    system = driven_arm()
+    refused(ModelError, "no output 'j3.q'", by=lambda: linearise(system, ["j3.q"]))
+    refused(
+        ModelError, "states names 'motor.j'", by=lambda: linearise(system).at(states={"motor.j": 1})
+    )
+    m = mbs.load("planar_2r")
+    name = next(m.joints()).name
+    m.add(CoulombFriction("friction", name, sliding=1.0))
+    refused(ModelError, "linearise", by=lambda: linearise(m.assemble()))

@@ -173,8 +173,12 @@ def khalil_frames(
 
 
 def _kept(spanning: SpanningTree) -> list[Branch]:
-    """Cut joints with a motor, friction or a rotor: they stay, and their free end is welded."""
-    return [Branch(edge, edge.a, -1, True) for edge in spanning.cuts if edge.joint.carries_effort]
+    """Cut joints with an effort, or without rows: they stay, and their free end is welded."""
+    return [
+        Branch(edge, edge.a, -1, True)
+        for edge in spanning.cuts
+        if edge.joint.carries_effort or not edge.joint.closes
+    ]
 
 
 def _extend(

@@ -9,7 +9,7 @@ from mbs.components.constraints import (
     Rod,
     RollingDisc,
 )
-from mbs.components.couplings import Coupling, Gear, RackAndPinion, Screw
+from mbs.components.couplings import Coupling, Gear, Helical, RackAndPinion, Screw
 from mbs.components.custom import Custom, Flange
 from mbs.components.drives import (
     DCMotor,
@@ -35,10 +35,13 @@ from mbs.components.forces import (
     Torque,
 )
 from mbs.components.joints import (
+    Cartesian,
     Cylindrical,
     Fixed,
     Free,
+    Gimbal,
     Joint,
+    PinSlot,
     Planar,
     Prismatic,
     Revolute,
@@ -47,6 +50,7 @@ from mbs.components.joints import (
     Universal,
 )
 from mbs.components.mechanism import Mechanism, Placed
+from mbs.components.motion_joint import MotionJoint
 from mbs.components.notes import Note
 from mbs.components.sensors import (
     AbsoluteSensor,
@@ -65,6 +69,7 @@ __all__ = [
     "Body",
     "Box",
     "Bushing",
+    "Cartesian",
     "Component",
     "ConstantVelocity",
     "CoulombFriction",
@@ -84,6 +89,8 @@ __all__ = [
     "ForceElement",
     "Free",
     "Gear",
+    "Gimbal",
+    "Helical",
     "IdealGear",
     "Joint",
     "JointFriction",
@@ -91,7 +98,9 @@ __all__ = [
     "JointStop",
     "KhalilBody",
     "Mechanism",
+    "MotionJoint",
     "Note",
+    "PinSlot",
     "Placed",
     "Planar",
     "Point",

@@ -9,10 +9,22 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from mbs.components.component import unit_axis
-from mbs.components.joints import Freedom, Joint
+import casadi
+from casadi import DM, SX
+
+from mbs.components.component import SymbolTable, unit_axis
+from mbs.components.joints import (
+    Freedom,
+    Joint,
+    Rows,
+    along_z,
+    cosine,
+    orientation_rows,
+    position_rows,
+)
 from mbs.errors import DescriptionError
-from mbs.expressions import Number, Scalar, to_float
+from mbs.expressions import Number, Scalar, to_float, to_sx
+from mbs.spatial import Pose, align_z
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +71,11 @@ class Rod(Constraint):
             )
         Constraint.__post_init__(self)
 
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """Its effort is the force that pushes the ends apart; near zero it is the lengthening."""
+        length = to_sx(self.length, symbols)
+        return [("force along", (casadi.sumsqr(pose.p) - length**2) / (2 * length))]
+
 
 @dataclass(frozen=True, slots=True)
 class _AxisConstraint(Constraint):
@@ -75,6 +92,10 @@ class _AxisConstraint(Constraint):
 class PointOnLine(_AxisConstraint):
     """The origin of frame_b stays on the axis, a line through the origin of frame_a; 2 rows."""
 
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """Nothing across the line."""
+        return position_rows(along_z(pose, self.axis), "xy")
+
 
 @dataclass(frozen=True, slots=True)
 class PointOnPlane(_AxisConstraint):
@@ -82,6 +103,10 @@ class PointOnPlane(_AxisConstraint):
 
     It closes a loop with 1 row.
     """
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """Nothing along the normal."""
+        return position_rows(along_z(pose, self.axis), "z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +116,42 @@ class ConstantVelocity(_AxisConstraint):
     Its centre is the origin of both frames, and the axis is that of the shaft in each of them.
     """
 
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origins agree, and frame_b is turned about an axis in the plane x, y alone."""
+        pose = along_z(pose, self.axis)
+        return [*position_rows(pose, "xyz"), orientation_rows(pose)[2]]
+
+    def facing(self, pose: Pose) -> list[SX]:
+        """The shafts are not folded back onto each other."""
+        return [0.5 * (casadi.trace(pose.R) - cosine(pose, self.axis))]
+
 
 # Rolling without slip: a constraint on velocities that no constraint on positions implies.
+#
+# With n the normal of the plane, u the axis of the disc and s = |n x u|, the point that touches
+# the plane is at c = -r (n - (n.u) u) / s from the centre; the centre is r s above the plane, and
+# the velocity V + w x c of the point has no part in the plane.
+#
+# Source: Neimark and Fufaev 1972, chapter 1.
+
+
+SLIPS = ("slip x", "slip y")
+"""Labels of the rows of velocities, in axes whose z is the normal of the plane."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """A disc on a plane, in axes whose z is the normal of the plane.
+
+    Attributes:
+        height: of the rim above the plane [m].
+        point: (3, 1) from the centre to where the rim touches the plane [m].
+        upright: sine of the angle between the disc and the plane.
+    """
+
+    height: SX
+    point: SX
+    upright: SX
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,3 +180,24 @@ class RollingDisc(Constraint):
         for name in ("normal", "axis"):
             object.__setattr__(self, name, unit_axis(self.name, getattr(self, name)))
         Constraint.__post_init__(self)
+
+    def on_plane(self, pose: Pose) -> Pose:
+        """Frame_b in axes at frame_a whose z is the normal of the plane."""
+        return Pose.turned(align_z(self.normal)).inverse() @ pose
+
+    def contact(self, pose: Pose, symbols: SymbolTable) -> Contact:
+        """Where it touches the plane.
+
+        Args:
+            pose: of frame_b, the centre of the disc, in axes whose z is the normal.
+            symbols: CasADi symbol of every parameter.
+        """
+        radius = to_sx(self.radius, symbols)
+        u = casadi.mtimes(pose.R, SX(DM(list(self.axis))))
+        s = casadi.sqrt(u[0] * u[0] + u[1] * u[1])
+        point = radius * casadi.vertcat(u[2] * u[0] / s, u[2] * u[1] / s, -s)
+        return Contact(pose.p[2] - radius * s, point, s)
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The rim stays on the plane."""
+        return [("force normal", self.contact(self.on_plane(pose), symbols).height)]

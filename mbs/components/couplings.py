@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from mbs.components.component import Component, named_scalars
-from mbs.components.joints import Motion
+from mbs.components.joints import Cylindrical, Motion
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Scalar, expression, to_float
 from mbs.text import quoted
@@ -158,3 +158,31 @@ class Screw(Transmission):
     def __post_init__(self) -> None:
         self._normalise("pitch", "offset")
         self._set_factor("pitch", expression(self.pitch) / (2 * math.pi))
+
+
+@dataclass(frozen=True, slots=True)
+class Helical(Cylindrical):
+    """A screw joint: a rotation `phi` about the axis, with which `s` along it advances.
+
+    Connecting it adds the `Screw` NAME.thread between its two coordinates.
+
+    Attributes:
+        pitch: advance for a whole turn [m]; less than zero for a left-hand thread.
+    """
+
+    pitch: Scalar = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._normalise("pitch")
+        if to_float(self.pitch) == 0:
+            raise DescriptionError(
+                f"{self.name}: pitch is 0, with which nothing advances; give the advance for a"
+                " turn, or take a Revolute joint"
+            )
+        Cylindrical.__post_init__(self)
+
+    @property
+    def companions(self) -> tuple[Component, ...]:
+        """The thread."""
+        name = self.name
+        return (Screw(f"{name}.thread", f"{name}.s", f"{name}.phi", pitch=self.pitch),)

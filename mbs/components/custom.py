@@ -447,6 +447,8 @@ class Custom(OnPoints):
     - `dissipation(at)`: what it turns into heat [W], never negative.
     - `rates(at)`: the rate of every state, by name.
     - `rows(at)`: what must be zero, by label: `Row`s of positions, unknowns and parameters.
+    - `positive(at)`: what must be positive where the rows are zero, by label: it tells which of the
+      configurations that the rows allow is meant.
     - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
     - `outputs(at)`: the value of every output, by name.
 
@@ -555,6 +557,10 @@ class Custom(OnPoints):
         """What must be zero, by label, of positions, unknowns and parameters."""
         return {}
 
+    def positive(self, at: Any) -> Mapping[str, SX]:
+        """What must be positive where the rows are zero, by label, such as a cosine."""
+        return {}
+
     def velocity_rows(self, at: Any) -> Mapping[str, Row | SX]:
         """What must be zero, by label, linear in velocities."""
         return {}
@@ -645,7 +651,7 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
             setattr(cls, name, _Handle(what.kind, name))
             continue
         annotations[name] = Any
-        if what.kind in ("state", "unknown"):
+        if what.kind in ("state", "unknown") or (what.kind == "frame" and what.default is None):
             setattr(cls, name, dataclass_field(default=what.default, kw_only=True))
         elif what.default is REQUIRED:
             delattr(cls, name)
@@ -663,7 +669,8 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
 
 
 def _check_frame(component: Custom, name: str, what: Declared) -> None:
-    component._take_point(name)
+    if getattr(component, name) is not None or what.default is REQUIRED:
+        component._take_point(name)
 
 
 def _check_coordinate(component: Custom, name: str, what: Declared) -> None:

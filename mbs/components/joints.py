@@ -8,17 +8,20 @@ frame_b. The rows that close a loop through a cut joint follow from the same des
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+import casadi
 import numpy as np
+from casadi import DM, SX
 
-from mbs.components.component import Component, Point, in_plane, unit_axis
+from mbs.components.component import Component, Point, SymbolTable, in_plane, unit_axis
 from mbs.components.custom import Flange
 from mbs.errors import DescriptionError
 from mbs.expressions import Number, Scalar, expression, to_float
+from mbs.spatial import Pose, align_z
 from mbs.text import quoted
 
 # Elementary motions of a frame, of which every joint is made.
@@ -61,6 +64,59 @@ class Freedom:
     def coordinate_of(self, joint: str) -> str:
         """Name of its coordinate in a joint of this name, which has a suffix beside others."""
         return f"{joint}.{self.suffix}" if self.suffix else joint
+
+
+# The rows that close a loop through a joint that is cut, from the pose of frame_b in frame_a.
+#
+# Lengths are in metres, directions are cosines, so that a row is zero when closed.
+#
+# Source: Haug 1989, chapter 9, for the rows of each type of joint.
+
+
+Rows = list[tuple[str, SX]]
+"""Label and value of each row."""
+
+
+def position_rows(pose: Pose, axes: str) -> Rows:
+    """The origin of frame_b has no part along some axes of frame_a."""
+    return [(f"force {axis}", pose.p["xyz".index(axis)]) for axis in axes]
+
+
+def tilt_rows(pose: Pose) -> Rows:
+    """The z axis of frame_b has no part along x and y of frame_a."""
+    return [("moment y", pose.R[0, 2]), ("moment x", pose.R[1, 2])]
+
+
+def orientation_rows(pose: Pose) -> Rows:
+    """Frame_b is not turned."""
+    R = pose.R
+    return [
+        ("moment x", 0.5 * (R[2, 1] - R[1, 2])),
+        ("moment y", 0.5 * (R[0, 2] - R[2, 0])),
+        ("moment z", 0.5 * (R[1, 0] - R[0, 1])),
+    ]
+
+
+def weld_rows(pose: Pose) -> Rows:
+    """The frames agree."""
+    return [*position_rows(pose, "xyz"), *orientation_rows(pose)]
+
+
+def along_z(pose: Pose, axis: Sequence[float]) -> Pose:
+    """The pose in axes whose z is the axis."""
+    inside = Pose.turned(align_z(axis))
+    return inside.inverse() @ pose @ inside
+
+
+def cosine(pose: Pose, axis: Sequence[float]) -> SX:
+    """Cosine between an axis of frame_b and the same axis of frame_a."""
+    z = SX(DM(list(axis)))
+    return casadi.dot(z, casadi.mtimes(pose.R, z))
+
+
+def diagonal(pose: Pose) -> list[SX]:
+    """Cosines between the axes of frame_b and those of frame_a."""
+    return [pose.R[k, k] for k in range(3)]
 
 
 # Rotors of motors that turn with a joint, faster than it.
@@ -235,10 +291,41 @@ class Joint(Component):
             pair = motor_range(self.name, name, getattr(self, name))
             object.__setattr__(self, name, pair)
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super(Joint, cls).__init_subclass__(**kwargs)
+        # rows say the same as freedoms: who writes other freedoms must not inherit old rows
+        if "freedoms" in vars(cls) and "closing_rows" not in vars(cls):
+            cls.closing_rows = Joint.closing_rows  # type: ignore[method-assign]
+
     @property
     def freedoms(self) -> tuple[Freedom, ...]:
         """The elementary motions from frame_a to frame_b."""
         raise NotImplementedError
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows | None:
+        """Label and value of what must be zero where it is cut; None where it must not be cut.
+
+        A joint without rows stays in the tree, and its free end is welded.
+
+        Args:
+            pose: of frame_b in frame_a.
+            symbols: CasADi symbol of every parameter.
+        """
+        return None
+
+    def facing(self, pose: Pose) -> list[SX]:
+        """Cosines that must be positive where the rows are zero: axes that are not opposed."""
+        return []
+
+    @property
+    def closes(self) -> bool:
+        """Whether rows can stand for it where it is cut."""
+        return type(self).closing_rows is not Joint.closing_rows
+
+    @property
+    def companions(self) -> tuple[Component, ...]:
+        """What is added to the mechanism together with it."""
+        return ()
 
     @property
     def places(self) -> bool:
@@ -315,6 +402,15 @@ class Revolute(_AxisJoint):
         """The angle [rad]."""
         return (Freedom(Motion.REVOLUTE, self.axis),)
 
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origins agree, and the axes."""
+        pose = along_z(pose, self.axis)
+        return [*position_rows(pose, "xyz"), *tilt_rows(pose)]
+
+    def facing(self, pose: Pose) -> list[SX]:
+        """The axes are not opposed."""
+        return [cosine(pose, self.axis)]
+
 
 @dataclass(frozen=True, slots=True)
 class Prismatic(_AxisJoint):
@@ -324,6 +420,15 @@ class Prismatic(_AxisJoint):
     def freedoms(self) -> tuple[Freedom, ...]:
         """The displacement [m]."""
         return (Freedom(Motion.PRISMATIC, self.axis),)
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origin moves along the axis alone, and nothing turns."""
+        pose = along_z(pose, self.axis)
+        return [*position_rows(pose, "xy"), *orientation_rows(pose)]
+
+    def facing(self, pose: Pose) -> list[SX]:
+        """No axis is opposed."""
+        return diagonal(pose)
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,6 +442,15 @@ class Cylindrical(_AxisJoint):
             Freedom(Motion.PRISMATIC, self.axis, "s"),
             Freedom(Motion.REVOLUTE, self.axis, "phi"),
         )
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origin moves along the axis alone, and the axes agree."""
+        pose = along_z(pose, self.axis)
+        return [*position_rows(pose, "xy"), *tilt_rows(pose)]
+
+    def facing(self, pose: Pose) -> list[SX]:
+        """The axes are not opposed."""
+        return [cosine(pose, self.axis)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,6 +467,97 @@ class Planar(_AxisJoint):
         return (
             Freedom(Motion.PRISMATIC, u, "s_x"),
             Freedom(Motion.PRISMATIC, v, "s_y"),
+            Freedom(Motion.REVOLUTE, self.axis, "phi"),
+        )
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origin stays in the plane, and the axes agree."""
+        pose = along_z(pose, self.axis)
+        return [*position_rows(pose, "z"), *tilt_rows(pose)]
+
+    def facing(self, pose: Pose) -> list[SX]:
+        """The axes are not opposed."""
+        return [cosine(pose, self.axis)]
+
+
+@dataclass(frozen=True, slots=True)
+class Cartesian(Joint):
+    """Translations `x`, `y`, `z` along the axes of frame_a, without any rotation.
+
+    It stays in the tree: a loop through it is closed by a weld behind it.
+    """
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Three displacements [m]."""
+        axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+        return tuple(Freedom(Motion.PRISMATIC, axis, name) for name, axis in axes.items())
+
+
+@dataclass(frozen=True, slots=True)
+class Gimbal(Joint):
+    """Three rotations, one after the other, `phi_1` about the first axis and so on.
+
+    It is singular where the first and the last axis are aligned; `Spherical` never is. It stays in
+    the tree: a loop through it is closed by a weld behind it.
+
+    Attributes:
+        axes: three axes in frame_a at the zero configuration, each orthogonal to the next one.
+    """
+
+    axes: tuple[Any, Any, Any] = ("z", "y", "x")
+
+    def __post_init__(self) -> None:
+        given = tuple(self.axes) if hasattr(self.axes, "__iter__") else ()
+        if len(given) != 3:
+            raise DescriptionError(
+                f"{self.name}: axes {quoted(self.axes)} are not three; give three axes"
+            )
+        axes = tuple(unit_axis(self.name, axis) for axis in given)
+        for first, second in ((axes[0], axes[1]), (axes[1], axes[2])):
+            if abs(np.dot(first, second)) > 1e-9:  # unit vectors: beyond the rounding of digits
+                raise DescriptionError(
+                    f"{self.name}: axes {quoted(self.axes)} are not orthogonal one to the next;"
+                    " give such as ('z', 'y', 'x')"
+                )
+        object.__setattr__(self, "axes", axes)
+        Joint.__post_init__(self)
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Three angles [rad]."""
+        return tuple(
+            Freedom(Motion.REVOLUTE, axis, f"phi_{k}") for k, axis in enumerate(self.axes, start=1)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PinSlot(_AxisJoint):
+    """A pin in a straight slot: a translation `s` along the slot, a rotation `phi` about the axis.
+
+    It stays in the tree: a loop through it is closed by a weld behind it.
+
+    Attributes:
+        axis: of the pin.
+        slot: direction of the slot, orthogonal to the axis; both in frame_a.
+    """
+
+    slot: Any = "x"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "slot", unit_axis(self.name, self.slot))
+        _AxisJoint.__post_init__(self)
+        if abs(np.dot(self.axis, self.slot)) > 1e-9:  # unit vectors: beyond the rounding of digits
+            raise DescriptionError(
+                f"{self.name}: slot {quoted(self.slot)} is not orthogonal to the axis"
+                f" {quoted(self.axis)}; give two orthogonal directions"
+            )
+
+    @property
+    def freedoms(self) -> tuple[Freedom, ...]:
+        """Displacement [m], then angle [rad]."""
+        return (
+            Freedom(Motion.PRISMATIC, self.slot, "s"),
             Freedom(Motion.REVOLUTE, self.axis, "phi"),
         )
 
@@ -392,6 +597,12 @@ class Universal(Joint):
             Freedom(Motion.REVOLUTE, second, "phi_b"),
         )
 
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origins agree, and the two axes stay orthogonal."""
+        first, second = (SX(DM(list(axis))) for axis in self.axes)
+        across = casadi.dot(first, casadi.mtimes(pose.R, second))
+        return [*position_rows(along_z(pose, (0.0, 0.0, 1.0)), "xyz"), ("moment across", across)]
+
 
 @dataclass(frozen=True, slots=True)
 class Spherical(Joint):
@@ -404,6 +615,10 @@ class Spherical(Joint):
     def freedoms(self) -> tuple[Freedom, ...]:
         """The orientation of frame_b in frame_a."""
         return (Freedom(Motion.SPHERICAL),)
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origins agree."""
+        return position_rows(along_z(pose, (0.0, 0.0, 1.0)), "xyz")
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,6 +634,10 @@ class Free(Joint):
         """Position and orientation of frame_b in frame_a."""
         return (Freedom(Motion.FREE),)
 
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """None."""
+        return []
+
 
 @dataclass(frozen=True, slots=True)
 class Fixed(Joint):
@@ -428,3 +647,11 @@ class Fixed(Joint):
     def freedoms(self) -> tuple[Freedom, ...]:
         """None."""
         return ()
+
+    def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
+        """The origins agree, and nothing turns."""
+        return weld_rows(pose)
+
+    def facing(self, pose: Pose) -> list[SX]:
+        """No axis is opposed."""
+        return diagonal(pose)

@@ -14,6 +14,7 @@ from mbs.components.custom import Custom, Flange, Signal
 from mbs.components.drives import flange_pair
 from mbs.components.joints import Joint
 from mbs.components.locking import lock
+from mbs.components.motion_joint import MotionJoint
 from mbs.components.notes import Note
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
@@ -217,7 +218,7 @@ class Mechanism:
     def connect(
         self,
         a: Point | RigidBody | Flange,
-        joint_or_point: Joint | Point | RigidBody | Flange,
+        joint_or_point: Joint | MotionJoint | Point | RigidBody | Flange,
         b: Point | RigidBody | None = None,
     ) -> None:
         """Put a joint between two points, weld two points together, or connect two flanges.
@@ -232,6 +233,16 @@ class Mechanism:
         if isinstance(a, Flange) or isinstance(joint_or_point, Flange):
             self._join(flange_pair(self.name, a, joint_or_point, b))
             return
+        if isinstance(joint_or_point, MotionJoint):
+            if b is None:
+                raise DescriptionError(
+                    f"{self.name}: joint {joint_or_point.name!r} has nothing on its other side;"
+                    " write connect(point, joint, point)"
+                )
+            placed, free = joint_or_point.between(self._point(a), self._point(b))
+            self.add(placed)
+            self.connect(a, free, b)
+            return
         if isinstance(joint_or_point, Joint):
             if b is None:
                 raise DescriptionError(
@@ -241,6 +252,8 @@ class Mechanism:
             before, after = self._point(a), self._point(b)
             if self.components.get(joint_or_point.name) is not joint_or_point:
                 self.add(joint_or_point)
+                for companion in joint_or_point.companions:
+                    self.add(companion)
             self._weld(before, joint_or_point.frame_a)
             self._weld(joint_or_point.frame_b, after)
             return
@@ -356,10 +369,17 @@ class Mechanism:
 
     def _require_use(self, component: Component) -> None:
         """Refuse a component that no equation would know."""
+        if isinstance(component, MotionJoint) and component.frame_a is None:
+            raise DescriptionError(
+                f"{self.name}: {type(component).__name__} {component.name!r} is added, but a joint"
+                " is connected; write connect(point, joint, point)"
+            )
         if isinstance(component, Custom):
             if component.lowered or component.has_equations:
                 return
             remedy = "write one of its methods loads, energy, rates, rows, velocity_rows or outputs"
+        elif isinstance(component, Joint) and not (component.places or component.closes):
+            remedy = "write its method closing_rows"
         elif isinstance(component, (RigidBody, Joint, Coupling, Sensor)):
             return
         else:

@@ -8,37 +8,23 @@ Source: Khalil & Creusot 1997, section 3.4; rows by joint type as in Haug 1989, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import casadi
-from casadi import DM, SX, Function
+from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.tree import norms_of, position_rate
-from mbs.components import (
-    ConstantVelocity,
-    Cylindrical,
-    Fixed,
-    Free,
-    Planar,
-    PointOnLine,
-    PointOnPlane,
-    Prismatic,
-    Revolute,
-    Rod,
-    RollingDisc,
-    Spherical,
-    Universal,
-)
+from mbs.components import Fixed, RollingDisc
+from mbs.components.constraints import SLIPS
 from mbs.components.custom import Row
 from mbs.errors import ModelError
-from mbs.expressions import to_sx
 from mbs.recursions.parts import part_rows, parts_at
 from mbs.recursions.route import relative_pose
-from mbs.spatial import Pose, align_z, cross
+from mbs.spatial import Pose, cross
 
 # How frames of cut joints move: velocities from the rates of their poses.
 
@@ -61,45 +47,7 @@ def cut_twist(system: System, pose: Pose, q: SX, v: SX) -> tuple[SX, SX]:
     return casadi.jtimes(pose.p, q, rate), casadi.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
 
 
-# Rolling discs: the row that keeps the rim on the plane, and the rows that forbid it to slip.
-#
-# With n the normal of the plane, u the axis of the disc and s = |n x u|, the point that touches
-# the plane is at c = -r (n - (n.u) u) / s from the centre; the centre is r s above the plane, and
-# the velocity V + w x c of the point has no part in the plane.
-#
-# Source: Neimark and Fufaev 1972, chapter 1.
-
-
-SLIPS = ("slip x", "slip y")
-"""Labels of the rows of velocities, in axes whose z is the normal of the plane."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Contact:
-    """A disc on a plane, in axes whose z is the normal of the plane.
-
-    Attributes:
-        height: of the rim above the plane [m].
-        point: (3, 1) from the centre to where the rim touches the plane [m].
-    """
-
-    height: SX
-    point: SX
-
-
-def contact(pose: Pose, disc: RollingDisc, radius: SX) -> Contact:
-    """Where a disc touches the plane z = 0.
-
-    Args:
-        pose: of frame_b, the centre of the disc, in axes whose z is the normal.
-        disc: its description.
-        radius: of the rim [m].
-    """
-    u = casadi.mtimes(pose.R, SX(DM(list(disc.axis))))
-    s = casadi.sqrt(u[0] * u[0] + u[1] * u[1])
-    return Contact(
-        pose.p[2] - radius * s, radius * casadi.vertcat(u[2] * u[0] / s, u[2] * u[1] / s, -s)
-    )
+# Rolling discs, which bind velocities too.
 
 
 def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
@@ -109,7 +57,7 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
     for cut, disc in rolling_discs(system):
         pose = pose_on_plane(system, q, cut, disc)
         V, w = cut_twist(system, pose, q, v)
-        touching = contact(pose, disc, radius_of(system, disc)).point
+        touching = disc.contact(pose, system.symbol_table).point
         slip = V + cross(w, touching)
         result.append((disc.name, casadi.jacobian(slip[:2], v)))
     for name, rows in part_rows(parts_at(system, q, v), velocities=True):
@@ -125,8 +73,8 @@ def least_upright(system: System) -> Function:
         q = SX.sym("q", system.nq)
         sines = []
         for cut, disc in rolling_discs(system):
-            u = casadi.mtimes(pose_on_plane(system, q, cut, disc).R, SX(DM(list(disc.axis))))
-            sines.append(casadi.sqrt(u[0] * u[0] + u[1] * u[1]))
+            pose = pose_on_plane(system, q, cut, disc)
+            sines.append(disc.contact(pose, system.symbol_table).upright)
         return Function("upright", [q, system.p], [casadi.mmin(casadi.vertcat(*sines))])
 
     function: Function = system.cached("least upright", build)
@@ -142,17 +90,7 @@ def rolling_discs(system: System) -> Iterator[tuple[Cut, RollingDisc]]:
 
 def pose_on_plane(system: System, q: SX, cut: Cut, disc: RollingDisc) -> Pose:
     """Frame_b of a rolling disc in axes at frame_a whose z is the normal of the plane."""
-    plane = Pose.turned(align_z(disc.normal))
-    return plane.inverse() @ relative_pose(system.tree, q, *cut.frames)
-
-
-def radius_of(system: System, disc: RollingDisc) -> SX:
-    """The radius of the rim [m], a number or an expression of the parameters."""
-    return to_sx(disc.radius, system.symbol_table)
-
-
-Rows = list[tuple[str, SX]]
-"""Label and value of each row."""
+    return disc.on_plane(relative_pose(system.tree, q, *cut.frames))
 
 
 def closure(system: System) -> Function:
@@ -272,14 +210,20 @@ def _equations(system: System) -> _Equations:
         loops, cosines = list[tuple[str, list[tuple[str, Row]]]](), list[SX]()
         for cut in system.cuts:
             pose = relative_pose(system.tree, q, *cut.frames)
-            rows = _cut_rows(system, q, cut, pose)
+            joint = Fixed("weld") if cut.welded else cut.edge.joint
+            rows = joint.closing_rows(pose, system.symbol_table)
+            assert rows is not None  # else it is welded
             loops.append((cut.edge.joint.name, [(n, Row(x, _unit(n))) for n, x in rows]))
-            cosines.extend(_facing(cut, pose))
+            cosines.extend(joint.facing(pose))
         for coupling in system.couplings:
             unit = "m" if system.coordinates[coupling.driven].unit == "m" else "1"
             value = q[coupling.driven] - coupling.value(q)
             loops.append((coupling.name, [("coordinate", Row(value, unit))]))
-        loops += part_rows(parts_at(system, q))
+        parts = parts_at(system, q)
+        loops += part_rows(parts)
+        for part in system.parts:
+            if part.element.has("positive"):
+                cosines.extend(SX(x) for x in part.element.positive(parts.at(part)).values())
         labels = [(name, [(label, row.unit) for label, row in rows]) for name, rows in loops]
         values = [row.value for _, rows in loops for _, row in rows]
         every = casadi.densify(casadi.vertcat(SX(0, 1), *values))
@@ -302,85 +246,3 @@ def facing(system: System, q: SX) -> SX:
     """
     found = _equations(system)
     return casadi.substitute(found.cosines, found.q, q)
-
-
-def _facing(cut: Cut, pose: Pose) -> list[SX]:
-    joint = cut.edge.joint
-    if cut.welded or isinstance(joint, (Fixed, Prismatic)):
-        return [pose.R[k, k] for k in range(3)]
-    if isinstance(joint, ConstantVelocity):
-        return [0.5 * (casadi.trace(pose.R) - _along(pose, joint.axis))]
-    if isinstance(joint, (Revolute, Cylindrical, Planar)):
-        return [_along(pose, joint.axis)]
-    return []
-
-
-def _along(pose: Pose, axis: Sequence[float]) -> SX:
-    """Cosine between an axis of frame_b and the same axis of frame_a."""
-    z = SX(DM(list(axis)))
-    return casadi.dot(z, casadi.mtimes(pose.R, z))
-
-
-def _cut_rows(system: System, q: SX, cut: Cut, pose: Pose) -> Rows:
-    """The rows of a cut joint, whose frame_b has this pose in its frame_a."""
-    joint = cut.edge.joint
-    if isinstance(joint, RollingDisc):
-        on_plane = pose_on_plane(system, q, cut, joint)
-        return [("force normal", contact(on_plane, joint, radius_of(system, joint)).height)]
-    if cut.welded:
-        return [*_position(pose, "xyz"), *_orientation(pose)]
-    if isinstance(joint, Rod):
-        return _rod(pose, to_sx(joint.length, system.symbol_table))
-    axis = getattr(joint, "axis", (0.0, 0.0, 1.0))
-    inside = Pose.turned(align_z(axis))
-    along = inside.inverse() @ pose @ inside
-    return _ROWS[type(joint)](along, joint)
-
-
-def _rod(pose: Pose, length: SX) -> Rows:
-    """Its effort is the force that pushes the ends apart; near zero the row is the lengthening."""
-    return [("force along", (casadi.sumsqr(pose.p) - length**2) / (2 * length))]
-
-
-def _position(pose: Pose, axes: str) -> Rows:
-    return [(f"force {axis}", pose.p["xyz".index(axis)]) for axis in axes]
-
-
-def _tilt(pose: Pose) -> Rows:
-    """The z axis of frame_b has no part along x and y of frame_a."""
-    return [("moment y", pose.R[0, 2]), ("moment x", pose.R[1, 2])]
-
-
-def _orientation(pose: Pose) -> Rows:
-    R = pose.R
-    return [
-        ("moment x", 0.5 * (R[2, 1] - R[1, 2])),
-        ("moment y", 0.5 * (R[0, 2] - R[2, 0])),
-        ("moment z", 0.5 * (R[1, 0] - R[0, 1])),
-    ]
-
-
-def _universal(pose: Pose, joint: Universal) -> Rows:
-    first, second = (SX(DM(list(axis))) for axis in joint.axes)
-    cosine = casadi.dot(first, casadi.mtimes(pose.R, second))
-    return [*_position(pose, "xyz"), ("moment across", cosine)]
-
-
-def _same_turn(pose: Pose) -> Rows:
-    """Frame_b is turned about an axis in the plane x, y of frame_a, so that it has not spun."""
-    return [("moment z", 0.5 * (pose.R[1, 0] - pose.R[0, 1]))]
-
-
-_ROWS: dict[type, Callable[[Pose, object], Rows]] = {
-    Revolute: lambda pose, joint: [*_position(pose, "xyz"), *_tilt(pose)],
-    Prismatic: lambda pose, joint: [*_position(pose, "xy"), *_orientation(pose)],
-    Cylindrical: lambda pose, joint: [*_position(pose, "xy"), *_tilt(pose)],
-    Planar: lambda pose, joint: [*_position(pose, "z"), *_tilt(pose)],
-    Spherical: lambda pose, joint: _position(pose, "xyz"),
-    PointOnLine: lambda pose, joint: _position(pose, "xy"),
-    PointOnPlane: lambda pose, joint: _position(pose, "z"),
-    ConstantVelocity: lambda pose, joint: [*_position(pose, "xyz"), *_same_turn(pose)],
-    Universal: lambda pose, joint: _universal(pose, joint),  # type: ignore[arg-type]
-    Fixed: lambda pose, joint: [*_position(pose, "xyz"), *_orientation(pose)],
-    Free: lambda pose, joint: [],
-}

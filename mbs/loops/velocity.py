@@ -19,11 +19,9 @@ from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.tree import position_rate
 from mbs.loops.closure import (
     closure_rows,
-    contact,
     independent_closure,
     pose_on_plane,
     position_rows,
-    radius_of,
     rolling_discs,
     row_groups,
     slip_rows,
@@ -216,7 +214,7 @@ def _against_slip(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
         along = [lam[2 * number], lam[2 * number + 1]]
         pose = pose_on_plane(system, q, cut, disc)
         f = vector([*along, 0])
-        m = cross(contact(pose, disc, radius_of(system, disc)).point, f)
+        m = cross(disc.contact(pose, system.symbol_table).point, f)
         result[disc.name] = casadi.mtimes(pose.R.T, f), casadi.mtimes(pose.R.T, m)
     return result
 

@@ -1,0 +1,90 @@
+"""Joints by their motion: the pose of frame_b in frame_a as a function of coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import casadi
+from casadi import SX
+
+from mbs.components import custom
+from mbs.components.component import Point
+from mbs.components.custom import Custom, Row
+from mbs.components.joints import Free
+from mbs.errors import DescriptionError
+from mbs.spatial import Pose, vector
+
+
+class MotionJoint(Custom):
+    """A joint by its motion: derive from it, declare coordinates as unknowns, write `motion`.
+
+        class Corkscrew(MotionJoint):
+            lead = custom.parameter("m")
+            phi = custom.unknown("rad")
+
+            def motion(self, at):
+                return turned("z", at.phi) @ shifted(0, 0, at.lead * at.phi)
+
+    It is connected as any joint, `m.connect(point_a, joint, point_b)`. Rows hold frame_b where the
+    motion has it, whether a loop closes there or not; the coordinates are named NAME.of_it. Motions
+    made of turns and slides one after the other are cheaper as `freedoms` of a `Joint`.
+
+    Source: Haug 1989, chapter 9, for constraints between two frames.
+    """
+
+    frame_a = custom.Declared("frame", default=None)
+    frame_b = custom.Declared("frame", default=None)
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if cls.motion is MotionJoint.motion:
+            raise DescriptionError(
+                f"{cls.__name__}: a MotionJoint needs a method motion(self, at), which returns the"
+                " pose of frame_b in frame_a"
+            )
+
+    def motion(self, at: Any) -> Pose:
+        """The pose of frame_b in frame_a."""
+        raise NotImplementedError
+
+    def between(self, a: Point, b: Point) -> tuple[MotionJoint, Free]:
+        """The joint between two points, and what places one in the other."""
+        points: dict[str, Any] = {"frame_a": a, "frame_b": b}
+        return replace(self, **points), Free(f"{self.name}.free")
+
+    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+        """Frame_b is where the motion has it: origins agree, and nothing is turned."""
+        offset, turn = self._off(at)
+        p = casadi.vertsplit(casadi.densify(offset))
+        x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+        return {
+            **{f"force {axis}": Row(value) for axis, value in zip("xyz", p, strict=True)},
+            **{f"moment {a}": Row(0.5 * r, "1") for a, r in zip("xyz", (x, y, z), strict=True)},
+        }
+
+    def positive(self, at: Any) -> Mapping[str, SX]:
+        """No axis is opposed to where the motion has it."""
+        _, turn = self._off(at)
+        return {f"axis {axis}": turn[k, k] for k, axis in enumerate("xyz")}
+
+    def _off(self, at: Any) -> tuple[SX, SX]:
+        """(3, 1) and (3, 3) frame_b seen from where the motion has it."""
+        seen, wanted = at.frame_a.to(at.frame_b), self.motion(at)
+        if not isinstance(wanted, Pose):
+            raise DescriptionError(
+                f"{self.name}: motion returns a {type(wanted).__name__}; return what turned(...)"
+                " and shifted(...) make, joined by @"
+            )
+        return seen.p - wanted.p, casadi.mtimes(wanted.R.T, seen.R)
+
+
+def turned(axis: str, angle: Any) -> Pose:
+    """A turn about "x", "y" or "z" by an angle [rad]."""
+    return Pose.about(axis, SX(angle))
+
+
+def shifted(x: Any = 0, y: Any = 0, z: Any = 0) -> Pose:
+    """A displacement [m]."""
+    return Pose.moved(vector([SX(x), SX(y), SX(z)]))

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 import casadi
 import numpy as np
@@ -19,7 +19,7 @@ from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.files import path_of, write_bytes
+from mbs.export.robot_files import system_of, write_xml
 from mbs.formats.urdf import UNLIMITED
 from mbs.text import quoted
 
@@ -48,17 +48,10 @@ def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
             other gravity than 9.81 m/s^2 along -z, or a symbol has no value.
         ExportError: the file cannot be written.
     """
-    if isinstance(system, Mechanism):
-        system = system.assemble()
-    if not isinstance(system, System):
-        raise ModelError(
-            f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
-        )
+    system = system_of(system)
     _check(system)
     root = _Writing(system, Numbers(system, "URDF")).robot()
-    indent(root)
-    content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
-    write_bytes(content, path_of(path))
+    write_xml(root, path)
 
 
 class Numbers:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi
 from casadi import SX
 
+from mbs.closed_forms.centres import with_spherical
 from mbs.closed_forms.ring import always_zero, gap_samples, is_planar, with_elbow, without_idle
 from mbs.closed_forms.roots import (
     Positions,
@@ -18,7 +19,6 @@ from mbs.closed_forms.roots import (
     square,
     turn_onto,
 )
-from mbs.closed_forms.spatial import with_balls
 from mbs.components.joints import Motion
 from mbs.recursions.chain import Ring, frames_at_zero
 
@@ -146,7 +146,7 @@ def planar(ring: Ring, q: SX, p: SX) -> Root | None:
     What a closing joint can do out of the plane is left out; a ball, or three turns about one
     point, stand for a turn.
     """
-    ring = with_balls(ring, q, p)
+    ring = with_spherical(ring, q, p)
     balls = sum(joint.motion is _BALL for joint in ring.joints)
     while len(ring.joints) > 3 and not balls:
         smaller = without_idle(ring, gap_samples(ring, q, p))
@@ -206,7 +206,7 @@ def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
 
 def along_normal(ring: Ring, q: SX, p: SX) -> Root | None:
     """The slide along the turns of a loop; None where it is not the only one, or not all agree."""
-    ring = with_balls(ring, q, p)
+    ring = with_spherical(ring, q, p)
     kinds = [joint.motion for joint in ring.joints]
     if kinds.count(Motion.SPHERICAL) > 1 or Motion.REVOLUTE not in kinds:
         return None

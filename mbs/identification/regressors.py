@@ -659,10 +659,10 @@ def power_regressor(
     an interval for the columns of friction of the energy model.
 
     Args:
-        system: open or closed; q must close the loops.
-        columns: as for `regressor`.
-        coordinates: of a closed system, "independent" or "tree".
-        choice: rotors, friction, offsets, couplings; see `columns_of`.
+        system: as for `energy_regressor`, and so are the others.
+        columns: likewise.
+        coordinates: likewise.
+        choice: likewise.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); P (1, n) with `columns`.

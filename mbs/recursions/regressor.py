@@ -258,10 +258,15 @@ def inertial_regressor(tree: Tree, poses: list[LinkPose], motions: list[Accelera
         poses: each with respect to its antecedent.
         motions: of the links; see `link_accelerations`.
     """
-    links: list[Elements] = []
-    for motion, twists in zip(motions, path_twists(tree, poses), strict=True):
-        units = unit_wrenches(motion)
-        links.append({twist.row: partial(element, twist, units) for twist in twists})
+    return _work_of_units(tree, poses, [unit_wrenches(motion) for motion in motions])
+
+
+def _work_of_units(tree: Tree, poses: list[LinkPose], units: list[list[Unit]]) -> list[SX]:
+    """For every link the matrix (nv, 10) of the work of its units in unit joint velocities."""
+    links: list[Elements] = [
+        {twist.row: partial(element, twist, own) for twist in twists}
+        for own, twists in zip(units, path_twists(tree, poses), strict=True)
+    ]
     return fill_rows(tree, poses, tree.nv, links)
 
 
@@ -357,11 +362,7 @@ def momentum_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
         poses: each with respect to its antecedent.
         velocities: of the links; see `link_velocities`.
     """
-    links: list[Elements] = []
-    for velocity, twists in zip(velocities, path_twists(tree, poses), strict=True):
-        units = unit_momenta(velocity)
-        links.append({twist.row: partial(element, twist, units) for twist in twists})
-    return fill_rows(tree, poses, tree.nv, links)
+    return _work_of_units(tree, poses, [unit_momenta(velocity) for velocity in velocities])
 
 
 def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:

@@ -1,4 +1,4 @@
-"""Configurations found by search alone: Gauss-Newton from many random starts."""
+"""Configurations: random ones, and those that Gauss-Newton finds from many random starts."""
 
 from __future__ import annotations
 
@@ -7,6 +7,15 @@ import numpy as np
 from mbs.assembly.tree import quaternion_slices
 from mbs.closed_forms.ring import independent_places
 from mbs.loops.closing import Closing, closure_parameters
+
+
+def near_assembled(system, reach, seed):
+    """A random configuration of the opened tree around the assembled one, quaternions unit."""
+    rng = np.random.default_rng(seed)
+    q = np.array(system.configuration) + rng.uniform(-reach, reach, system.nq)
+    for part in quaternion_slices(system.tree):
+        q[part] /= np.linalg.norm(q[part])
+    return q
 
 
 def searched(system, q_a, starts=150, seed=0, reach=3.5):

@@ -35,7 +35,7 @@ from mbs.components.sensors import (
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError
 from mbs.expressions import to_sx
-from mbs.spatial import Inertia, MatrixTurn, Pose
+from mbs.spatial import Inertia, MatrixRotation, Pose
 from mbs.text import did_you_mean
 
 Places = Mapping[tuple[str, str], tuple[int, Pose]]
@@ -335,7 +335,9 @@ def _part(
         component = mechanism.components[name]
         if isinstance(component, RigidBody):
             pose = places[name, ""][1]
-            inertia = inertia + component.inertial(symbols).seen_from(MatrixTurn(pose.R), pose.p)
+            inertia = inertia + component.inertial(symbols).seen_from(
+                MatrixRotation(pose.R), pose.p
+            )
     return WeldedPart(frozenset(sides[side]), inertia, sign)
 
 

@@ -101,7 +101,7 @@ def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
     stacked = casadi.vertcat(*(pose.matrix for pose in chain.between))
     function = Function("gaps", [symbols], [casadi.densify(stacked)])
     gaps = np.array(DM(function(p))).reshape(len(chain.gaps), 4, 4)
-    prismatic = np.array([not joint.turns for joint in chain.joints], dtype=bool)
+    prismatic = np.array([not joint.is_rotational for joint in chain.joints], dtype=bool)
     return Arm(tuple(joint.name for joint in chain.joints), prismatic, gaps)
 
 

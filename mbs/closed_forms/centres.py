@@ -64,8 +64,8 @@ def merge_centre(ring: Ring, centre: Centre) -> Ring:
     joints, gaps = begun.joints[centre.count :], begun.gaps[centre.count :]
     name = ", ".join(joint.name for joint in begun.joints[: centre.count])
     spherical = ChainJoint(name, Motion.SPHERICAL, None, 1)
-    first = begun.gaps[0].then(Pose.moved(centre.before))
-    leave = Gap(Pose.moved(-centre.after))
+    first = begun.gaps[0].then(Pose.translation(centre.before))
+    leave = Gap(Pose.translation(-centre.after))
     if not joints:
         return Ring((spherical,), (first.after(leave),))
     return Ring((spherical, *joints), (first, gaps[0].after(leave), *gaps[1:]))

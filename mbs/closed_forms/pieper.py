@@ -25,7 +25,7 @@ from mbs.closed_forms.sequence import (
 )
 from mbs.errors import NoClosedForm
 from mbs.recursions.chain import ChainJoint, Gap, Ring
-from mbs.spatial import Pose, axis_turn, vector
+from mbs.spatial import Pose, axis_rotation, vector
 
 # Quantities that depend on one joint, and equations X e^(i q) = U in another.
 #
@@ -86,7 +86,7 @@ class PieperLoop:
 def basis(scene: PieperLoop, k: int) -> SX:
     """(3, 1) what the factors of a form in joint k multiply."""
     x = scene.x(k)
-    if scene.ring.joints[k].turns:
+    if scene.ring.joints[k].is_rotational:
         return casadi.vertcat(casadi.cos(x), casadi.sin(x), 1)
     return casadi.vertcat(x * x, x, 1)
 
@@ -94,7 +94,7 @@ def basis(scene: PieperLoop, k: int) -> SX:
 def moved_point(joint: ChainJoint, point: SX) -> SX:
     """(3, 3) forms of the coordinates of a point that the joint moves."""
     x, y, z, sign = point[0], point[1], point[2], joint.sign
-    if joint.turns:
+    if joint.is_rotational:
         return casadi.vertcat(
             casadi.horzcat(x, -sign * y, 0), casadi.horzcat(y, sign * x, 0), casadi.horzcat(0, 0, z)
         )
@@ -143,7 +143,7 @@ def three_turns(scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G:
 
 
 def _turn(scene: PieperLoop, k: int) -> SX:
-    return SX(axis_turn("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
+    return SX(axis_rotation("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
 def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> Step:
@@ -220,7 +220,7 @@ def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
         form: (3, 1) factors, see `forms`.
         unit: of the size of what the form is a sum of, in its unit.
     """
-    if not scene.ring.joints[k].turns:
+    if not scene.ring.joints[k].is_rotational:
         return _polynomial(scene, k, [form[0], form[1], form[2]], unit)
     if scene.zero(form[:2] / unit):
         return None
@@ -245,7 +245,7 @@ def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
         A: (3, 3) symmetric, factors of the products, see `forms`.
         unit: of the size of what it is a sum of, in its unit.
     """
-    if not scene.ring.joints[k].turns:
+    if not scene.ring.joints[k].is_rotational:
         powers = [A[0, 0], 2 * A[0, 1], A[1, 1] + 2 * A[0, 2], 2 * A[1, 2], A[2, 2]]
         return _polynomial(scene, k, powers, unit)
     mean = (A[0, 0] + A[1, 1]) / 2
@@ -364,9 +364,9 @@ def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[Step] | None:
     joint, way = scene.ring.joints[2], scene.after(1).pose
     f = casadi.mtimes(way.R, moved_point(joint, point))
     f[:, 2] += way.p
-    square = _square(f, way.p, point) if joint.turns else _slid_square(f)
+    square = _square(f, way.p, point) if joint.is_rotational else _slid_square(f)
     reach = Reach(scene, scene.after(0).pose, f, square, p)
-    steps = _by_turning(reach) if scene.ring.joints[1].turns else _by_sliding(reach)
+    steps = _by_turning(reach) if scene.ring.joints[1].is_rotational else _by_sliding(reach)
     return None if steps is None else [*steps, _first(reach)]
 
 
@@ -385,7 +385,7 @@ def _slid_square(f: SX) -> SX:
 def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
     """Two equations a . (J2 f) = h: vectors a, forms h, and the units of h."""
     scene, R, t = reach.scene, reach.way.R, reach.way.p
-    if not scene.ring.joints[0].turns:
+    if not scene.ring.joints[0].is_rotational:
         rows = [R[k, :].T for k in (0, 1)]
         return rows, [constant(reach.p[k] - t[k]) for k in (0, 1)], [scene.length] * 2
     known = casadi.sumsqr(reach.p) - casadi.sumsqr(t)
@@ -445,7 +445,7 @@ def _by_sliding(reach: Reach) -> list[Step] | None:
     """Joints 3 and 2 where joint 2 slides."""
     rows, forms, _ = _rows(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
-    if reach.scene.ring.joints[0].turns:
+    if reach.scene.ring.joints[0].is_rotational:
         return _slide_in_turn(reach, rows[0], rows[1][2], (left[0], left[1]))
     return _two_slides(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
 
@@ -484,10 +484,10 @@ def _slide_in_turn(reach: Reach, a: SX, along: SX, left: tuple[SX, SX]) -> list[
 def _first(reach: Reach) -> Step:
     """Joint 1, once the other two are known."""
     scene = reach.scene
-    f = Pose.moved(casadi.mtimes(reach.f, basis(scene, 2)))
+    f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))
     w = (reach.way @ scene.motion(1) @ f).p
     joint = scene.ring.joints[0]
-    if joint.turns:
+    if joint.is_rotational:
         return turn_onto(scene, 0, (w[:2], reach.p[:2]), scene.length)
     return linear(scene, 0, SX(1), joint.sign * (reach.p[2] - w[2]))
 
@@ -504,7 +504,7 @@ def three_slides(scene: PieperLoop) -> list[Step]:
         NoClosedForm: two of the turning axes are always parallel, or the slides coplanar.
     """
     turns = scene.ring
-    for k in reversed([k for k, joint in enumerate(turns.joints) if not joint.turns]):
+    for k in reversed([k for k, joint in enumerate(turns.joints) if not joint.is_rotational]):
         turns = turns.without(k)
     names = ", ".join(joint.name for joint in turns.joints)
     if any(scene.zero(gap.pose.R[:2, 2]) for gap in turns.gaps):
@@ -523,7 +523,7 @@ def _slides(scene: PieperLoop) -> Step:
     way, places, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
         way = way @ gap.pose
-        if joint.turns:
+        if joint.is_rotational:
             way = way @ scene.motion(k)
         else:
             columns.append(joint.sign * way.R[:, 2])
@@ -592,7 +592,7 @@ def pieper(problem: Problem) -> StepSequence:
             f"the loop has {problem.size} unknown joints ({', '.join(names)}), and Pieper's method"
             " takes six"
         )
-    if sum(not joint.turns for joint in problem.ring.joints) == 3:
+    if sum(not joint.is_rotational for joint in problem.ring.joints) == 3:
         return StepSequence(
             _JOINTS, three_slides(PieperLoop(problem, problem.ring, _length(problem)))
         )
@@ -615,8 +615,8 @@ def _steps(scene: PieperLoop) -> list[Step] | None:
     """The steps where the axes of the last three joints meet; None where the first three differ."""
     ring = scene.ring
     first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
-    point = (scene.after(2).pose @ Pose.moved(vector([0, 0, first]))).p
-    wanted = (scene.after(5).inverse().pose @ Pose.moved(vector([0, 0, last]))).p
+    point = (scene.after(2).pose @ Pose.translation(vector([0, 0, first]))).p
+    wanted = (scene.after(5).inverse().pose @ Pose.translation(vector([0, 0, last]))).p
     steps = three_joints(scene, point, wanted)
     if steps is None:
         return None
@@ -675,7 +675,7 @@ def _concurrent(problem: Problem, length: SX) -> list[int]:
     values = np.array(problem.at_samples(casadi.vertcat(*rows)))
     meet = np.all(np.abs(values[:, :, 2:]) < ZERO, axis=(0, 2))
     bent = np.all(np.abs(values[:, :, :2]) > ZERO, axis=(0, 2))
-    three = [all(joints[(k + m) % _JOINTS].turns for m in range(3)) for k in range(_JOINTS)]
+    three = [all(joints[(k + m) % _JOINTS].is_rotational for m in range(3)) for k in range(_JOINTS)]
     return [k for k in (3, 0, 1, 2, 4, 5) if meet[k] and bent[k] and three[k]]
 
 

@@ -127,7 +127,7 @@ def _pass_cut(builder: ChainBuilder, system: System, number: int) -> None:
         return
     if isinstance(joint, Rod):
         builder.through(ball)
-        builder.over(Pose.moved(vector([to_sx(joint.length, system.symbol_table), 0, 0])))
+        builder.over(Pose.translation(vector([to_sx(joint.length, system.symbol_table), 0, 0])))
         builder.through(ball)
         return
     if isinstance(joint, PointOnLine):
@@ -135,7 +135,7 @@ def _pass_cut(builder: ChainBuilder, system: System, number: int) -> None:
         freedoms = (Freedom(Motion.PRISMATIC, joint.axis),)
     first = cut_places(system)[number]
     for k, freedom in reversed(list(enumerate(freedoms))):
-        aligned = Pose.turned(align_z(freedom.axis))
+        aligned = Pose.rotation(align_z(freedom.axis))
         name = freedom.coordinate_of(joint.name)
         builder.over(aligned)
         builder.past(ChainJoint(name, freedom.motion, first + k, -1, cut=True))
@@ -231,7 +231,7 @@ def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
         joint = ring.joints[k]
         if joint.cut and joint.motion is not Motion.SPHERICAL:
             cosine = abs(_normal(samples[0], start, k)[2])
-            idle = cosine < _CLOSE if joint.turns else cosine > 1 - _CLOSE
+            idle = cosine < _CLOSE if joint.is_rotational else cosine > 1 - _CLOSE
             if idle:
                 return ring.without(k)
     return ring

@@ -144,7 +144,7 @@ def confined(ring: Ring, q: SX, p: SX) -> Root | None:
         return None
     begun = ring.rotated((balls[0] + 1) % 4)
     for way in (begun, begun.reversed().rotated(1)):
-        if way.joints[0].turns:
+        if way.joints[0].is_rotational:
             normal = _normal(way, q, p)
             if normal is not None and not _keeps(way, normal, q, p):
                 return _brought(way, normal)
@@ -174,7 +174,7 @@ def _brought(ring: Ring, normal: SX) -> Root:
     X1, X2, X3, X4 = (gap.pose for gap in ring.gaps)
     joint, goal = ring.joints[0], X1.inverse().p
     m = X2.R @ normal
-    Z = casadi.dot(normal, (X3 @ Pose.moved(X4.p)).p) + casadi.dot(m, X2.p)
+    Z = casadi.dot(normal, (X3 @ Pose.translation(X4.p)).p) + casadi.dot(m, X2.p)
     X, Y = casadi.dot(in_plane(m), in_plane(goal)), across(in_plane(m), in_plane(goal))
     return Root(
         {
@@ -267,7 +267,7 @@ def at_distance(ring: Ring, q: SX, p: SX) -> Root | None:
         if len(span.chain.joints) == 1:
             m, d = _ends(span)
             idle = any(always_zero(in_plane(end), q, p) for end in (m, d))
-            if not (idle and span.chain.joints[0].turns):
+            if not (idle and span.chain.joints[0].is_rotational):
                 return _at_distance(span.chain.joints[0], m, d, span.squared)
     return None
 
@@ -281,7 +281,7 @@ def _ends(span: Span) -> tuple[SX, SX]:
 
 def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> Root:
     def value(sign: int) -> SX:
-        if joint.turns:
+        if joint.is_rotational:
             Z = (squared - square(m) - square(d)) / 2 - m[2] * d[2]
             return root_angle(m[0] * d[0] + m[1] * d[1], -across(m, d), Z, sign).value
         w = m + d
@@ -425,7 +425,7 @@ def slides(ring: Ring, q: SX, p: SX) -> Root | None:
 def _slid(ring: Ring, centre: Centre) -> Root:
     """The slides that lead from the centre, the first one of the loop, back to it."""
     joints = ring.joints[centre.count :]
-    poses = frames_at_zero(ring.gaps[centre.count :], Pose.moved(-centre.after))
+    poses = frames_at_zero(ring.gaps[centre.count :], Pose.translation(-centre.after))
     axes, pose = [pose.R[:, 2] for pose in poses], poses[-1]
     if centre.count:
         pose = pose @ ring.gaps[0].pose
@@ -581,7 +581,7 @@ def held_point(name: str, spans: Sequence[Span]) -> Root:
 
 
 def _sphere(span: Span, places: Sequence[int]) -> _Sphere:
-    *poses, end = frames_at_zero(span.chain.gaps, Pose.moved(-span.goal))
+    *poses, end = frames_at_zero(span.chain.gaps, Pose.translation(-span.goal))
     axes = {
         joint.place: joint.sign * at.R[:, 2]
         for joint, at in zip(span.chain.joints, poses, strict=True)
@@ -667,7 +667,7 @@ def _angles(ring: Ring, axes: _Axes, swap: int, sense: int) -> list[Angle]:
     across = 2 * casadi.dot(line, axes.known) / casadi.sumsqr(line)
     opposite = sense * (across * line - axes.known)
     a = turn_onto(in_plane(R2[:, 2]), in_plane(R1.T @ opposite))
-    before = Pose.turned(R2.T @ _turned(a).R.T @ R1.T).R @ axes.before
+    before = Pose.rotation(R2.T @ _turned(a).R.T @ R1.T).R @ axes.before
     b = turn_onto(in_plane(R3[:, 2]), in_plane(before))
     c = turn_onto(in_plane(opposite), R3[2, 0:2].T)
     return [a, b, c]
@@ -684,4 +684,4 @@ def _opening(ring: Ring, angles: list[Angle]) -> SX:
 def _turned(angle: Angle) -> Pose:
     c, s = casadi.cos(angle.value), casadi.sin(angle.value)
     rows = (casadi.horzcat(c, -s, 0), casadi.horzcat(s, c, 0), casadi.horzcat(SX(0), 0, 1))
-    return Pose.turned(casadi.vertcat(*rows))
+    return Pose.rotation(casadi.vertcat(*rows))

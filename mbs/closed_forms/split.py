@@ -22,7 +22,7 @@ from mbs.spatial import Pose
 
 _MOST = 6
 _ENOUGH = 3
-_AXES = Pose.turned(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
+_AXES = Pose.rotation(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
 
 
 def split(ring: Ring, q: SX, p: SX) -> Root | str:

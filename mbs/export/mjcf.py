@@ -349,7 +349,7 @@ class _Writer:
         elif isinstance(joint, Revolute):
             # two points of the axis
             for k, along in enumerate((-_APART / 2, _APART / 2)):
-                shift = Pose.moved(SX(DM(along * np.array(joint.axis))))
+                shift = Pose.translation(SX(DM(along * np.array(joint.axis))))
                 ends = [(number, pose @ shift) for number, pose in (frame_a, frame_b)]
                 name = joint.name if not k else self._unused(f"{joint.name}_axis")
                 self._equality(equalities, "connect", name, *ends)

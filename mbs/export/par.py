@@ -21,7 +21,7 @@ from mbs.files import path_of
 from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable, write_par
 from mbs.formats.table import BODY_SCALARS, GEOMETRY
 from mbs.operations.graph import graph_of
-from mbs.spatial import Khalil, Pose, align_z, placed
+from mbs.spatial import Khalil, Pose, align_z, frames_to
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 Text = Callable[[SX], str]
@@ -87,7 +87,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
             (cut.link_b, cut.pose_b, fixed),
         ):
             axis = cut.edge.joint.freedoms[0].axis
-            *via, own = placed(pose @ Pose.turned(align_z(axis)), size)
+            *via, own = frames_to(pose @ Pose.rotation(align_z(axis)), size)
             before = number[link_number]
             for frame in via:
                 frames.append(FrameRow(before, 2, None, **_geometry(frame, text)))

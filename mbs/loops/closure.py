@@ -137,7 +137,7 @@ def rolling_discs(system: System) -> Iterator[tuple[Cut, RollingDisc]]:
 
 def pose_on_plane(system: System, q: SX, cut: Cut, disc: RollingDisc) -> Pose:
     """Frame_b of a rolling disc in axes at frame_a whose z is the normal of the plane."""
-    plane = Pose.turned(align_z(disc.normal))
+    plane = Pose.rotation(align_z(disc.normal))
     return plane.inverse() @ relative_pose(system.tree, q, *cut.frames)
 
 
@@ -279,7 +279,7 @@ def _cut_rows(system: System, q: SX, cut: Cut, pose: Pose) -> Rows:
     if isinstance(joint, Rod):
         return _rod(pose, to_sx(joint.length, system.symbol_table))
     axis = getattr(joint, "axis", (0.0, 0.0, 1.0))
-    inside = Pose.turned(align_z(axis))
+    inside = Pose.rotation(align_z(axis))
     along = inside.inverse() @ pose @ inside
     return _ROWS[type(joint)](along, joint)
 

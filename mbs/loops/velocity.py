@@ -29,7 +29,7 @@ from mbs.loops.closure import (
 )
 from mbs.recursions.force_elements import sum_wrenches
 from mbs.recursions.route import relative_pose
-from mbs.spatial import Pose, Wrench, add_wrenches, carried, cross, skew, vector
+from mbs.spatial import Pose, Wrench, add_wrenches, cross, skew, transform_wrench, vector
 
 
 def closure_jacobian(system: System) -> Function:
@@ -170,7 +170,7 @@ def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wr
         for link, sign in ((cut.link_a, 1), (cut.link_b, -1)):
             if link >= 0:
                 T = relative_pose(system.tree, q, (link, Pose.identity()), cut.frames[1])
-                f, m = carried(T, wrenches[cut.edge.joint.name])
+                f, m = transform_wrench(T, wrenches[cut.edge.joint.name])
                 exerted.append({link: (sign * f, sign * m)})
     return sum_wrenches(*exerted)
 

@@ -16,7 +16,7 @@ from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.velocities import Acceleration, moving_base, resting_base
-from mbs.spatial import Wrench, carried
+from mbs.spatial import Wrench, transform_wrench
 
 COORDINATES = ("independent", "tree")
 
@@ -190,7 +190,9 @@ def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
     exerted: list[dict[int, Wrench]] = []
     for column, row in enumerate(system.bodies):
         link, pose = system.frames[row.name]
-        exerted.append({link: carried(pose, (wrenches[0:3, column], wrenches[3:6, column]))})
+        exerted.append(
+            {link: transform_wrench(pose, (wrenches[0:3, column], wrenches[3:6, column]))}
+        )
     return sum_wrenches(*exerted)
 
 

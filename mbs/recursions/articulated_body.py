@@ -18,7 +18,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regroup, slide_frames
+from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     Displacement,
@@ -67,13 +67,13 @@ class ArticulatedInertia:
         """Of two bodies that move together, in one frame."""
         return ArticulatedInertia(self.M + other.M, self.H + other.H, self.J + other.J)
 
-    def turned(self, R: Rotation) -> ArticulatedInertia:
+    def rotate(self, R: Rotation) -> ArticulatedInertia:
         """The same body about the same point in the axes of frame i."""
         return ArticulatedInertia(
             R.apply_to_tensor(self.M), R.apply_to_square(self.H), R.apply_to_tensor(self.J)
         )
 
-    def slid(self, axis: int, t: SX) -> ArticulatedInertia:
+    def shift(self, axis: int, t: SX) -> ArticulatedInertia:
         """The body displaced by t [m] along a coordinate axis; ten products."""
         if t.is_zero():
             return self
@@ -217,7 +217,7 @@ def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
         poses: each with respect to its antecedent.
         right: (nv, m) efforts.
     """
-    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     eliminations = _eliminations(tree, poses, bodies)
     rest = [zeros(6)] * len(tree.links)
     columns = (_solution(tree, eliminations, rest, right[:, k]) for k in range(right.shape[1]))
@@ -247,7 +247,7 @@ def articulated_accelerations(
     """
     inertias = [link.inertia for link in tree.links]
     if not external:
-        poses, inertias = slide_frames(tree, poses, inertias, base_rests=is_zero(base.w))
+        poses, inertias = shift_frames(tree, poses, inertias, base_rests=is_zero(base.w))
     bodies = [PseudoInertia.of(inertia) for inertia in inertias]
     still = SX.zeros(tree.nv)
     motions = link_accelerations(tree, poses, v, still, base)
@@ -268,7 +268,7 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
 
     Where the first is a vanishing part of the second, the inertia matrix is singular.
     """
-    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     rigid = regroup(tree, poses, bodies)
     free, locked = zeros(tree.nv), zeros(tree.nv)
     for link, elimination in zip(tree.links, _eliminations(tree, poses, bodies), strict=True):
@@ -305,7 +305,7 @@ def _eliminations(
             body = ArticulatedInertia.of(pose.motion[0].body(rigid[j]))
         drive, pivots = _drive(tree, poses, j), list[Pivot]()
         if inner:
-            drive = replace(drive, momentum=inner[0].turn.apply(drive.momentum))
+            drive = replace(drive, momentum=inner[0].rotation.apply(drive.momentum))
         for direction in _DIRECTIONS[link.motion]:
             pivots.append(Pivot.of(body, direction, drive))
             body = body.without(pivots[-1])
@@ -357,5 +357,5 @@ def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:
     v, w = twist[:3], twist[3:]
     for step in steps:
         p = step.point(zeros())
-        v, w = step.turn.apply_inverse(v + cross(w, p)), step.turn.apply_inverse(w)
+        v, w = step.rotation.apply_inverse(v + cross(w, p)), step.rotation.apply_inverse(w)
     return casadi.vertcat(v, w)

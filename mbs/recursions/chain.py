@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from mbs.assembly.tree import Frame, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.route import common_link
-from mbs.spatial import Pose, axis_turn, quaternion_rotation, vector
+from mbs.spatial import Pose, axis_rotation, quaternion_rotation, vector
 
 Array = NDArray[np.float64]
 
@@ -69,8 +69,8 @@ class ChainJoint:
     spin: Spin | None = None
 
     @property
-    def turns(self) -> bool:
-        """Whether the joint turns."""
+    def is_rotational(self) -> bool:
+        """Whether the joint rotates."""
         return self.motion is not Motion.PRISMATIC
 
     def displacement(self, q: SX) -> Pose:
@@ -81,18 +81,18 @@ class ChainJoint:
             case Motion.SPHERICAL:
                 return _spherical_pose(q, self.sign)
             case Motion.PRISMATIC:
-                return Pose.moved(vector([0, 0, self.sign * q]))
-        return Pose.turned(axis_turn("z", self.sign * q).matrix)
+                return Pose.translation(vector([0, 0, self.sign * q]))
+        return Pose.rotation(axis_rotation("z", self.sign * q).matrix)
 
 
 def free_pose(values: SX, sign: int = 1) -> Pose:
     """The pose that three translations and a quaternion tell, or its inverse."""
-    pose = Pose.moved(values[0:3]) @ _spherical_pose(values[3:7], 1)
+    pose = Pose.translation(values[0:3]) @ _spherical_pose(values[3:7], 1)
     return pose if sign > 0 else pose.inverse()
 
 
 def _spherical_pose(quaternion: SX, sign: int) -> Pose:
-    pose = Pose.turned(quaternion_rotation(quaternion / casadi.norm_2(quaternion)))
+    pose = Pose.rotation(quaternion_rotation(quaternion / casadi.norm_2(quaternion)))
     return pose if sign > 0 else pose.inverse()
 
 

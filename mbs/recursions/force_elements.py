@@ -23,7 +23,7 @@ from mbs.recursions.velocities import (
     link_accelerations,
     link_velocities,
 )
-from mbs.spatial import PseudoInertia, Wrench, add_wrenches, carried, zeros
+from mbs.spatial import PseudoInertia, Wrench, add_wrenches, transform_wrench, zeros
 
 # Wrenches that the joints of a tree transmit, link by link as the description has them.
 #
@@ -109,7 +109,7 @@ def element_wrenches(
         acting = zip(force.element.points, _on_frames(tree, force, q, moving), strict=True)
         for point, ((link, pose), wrench) in acting:
             if link >= 0 if held is None else (point.owner.name, point.port) in held:
-                f, m = carried(pose, wrench)
+                f, m = transform_wrench(pose, wrench)
                 exerted.append({link: (-f, -m)})
     return sum_wrenches(*exerted)
 

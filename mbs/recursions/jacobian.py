@@ -79,7 +79,7 @@ class Outlook:
     branches: tuple[list[PathStep], list[PathStep]]
 
     @property
-    def turns(self) -> int:
+    def rotations(self) -> int:
         """Number of turns on the longer branch."""
         return max(sum(isinstance(s, OtherRotation) for s in branch) for branch in self.branches)
 
@@ -108,7 +108,7 @@ def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> 
     J = zeros(6, seen.tree.nv)
     for branch, arms in zip(seen.branches, _arms(seen.branches, reference), strict=True):
         columns = _local_columns(seen.tree, branch, arms)
-        for k, V, w in _carried(branch, columns, matrices):
+        for k, V, w in _columns_at_start(branch, columns, matrices):
             J[:, k] = casadi.vertcat(V, w)
     return J
 
@@ -176,7 +176,7 @@ def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[t
     return result
 
 
-def _carried(
+def _columns_at_start(
     branch: list[PathStep], columns: list[tuple[int, Column]], matrices: int
 ) -> list[Column]:
     """The columns in the axes at the beginning of the branch."""
@@ -186,22 +186,22 @@ def _carried(
     for number, step in enumerate(branch[:split]):
         if isinstance(step, OtherRotation):
             R = casadi.mtimes(R, step.rotation.matrix)
-        near += [_turned(R, column) for at, column in columns if at == number]
+        near += [_rotate(R, column) for at, column in columns if at == number]
     far: list[Column] = []
     for number in reversed(range(split, len(branch))):
         far += [column for at, column in columns if at == number]
         step = branch[number]
         if isinstance(step, OtherRotation):
-            far = [_moved(step.rotation, column) for column in far]
-    return near + [_turned(R, column) for column in far]
+            far = [_rotate_by(step.rotation, column) for column in far]
+    return near + [_rotate(R, column) for column in far]
 
 
-def _turned(R: SX, column: Column) -> Column:
+def _rotate(R: SX, column: Column) -> Column:
     k, V, w = column
     return k, casadi.mtimes(R, V), casadi.mtimes(R, w)
 
 
-def _moved(rotation: Rotation, column: Column) -> Column:
+def _rotate_by(rotation: Rotation, column: Column) -> Column:
     k, V, w = column
     V, w = along(rotation, [V, w])
     return k, V, w
@@ -252,7 +252,7 @@ class Survey:
         return replace(self, J=self.J @ parts * units, units=units)
 
     @property
-    def on_the_way(self) -> range:
+    def on_path(self) -> range:
         """Places of the base and of the links."""
         return range(len(self.frames) - 1)
 
@@ -266,14 +266,14 @@ class Survey:
         """(samples, 3, nv) angular velocity in the axes of a frame."""
         return np.asarray(np.swapaxes(self.R[axes], 1, 2) @ self.J[:, 3:])
 
-    def turned(self, axes: int) -> Array:
+    def orientation(self, axes: int) -> Array:
         """(samples, 3, 3) orientation of a frame in the axes that were asked for."""
         return np.asarray(np.swapaxes(self.R[-1], 1, 2) @ self.R[axes])
 
     def separate_origins(self) -> list[int]:
         """Places of links whose origins are not always where a later one's or the frame's is."""
         seen, kept = [self.target_p], []
-        for number in reversed(self.on_the_way):
+        for number in reversed(self.on_path):
             if all(np.abs(self.p[number] - other).max() > _ZERO for other in seen):
                 kept.append(number)
                 seen.append(self.p[number])
@@ -296,7 +296,7 @@ def survey(target: VelocityTarget) -> Survey:
     frames = [(k, home) for k in (-1, *path)] + [axes, frame]
     placed = [(poses[k] if k >= 0 else home) @ inside for k, inside in frames]
     base = outlook(target.along((-1, home)))
-    J = jacobian(base, matrices=base.turns)
+    J = jacobian(base, matrices=base.rotations)
     outputs = [casadi.horzcat(*(pose.matrix for pose in placed)), casadi.densify(J)]
     f = Function("survey", [q, target.p], outputs)
     values = [f(*sample) for sample in random_samples(tree, target.p.numel())]
@@ -399,7 +399,7 @@ def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> S
         reference: link whose origin V belongs to, None for the frame's own origin.
     """
     seen = outlook(target)
-    most = seen.turns
+    most = seen.rotations
     numbers = [most] if most > _MOST_TURNS else sorted({*range(0, most, 2), most})
     candidates = (jacobian(seen, reference, number) for number in numbers)
     return min(candidates, key=lambda J: cost(J, target.q, target.p))
@@ -439,8 +439,8 @@ def _ranked(
     found: Survey, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
     """Pairs of axes and reference, those with the fewest entries that vary first."""
-    links = [found.frames[k][0] for k in found.on_the_way]
-    places = spread(found.on_the_way)
+    links = [found.frames[k][0] for k in found.on_path]
+    places = spread(found.on_path)
     axes = places if intermediate is None else [links.index(intermediate)]
     own: list[int | None] = [None, *spread(found.separate_origins())]
     references = own if reference is None else [links.index(reference)]

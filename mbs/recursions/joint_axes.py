@@ -16,7 +16,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, motion_behind, unit_motions
-from mbs.spatial import Displacement, Rotation, Screw, cross, is_zero, vector, zeros
+from mbs.spatial import Displacement, Rotation, ScrewDisplacement, cross, is_zero, vector, zeros
 
 # The unit motions of a joint and their rates, as seen by an observer at the joint.
 #
@@ -222,9 +222,9 @@ def _of_one(
     dot = vector([w[1], -w[0], 0])
     ddot = vector([wd[1] + w[0] * w[2], w[1] * w[2] - wd[0], own.rate.U[2, 2]])
     screw = pose.motion[0]
-    assert isinstance(screw, Screw)
+    assert isinstance(screw, ScrewDisplacement)
     linear, _ = motion_behind(link.motion, v)
-    height = Screw.about("z", SX(0), screw.t)
+    height = ScrewDisplacement.about("z", SX(0), screw.t)
     path: tuple[AxesStep, ...] = (
         *_drift(linear),
         height,
@@ -242,7 +242,7 @@ def _of_one(
 def _continued(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
     """The axes of the joint before, at another point; `rotation` leads to them from its frame."""
     p = rotation.apply(pose.p)
-    shift = tuple(Screw.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))
+    shift = tuple(ScrewDisplacement.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))
     path: tuple[AxesStep, ...] = (*shift, *_drift(cross(axes.w, p)))
     before = axes.lines[0]
     line = revolute_line(before.spin, before.second.angular, pose.spin.apply(own.vd))

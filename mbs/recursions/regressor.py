@@ -22,7 +22,7 @@ from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, Velocity, unit_motions
 from mbs.spatial import (
     Inertia,
-    Screw,
+    ScrewDisplacement,
     body_through,
     cross,
     elements,
@@ -128,9 +128,9 @@ def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
         ten[k] = 1
     body, screw = Inertia.from_parameters(ten), pose.motion[0]
     if motion is Motion.PRISMATIC:
-        body = body.turned(screw.turn)
-    elif isinstance(screw, Screw):
-        body = body.slid(2, screw.t)
+        body = body.rotate(screw.rotation)
+    elif isinstance(screw, ScrewDisplacement):
+        body = body.shift(2, screw.t)
     constants = elements(body_through(pose.seat, body).parameters)
     return ColumnSum(_grouped(constants), _XX if len(part) > 1 else None)
 

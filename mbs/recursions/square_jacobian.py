@@ -118,7 +118,7 @@ def square_jacobian(
         places = _places(tree, found, columns)
     else:
         found = found.combined(_values(target, G))
-        places = [*spread(found.on_the_way), len(found.frames) - 1]
+        places = [*spread(found.on_path), len(found.frames) - 1]
     size = len(found.frames)
     views = _views(found, places, rows, columns)
     view = min(views, key=lambda v: v.rank(size))
@@ -150,7 +150,7 @@ def _values(target: VelocityTarget, A: SX) -> Array:
 def _places(tree: Tree, found: Survey, columns: Sequence[int]) -> list[int]:
     """The base, the links of these columns, and the axes that were asked for."""
     kept = []
-    for place in found.on_the_way:
+    for place in found.on_path:
         link, _ = found.frames[place]
         v = tree.links[link].v if link >= 0 else slice(0, 0)
         if link < 0 or any(v.start <= column < v.stop for column in columns):
@@ -199,7 +199,7 @@ def _views(
     memo: dict[bytes, tuple[Block, ...] | None] = {}
     references = [None, *(k for k in found.separate_origins() if k in places)]
     for j in places:
-        R, w = found.turned(j), found.angular(j)[:, :, columns]
+        R, w = found.orientation(j), found.angular(j)[:, :, columns]
         w_kept = _rows_reached(R, w_rows)
         if w_kept is None:
             continue
@@ -207,7 +207,7 @@ def _views(
             if _leaks(found.arm(r), R, w, V_rows, w_kept):
                 continue
             for i in places:
-                V_kept = _rows_reached(found.turned(i), V_rows)
+                V_kept = _rows_reached(found.orientation(i), V_rows)
                 if V_kept is None:
                     continue
                 V = found.linear(i, r)[:, :, columns]

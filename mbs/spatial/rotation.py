@@ -56,7 +56,7 @@ class Rotation(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class AxisRotation:
     """A rotation about a coordinate axis, by its sine and cosine."""
 
     axis: str
@@ -83,13 +83,13 @@ class Turn:
 
     def apply(self, vector: SX) -> SX:
         """The vector of the turned frame in the fixed one."""
-        return self._turned(vector, self.s)
+        return self._rotate(vector, self.s)
 
     def apply_inverse(self, vector: SX) -> SX:
         """The vector of the fixed frame in the turned one."""
-        return self._turned(vector, -self.s)
+        return self._rotate(vector, -self.s)
 
-    def _turned(self, vector: SX, s: SX) -> SX:
+    def _rotate(self, vector: SX, s: SX) -> SX:
         k, h = self.across
         turned = +vector
         turned[k] = self.c * vector[k] - s * vector[h]
@@ -127,7 +127,7 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class MatrixTurn:
+class MatrixRotation:
     """A rotation by its matrix, where no axis is special (quaternions)."""
 
     matrix: SX
@@ -149,10 +149,10 @@ class MatrixTurn:
         return casadi.mtimes(casadi.mtimes(self.matrix, square), self.matrix.T)
 
 
-def axis_turn(axis: str, angle: SX) -> Turn:
+def axis_rotation(axis: str, angle: SX) -> AxisRotation:
     """The turn by an angle [rad] about the axis "x", "y" or "z"."""
     s, c = sin_cos(angle)
-    return Turn(axis, s, c)
+    return AxisRotation(axis, s, c)
 
 
 def align_z(direction: Sequence[float]) -> SX:

@@ -105,7 +105,9 @@ def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...
         knowledge: what is known.
         most: variables of an equation with products of them, before known sums are taken out.
     """
-    slides = frozenset(k for k, joint in enumerate(knowledge.ring.joints) if not joint.turns)
+    slides = frozenset(
+        k for k, joint in enumerate(knowledge.ring.joints) if not joint.is_rotational
+    )
     sums = [(known.members, at) for known, _, at in knowledge.open_sums()]
     found = dict[object, list[Equation]]()
     for split in splits(knowledge):
@@ -287,8 +289,8 @@ def _turned(own: Factor, angle: SX, conjugate: bool) -> Factor:
 def _own(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, term: Members) -> Factor:
     """X and Y of one product of powers of the joints."""
     joints = knowledge.ring.joints
-    slides = {k: power for k, power in term if not joints[k].turns}
-    angles = [(k, sign) for k, sign in term if joints[k].turns]
+    slides = {k: power for k, power in term if not joints[k].is_rotational}
+    angles = [(k, sign) for k, sign in term if joints[k].is_rotational]
     if not angles:
         return Factor(_coefficient(knowledge, matrices, equation.row, slides), SX(0))
     if not _has_partner(equation, slides, angles, term):
@@ -390,9 +392,9 @@ def _joint(knowledge: Knowledge, k: int, number: int, direction: int) -> SX:
     joint = knowledge.ring.joints[k]
     sign = direction * joint.sign
     if k not in knowledge.known:
-        return _sparse_basis(joint.turns, sign)[number]
-    basis, q = _sparse_basis(joint.turns, 1), knowledge.position(k)
-    if joint.turns:
+        return _sparse_basis(joint.is_rotational, sign)[number]
+    basis, q = _sparse_basis(joint.is_rotational, 1), knowledge.position(k)
+    if joint.is_rotational:
         return SX(basis[0] + casadi.cos(q) * basis[1] + (sign * casadi.sin(q)) * basis[2])
     return SX(basis[0] + (sign * q) * basis[1] + (q * q) * basis[2])
 

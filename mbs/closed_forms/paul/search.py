@@ -57,7 +57,7 @@ def _alone(stage: Stage) -> Iterator[tuple[Variable, SX, str]]:
 
 
 def _angle(knowledge: Knowledge, k: int) -> Variable:
-    return Variable(not knowledge.ring.joints[k].turns, ((k, 1),))
+    return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 
 def _combined(first: Variable, second: Variable, sense: int) -> dict[int, int]:
@@ -87,7 +87,7 @@ def at_feet(problem: Problem) -> Ring:
     ring = problem.ring
     for k in range(len(ring.joints) - 1):
         here, after = ring.joints[k], ring.joints[k + 1]
-        if here.turns and after.turns and not ring.gaps[k + 1].pivots:
+        if here.is_rotational and after.is_rotational and not ring.gaps[k + 1].pivots:
             ring = _moved(problem, ring, k)
     return ring
 
@@ -102,7 +102,7 @@ def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
     if np.max(np.abs(values[:, 1])) < ZERO or np.min(np.abs(values[:, 0])) < ZERO:
         return ring
     along = SX(across / sine2)
-    to, back = (Gap(Pose.moved(vector([0, 0, sign * along]))) for sign in (1, -1))
+    to, back = (Gap(Pose.translation(vector([0, 0, sign * along]))) for sign in (1, -1))
     gaps = list(ring.gaps)
     gaps[k] = to.after(gaps[k])
     gaps[k + 1] = gaps[k + 1].after(back)

@@ -147,7 +147,7 @@ def _samples(problem: Problem, ring: Ring) -> Samples:
     q = np.array([x[places] for x, _ in problem.samples])
     length = float(np.mean(np.linalg.norm(gaps[..., :3, 3], axis=-1))) or 1.0
     gaps[..., :3, 3] /= length
-    slides = [not joint.turns for joint in ring.joints]
+    slides = [not joint.is_rotational for joint in ring.joints]
     return Samples(gaps, np.where(slides, q / length, q))
 
 
@@ -400,7 +400,7 @@ def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
     back = [represented(inverse(T))[:, block, block] for T in gaps]
     turns = [_basis(knowledge, k, 1)[:, block, block] for k in joints]
     turns_back = [_basis(knowledge, k, -1)[:, block, block] for k in joints]
-    slides = frozenset(k for k in joints if not knowledge.ring.joints[k].turns)
+    slides = frozenset(k for k in joints if not knowledge.ring.joints[k].is_rotational)
     return _Pieces(joints, ways, back, turns, turns_back, slides)
 
 
@@ -411,7 +411,7 @@ def _merged(knowledge: Knowledge, k: int) -> Matrix:
     before = (k - 1) % n
     while before in knowledge.known:
         joint = ring.joints[before]
-        moved = motion(joint.sign * samples.q[:, before], not joint.turns)
+        moved = motion(joint.sign * samples.q[:, before], not joint.is_rotational)
         T = samples.gaps[:, before] @ moved @ T
         before = (before - 1) % n
     return T
@@ -420,8 +420,8 @@ def _merged(knowledge: Knowledge, k: int) -> Matrix:
 def _basis(knowledge: Knowledge, k: int, direction: int) -> Tensor:
     """(3, 15, 15) factors of e^-iq, 1, e^iq, or of r, 1, r^2."""
     joint = knowledge.ring.joints[k]
-    one, first, second = joint_basis(not joint.turns)
-    if not joint.turns:
+    one, first, second = joint_basis(not joint.is_rotational)
+    if not joint.is_rotational:
         return np.array([direction * joint.sign * first, one, second], dtype=complex)
     up = (first - 1j * direction * joint.sign * second) / 2
     return np.array([up.conj(), one, up])

@@ -248,7 +248,7 @@ def _loops(problem: Problem) -> list[_Loop]:
     for ring in (problem.ring, problem.ring.reversed()):
         for first in range(6):
             own = ring.rotated(first)
-            slides = np.array([not joint.turns for joint in own.joints])
+            slides = np.array([not joint.is_rotational for joint in own.joints])
             if slides[5]:
                 continue
             ways = _numbers(problem, own, length)
@@ -287,7 +287,7 @@ def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
         _in_joint([part[rows, :] for part in parts], loop),
         joint.name,
         _place(joint),
-        not joint.turns,
+        not joint.is_rotational,
         regularity(numbers[:, :, rows]),
     )
 
@@ -301,7 +301,7 @@ def _spread(parts: Array) -> Array:
 def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
     """The parts with 1, cos q, sin q, or with the powers of r in metres."""
     joint = loop.ring.joints[2]
-    if joint.turns:
+    if joint.is_rotational:
         return parts[0], parts[1], joint.sign * parts[2]
     if len(parts) == 3:
         parts = [parts[0] + parts[1], 2 * parts[2], parts[0] - parts[1]]

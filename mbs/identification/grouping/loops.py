@@ -98,7 +98,7 @@ def _shared(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
 
 
 def _along(freedom: Freedom) -> Pose:
-    return Pose.turned(align_z(freedom.axis))
+    return Pose.rotation(align_z(freedom.axis))
 
 
 def pair_relations(
@@ -134,7 +134,7 @@ def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
 
 def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
     """What link b shares with link a, or loses to the base."""
-    through = lambda_transform(Pose.turned(R))
+    through = lambda_transform(Pose.rotation(R))
     names = TEN_PARAMETERS[: (9 if a < 0 else 10) if moments else 6]
     for k, name in enumerate(names):
         yield {(b, name): SX(1), **(on_link(a, -through[:, k]) if a >= 0 else {})}

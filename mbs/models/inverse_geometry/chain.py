@@ -59,7 +59,7 @@ class FrameChain:
     @property
     def prismatic(self) -> tuple[bool, ...]:
         """Whether each is prismatic."""
-        return tuple(not joint.turns for joint in self.chain.joints)
+        return tuple(not joint.is_rotational for joint in self.chain.joints)
 
     @property
     def key(self) -> tuple[object, ...]:

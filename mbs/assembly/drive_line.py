@@ -381,7 +381,7 @@ class AttachedDevice:
     Attributes:
         device: its description.
         coordinate: the coordinate that it turns.
-        velocity: number in v of this coordinate.
+        velocity: index in v of this coordinate.
         factor: speed of its flange for a unit velocity of the coordinate.
         symbols: CasADi symbol of every parameter.
     """

@@ -373,9 +373,9 @@ class CoordinateCoupling:
 
     Attributes:
         name: of the coupling.
-        driven, driver: numbers in q.
+        driven, driver: indices in q.
         coefficients: c_0, c_1, ...
-        others: number in q and factor of each further coordinate.
+        others: index in q and factor of each further coordinate.
     """
 
     name: str
@@ -411,8 +411,8 @@ class Lever:
     """How much of a coordinate an element acts on.
 
     Attributes:
-        position: number in q of the coordinate, None where it is no position.
-        velocity: number in v of the coordinate.
+        position: index in q of the coordinate, None where it is no position.
+        velocity: index in v of the coordinate.
         factor: what a unit of the coordinate contributes.
     """
 

@@ -11,12 +11,12 @@ from mbs.closed_forms.roots import Root
 from mbs.closed_forms.spatial import (
     aim,
     at_distance,
-    ball,
     bennett,
-    confined,
+    confine,
     free_body,
     orientation,
-    slides,
+    prismatic,
+    spherical,
     spin,
 )
 from mbs.closed_forms.split import split
@@ -25,16 +25,16 @@ from mbs.recursions.chain import Ring
 
 _KERNELS: tuple[Callable[[Ring, SX, SX], Root | None], ...] = (
     free_body,
-    ball,
+    spherical,
     spin,
-    slides,
+    prismatic,
     planar,
     at_distance,
     aim,
     bennett,
     orientation,
     along_normal,
-    confined,
+    confine,
 )
 
 
@@ -52,7 +52,7 @@ def closed_form(ring: Ring, q: SX, p: SX) -> Root | str:
         return "a free body is in it"
     for kernel in _KERNELS:
         root = kernel(ring, q, p)
-        if root is not None and any(root.ways.values()):
+        if root is not None and any(root.branches.values()):
             return root
     found = split(ring, q, p)
     if isinstance(found, Root):

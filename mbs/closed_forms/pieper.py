@@ -1,4 +1,4 @@
-"""Pieper's method: arms with three axes through one point, or with three joints that slide."""
+"""Pieper's method: arms with three axes through one point, or with three prismatic joints."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ class PieperLoop:
 
     def x(self, k: int) -> SX:
         """The symbol of the position of joint k of the ring."""
-        return SX(self.problem.x[self.place(k)])
+        return SX(self.problem.x[self.index(k)])
 
-    def place(self, k: int) -> int:
+    def index(self, k: int) -> int:
         """The place of joint k of the ring."""
-        place = self.ring.joints[k].place
-        assert place is not None
-        return place
+        index = self.ring.joints[k].index
+        assert index is not None
+        return index
 
     def after(self, k: int) -> Gap:
         """The way from joint k to the next."""
@@ -114,7 +114,7 @@ def product(a: SX, b: SX) -> SX:
     return SX((outer + outer.T) / 2)
 
 
-# Three turns whose axes meet, or are taken by themselves, from the rotation they make.
+# Three revolute joints whose axes meet, or are taken by themselves, from the rotation they make.
 #
 # Z(q1) A Z(q2) B Z(q3) = G; the element G_zz holds the middle one alone.
 #
@@ -127,7 +127,7 @@ def three_turns(scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G:
     Args:
         scene: whose joints they are.
         turns: their numbers in the ring.
-        A: (3, 3) rotation between the first two; no turn about z.
+        A: (3, 3) rotation between the first two; no rotation about z.
         B: (3, 3) rotation between the last two, likewise.
         G: (3, 3) what they make, of joints that are known.
     """
@@ -157,7 +157,7 @@ def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> Step:
     root = _square_angle(X, Y, Z, sign, G) if square else cosine_root(X, Y, Z, sign)
     end = scene.suffix(k)
     found = Found(
-        {scene.place(k): root.value},
+        {scene.index(k): root.value},
         () if square else (root.real,),
         (root.regular,),
         {f"X{end}": X, f"Y{end}": Y, f"Z{end}": Z},
@@ -199,7 +199,7 @@ def turn_onto(
     q, n = joint.name, scene.suffix(k)
     text = f"X{n} cos({q}) - Y{n} sin({q}) = U{n}, Y{n} cos({q}) + X{n} sin({q}) = V{n}"
     coefficients = {f"X{n}": X, f"Y{n}": Y, f"U{n}": U, f"V{n}": V}
-    found = Found({scene.place(k): value}, (), (size, *regular), coefficients)
+    found = Found({scene.index(k): value}, (), (size, *regular), coefficients)
     return step(scene.problem, "type 3", text, {}, found)
 
 
@@ -228,7 +228,7 @@ def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
     q, n, sign = joint.name, scene.suffix(k), SX.sym(joint.name)
     root = cosine_root(form[0], form[1], -form[2], sign, unit)
     found = Found(
-        {scene.place(k): root.value},
+        {scene.index(k): root.value},
         (root.real,),
         (root.regular,),
         {f"X{n}": form[0], f"Y{n}": form[1], f"Z{n}": -form[2]},
@@ -259,7 +259,7 @@ def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
     named = dict(zip((f"A{n}", f"B{n}", f"X{n}", f"Y{n}"), casadi.vertsplit(a[:4]), strict=True))
     named[f"Z{n}"] = -a[4]
     text = f"A{n} cos(2 {q}) + B{n} sin(2 {q}) + X{n} cos({q}) + Y{n} sin({q}) = Z{n}"
-    found = Found({scene.place(k): root.value}, (root.real,), (root.regular,), named)
+    found = Found({scene.index(k): root.value}, (root.real,), (root.regular,), named)
     return step(scene.problem, "quartic", text, signs, found)
 
 
@@ -277,7 +277,7 @@ def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float =
     r, n, size = joint.name, scene.suffix(k), factor / scale
     x = value / scale * size / (size * size + TINY_SQUARE)
     regular = () if factor.is_constant() else (size * size,)
-    found = Found({scene.place(k): x}, (), regular, {f"X{n}": factor, f"Y{n}": value})
+    found = Found({scene.index(k): x}, (), regular, {f"X{n}": factor, f"Y{n}": value})
     return step(scene.problem, "type 1", f"X{n} {r} = Y{n}", {}, found)
 
 
@@ -301,7 +301,7 @@ def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Step 
         five = casadi.vertcat(*[SX(0)] * (4 - degree), *factors)
         both = casadi.vertcat(*signs.values())
         root = real_quartic(five, both, scene.length, unit)
-    found = Found({scene.place(k): root.value}, (root.real,), (root.regular,), named)
+    found = Found({scene.index(k): root.value}, (root.real,), (root.regular,), named)
     kind = "quadratic" if degree == 2 else "quartic"
     return step(scene.problem, kind, text, signs, found)
 
@@ -325,7 +325,7 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
     return Root(SX((middle + root.value) * length), SX(root.real / size), SX(a * a))
 
 
-# Three joints that carry a point to where it is wanted.
+# Three joints that carry a point to where it has to be.
 #
 # J1 [R1 t1] J2 f = p, where f(q3) is the point seen after joint 2. What joint 1 leaves unchanged
 # gives two equations in which joint 2 stands linearly, and joint 2 is eliminated from them; what
@@ -336,14 +336,14 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reach:
-    """The wanted position of a point.
+    """The target position of a point.
 
     Attributes:
         scene: whose first three joints carry it.
         way: (R1, t1) from joint 1 to joint 2.
         f: (3, 3) forms in joint 3 of the point seen after joint 2.
         square: (3, 1) form of |f|^2.
-        p: (3, 1) the wanted position [m].
+        p: (3, 1) the target position [m].
     """
 
     scene: PieperLoop
@@ -359,7 +359,7 @@ def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[Step] | None:
     Args:
         scene: whose first three joints they are.
         point: (3, 1) seen after joint 3 [m].
-        p: (3, 1) where it is wanted, seen before joint 1 [m].
+        p: (3, 1) where it has to be, seen before joint 1 [m].
     """
     joint, way = scene.ring.joints[2], scene.after(1).pose
     f = casadi.mtimes(way.R, moved_point(joint, point))
@@ -411,9 +411,9 @@ def _by_turning(reach: Reach) -> list[Step] | None:
         return None
     b3 = basis(scene, 2)
     point = casadi.mtimes(reach.f[:2, :], b3)
-    wanted = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + TINY_SQUARE)
+    target = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + TINY_SQUARE)
     regular = () if K.is_constant() else (K / unit_K,)
-    return [third, turn_onto(scene, 1, (point, wanted), scene.length, regular)]
+    return [third, turn_onto(scene, 1, (point, target), scene.length, regular)]
 
 
 def _parallel(
@@ -492,16 +492,17 @@ def _first(reach: Reach) -> Step:
     return linear(scene, 0, SX(1), joint.sign * (reach.p[2] - w[2]))
 
 
-# Three joints that slide, anywhere in the loop: the turns first, then three linear equations.
+# Three prismatic joints, anywhere in the loop: the revolute joints first, then three
+# linear equations.
 #
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
 def three_slides(scene: PieperLoop) -> list[Step]:
-    """The steps of a loop of three joints that turn and three that slide.
+    """The steps of a loop of three revolute and three prismatic joints.
 
     Raises:
-        NoClosedForm: two of the turning axes are always parallel, or the slides coplanar.
+        NoClosedForm: two of the turning axes are always parallel, or the prismatic joints coplanar.
     """
     turns = scene.ring
     for k in reversed([k for k, joint in enumerate(turns.joints) if not joint.is_rotational]):
@@ -519,28 +520,28 @@ def three_slides(scene: PieperLoop) -> list[Step]:
 
 
 def _slides(scene: PieperLoop) -> Step:
-    """The joints that slide, from the sum of all ways around the loop."""
-    way, places, columns = Pose.identity(), list[int](), list[SX]()
+    """The prismatic joints, from the sum of all translations around the loop."""
+    way, indices, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
         way = way @ gap.pose
         if joint.is_rotational:
             way = way @ scene.motion(k)
         else:
             columns.append(joint.sign * way.R[:, 2])
-            places.append(k)
+            indices.append(k)
     M = casadi.horzcat(*columns)
     adjugate = casadi.horzcat(*(_cross(M, k) for k in range(3))).T
     determinant = casadi.dot(M[:, 0], _cross(M, 0))
     if scene.zero(determinant):
-        names = ", ".join(scene.ring.joints[k].name for k in places)
+        names = ", ".join(scene.ring.joints[k].name for k in indices)
         raise NoClosedForm(f"joints {names} slide in one plane, so that they are not determined")
     r = -casadi.mtimes(adjugate, way.p) * determinant / (determinant * determinant + TINY_SQUARE)
-    ends = [scene.suffix(k) for k in places]
-    values = {scene.place(k): r[m] for m, k in enumerate(places)}
+    ends = [scene.suffix(k) for k in indices]
+    values = {scene.index(k): r[m] for m, k in enumerate(indices)}
     return step(
         scene.problem,
         "linear",
-        _text(scene, places, ends),
+        _text(scene, indices, ends),
         {},
         Found(values, (), (determinant * determinant,), _named(M, way.p, ends)),
     )
@@ -556,8 +557,8 @@ def _named(M: SX, p: SX, ends: list[str]) -> dict[str, SX]:
     return named | {f"{axis}0": p[m] for m, axis in enumerate("XYZ")}
 
 
-def _text(scene: PieperLoop, places: list[int], ends: list[str]) -> str:
-    names = [scene.ring.joints[k].name for k in places]
+def _text(scene: PieperLoop, indices: list[int], ends: list[str]) -> str:
+    names = [scene.ring.joints[k].name for k in indices]
     rows = (
         " + ".join(f"{axis}{end} {name}" for end, name in zip(ends, names, strict=True))
         for axis in "XYZ"
@@ -616,8 +617,8 @@ def _steps(scene: PieperLoop) -> list[Step] | None:
     ring = scene.ring
     first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
     point = (scene.after(2).pose @ Pose.translation(vector([0, 0, first]))).p
-    wanted = (scene.after(5).inverse().pose @ Pose.translation(vector([0, 0, last]))).p
-    steps = three_joints(scene, point, wanted)
+    target = (scene.after(5).inverse().pose @ Pose.translation(vector([0, 0, last]))).p
+    steps = three_joints(scene, point, target)
     if steps is None:
         return None
     before = Pose.identity()
@@ -662,7 +663,7 @@ def _regular(problem: Problem, steps: list[Step]) -> bool:
 
 
 def _concurrent(problem: Problem, length: SX) -> list[int]:
-    """The numbers k such that joints k, k + 1 and k + 2 turn about axes through one point."""
+    """The numbers k such that joints k, k + 1 and k + 2 rotate about axes through one point."""
     gaps, joints = problem.ring.gaps, problem.ring.joints
     after = [gaps[(k + 1) % _JOINTS].pose for k in range(_JOINTS)]
     ahead, behind = [_height(way) for way in after], [_height(way.inverse()) for way in after]

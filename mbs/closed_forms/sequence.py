@@ -70,7 +70,7 @@ class Step:
     """Some joints of a loop, from the given and from the joints found before.
 
     Attributes:
-        places: numbers in x of what it gives; beyond the joints those of further angles.
+        indices: indices in x of what it gives; beyond the joints those of further angles.
         names: of these, as they stand in the equation.
         kind: of the equation, such as "type 2" or "quartic".
         equation: as one reads it, in terms of the coefficients, such as
@@ -83,7 +83,7 @@ class Step:
             free of units that vanishes where the step leaves a joint undetermined.
     """
 
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     names: tuple[str, ...]
     kind: str
     equation: str
@@ -124,14 +124,14 @@ def step(problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], fo
     columns = (found.values.values(), found.real, found.regular, coefficients.values())
     outputs = [casadi.densify(SX(casadi.vertcat(*column))) for column in columns]
     function = Function("step", [problem.x, problem.given, SX(s)], outputs, {"cse": True})
-    places = tuple(found.values)
-    names = tuple(_name(problem, place) for place in places)
-    return Step(places, names, kind, equation, tuple(signs), tuple(coefficients), function)
+    indices = tuple(found.values)
+    names = tuple(_name(problem, index) for index in indices)
+    return Step(indices, names, kind, equation, tuple(signs), tuple(coefficients), function)
 
 
-def _name(problem: Problem, place: int) -> str:
-    names = {joint.place: joint.name for joint in problem.ring.joints}
-    return names.get(place, str(problem.x[place]))
+def _name(problem: Problem, index: int) -> str:
+    names = {joint.index: joint.name for joint in problem.ring.joints}
+    return names.get(index, str(problem.x[index]))
 
 
 # Steps one after the other: a configuration for every choice of their signs.
@@ -143,7 +143,7 @@ class Leaf:
 
     Attributes:
         x: (n, 1) positions of the joints.
-        real: (r, 1) every radicand on the way.
+        real: (r, 1) every radicand on the path.
         regular: (e, 1) every quantity that must not vanish.
         coefficients: by name, those of every step.
     """
@@ -220,7 +220,7 @@ def _taken(leaf: Leaf, step: Step, given: SX, s: SX) -> Leaf:
     """The configuration with one more step."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
-    x[list(step.places)] = values
+    x[list(step.indices)] = values
     named = dict(zip(step.coefficients, casadi.vertsplit(coefficients), strict=True))
     return Leaf(
         x,

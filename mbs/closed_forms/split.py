@@ -1,4 +1,4 @@
-"""Any loop of turns and slides, by Paul's method: split in every way, its simplest equations first.
+"""Any loop of revolute and prismatic joints, by Paul's method: the simplest equations first.
 
 Source: Paul 1981, section 3.7; Khalil & Dombre 2002, section 4.4.
 """
@@ -26,10 +26,10 @@ _AXES = Pose.rotation(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
 
 
 def split(ring: Ring, q: SX, p: SX) -> Root | str:
-    """The ways to find the turns and slides of a loop, or why there is none.
+    """The ways to find the revolute and prismatic joints of a loop, or why there is none.
 
-    A ball counts as three turns, of which nothing is asked. The label of a way has the signs of
-    all steps with several roots, each named after its joint.
+    A spherical joint counts as three revolute joints, of which nothing is asked. The label of a way
+    has the signs of all steps with several roots, each named after its joint.
 
     Args:
         ring: the loop.
@@ -39,7 +39,7 @@ def split(ring: Ring, q: SX, p: SX) -> Root | str:
     simple = _without_balls(ring)
     if len(simple.joints) > _MOST:
         return f"a loop determines {_MOST} turns and slides at most"
-    if all(joint.place is None for joint in simple.joints):
+    if all(joint.index is None for joint in simple.joints):
         return "nothing but balls is unknown"
     problem = _problem(simple, q, p)
     if isinstance(problem, str):
@@ -52,7 +52,7 @@ def split(ring: Ring, q: SX, p: SX) -> Root | str:
 
 
 def _without_balls(ring: Ring) -> Ring:
-    """The loop with three turns about crossed axes in the place of each ball."""
+    """The loop with three revolute joints about crossed axes in the place of each ball."""
     joints, gaps = list[ChainJoint](), list[Gap]()
     for joint, gap in zip(ring.joints, ring.gaps, strict=True):
         gaps.append(gap)
@@ -76,7 +76,7 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
         return "they can move while all that is known stays"
     if len(samples) < _ENOUGH:
         return "no configuration that closes it was found"
-    joints = tuple(replace(joint, place=k) for k, joint in enumerate(ring.joints))
+    joints = tuple(replace(joint, index=k) for k, joint in enumerate(ring.joints))
     names = [joint.name for joint in joints] + [f"x{k + 1}" for k in range(n)]
     x = casadi.vertcat(*map(SX.sym, names))
     own = replace(ring, joints=joints)
@@ -84,22 +84,22 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
 
 
 def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> Root:
-    places = {k: joint.place for k, joint in enumerate(ring.joints) if joint.place is not None}
-    needed = _up_to(sequence, set(places))
-    ways = dict[str, dict[int, SX]]()
+    indices = {k: joint.index for k, joint in enumerate(ring.joints) if joint.index is not None}
+    needed = _up_to(sequence, set(indices))
+    branches = dict[str, dict[int, SX]]()
     for branch, leaf in enumerate(needed.leaves(problem.given)):
         x = _where_real(leaf)
-        ways[needed.label(branch)] = {place: SX(x[k]) for k, place in places.items()}
-    return Root(ways)
+        branches[needed.label(branch)] = {index: SX(x[k]) for k, index in indices.items()}
+    return Root(branches)
 
 
-def _up_to(sequence: StepSequence, wanted: set[int]) -> StepSequence:
-    """The first steps, until they have given what is wanted."""
+def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
+    """The first steps, until they have given what is asked for."""
     steps = list[Step]()
     for step in sequence.steps:
-        if wanted:
+        if target:
             steps.append(step)
-            wanted = wanted - set(step.places)
+            target = target - set(step.indices)
     return replace(sequence, steps=tuple(steps))
 
 

@@ -44,8 +44,8 @@ def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
         path: of the .urdf file.
 
     Raises:
-        ModelError: it is neither, it has loops, a ball joint, springs, rotors, force elements or
-            other gravity than 9.81 m/s^2 along -z, or a symbol has no value.
+        ModelError: it is neither, it has loops, a spherical joint, springs, rotors, force elements
+            or other gravity than 9.81 m/s^2 along -z, or a symbol has no value.
         ExportError: the file cannot be written.
     """
     system = system_of(system)

@@ -54,7 +54,7 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     Args:
         system: with closed loops.
         q: (nq, 1) symbols of positions that close the loops.
-        v_a: (m, 1) independent velocities, or None when gamma is not wanted.
+        v_a: (m, 1) independent velocities, or None when gamma is not target.
     """
     closure = system.closure
     assert closure is not None

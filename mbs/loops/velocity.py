@@ -242,7 +242,7 @@ def scales(system: System) -> Scales:
 def _length(J: NDArray[np.float64], labels: list[str], units: list[str]) -> float:
     """How far an angle moves the rows of positions, the largest of them."""
     turns = [k for k, unit in enumerate(units) if unit.startswith("rad")]
-    places = [k for k, label in enumerate(labels) if label.startswith("force")]
-    moved = np.abs(J[np.ix_(places, turns)])
+    indices = [k for k, label in enumerate(labels) if label.startswith("force")]
+    moved = np.abs(J[np.ix_(indices, turns)])
     largest = float(np.max(moved, initial=0.0))
     return largest if largest > 0 else 1.0

@@ -21,7 +21,7 @@ from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closure import SLIPS, independent_closure
 from mbs.loops.configuration import Values, start
 from mbs.loops.function import function
-from mbs.loops.plan import plan, ways_at
+from mbs.loops.plan import branches_at, plan
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.contacts import require_no_contacts
@@ -494,7 +494,7 @@ def _winds(system: System) -> bool:
 def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
     """The labels of the closed configuration q."""
     stages = plan(system)
-    ways = ways_at(system, stages, q, p)
+    ways = branches_at(system, stages, q, p)
     if len(ways) < len(stages):
         raise Unclosable(
             f"{system.name}: the closed form of the loop of {stages[len(ways)].name} does not give"

@@ -81,7 +81,7 @@ def _fill_ancestors(
 
 
 def velocity_antecedents(tree: Tree) -> list[int]:
-    """For each velocity the one before it on the way to the base, or -1."""
+    """For each velocity the one before it on the path to the base, or -1."""
     before = []
     for link in tree.links:
         i = link.antecedent

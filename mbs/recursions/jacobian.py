@@ -1,7 +1,7 @@
 """Jacobian of a frame, where its entries are zero or constant, and Renaud's factors of it.
 
 Every joint gives the velocity z x L along its own axis, L being the vector from the joint to the
-point whose velocity is asked for; the axes in which the result is wanted may be those of any
+point whose velocity is asked for; the axes in which the result is asked for may be those of any
 frame, and the nearer they are to the middle of the chain, the fewer turns are needed.
 
 Source: Renaud 1980; Khalil & Creusot 1997, eq. 3 and 5.
@@ -67,7 +67,7 @@ class VelocityTarget:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlook:
-    """The tree seen from the frame in whose axes a Jacobian is wanted.
+    """The tree seen from the frame in whose axes a Jacobian is asked for.
 
     Attributes:
         tree: the links.
@@ -114,7 +114,7 @@ def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> 
 
 
 Column = tuple[int, SX, SX]
-"""Number in v, and what a unit of it gives: linear and angular velocity."""
+"""Index in v, and what a unit of it gives: linear and angular velocity."""
 
 
 def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
@@ -344,7 +344,7 @@ def varying(values: Array) -> NDArray[np.bool_]:
 # Renaud's factors of a Jacobian, and the frame in the middle that makes the last one simple.
 #
 # J = [R 0; 0 R] [I -L^; 0 I] J_i: the velocity of a reference point in the axes of an
-# intermediate frame i, moved to the origin of the frame, turned into the axes that are wanted.
+# intermediate frame i, moved to the origin of the frame, turned into the target axes.
 #
 # Source: Renaud 1980; Khalil & Creusot 1997, eq. 4.
 
@@ -365,7 +365,7 @@ class Renaud:
     Attributes:
         intermediate: link in whose axes J is, -1 for the base.
         reference: link whose origin V belongs to, None for the frame's own origin.
-        R: (3, 3) orientation of the intermediate frame in the axes that are wanted.
+        R: (3, 3) orientation of the intermediate frame in the target axes.
         L: (3, 1) from the reference to the frame's origin, in the intermediate axes [m].
         J: (6, nv) in the intermediate axes.
     """
@@ -411,7 +411,7 @@ def renaud(
     """The three factors; what is not asked for is chosen for the fewest operations of J.
 
     Args:
-        target: the frame that moves, and the axes that are wanted.
+        target: the frame that moves, and the target axes.
         intermediate: link on the path to the frame, -1 for the base, or None for the best.
         reference: link on the path whose origin the velocity J v belongs to, or None for the best.
     """

@@ -1,7 +1,7 @@
 """Axes in which a joint is simple: its unit motions and their rates there.
 
 They stand at the origin of link j and do not turn with joint j: what is computed there for the
-joint needs no turn about its own axis. Joints with parallel axes, one after the other, have the
+joint needs no rotation about its own axis. Joints with parallel axes, one after the other, have the
 same axes, so that what is between them is a translation.
 """
 

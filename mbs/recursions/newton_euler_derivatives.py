@@ -287,7 +287,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
     """Links whose columns cost less by way of the base; empty when too few do.
 
     In the base a pair of joints costs the same however far they are apart and however their axes
-    lie; on the way through the joints right angles and vanishing distances are cheaper still.
+    lie; on the path through the joints right angles and vanishing distances are cheaper still.
     """
     saved: dict[int, int] = {}
     for j, link in enumerate(tree.links):

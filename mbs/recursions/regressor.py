@@ -389,7 +389,7 @@ def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
 
 
 def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:
-    """Velocities that raise nothing: turns about vertical axes and level slides."""
+    """Velocities that raise nothing: rotations about vertical axes and level slides."""
     own = [
         (twist, ups[j])
         for j, link in enumerate(tree.links)

@@ -82,7 +82,7 @@ def _moments(body: Body) -> tuple[SX, SX, SX]:
 # The origin of the frame of a revolute link may stand anywhere on its axis. Three places save
 # operations: the foot of the axis when it is at rest, because no force on it does any work and
 # gravity alone accelerates it; the foot of the axis of a last link; the height of the link behind
-# it when that one turns about a parallel axis and the frame stands beside its foot already: a
+# it when that one rotates about a parallel axis and the frame stands beside its foot already: a
 # distance that is passed on to a joint without one saves nothing.
 
 

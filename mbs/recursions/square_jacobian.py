@@ -163,9 +163,9 @@ def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
 
     Args:
         rows: that were asked for.
-        R_V: rows of the orientation of the wanted axes in the linear axes.
+        R_V: rows of the orientation of the target axes in the linear axes.
         R_w: likewise in the angular axes.
-        arm: (3, 1) from the reference to the frame's origin, in the wanted axes.
+        arm: (3, 1) from the reference to the frame's origin, in the target axes.
     """
     V_rows, w_rows = [k for k in rows if k < 3], [k - 3 for k in rows if k >= 3]
     Q_V, Q_w = R_V[:, V_rows], R_w[:, w_rows]

@@ -196,7 +196,7 @@ class ConfigurationList:
     Attributes:
         system: name of the mechanism.
         frame: that was taken there.
-        T: the wanted pose, rows of (4, 4).
+        T: the target pose, rows of (4, 4).
         names: of the coordinates.
         units: of the coordinates.
         locked: joints that stayed, with their positions.

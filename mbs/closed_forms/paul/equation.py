@@ -60,7 +60,8 @@ class Part:
     """What stands with one product of variables.
 
     Attributes:
-        values: (samples) G of Re(G e^i(angle)) times the slides; real where there is no angle.
+        values: (samples) G of Re(G e^i(angle)) times the prismatic joints; real where there is no
+            angle.
         sources: what it is the sum of.
     """
 

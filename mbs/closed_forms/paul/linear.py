@@ -119,11 +119,11 @@ def _built(stage: Stage, rows: tuple[Equation, ...], variables: Variables) -> St
     values, regular, at = dict[int, SX](), list[SX](), 0
     power = sum(row.row.power for row in rows) - sum(variable.slides for variable in variables)
     for variable in variables:
-        place = stage.knowledge.place(variable)
+        index = stage.knowledge.index(variable)
         if variable.slides:
-            values[place] = divided(solved[at], D)
+            values[index] = divided(solved[at], D)
         else:
-            values[place] = angle_of(solved[at + 1] * D, solved[at] * D).value
+            values[index] = angle_of(solved[at + 1] * D, solved[at] * D).value
         at += 1 if variable.slides else 2
     if not D.is_constant():
         regular.append(SX((D / stage.matrices.length**power) ** 2))

@@ -42,7 +42,7 @@ class Stage:
 
     def number(self, variable: Variable) -> str:
         """What tells the coefficients of a variable from others."""
-        return str(self.knowledge.place(variable) + 1)
+        return str(self.knowledge.index(variable) + 1)
 
     def term(self, variable: Variable) -> str:
         """The variable as an equation shows it."""
@@ -128,21 +128,21 @@ def angle_step(
     ]
     right = f"Z{number}" if f"Z{number}" in named else "0"
     sign = SX.sym("sign")
-    found = _roots(stage.knowledge.place(variable), XYZ, sign, stage.matrices.length**power)
+    found = _roots(stage.knowledge.index(variable), XYZ, sign, stage.matrices.length**power)
     found = replace(found, coefficients=named)
     signs = {stage.knowledge.name(variable): sign}
     equation = f"{' + '.join(pieces)} = {right}"
     return step(stage.knowledge.problem, kind, equation, signs, found)
 
 
-def _roots(place: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
+def _roots(index: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
     """Both roots; where Z is zero they are opposite, and always real."""
     X, Y, Z = XYZ
     if not Z.is_zero():
         root = cosine_root(X, Y, Z, sign, scale)
-        return Found({place: root.value}, (root.real,), (root.regular,))
+        return Found({index: root.value}, (root.real,), (root.regular,))
     root = angle_of(sign * X, -sign * Y, scale)
-    return Found({place: root.value}, (), () if root.regular.is_constant() else (root.regular,))
+    return Found({index: root.value}, (), () if root.regular.is_constant() else (root.regular,))
 
 
 def _quadratic(stage: Stage, equation: Equation) -> Candidate:
@@ -171,7 +171,7 @@ def length_step(stage: Stage, variable: Variable, abc: list[SX], kind: str = "qu
     equation = " + ".join(name + powers[name] for name in named) + " = 0"
     regular = () if a.is_constant() else (SX(a * a),)
     found = Found(
-        {stage.knowledge.place(variable): root.value - middle}, (root.real,), regular, named
+        {stage.knowledge.index(variable): root.value - middle}, (root.real,), regular, named
     )
     signs = {stage.knowledge.name(variable): sign}
     return step(stage.knowledge.problem, kind, equation, signs, found)

@@ -31,7 +31,7 @@ def sums(stage: Stage) -> Iterator[Candidate]:
 
         def build(rest: Variable = rest, value: SX = value, text: str = text) -> Step:
             turns = casadi.floor((value + casadi.pi) / (2 * casadi.pi))
-            found = Found({stage.knowledge.place(rest): SX(value - 2 * casadi.pi * turns)})
+            found = Found({stage.knowledge.index(rest): SX(value - 2 * casadi.pi * turns)})
             return step(stage.knowledge.problem, "sum", text, {}, found)
 
         yield Candidate((0.0,), (rest,), build)
@@ -41,8 +41,8 @@ def _alone(stage: Stage) -> Iterator[tuple[Variable, SX, str]]:
     """Single angles, their values, and the equation."""
     knowledge = stage.knowledge
     opened = [
-        (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[place]}")
-        for (rest, value, _), (whole, place) in zip(
+        (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[index]}")
+        for (rest, value, _), (whole, index) in zip(
             knowledge.open_sums(), knowledge.sums, strict=True
         )
     ]
@@ -170,7 +170,7 @@ def _cheapest(stage: Stage) -> tuple[Step, tuple[Variable, ...]] | None:
 
 def _require_simple(problem: Problem) -> None:
     for joint in problem.ring.joints:
-        if joint.motion not in _SIMPLE or joint.place is None:
+        if joint.motion not in _SIMPLE or joint.index is None:
             raise NoClosedForm(
                 f"joint {joint.name} is {joint.motion.name.lower()}, and Paul's method knows"
                 " revolute and prismatic joints"

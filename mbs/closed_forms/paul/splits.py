@@ -35,7 +35,7 @@ class Variable:
     """A slide, an angle, or a sum of angles with signs.
 
     Attributes:
-        slides: whether it is the length of a slide.
+        slides: whether it is the length of a prismatic joint.
         members: number of each joint in the ring, and its sign; the first sign is +1.
     """
 
@@ -84,31 +84,31 @@ class Knowledge:
         """Numbers of the unknown joints."""
         return [k for k in range(len(self.ring.joints)) if k not in self.known]
 
-    def place(self, variable: Variable) -> int:
+    def index(self, variable: Variable) -> int:
         """The place of a variable in x; of a sum the next free one."""
         if variable.single:
-            place = self.ring.joints[variable.members[0][0]].place
-            return -1 if place is None else place
+            index = self.ring.joints[variable.members[0][0]].index
+            return -1 if index is None else index
         return self.problem.size + len(self.sums)
 
     def can_hold(self, variable: Variable) -> bool:
         """Whether a variable is new, and there is a place for it."""
         held = [known.members for known, _, _ in self.open_sums()]
         return variable.single or (
-            variable.members not in held and self.place(variable) < self.problem.x.numel()
+            variable.members not in held and self.index(variable) < self.problem.x.numel()
         )
 
     def name(self, variable: Variable) -> str:
         """The name of a variable as an equation shows it."""
         if variable.single:
             return self.ring.joints[variable.members[0][0]].name
-        return str(self.problem.x[self.place(variable)])
+        return str(self.problem.x[self.index(variable)])
 
     def with_joint(self, variable: Variable) -> Knowledge:
         """The same with one more variable."""
         if variable.single:
             return replace(self, known=self.known | {variable.members[0][0]})
-        return replace(self, sums=(*self.sums, (variable, self.place(variable))))
+        return replace(self, sums=(*self.sums, (variable, self.index(variable))))
 
     def open_sums(self) -> list[tuple[Variable, SX, Matrix]]:
         """Known sums of the unknown joints: expression, and values at the samples."""
@@ -116,12 +116,12 @@ class Knowledge:
 
     def position(self, k: int) -> SX:
         """The symbol of joint number k."""
-        return SX(self.problem.x[self.place(Variable(False, ((k, 1),)))])
+        return SX(self.problem.x[self.index(Variable(False, ((k, 1),)))])
 
 
-def _rest(knowledge: Knowledge, variable: Variable, place: int) -> tuple[Variable, SX, Matrix]:
+def _rest(knowledge: Knowledge, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
     """What is left of a sum when its known members are taken away."""
-    value = SX(knowledge.problem.x[place])
+    value = SX(knowledge.problem.x[index])
     members = [member for member in variable.members if member[0] not in knowledge.known]
     for k, sign in variable.members:
         if k in knowledge.known:
@@ -142,9 +142,9 @@ def beginning(problem: Problem, ring: Ring) -> Knowledge:
 def _samples(problem: Problem, ring: Ring) -> Samples:
     stacked = casadi.vertcat(*(gap.pose.matrix for gap in ring.gaps))
     function = Function("gaps", [problem.given], [casadi.densify(stacked)])
-    n, places = len(ring.joints), [joint.place or 0 for joint in ring.joints]
+    n, indices = len(ring.joints), [joint.index or 0 for joint in ring.joints]
     gaps = np.array([np.array(function(given)).reshape(n, 4, 4) for _, given in problem.samples])
-    q = np.array([x[places] for x, _ in problem.samples])
+    q = np.array([x[indices] for x, _ in problem.samples])
     length = float(np.mean(np.linalg.norm(gaps[..., :3, 3], axis=-1))) or 1.0
     gaps[..., :3, 3] /= length
     slides = [not joint.is_rotational for joint in ring.joints]
@@ -201,7 +201,7 @@ def represented_pose(pose: Pose, opposite: Pose) -> SX:
 
 
 def joint_basis(slides: bool) -> Matrix:
-    """(3, 15, 15) factors of 1, cos q, sin q of a turn about z; of 1, r, r^2 of a slide along z."""
+    """(3, 15, 15) factors of 1, cos q, sin q of a rotation; of 1, r, r^2 of a translation."""
     T = np.broadcast_to(np.eye(4), (3, 4, 4)).copy()
     if slides:
         T[1, 2, 3], T[2, 2, 3] = 1.0, -1.0
@@ -214,7 +214,7 @@ def joint_basis(slides: bool) -> Matrix:
 
 
 def motion(q: Matrix, slides: bool) -> Matrix:
-    """(..., 4, 4) slide along z, or turn about z."""
+    """(..., 4, 4) translation along z, or rotation about z."""
     T = np.zeros((*q.shape, 4, 4))
     T[..., range(4), range(4)] = 1.0
     if slides:
@@ -465,7 +465,7 @@ def simple_rows(
 
     Args:
         split: of the loop.
-        slides: numbers of its slides.
+        slides: numbers of its prismatic joints.
         most: variables of a row with products of them.
     """
     offset = 0 if split.seed == 2 else -6

@@ -246,7 +246,7 @@ def _quartic(stage: Stage, variable: Variable, F: list[SX], unit: int) -> Step:
     named = {n: value for n, value in zip(names, F, strict=True) if not value.is_zero()}
     text = [n + piece for n, piece in zip(names, pieces, strict=True) if n in named]
     found = Found(
-        {stage.knowledge.place(variable): root.value}, (root.real,), (root.regular,), named
+        {stage.knowledge.index(variable): root.value}, (root.real,), (root.regular,), named
     )
     name = stage.knowledge.name(variable)
     symbols = {f"{name}a": SX(signs[0]), f"{name}b": SX(signs[1])}

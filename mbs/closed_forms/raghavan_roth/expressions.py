@@ -175,14 +175,14 @@ class Characteristic:
     Attributes:
         matrices: the parts M_k, (n, n) expressions of the problem's given.
         joint: name of the joint.
-        place: its number in the problem's x.
+        index: its index in the problem's x.
         slides: whether it slides.
         regularity: reciprocal condition of the matrix at positions that are no solutions.
     """
 
     matrices: tuple[SX, ...]
     joint: str
-    place: int
+    index: int
     slides: bool
     regularity: float
 
@@ -259,8 +259,8 @@ def _loops(problem: Problem) -> list[_Loop]:
 
 def _length(problem: Problem) -> float:
     """A power of two of about the size of the loop at the samples [m]."""
-    places = casadi.horzcat(*(gap.pose.p for gap in problem.ring.gaps))
-    total = [float(np.sum(np.linalg.norm(p, axis=0))) for p in problem.at_samples(SX(places))]
+    indices = casadi.horzcat(*(gap.pose.p for gap in problem.ring.gaps))
+    total = [float(np.sum(np.linalg.norm(p, axis=0))) for p in problem.at_samples(SX(indices))]
     mean = float(np.mean(total))
     return float(2.0 ** round(np.log2(mean))) if mean > 0 else 1.0
 
@@ -309,6 +309,6 @@ def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
 
 
 def _place(joint: ChainJoint) -> int:
-    if joint.place is None:
+    if joint.index is None:
         raise NoClosedForm(f"joint {joint.name} has no place among the unknowns of the problem")
-    return joint.place
+    return joint.index

@@ -1,4 +1,4 @@
-"""Configurations for wanted poses by the general method."""
+"""Configurations for target poses by the general method."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 SIZE = 15
 
-#: Numbers of the elements without p.p and p.p l - 2 (p.l) p: a slide r is in them without r^2.
+#: Numbers of the elements without p.p and p.p l - 2 (p.l) p: a displacement r is in them without
+# r^2.
 LINEAR = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 
 
@@ -45,7 +46,7 @@ def _slope(t: Array) -> Array:
 
 
 def _turning() -> Array:
-    """(3, 15, 15) the parts of rho of a turn about z with 1, its cosine and its sine."""
+    """(3, 15, 15) the parts of rho of a rotation about z with 1, its cosine and its sine."""
     Z = np.zeros((3, SIZE, SIZE))
     Z[0, range(3), range(3)] = 1.0
     for k in (3, 6, 9, 12):
@@ -58,10 +59,11 @@ def _turning() -> Array:
 SLOPES = np.array([_slope(axis) for axis in np.eye(3)])
 #: (3, 15, 15) parts of rho of a turn q about z, with 1, cos q, sin q.
 TURN = _turning()
-#: (3, 15, 15) parts of rho of a slide r along z, with 1, r, r^2.
+#: (3, 15, 15) parts of rho of a displacement r along z, with 1, r, r^2.
 SLIDE = np.array([np.eye(SIZE), SLOPES[2], 0.5 * SLOPES[2] @ SLOPES[2]])
 
-#: (6,) elements that a turn about z leaves alone, and (6,) those that a slide along z leaves alone.
+#: (6,) elements that a rotation about z leaves alone, and (6,) those that a prismatic joint along z
+# leaves alone.
 KEPT_BY_TURN = np.array([1, 2, 5, 8, 11, 14])
 KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
 
@@ -108,11 +110,11 @@ def half_parts(prismatic: bool) -> Array:
 #
 # rho(Z_3) rho(C_3) rho(Z_4) rho(C_4) rho(Z_5) w(C_5)
 #     = rho(C_2^-1) rho(Z_2^-1) rho(C_1^-1) rho(Z_1^-1) w(C_6^-1)
-# is fifteen equations, of which the first is 1 = 1; joint 6 is not in them, for it turns about the
-# direction of the pair. The right side is a (14, 8) block times eight monomials of joints 1 and 2,
-# and a constant; the left null vectors of the block leave equations in joints 3, 4 and 5. With the
-# half angles x4, x5 they have the nine monomials x4^i x5^j, i, j <= 2; with their products by x4,
-# or
+# is fifteen equations, of which the first is 1 = 1; joint 6 is not in them, for it rotates about
+# the direction of the pair. The right side is a (14, 8) block times eight monomials of joints 1 and
+# 2, and a constant; the left null vectors of the block leave equations in joints 3, 4 and 5. With
+# the half angles x4, x5 they have the nine monomials x4^i x5^j, i, j <= 2; with their products by
+# x4, or
 # by x5, there are twelve equations in twelve monomials. Slides have r^2 in four of the equations
 # only, so that without these the monomials are fewer.
 #
@@ -202,7 +204,7 @@ class Elimination:
 def weights(u: Array, count: int) -> Array:
     """(N, count) of joint 3 at angles u: 1, cos u, sin u, or cos(u/2), sin(u/2) where count is 2.
 
-    A turn is at u, a slide at r = tan(u/2).
+    A turn is at u, a prismatic joint at r = tan(u/2).
     """
     if count == 2:
         return np.stack([np.cos(u / 2), np.sin(u / 2)], axis=-1)
@@ -309,8 +311,8 @@ def _rayleigh(vectors: Array, X: Array) -> Array:
 
 # A loop of six joints, begun at any of them and walked either way.
 #
-# The wanted pose T closes the arm to the loop Z_1 C_1 Z_2 C_2 .. Z_6 C_6 = 1: Z_k is the motion
-# of joint k, C_k the way to the next joint, and the pose is in one of the ways.
+# The target pose T closes the arm to the loop Z_1 C_1 Z_2 C_2 .. Z_6 C_6 = 1: Z_k is the motion
+# of joint k, C_k the path to the next joint, and the pose is in one of the ways.
 
 
 _TINY_LENGTH = 1e-9  # part of an arm's length that is rounding of lengths between its joints
@@ -325,8 +327,8 @@ class Arrangement:
         sign: +1 or -1, of the arm's joint order[k] by the loop's joint k.
         prismatic: (6,) whether each joint of the loop slides.
         offsets: (6,) angles from which the loop's joints are counted [rad]; zero for slides.
-        ways: (6, 4, 4) constant ways; the one at `place` ends where the pose begins.
-        place: number of the way with the pose.
+        ways: (6, 4, 4) constant ways; the one at `index` ends where the pose begins.
+        index: number of the way with the pose.
         after: (4, 4) what comes after the pose in its way.
         length: the unit [m].
     """
@@ -336,15 +338,15 @@ class Arrangement:
     prismatic: NDArray[np.bool_]
     offsets: Array
     ways: Array
-    place: int
+    index: int
     after: Array
     length: float
 
     def all_ways(self, T: Array) -> Array:
-        """(N, 6, 4, 4) the ways for wanted poses T, (N, 4, 4) [m]."""
+        """(N, 6, 4, 4) the ways for target poses T, (N, 4, 4) [m]."""
         T = _scaled(T, self.length)
         ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
-        ways[:, self.place] = ways[:, self.place] @ self._pose(T) @ self.after
+        ways[:, self.index] = ways[:, self.index] @ self._pose(T) @ self.after
         return ways
 
     def _pose(self, T: Array) -> Array:
@@ -730,14 +732,14 @@ _FAR = 1e3  # slides, in reaches of the arm, that are taken for infinite
 
 
 def candidates(prepared: Prepared, T: Array) -> Array:
-    """(m, 6) configurations that may reach a wanted pose; polish and check them.
+    """(m, 6) configurations that may reach a target pose; polish and check them.
 
     Among them is every isolated configuration that does, near double ones too, some of them twice;
     others do not reach the pose at all.
 
     Args:
         prepared: see `prepare`.
-        T: (4, 4) wanted pose [m].
+        T: (4, 4) target pose [m].
 
     Raises:
         NoClosedForm: the method does not hold for the arm, see `Prepared.regular`.
@@ -750,7 +752,7 @@ def candidates_many(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
 
     Args:
         prepared: see `prepare`.
-        T: (N, 4, 4) wanted poses [m].
+        T: (N, 4, 4) target poses [m].
 
     Returns:
         (m,) numbers of the poses, ascending, and (m, 6) configurations for them.

@@ -16,7 +16,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
 from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.numbers import NONZERO
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
@@ -197,7 +197,7 @@ def characteristic_function(chain: FrameChain) -> Function:
     return made
 
 
-# How far configurations are from the wanted pose: the forward model of a chain on symbols.
+# How far configurations are from the target pose: the forward model of a chain on symbols.
 
 
 def forward(chain: FrameChain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
@@ -263,7 +263,7 @@ class InverseGeometry(ModelFunction):
         """Evaluate it as any model; a branch and a pose given in numbers must be such."""
         T = kwargs.get("T", args[0] if args else None)
         if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
-            wanted_pose(self.system, T)
+            target_pose(self.system, T)
         branch = kwargs.get("branch", args[1] if len(args) > 1 else None)
         if isinstance(branch, (int, float, np.ndarray, np.generic)):
             self._require_branch(np.asarray(branch))
@@ -353,7 +353,7 @@ def signs_of(sequence: StepSequence, branch: SX) -> SX:
 def whole_configuration(chain: FrameChain, x: SX) -> SX:
     """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
     q = SX(DM(chain.system.position(chain.locked)))
-    q[list(chain.places)] = x
+    q[list(chain.indices)] = x
     return q
 
 

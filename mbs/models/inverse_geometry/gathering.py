@@ -58,7 +58,7 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
 
     Args:
         chain: what is solved for.
-        target: the pose that is wanted, of the chain in numbers.
+        target: the target pose, of the chain in numbers.
         method: "pieper", "paul", "general", "search"; "auto" for a closed form, else the general
             method for six joints, else the search.
         p: (np,) the parameters.

@@ -15,7 +15,7 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_poses
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
     all_branches,
@@ -143,7 +143,7 @@ class BranchSolutions:
     Attributes:
         q: (N, branches, n) positions of the chain's joints [rad or m].
         valid: (N, branches) whether there is a solution.
-        residual: (N, branches) largest difference of an element from the wanted pose.
+        residual: (N, branches) largest difference of an element from the target pose.
         labels: of the branches.
         searched: (N,) whether the solutions are to be looked for by other means: branches meet
             there, or leave a joint undetermined.
@@ -371,7 +371,7 @@ def solve_many(
     """
     require_system(system)
     require_method(system, method, METHODS)
-    poses, p = wanted_poses(system, T), np.array(system.parameter_values(parameters))
+    poses, p = target_poses(system, T), np.array(system.parameter_values(parameters))
 
     def solved(pose: Array) -> Solutions:
         return solve(system, pose, frame, method, given, locked=locked, parameters=parameters)
@@ -383,11 +383,11 @@ def solve_many(
     draft = robot.draft(poses)
     for k in np.flatnonzero(draft.searched):
         pose = poses[k]
-        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.chain.places)]
+        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.chain.indices)]
         draft = with_configurations(draft, int(k), robot.arm, q, pose)
     q, valid = robot.whole(draft.q), draft.valid
     if leaves_out(limits):
-        q, within = _wound(bounds(system, limits, robot.chain.places), q)
+        q, within = _wound(bounds(system, limits, robot.chain.indices), q)
         valid = valid & within
     return ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
 
@@ -413,11 +413,11 @@ class _Robot:
     def whole(self, q: Array) -> Array:
         """(N, branches, nq) positions of all joints, those outside the chain as assembled."""
         system = self.chain.system
-        if self.chain.places == tuple(range(system.nq)):
+        if self.chain.indices == tuple(range(system.nq)):
             return q
         every = np.empty((*q.shape[:2], system.nq))
         every[...] = system.position(self.chain.locked)
-        every[..., list(self.chain.places)] = q
+        every[..., list(self.chain.indices)] = q
         return every
 
 

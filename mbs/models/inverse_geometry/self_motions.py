@@ -267,7 +267,7 @@ class Family:
 
     def contains(self, q: Array) -> bool:
         """Whether a configuration (nq,) [rad or m] is one of it, up to whole turns."""
-        return bool(self.meets(np.asarray(q, dtype=float)[None, list(self._motion.places)])[0])
+        return bool(self.meets(np.asarray(q, dtype=float)[None, list(self._motion.indices)])[0])
 
     def meets(self, q: Array) -> NDArray[np.bool_]:
         """(m,) whether configurations (m, n) of the chain belong to it."""
@@ -290,7 +290,7 @@ class _SelfMotion:
     target: Target
     curve: ConfigurationCurve
     free: int
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     whole: Whole
 
     def at(self, value: float) -> Array | None:
@@ -341,7 +341,11 @@ class _SelfMotion:
 
 
 def family(
-    target: Target, curve: ConfigurationCurve, dimension: int, places: tuple[int, ...], whole: Whole
+    target: Target,
+    curve: ConfigurationCurve,
+    dimension: int,
+    indices: tuple[int, ...],
+    whole: Whole,
 ) -> Family:
     """The description of a self-motion.
 
@@ -349,14 +353,14 @@ def family(
         target: the pose that is held.
         curve: configurations along it.
         dimension: how many freedoms it has.
-        places: of the chain's joints in q.
+        indices: of the chain's joints in q.
         whole: the configuration (nq,) of the robot for one of the chain, (n,).
     """
     moves = np.ptp(curve.x, axis=0) > _MOVES
     free = _free_joint(curve, moves)
     names = target.arm.names
     moving = tuple(name for name, m in zip(names, moves, strict=True) if m)
-    motion = _SelfMotion(target, curve, free, places, whole)
+    motion = _SelfMotion(target, curve, free, indices, whole)
     relations = _relations(target, curve, free) if dimension == 1 else ()
     return Family(names[free], moving, relations, _range(target, curve, free), dimension, motion)
 

@@ -119,8 +119,8 @@ def bounds(
         own[name] = None if pair is None else _pair(system, name, pair)
     pairs = [own[name] or (-math.inf, math.inf) for name in names]
     low, high = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
-    places = set(range(len(names)) if turning is None else turning)
-    turns = [c.kind == "revolute" and k in places for k, c in enumerate(system.coordinates)]
+    indices = set(range(len(names)) if turning is None else turning)
+    turns = [c.kind == "revolute" and k in indices for k, c in enumerate(system.coordinates)]
     return CoordinateLimits(names, low, high, np.array(turns, dtype=bool))
 
 
@@ -162,7 +162,7 @@ _MOST_ROWS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """One configuration that takes the frame to the wanted pose.
+    """One configuration that takes the frame to the target pose.
 
     Attributes:
         q: (nq,) positions [rad or m].
@@ -191,7 +191,7 @@ class Solution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solutions(Sequence[Solution]):
-    """Every configuration that takes the frame to the wanted pose, a sequence of `Solution`.
+    """Every configuration that takes the frame to the target pose, a sequence of `Solution`.
 
     Attributes:
         system: name of the robot.
@@ -302,7 +302,7 @@ def unreachable(target: Target, nearest: Nearest) -> str:
     """Why a pose has no solution at all.
 
     Args:
-        target: the pose that is wanted.
+        target: the target pose.
         nearest: the reachable pose nearest to it.
     """
     arm = target.arm

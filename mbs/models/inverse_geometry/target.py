@@ -30,11 +30,11 @@ linear; and one that is hardly more than rounding."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """The equations of a wanted pose.
+    """The equations of a target pose.
 
     Attributes:
         arm: that moves the frame.
-        T: (4, 4) the wanted pose; (m, 4, 4) of m configurations, each its own.
+        T: (4, 4) the target pose; (m, 4, 4) of m configurations, each its own.
     """
 
     arm: Arm
@@ -345,14 +345,14 @@ def _monomials(c: int, degree: int) -> list[tuple[int, ...]]:
 def _macaulay(powers: list[tuple[int, ...]], columns: Array, degree: int, c: int) -> Array:
     """Rows: the products of monomials and equations, cut off above the degree."""
     kept = _monomials(c, degree)
-    place = {power: k for k, power in enumerate(kept)}
+    index = {power: k for k, power in enumerate(kept)}
     rows = []
     for factor in _monomials(c, degree - 1):
         for equation in columns.T:
             row = np.zeros(len(kept))
             for power, value in zip(powers, equation, strict=True):
                 product = tuple(a + b for a, b in zip(power, factor, strict=True))
-                if product in place:
-                    row[place[product]] += value
+                if product in index:
+                    row[index[product]] += value
             rows.append(row)
     return np.array(rows)

@@ -49,8 +49,8 @@ class InputMotion:
     """A joint whose motion is an input.
 
     Attributes:
-        velocity: its number in v.
-        position: number in q where the position is an input too, None where it is a state.
+        velocity: its index in v.
+        position: index in q where the position is an input too, None where it is a state.
     """
 
     velocity: int

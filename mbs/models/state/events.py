@@ -78,7 +78,7 @@ def standstill(
 
 
 States = tuple[Sequence[int], Sequence[int]]
-"""Numbers in q and in v of the positions and velocities that a state begins with."""
+"""Indices in q and in v of the positions and velocities that a state begins with."""
 
 
 def minimal_jump(

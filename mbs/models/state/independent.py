@@ -57,8 +57,9 @@ from mbs.spatial import Wrench, quaternion_rate, quaternion_rotation
 
 # Quaternion joints in loops whose motion is independent, as a whole or in part.
 #
-# A rod between two ball joints spins about its own axis whatever the loops do, and no element of
-# the quaternion of a ball joint stands for that spin. The quaternion as a whole is then a state,
+# A rod between two spherical joints spins about its own axis whatever the loops do, and no element
+# of the quaternion of a spherical joint stands for that spin. The quaternion as a whole is then a
+# state,
 # and a second one, on the loops, is solved for with the other dependent positions: of all
 # quaternions that close the loops the one that is not turned from the state about the independent
 # axes.
@@ -78,7 +79,7 @@ class Orientation:
 
     Attributes:
         link: that it moves.
-        free: numbers in v of its velocities whose positions may be chosen.
+        free: indices in v of its velocities whose positions may be chosen.
     """
 
     link: Link
@@ -91,7 +92,7 @@ class Orientation:
 
     @property
     def positions(self) -> tuple[int, ...]:
-        """Numbers in q."""
+        """Indices in q."""
         return tuple(range(self.link.q.start, self.link.q.stop))
 
     @property
@@ -184,21 +185,21 @@ class MinimalLayout:
     frame; outputs of devices; efforts; efforts of contacts; what is observed].
 
     Attributes:
-        positions: numbers in q of the first part of x.
+        positions: indices in q of the first part of x.
         orientations: quaternion joints of loops that are among them.
-        velocities: numbers in v of the second part of x.
-        dependents: numbers in q of z, some of them in x too: see `minimal_orientation`.
+        velocities: indices in v of the second part of x.
+        dependents: indices in q of z, some of them in x too: see `minimal_orientation`.
         shown: those of them that are in y, which are not in x.
-        inputs: numbers in v of the efforts of motors.
+        inputs: indices in v of the efforts of motors.
         devices: numbers of the devices whose inputs are in u.
         wrenches: names of the frames on which wrenches act, six numbers each: force and moment
             about the origin, in axes of the base.
         frames: these frames.
         motions: joints whose accelerations, or positions, velocities and accelerations, are in u.
         extra: size of w.
-        accelerations: numbers in v of the first part of y.
-        passive: numbers in v of the velocities and accelerations of dependent joints in y.
-        efforts: numbers in v of the efforts in y, each all that drives the joint but contacts.
+        accelerations: indices in v of the first part of y.
+        passive: indices in v of the velocities and accelerations of dependent joints in y.
+        efforts: indices in v of the efforts in y, each all that drives the joint but contacts.
         contacts: efforts of rigid stops and Coulomb friction in y.
     """
 
@@ -271,7 +272,7 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
 
 
 def _free_positions(system: System, orientations: Sequence[Orientation]) -> tuple[int, ...]:
-    """Numbers in q of the positions that are independent, those of quaternion joints as a whole."""
+    """Indices in q of the positions that are independent, those of quaternion joints as a whole."""
     if not system.is_closed:
         return tuple(range(system.nq))
     numbers = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
@@ -602,7 +603,7 @@ def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> St
     Args:
         system: open or closed.
         layout: what stands where.
-        motors: numbers in v of the efforts in u.
+        motors: indices in v of the efforts in u.
     """
     in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
     in_u = [len(motors), len(system.devices), 6 * len(layout.frames)]

@@ -219,8 +219,8 @@ class Prescribed:
 
     Attributes:
         name: of the velocity.
-        velocity: its number in v.
-        position: number in q where the position is prescribed, None where it is free.
+        velocity: its index in v.
+        position: index in q where the position is prescribed, None where it is free.
         holds_speed: whether the velocity is prescribed; an acceleration alone leaves it free.
         time: symbol of the time in the laws [s].
         laws: position, velocity and acceleration as functions of it; what is free is zero.

@@ -273,7 +273,7 @@ def passage(
 
 
 def _position(system: System, number: int) -> int:
-    """The number in q of a velocity of a joint with one degree of freedom."""
+    """The index in q of a velocity of a joint with one degree of freedom."""
     link = next(link for link in system.tree.links if link.v.start <= number < link.v.stop)
     return int(link.q.start + number - link.v.start)
 
@@ -316,7 +316,7 @@ class TreeState:
         states: numbers in X of the states x.
         dependents: numbers in X of the dependents z.
         passive: numbers in X of the velocities of the dependent joints.
-        held: numbers in v of the independent velocities.
+        held: indices in v of the independent velocities.
         units: (nv,) typical velocities, of one size for all joints.
     """
 

@@ -27,7 +27,7 @@ def systems():
 def drawn(system, away, seed):
     """A closed configuration whose independent joints stand elsewhere."""
     rng = np.random.default_rng(seed)
-    held = complete(system, ()).held
+    held = complete(system, ()).undetermined
     q = np.array(system.configuration)
     q[list(held)] += rng.uniform(-away, away, len(held))
     closed = Closing(system, NONE, held).nearest(q)
@@ -197,7 +197,7 @@ def test_chain_joints_that_depend_on_each_other():
     way = frame_chain(system, frame)
     found = solutions(system, frame, pose(system, frame, q))
     assert [same(system, configuration.q, q, 1e-8) for configuration in found] == [True]
-    assert close(system, way, q[list(way.places)] + 0.1, NONE) == []
+    assert close(system, way, q[list(way.indices)] + 0.1, NONE) == []
 
 
 @pytest.mark.parametrize(("closing", "seed"), [("spherical", 1), ("spherical", 2), ("revolute", 1)])
@@ -213,8 +213,8 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
     reason = why_searched(system, way)
     if reason is not None:
         assert "no closed form known here" in reason
-    held = complete(system, way.places).held
-    rest = close(system, way, q[list(way.places)], NONE, q)
+    held = complete(system, way.indices).undetermined
+    rest = close(system, way, q[list(way.indices)], NONE, q)
     assert any(same(system, configuration.q, q, 1e-6) for configuration in rest)
     for configuration in rest:
         np.testing.assert_allclose(configuration.q[list(held)], q[list(held)], atol=1e-12)
@@ -223,7 +223,7 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
 def test_search_with_positions_held_finds_what_closed_forms_find(systems):
     system = systems["akr3000"]
     q = drawn(system, 0.03, 3)
-    places = frame_chain(system, 10).places
+    places = frame_chain(system, 10).indices
     found = closed_configurations(Closing(system, NONE, places), q)
     exact = close(system, frame_chain(system, 10), q[list(places)], NONE)
     assert len(found) == len(exact) == 4

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import quaternion_slices
-from mbs.assembly.validity import Row, all_hold, plain_fault, plain_rows
+from mbs.assembly.validity import ValidityRow, all_hold, plain_fault, plain_rows
 from mbs.errors import MbsError, ModelError
 from mbs.native import compiled
 from mbs.numbers import doubles
@@ -107,7 +107,7 @@ class ConfigurationCheck:
         refuse: `refuse(system, q, p)` raises the error that says why numbers are not taken.
     """
 
-    rows: Callable[[System, SX], list[Row]]
+    rows: Callable[[System, SX], list[ValidityRow]]
     refuse: Callable[[System, Any, Any], None]
 
 
@@ -193,7 +193,7 @@ class ModelFunction(Function):
             if self._asks and size and self._sizes.get(name, (0,))[0] == size
         )
 
-    def rows(self, q: SX) -> list[Row]:
+    def rows(self, q: SX) -> list[ValidityRow]:
         """What is asked of the inputs `asked`; empty where it is nothing.
 
         Args:

@@ -15,7 +15,7 @@ from mbs.closed_forms.sequence import (
     Found,
     Problem,
     Root,
-    Step,
+    SequenceStep,
     StepSequence,
     cosine_root,
     real_quartic,
@@ -121,7 +121,9 @@ def product(a: SX, b: SX) -> SX:
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
-def three_turns(scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G: SX) -> list[Step]:
+def three_turns(
+    scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G: SX
+) -> list[SequenceStep]:
     """The steps of three joints that turn.
 
     Args:
@@ -146,7 +148,7 @@ def _turn(scene: PieperLoop, k: int) -> SX:
     return SX(axis_rotation("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
-def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> Step:
+def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceStep:
     """The joint in the middle, from row^T Z column = G_zz."""
     joint = scene.ring.joints[k]
     sign = SX.sym(joint.name)
@@ -174,13 +176,13 @@ def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
     return Root(SX(angle), SX(1), SX(1))
 
 
-def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> Step:
+def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
     return turn_onto(scene, k, (start, end), 1.0)
 
 
 def turn_onto(
     scene: PieperLoop, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
-) -> Step:
+) -> SequenceStep:
     """The turn of joint k that brings one vector of the plane onto the direction of another.
 
     Args:
@@ -211,7 +213,7 @@ _SMALL = 1e-30
 rounding, and the root is then finite."""
 
 
-def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
+def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> SequenceStep | None:
     """Joint k from form = 0; None where the form does not depend on the joint.
 
     Args:
@@ -236,7 +238,7 @@ def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
     return step(scene.problem, "type 2", f"X{n} cos({q}) + Y{n} sin({q}) = Z{n}", {q: sign}, found)
 
 
-def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
+def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> SequenceStep | None:
     """Joint k from b^T A b = 0; None where it does not depend on the joint.
 
     Args:
@@ -263,7 +265,9 @@ def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
     return step(scene.problem, "quartic", text, signs, found)
 
 
-def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0) -> Step:
+def linear(
+    scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0
+) -> SequenceStep:
     """A joint that slides, from factor x = value.
 
     Args:
@@ -281,7 +285,7 @@ def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float =
     return step(scene.problem, "type 1", f"X{n} {r} = Y{n}", {}, found)
 
 
-def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Step | None:
+def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> SequenceStep | None:
     """A joint that slides, from a polynomial; factors from the highest power."""
     degree = len(factors) - 1
     while degree and scene.zero(factors[0] * scene.length**degree / unit):
@@ -353,7 +357,7 @@ class Reach:
     p: SX
 
 
-def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[Step] | None:
+def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | None:
     """The steps of joints 3, 2 and 1; None where these three cannot be found so.
 
     Args:
@@ -394,7 +398,7 @@ def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
     return [turned, R[2, :].T], forms, [scene.length**2, scene.length]
 
 
-def _by_turning(reach: Reach) -> list[Step] | None:
+def _by_turning(reach: Reach) -> list[SequenceStep] | None:
     """Joints 3 and 2 where joint 2 turns."""
     scene = reach.scene
     (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
@@ -418,7 +422,7 @@ def _by_turning(reach: Reach) -> list[Step] | None:
 
 def _parallel(
     reach: Reach, first: tuple[SX, SX, SX], second: tuple[SX, SX, SX]
-) -> list[Step] | None:
+) -> list[SequenceStep] | None:
     """Joints 3 and 2 where joint 2 stands in both equations in the same way, or in one alone."""
     scene, (a, Z1, unit), (b, Z2, unit_b) = reach.scene, first, second
     if scene.zero(b[:2] * scene.length / unit_b):
@@ -441,7 +445,7 @@ def _parallel(
     return None if joint is None else [third, joint]
 
 
-def _by_sliding(reach: Reach) -> list[Step] | None:
+def _by_sliding(reach: Reach) -> list[SequenceStep] | None:
     """Joints 3 and 2 where joint 2 slides."""
     rows, forms, _ = _rows(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
@@ -450,7 +454,9 @@ def _by_sliding(reach: Reach) -> list[Step] | None:
     return _two_slides(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
 
 
-def _two_slides(reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]) -> list[Step] | None:
+def _two_slides(
+    reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]
+) -> list[SequenceStep] | None:
     """Joints 3 and 2 from along[k] x2 = left[k], two equations in the plane across joint 1."""
     scene, sign = reach.scene, reach.scene.ring.joints[1].sign
     third = root_of_form(scene, 2, along[1] * left[0] - along[0] * left[1], scene.length)
@@ -461,7 +467,9 @@ def _two_slides(reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]) -> list
     return [third, linear(scene, 1, square, sign * value)]
 
 
-def _slide_in_turn(reach: Reach, a: SX, along: SX, left: tuple[SX, SX]) -> list[Step] | None:
+def _slide_in_turn(
+    reach: Reach, a: SX, along: SX, left: tuple[SX, SX]
+) -> list[SequenceStep] | None:
     """Joints 3 and 2 where joint 1 turns and joint 2 slides.
 
     With r the way of joint 2: r^2 / 2 + (f_z + a_z) r = left[0] and along r = left[1].
@@ -481,7 +489,7 @@ def _slide_in_turn(reach: Reach, a: SX, along: SX, left: tuple[SX, SX]) -> list[
     return [third, linear(scene, 1, along, sign * casadi.dot(left[1], b3))]
 
 
-def _first(reach: Reach) -> Step:
+def _first(reach: Reach) -> SequenceStep:
     """Joint 1, once the other two are known."""
     scene = reach.scene
     f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))
@@ -498,7 +506,7 @@ def _first(reach: Reach) -> Step:
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
-def three_slides(scene: PieperLoop) -> list[Step]:
+def three_slides(scene: PieperLoop) -> list[SequenceStep]:
     """The steps of a loop of three revolute and three prismatic joints.
 
     Raises:
@@ -519,7 +527,7 @@ def three_slides(scene: PieperLoop) -> list[Step]:
     return [*three_turns(begun, (0, 1, 2), A, B, G), _slides(scene)]
 
 
-def _slides(scene: PieperLoop) -> Step:
+def _slides(scene: PieperLoop) -> SequenceStep:
     """The prismatic joints, from the sum of all translations around the loop."""
     way, indices, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
@@ -612,7 +620,7 @@ def _cost(sequence: StepSequence) -> tuple[int, int]:
     return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
 
 
-def _steps(scene: PieperLoop) -> list[Step] | None:
+def _steps(scene: PieperLoop) -> list[SequenceStep] | None:
     """The steps where the axes of the last three joints meet; None where the first three differ."""
     ring = scene.ring
     first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
@@ -652,7 +660,7 @@ def _pose_comes_first(scene: PieperLoop) -> bool:
     return counts[1] == max(counts)
 
 
-def _regular(problem: Problem, steps: list[Step]) -> bool:
+def _regular(problem: Problem, steps: list[SequenceStep]) -> bool:
     """Whether the steps determine every joint of a generic configuration."""
     x, given = problem.x, problem.given
     return not any(

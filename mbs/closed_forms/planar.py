@@ -8,8 +8,8 @@ from casadi import SX
 from mbs.closed_forms.centres import with_spherical
 from mbs.closed_forms.ring import always_zero, gap_samples, is_planar, with_elbow, without_idle
 from mbs.closed_forms.roots import (
+    LoopBranches,
     Positions,
-    Root,
     across,
     angle_onto,
     in_plane,
@@ -31,13 +31,15 @@ from mbs.recursions.chain import Ring, frames_at_zero
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 8.
 
 
-def three_revolute(ring: Ring) -> Root:
+def three_revolute(ring: Ring) -> LoopBranches:
     """The two branches of a planar loop of three unknown revolute joints.
 
     Args:
         ring: its joints a, b, c; b is the one in the middle, c may be spherical.
     """
-    return Root({label: _three_revolute_root(ring, sign) for label, sign in signed(ring.joints[1])})
+    return LoopBranches(
+        {label: _three_revolute_root(ring, sign) for label, sign in signed(ring.joints[1])}
+    )
 
 
 def _three_revolute_root(ring: Ring, sign: int) -> Positions:
@@ -61,13 +63,15 @@ def _three_revolute_root(ring: Ring, sign: int) -> Positions:
 # Source: Khalil & Creusot 1997, section 3.3, equations of types 2 and 4.
 
 
-def one_prismatic(ring: Ring) -> Root:
+def one_prismatic(ring: Ring) -> LoopBranches:
     """The two branches of a planar loop of a prismatic joint between two revolute ones.
 
     Args:
         ring: its joints a, b, c; b is the prismatic one, c may be spherical.
     """
-    return Root({label: _one_prismatic_root(ring, sign) for label, sign in signed(ring.joints[1])})
+    return LoopBranches(
+        {label: _one_prismatic_root(ring, sign) for label, sign in signed(ring.joints[1])}
+    )
 
 
 def _one_prismatic_root(ring: Ring, sign: int) -> Positions:
@@ -86,7 +90,7 @@ def _one_prismatic_root(ring: Ring, sign: int) -> Positions:
 # Source: Khalil & Creusot 1997, section 3.3, equations of types 1 and 3.
 
 
-def two_prismatic(ring: Ring) -> Root:
+def two_prismatic(ring: Ring) -> LoopBranches:
     """The only branch of a planar loop of an unknown revolute joint and two prismatic ones.
 
     Args:
@@ -97,7 +101,7 @@ def two_prismatic(ring: Ring) -> Root:
     e, u, v = (in_plane(p) for p in (X2.p + X2.R @ X3.p + R @ X1.p, X2.R[:, 2], R[:, 2]))
     a, whole = last_angle(in_plane(R @ X1.R)), across(u, v)
     values = (a, -across(e, v) / whole, -across(u, e) / whole)
-    return Root({"": positions(ring.joints, values)})
+    return LoopBranches({"": positions(ring.joints, values)})
 
 
 # A planar loop of equal opposite sides: the parallelogram, and its mirror image that crosses.
@@ -108,7 +112,7 @@ def two_prismatic(ring: Ring) -> Root:
 # either keeps its label through the flat position, where they meet.
 
 
-def parallelogram(ring: Ring, pivot: int) -> Root:
+def parallelogram(ring: Ring, pivot: int) -> LoopBranches:
     """The two branches of a loop that can be a parallelogram.
 
     Args:
@@ -121,7 +125,7 @@ def parallelogram(ring: Ring, pivot: int) -> Root:
     g = in_plane(back.p)
     Q = g - in_plane((back @ ring.gaps[0].pivots[pivot]).p)
     mirrored = g * (2 * (Q.T @ g) / square(g)) - Q
-    return Root(
+    return LoopBranches(
         {
             f"{name}:parallel": _parallelogram_root(ring, Q, g - Q),
             f"{name}:crossed": _parallelogram_root(ring, mirrored, g - mirrored),
@@ -142,7 +146,7 @@ def _parallelogram_root(ring: Ring, A: SX, B: SX) -> Positions:
 _SPHERICAL, _PRISMATIC = Motion.SPHERICAL, Motion.PRISMATIC
 
 
-def planar(ring: Ring, q: SX, p: SX) -> Root | None:
+def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The branches of a plane loop; None where it is none, or too much of it is unknown.
 
     What a closing joint can do out of the plane is left out; a spherical joint, or three revolute
@@ -171,7 +175,7 @@ def _spherical_last(ring: Ring) -> Ring:
     return ring
 
 
-def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> Root:
+def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBranches:
     has_spherical = ring.joints[2].motion is _SPHERICAL
     if len(prismatic) == 1:
         index = prismatic[0]
@@ -207,7 +211,7 @@ def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 1.
 
 
-def along_normal(ring: Ring, q: SX, p: SX) -> Root | None:
+def along_normal(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The displacement along parallel revolute axes; None where more than one joint has a part."""
     ring = with_spherical(ring, q, p)
     kinds = [joint.motion for joint in ring.joints]
@@ -230,4 +234,4 @@ def along_normal(ring: Ring, q: SX, p: SX) -> Root | None:
         return None
     ((k, slope),) = moving.items()
     end = poses[-1].p
-    return Root({"": positions([ring.joints[k]], [-casadi.dot(normal, end) / slope])})
+    return LoopBranches({"": positions([ring.joints[k]], [-casadi.dot(normal, end) / slope])})

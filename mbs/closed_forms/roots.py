@@ -29,7 +29,7 @@ class RodSpin:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Root:
+class LoopBranches:
     """The branches of a loop.
 
     Attributes:

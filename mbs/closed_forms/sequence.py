@@ -66,7 +66,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class SequenceStep:
     """Some joints of a loop, from the given and from the joints found before.
 
     Attributes:
@@ -109,7 +109,9 @@ class Found:
     coefficients: Mapping[str, SX] | None = None
 
 
-def step(problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], found: Found) -> Step:
+def step(
+    problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], found: Found
+) -> SequenceStep:
     """A step from the expressions that make it up.
 
     Args:
@@ -126,7 +128,7 @@ def step(problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], fo
     function = Function("step", [problem.x, problem.given, SX(s)], outputs, {"cse": True})
     indices = tuple(found.values)
     names = tuple(_name(problem, index) for index in indices)
-    return Step(indices, names, kind, equation, tuple(signs), tuple(coefficients), function)
+    return SequenceStep(indices, names, kind, equation, tuple(signs), tuple(coefficients), function)
 
 
 def _name(problem: Problem, index: int) -> str:
@@ -167,7 +169,7 @@ class StepSequence:
     """
 
     size: int
-    steps: Sequence[Step]
+    steps: Sequence[SequenceStep]
 
     @property
     def signs(self) -> tuple[str, ...]:
@@ -216,7 +218,7 @@ class StepSequence:
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
-def _taken(leaf: Leaf, step: Step, given: SX, s: SX) -> Leaf:
+def _taken(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
     """The configuration with one more step."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)

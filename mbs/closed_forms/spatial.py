@@ -21,9 +21,9 @@ from mbs.closed_forms.centres import (
 from mbs.closed_forms.ring import always_zero, parallel, with_elbow
 from mbs.closed_forms.roots import (
     Angle,
+    LoopBranches,
     Positions,
     RodSpin,
-    Root,
     across,
     angle_onto,
     in_plane,
@@ -46,7 +46,7 @@ from mbs.spatial import Pose, cross, quaternion_rotation, vector
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
 
-def aim(ring: Ring, q: SX, p: SX) -> Root | None:
+def aim(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The branches that aim a link at its other end; None unless two centres are all unknown.
 
     Args:
@@ -64,9 +64,9 @@ def aim(ring: Ring, q: SX, p: SX) -> Root | None:
     return None
 
 
-def _aim_branches(ring: Ring, one: Centre, other: Centre) -> Root:
+def _aim_branches(ring: Ring, one: Centre, other: Centre) -> LoopBranches:
     branches = signed(ring.joints[1])
-    return Root({label: _aim_root(ring, one, other, sign) for label, sign in branches})
+    return LoopBranches({label: _aim_root(ring, one, other, sign) for label, sign in branches})
 
 
 def _aim_root(ring: Ring, one: Centre, other: Centre, sign: int) -> Positions:
@@ -89,14 +89,14 @@ def _aim_root(ring: Ring, one: Centre, other: Centre, sign: int) -> Positions:
 # Source: Shepperd 1978.
 
 
-def spherical(ring: Ring, q: SX, p: SX) -> Root | None:
+def spherical(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The orientation of a spherical joint of the tree; None unless it alone is unknown."""
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.SPHERICAL or joint.index is None:
         return None
     R = ring.gaps[0].pose.R
     quaternion = unit_quaternion(R.T if joint.sign > 0 else R)
-    return Root({"": {joint.index + k: quaternion[k] for k in range(4)}})
+    return LoopBranches({"": {joint.index + k: quaternion[k] for k in range(4)}})
 
 
 def unit_quaternion(R: SX) -> SX:
@@ -131,7 +131,7 @@ def unit_quaternion(R: SX) -> SX:
 _Z = (0.0, 0.0, 1.0)
 
 
-def confine(ring: Ring, q: SX, p: SX) -> Root | None:
+def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The rotation that brings a spherical joint into the plane of two others, or None.
 
     Args:
@@ -170,14 +170,14 @@ def _is_across(ring: Ring, normal: SX, q: SX, p: SX) -> bool:
     return always_zero(in_plane(ring.gaps[1].pose.R @ normal), q, p)
 
 
-def _confine_branches(ring: Ring, normal: SX) -> Root:
+def _confine_branches(ring: Ring, normal: SX) -> LoopBranches:
     """The first joint, from the spherical one before it and its height on the normal behind it."""
     X1, X2, X3, X4 = (gap.pose for gap in ring.gaps)
     joint, target = ring.joints[0], X1.inverse().p
     m = X2.R @ normal
     Z = casadi.dot(normal, (X3 @ Pose.translation(X4.p)).p) + casadi.dot(m, X2.p)
     X, Y = casadi.dot(in_plane(m), in_plane(target)), across(in_plane(m), in_plane(target))
-    return Root(
+    return LoopBranches(
         {
             label: positions([joint], [root_angle(X, Y, Z - m[2] * target[2], sign).value])
             for label, sign in signed(joint)
@@ -188,7 +188,9 @@ def _confine_branches(ring: Ring, normal: SX) -> Root:
 # Two coupled coordinates: the driven one by its polynomial, the driver where that is a line.
 
 
-def coupled_position(coupling: CoordinateCoupling, known: Container[int], q: SX) -> Root | str:
+def coupled_position(
+    coupling: CoordinateCoupling, known: Container[int], q: SX
+) -> LoopBranches | str:
     """The unknown one of coupled coordinates, or why it does not follow.
 
     Args:
@@ -202,13 +204,13 @@ def coupled_position(coupling: CoordinateCoupling, known: Container[int], q: SX)
         return "more than one of its coordinates are unknown"
     (number,) = unknown
     if number == coupling.driven:
-        return Root({"": {number: coupling.value(q)}})
+        return LoopBranches({"": {number: coupling.value(q)}})
     if number == coupling.driver and len(terms) != 2:
         return "its driver follows from a polynomial that is not of degree one"
     # linear in the unknown one, whose factor is its slope
     slope = terms[1] if number == coupling.driver else dict(coupling.others)[number]
     rest = casadi.substitute(coupling.value(q), q[number], SX(0))
-    return Root({"": {number: (q[coupling.driven] - rest) / slope}})
+    return LoopBranches({"": {number: (q[coupling.driven] - rest) / slope}})
 
 
 # One joint that brings two centres of a loop to the distance that a rigid link between them
@@ -262,7 +264,7 @@ def _span(begun: Ring, one: Centre, other: Centre) -> Span:
     )
 
 
-def at_distance(ring: Ring, q: SX, p: SX) -> Root | None:
+def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The two branches of a joint where a rigid link fits; None where no link asks for it."""
     for span in spans(ring, q, p):
         if len(span.chain.joints) == 1:
@@ -280,7 +282,7 @@ def _ends(span: Span) -> tuple[SX, SX]:
     return -(back.p + back.R @ span.target), after.p + after.R @ span.start
 
 
-def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> Root:
+def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> LoopBranches:
     def value(sign: int) -> SX:
         if joint.is_rotational:
             Z = (squared - square(m) - square(d)) / 2 - m[2] * d[2]
@@ -288,13 +290,15 @@ def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> Root:
         w = m + d
         return SX(sign * casadi.sqrt(squared - w[0] * w[0] - w[1] * w[1]) - w[2])
 
-    return Root({label: positions([joint], (value(sign),)) for label, sign in signed(joint)})
+    return LoopBranches(
+        {label: positions([joint], (value(sign),)) for label, sign in signed(joint)}
+    )
 
 
 # A free body as the only unknown joint: its position and quaternion follow from its pose.
 
 
-def free_body(ring: Ring, q: SX, p: SX) -> Root | None:
+def free_body(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The pose of a free body; None unless it alone is unknown."""
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.FREE or joint.index is None:
@@ -302,7 +306,7 @@ def free_body(ring: Ring, q: SX, p: SX) -> Root | None:
     pose = ring.gaps[0].pose
     pose = pose.inverse() if joint.sign > 0 else pose
     values = casadi.vertcat(pose.p, unit_quaternion(pose.R))
-    return Root({"": {joint.index + k: values[k] for k in range(7)}})
+    return LoopBranches({"": {joint.index + k: values[k] for k in range(7)}})
 
 
 # Three unknown revolute joints from orientations alone.
@@ -314,13 +318,15 @@ def free_body(ring: Ring, q: SX, p: SX) -> Root | None:
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
 
-def orientations(ring: Ring) -> Root:
+def orientations(ring: Ring) -> LoopBranches:
     """The two branches of a loop of three unknown revolute joints, as far as orientations go.
 
     Args:
         ring: its joints a, b, c; b is the one in the middle.
     """
-    return Root({label: _orientations_root(ring, sign) for label, sign in signed(ring.joints[1])})
+    return LoopBranches(
+        {label: _orientations_root(ring, sign) for label, sign in signed(ring.joints[1])}
+    )
 
 
 def _orientations_root(ring: Ring, sign: int) -> Positions:
@@ -345,7 +351,7 @@ def _orientations_root(ring: Ring, sign: int) -> Positions:
 # Source: Khalil & Creusot 1997, section 3.3; for RCCC loops Duffy 1980.
 
 
-def orientation(ring: Ring, q: SX, p: SX) -> Root | None:
+def orientation(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The revolute joints that orientations alone determine; None where there is none."""
     if any(joint.motion not in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints):
         return None
@@ -354,7 +360,9 @@ def orientation(ring: Ring, q: SX, p: SX) -> Root | None:
     match len(directions.joints):
         case 1 if not shared:
             (joint,) = directions.joints
-            return Root({"": positions([joint], [last_angle(in_plane(directions.gaps[0].pose.R))])})
+            return LoopBranches(
+                {"": positions([joint], [last_angle(in_plane(directions.gaps[0].pose.R))])}
+            )
         case 2 if len(shared) < 2:
             return _two_orientations(directions, shared)
         case 3 if not shared and _is_oriented(ring, revolute, q, p):
@@ -390,14 +398,14 @@ def _is_oriented(ring: Ring, revolute: Ring, q: SX, p: SX) -> bool:
     return len(ring.joints) == len(revolute.joints) + 3
 
 
-def _two_orientations(ring: Ring, shared: frozenset[str]) -> Root:
+def _two_orientations(ring: Ring, shared: frozenset[str]) -> LoopBranches:
     values: dict[int, SX] = {}
     for begun in (ring, ring.rotated(1)):
         joint, (R1, R2) = begun.joints[0], (gap.pose.R for gap in begun.gaps)
         if joint.name not in shared:
             revolute = angle_onto(R2[0:2, 2], R1[2, 0:2].T)
             values |= positions([joint], [revolute.value])
-    return Root({"": values})
+    return LoopBranches({"": values})
 
 
 # Prismatic joints alone, or with all rotations about one point: linear equations.
@@ -410,7 +418,7 @@ def _two_orientations(ring: Ring, shared: frozenset[str]) -> Root:
 _MOST = 3
 
 
-def prismatic(ring: Ring, q: SX, p: SX) -> Root | None:
+def prismatic(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The only displacements that close a loop; None where a rotation has a say in them."""
     number = sum(joint.motion is Motion.PRISMATIC for joint in ring.joints)
     if not 1 <= number <= _MOST:
@@ -424,7 +432,7 @@ def prismatic(ring: Ring, q: SX, p: SX) -> Root | None:
     return None
 
 
-def _prismatic_branches(ring: Ring, centre: Centre) -> Root:
+def _prismatic_branches(ring: Ring, centre: Centre) -> LoopBranches:
     """The prismatic joints that lead from the centre, the first one of the loop, back to it."""
     joints = ring.joints[centre.count :]
     poses = frames_at_zero(ring.gaps[centre.count :], Pose.translation(-centre.after))
@@ -432,7 +440,7 @@ def _prismatic_branches(ring: Ring, centre: Centre) -> Root:
     if centre.count:
         pose = pose @ ring.gaps[0].pose
     e = pose.p + pose.R @ centre.before
-    return Root({"": positions(joints, _combination(axes, -e))})
+    return LoopBranches({"": positions(joints, _combination(axes, -e))})
 
 
 def _combination(u: Sequence[SX], e: SX) -> list[SX]:
@@ -456,7 +464,7 @@ def _combination(u: Sequence[SX], e: SX) -> list[SX]:
 # may spin about u.
 
 
-def spin(ring: Ring, q: SX, p: SX) -> Root | None:
+def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The orientation of a rod that spins; None where more than its two joints is unknown.
 
     Args:
@@ -472,7 +480,7 @@ def spin(ring: Ring, q: SX, p: SX) -> Root | None:
     return None
 
 
-def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> Root:
+def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
     before, after = ring.gaps[0].pose.inverse().p, ring.gaps[1].pose.p
     u, w = (after, before) if joint.sign > 0 else (before, after)
     u, w = u / casadi.norm_2(u), w / casadi.norm_2(w)
@@ -487,7 +495,7 @@ def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> Root:
     given = q[joint.index : joint.index + 4]
     left = _product(casadi.vertcat(shortest[0], -shortest[1:4]), given)
     angle = 2 * casadi.atan2(casadi.dot(u, left[1:4]), left[0])
-    return Root({"": path}, RodSpin(joint.spin.index, SX(angle)))
+    return LoopBranches({"": path}, RodSpin(joint.spin.index, SX(angle)))
 
 
 def _shortest_rotation(a: SX, b: SX) -> SX:
@@ -562,7 +570,7 @@ def _span_normal(a: Sequence[SX]) -> SX:
     return a[0] if len(a) == 1 else cross(a[0], a[1])
 
 
-def point_on_links(name: str, spans: Sequence[Span]) -> Root:
+def point_on_links(name: str, spans: Sequence[Span]) -> LoopBranches:
     """The two positions of a point that rigid links hold.
 
     Args:
@@ -580,7 +588,7 @@ def point_on_links(name: str, spans: Sequence[Span]) -> Root:
     for label, sign in (("+", 1), ("-", -1)):
         point = base + along * ((sign * root - B) / A)
         branches[f"{name}:{label}"] = {index: point[k] for k, index in enumerate(indices)}
-    return Root(branches)
+    return LoopBranches(branches)
 
 
 def _sphere(span: Span, indices: Sequence[int]) -> _Sphere:
@@ -626,7 +634,7 @@ class _Axes:
     after: SX
 
 
-def bennett(ring: Ring, q: SX, p: SX) -> Root | None:
+def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The only branch of a loop of three unknown revolute joints and a known one, or None."""
     revolute = all(joint.motion is Motion.REVOLUTE for joint in ring.joints)
     if len(ring.joints) != 3 or not revolute:
@@ -637,7 +645,7 @@ def bennett(ring: Ring, q: SX, p: SX) -> Root | None:
         if len(known) == 1 and not any(gap.pivots for gap in begun.gaps[1:]):
             branches = _closing(begun, known[0], q, p)
             if len(branches) == 1:
-                return Root(
+                return LoopBranches(
                     {"": positions(ring.rotated(first).joints, [t.value for t in branches[0]])}
                 )
     return None

@@ -13,8 +13,8 @@ from casadi import DM, SX
 
 from mbs.closed_forms.paul import paul
 from mbs.closed_forms.ring import closed_samples
-from mbs.closed_forms.roots import Root
-from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
+from mbs.closed_forms.roots import LoopBranches
+from mbs.closed_forms.sequence import Leaf, Problem, SequenceStep, StepSequence
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
 from mbs.recursions.chain import ChainJoint, Gap, Ring
@@ -25,7 +25,7 @@ _ENOUGH = 3
 _AXES = Pose.rotation(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
 
 
-def split(ring: Ring, q: SX, p: SX) -> Root | str:
+def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
     """The ways to find the revolute and prismatic joints of a loop, or why there is none.
 
     A spherical joint counts as three revolute joints, of which nothing is asked. The label of a way
@@ -83,19 +83,19 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
     return Problem(own, x, given, [(sample.x, sample.given) for sample in samples])
 
 
-def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> Root:
+def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
     indices = {k: joint.index for k, joint in enumerate(ring.joints) if joint.index is not None}
     needed = _up_to(sequence, set(indices))
     branches = dict[str, dict[int, SX]]()
     for branch, leaf in enumerate(needed.leaves(problem.given)):
         x = _where_real(leaf)
         branches[needed.label(branch)] = {index: SX(x[k]) for k, index in indices.items()}
-    return Root(branches)
+    return LoopBranches(branches)
 
 
 def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
     """The first steps, until they have given what is asked for."""
-    steps = list[Step]()
+    steps = list[SequenceStep]()
     for step in sequence.steps:
         if target:
             steps.append(step)

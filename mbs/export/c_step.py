@@ -156,7 +156,7 @@ _EXAMPLE = """\
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class StepTexts:
     """The texts of a system's motion.
 
     Attributes:
@@ -170,7 +170,7 @@ class Step:
     example: str
 
 
-def step_texts(system: System, name: str, library: str, real: Real, mark: str) -> Step:
+def step_texts(system: System, name: str, library: str, real: Real, mark: str) -> StepTexts:
     """The C of the motion of a system.
 
     Args:
@@ -203,7 +203,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
     sizes = _sizes(system, state, variables, work)
     words = {"name": name, "upper": name.upper(), "real": f"{library}_real", "library": library}
     title = in_c_comment(system.name)
-    return Step(
+    return StepTexts(
         _header(system, variables, sizes, {**words, "title": title}),
         "\n".join(
             [

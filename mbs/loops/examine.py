@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, require_system
-from mbs.assembly.validity import Row
+from mbs.assembly.validity import ValidityRow
 from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters, row_sizes
 from mbs.loops.closure import closure_rows
@@ -121,7 +121,7 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
         )
 
 
-def loop_rows(system: System, q: SX) -> list[Row]:
+def loop_rows(system: System, q: SX) -> list[ValidityRow]:
     """What a configuration of closed loops must fulfil for models in the independent joints.
 
     Args:
@@ -130,8 +130,8 @@ def loop_rows(system: System, q: SX) -> list[Row]:
     """
     _, leads, opening = configuration_health(system)(q, system.p)
     return [
-        Row("open", "opening of the loops", opening, OPEN, "the loops are open"),
-        Row(
+        ValidityRow("open", "opening of the loops", opening, OPEN, "the loops are open"),
+        ValidityRow(
             "undetermined",
             "hold of the independent joints, negative",
             -leads,

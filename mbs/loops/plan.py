@@ -30,7 +30,7 @@ from mbs.closed_forms.ring import (
     ring_of,
     spin_indices,
 )
-from mbs.closed_forms.roots import Root
+from mbs.closed_forms.roots import LoopBranches
 from mbs.closed_forms.spatial import (
     Span,
     coupled_position,
@@ -406,7 +406,7 @@ def _coupling_stage(work: _Work, coupling: CoordinateCoupling) -> Stage | str | 
     return root if isinstance(root, str) else _stage(work, coupling.name, root)
 
 
-def _stage(work: _Work, name: str, root: Root) -> Stage:
+def _stage(work: _Work, name: str, root: LoopBranches) -> Stage:
     arguments, branches = [work.q, work.system.p], list(root.branches.values())
     indices = tuple(sorted(branches[0]))
     columns = [casadi.vertcat(*(branch[index] for index in indices)) for branch in branches]

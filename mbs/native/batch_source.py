@@ -9,7 +9,7 @@ from itertools import accumulate
 import casadi
 from casadi import Function
 
-from mbs.native.c_code import Batch, BlockCode, LaneCode, blocks, schedule, slots
+from mbs.native.c_code import BlockCode, LaneCode, SinCosGroup, blocks, schedule, slots
 from mbs.native.kernel import BLOCK, HEADERS
 from mbs.operations.graph import Graph, graph_of
 
@@ -72,7 +72,9 @@ def batch_source(
     graph = graph_of(function)
     pieces = blocks(graph, schedule(graph), block)
     where = slots(graph, pieces)
-    angles = sum(len(step.angles) for steps in pieces for step in steps if isinstance(step, Batch))
+    angles = sum(
+        len(step.angles) for steps in pieces for step in steps if isinstance(step, SinCosGroup)
+    )
     sincos = "mbs_sincos_wide" if angles <= _INLINE else "mbs_sincos_wide_call"
     code: BlockCode = _States(graph, where, sincos, [False] * len(graph.inputs))
     taken = [port.sparsity.nnz() for port in graph.inputs]

@@ -21,10 +21,10 @@ from casadi import Function, Sparsity
 from mbs.errors import ModelError
 from mbs.native.c_code import (
     LANES,
-    Batch,
     BlockCode,
     LaneCode,
     Memory,
+    SinCosGroup,
     Step,
     blocks,
     gives,
@@ -290,7 +290,7 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     every = [steps for some in pieces for steps in some]
     columns, elsewhere = direct_columns(graph, maps, function.n_out())
     where = slots(graph, every, {port: begins[k] for port, k in late.items()}, elsewhere)
-    batches = sum(isinstance(step, Batch) for steps in every for step in steps)
+    batches = sum(isinstance(step, SinCosGroup) for steps in every for step in steps)
     code = BlockCode(graph, where, "mbs_sincos8" if batches <= _INLINE else "mbs_sincos8_call")
     memory = Memory(function, graph, where.count)
     sources = []

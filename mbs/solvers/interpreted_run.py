@@ -9,7 +9,15 @@ import numpy.typing as npt
 
 from mbs.errors import Interrupted, SolverError
 from mbs.solvers.dopri5 import Dopri5
-from mbs.solvers.problem import Event, EventMotion, Failure, Problem, failed, fired_of, interrupted
+from mbs.solvers.problem import (
+    Event,
+    EventMotion,
+    Failure,
+    IntegrationProblem,
+    failed,
+    fired_of,
+    interrupted,
+)
 from mbs.solvers.rodas import Rodas
 from mbs.solvers.stepper import EPSILON, Array, Projection, Stepper, Table
 
@@ -287,7 +295,7 @@ shortened."""
 _CHUNK = 50  # steps between two calls of progress
 
 
-def run_interpreted(problem: Problem, progress: Progress | None) -> EventMotion:
+def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> EventMotion:
     """The motion at the times of a problem, as far as it comes.
 
     Args:
@@ -322,7 +330,7 @@ def _vector(value: casadi.DM) -> Array:
     return np.asarray(value.full()[:, 0])
 
 
-def _stepper(problem: Problem, p: Array) -> Stepper:
+def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     functions, start, state = problem.equations, float(problem.times[0]), problem.x0
     project = _projection(problem, p)
     control = problem.rtol, problem.atol, problem.max_step
@@ -349,7 +357,7 @@ def _begun(solver: Stepper) -> Array:
         raise failed(solver.t, 0.0, str(failure), state=solver.x.tolist()) from failure
 
 
-def _projection(problem: Problem, p: Array) -> Projection | None:
+def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
     """Newton steps until the constraints hold to rounding."""
     step = problem.equations.project
     if step is None:
@@ -371,7 +379,7 @@ def _projection(problem: Problem, p: Array) -> Projection | None:
     return onto
 
 
-def _watched(problem: Problem, p: Array, solver: Stepper) -> EventStepper | None:
+def _watched(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepper | None:
     """The integration with its events, which has looked at the first state."""
     functions, project = problem.equations, solver.project
     indicators, rates, jump = functions.indicators, functions.rates, functions.jump

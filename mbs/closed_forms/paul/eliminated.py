@@ -21,15 +21,15 @@ from mbs.closed_forms.paul.linear import (
     row_factors,
     row_values,
 )
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, angle_step, unsteady
+from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, angle_step, unsteady
 from mbs.closed_forms.paul.splits import Variable
-from mbs.closed_forms.sequence import Step
+from mbs.closed_forms.sequence import SequenceStep
 
 _MOST = 2
 _ROWS = 8
 
 
-def eliminated(stage: Stage) -> Iterator[Candidate]:
+def eliminated(stage: PaulStage) -> Iterator[Candidate]:
     """Steps of type 2 from several linear equations."""
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(e.variables for e in rows if len(e.variables) > 1):
@@ -44,7 +44,7 @@ def eliminated(stage: Stage) -> Iterator[Candidate]:
 
 
 def _of(
-    stage: Stage, rows: list[Equation], variable: Variable, others: Variables
+    stage: PaulStage, rows: list[Equation], variable: Variable, others: Variables
 ) -> Iterator[Candidate]:
     width = len(columns(others))
     for chosen in combinations(rows, width + 1):
@@ -61,7 +61,7 @@ def _of(
             continue
         cost = float(sum(row.cost for row in chosen))
 
-        def build(chosen: tuple[Equation, ...] = chosen) -> Step:
+        def build(chosen: tuple[Equation, ...] = chosen) -> SequenceStep:
             return _built(stage, chosen, variable, others)
 
         # after the equations in one unknown, 4 and 5, and before the pairs of equations, 6
@@ -80,7 +80,9 @@ def _minors(K: Matrix) -> Matrix:
     return np.stack(values, axis=-1)
 
 
-def _built(stage: Stage, rows: tuple[Equation, ...], variable: Variable, others: Variables) -> Step:
+def _built(
+    stage: PaulStage, rows: tuple[Equation, ...], variable: Variable, others: Variables
+) -> SequenceStep:
     K = [row_factors(stage, row, others)[:-1] for row in rows]
     own = [row_factors(stage, row, (variable,)) for row in rows]
     X, Y, Z = (

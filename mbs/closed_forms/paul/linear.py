@@ -16,9 +16,9 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.closed_forms.paul.equation import Equation, Key
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, divided, unsteady
+from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, divided, unsteady
 from mbs.closed_forms.paul.splits import Variable
-from mbs.closed_forms.sequence import Found, Step, angle_of, step
+from mbs.closed_forms.sequence import Found, SequenceStep, angle_of, step
 from mbs.numbers import NONZERO
 from mbs.solvers.rank import graded
 
@@ -32,7 +32,7 @@ _CHOICES = 8
 _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
 
-def linear(stage: Stage) -> Iterator[Candidate]:
+def linear(stage: PaulStage) -> Iterator[Candidate]:
     """Steps that solve as many linear equations as there are columns."""
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(equation.variables for equation in rows):
@@ -41,7 +41,9 @@ def linear(stage: Stage) -> Iterator[Candidate]:
         order = 3.0 if sums else float(min(len(variables), 2))
         for chosen, rank in _best(inside, variables):
 
-            def build(chosen: tuple[Equation, ...] = chosen, v: Variables = variables) -> Step:
+            def build(
+                chosen: tuple[Equation, ...] = chosen, v: Variables = variables
+            ) -> SequenceStep:
                 return _built(stage, chosen, v)
 
             yield Candidate((order, *rank), variables, build)
@@ -72,7 +74,7 @@ def row_values(equation: Equation, variables: Variables) -> Matrix:
     return np.stack(np.broadcast_arrays(*values), axis=-1)
 
 
-def row_factors(stage: Stage, equation: Equation, variables: Variables) -> list[SX]:
+def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> list[SX]:
     """The coefficients, then the constant."""
     factors = list[SX]()
     for variable in variables:
@@ -109,7 +111,7 @@ def _best(
     return sorted(choices, key=lambda choice: choice[1])[:_CHOICES]
 
 
-def _built(stage: Stage, rows: tuple[Equation, ...], variables: Variables) -> Step:
+def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -> SequenceStep:
     """The step by Cramer's rule."""
     table = [row_factors(stage, row, variables) for row in rows]
     A = casadi.vertcat(*(casadi.horzcat(*row[:-1]) for row in table))
@@ -149,7 +151,9 @@ def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
     return SX(casadi.det(A)), numerators
 
 
-def _text(stage: Stage, table: list[list[SX]], variables: Variables) -> tuple[dict[str, SX], str]:
+def _text(
+    stage: PaulStage, table: list[list[SX]], variables: Variables
+) -> tuple[dict[str, SX], str]:
     named, lines = dict[str, SX](), list[str]()
     for letter, row in zip(_letters(len(table)), table, strict=True):
         pieces, right = list[str](), "0"

@@ -13,10 +13,10 @@ from casadi import SX
 from mbs.closed_forms.paul.eliminated import eliminated
 from mbs.closed_forms.paul.equation import PRODUCTS, equations, ring_matrices
 from mbs.closed_forms.paul.linear import linear
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, one_unknown
+from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, one_unknown
 from mbs.closed_forms.paul.splits import Knowledge, Variable, beginning
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
-from mbs.closed_forms.sequence import ZERO, Found, Problem, Step, StepSequence, step
+from mbs.closed_forms.sequence import ZERO, Found, Problem, SequenceStep, StepSequence, step
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
 from mbs.recursions.chain import Gap, Ring
@@ -25,11 +25,11 @@ from mbs.spatial import Pose, vector
 # The last angle of a sum that is known.
 
 
-def sums(stage: Stage) -> Iterator[Candidate]:
+def sums(stage: PaulStage) -> Iterator[Candidate]:
     """Steps that take known angles away from a known sum, or one sum away from another."""
     for rest, value, text in _alone(stage):
 
-        def build(rest: Variable = rest, value: SX = value, text: str = text) -> Step:
+        def build(rest: Variable = rest, value: SX = value, text: str = text) -> SequenceStep:
             turns = casadi.floor((value + casadi.pi) / (2 * casadi.pi))
             found = Found({stage.knowledge.index(rest): SX(value - 2 * casadi.pi * turns)})
             return step(stage.knowledge.problem, "sum", text, {}, found)
@@ -37,7 +37,7 @@ def sums(stage: Stage) -> Iterator[Candidate]:
         yield Candidate((0.0,), (rest,), build)
 
 
-def _alone(stage: Stage) -> Iterator[tuple[Variable, SX, str]]:
+def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
     """Single angles, their values, and the equation."""
     knowledge = stage.knowledge
     opened = [
@@ -135,12 +135,12 @@ def paul(problem: Problem) -> StepSequence:
     """
     _require_simple(problem)
     knowledge = beginning(problem, at_feet(problem))
-    loop, steps = ring_matrices(knowledge.ring), list[Step]()
+    loop, steps = ring_matrices(knowledge.ring), list[SequenceStep]()
     while knowledge.unknown:
-        stage = Stage(knowledge, loop, equations(knowledge))
+        stage = PaulStage(knowledge, loop, equations(knowledge))
         candidate = _cheapest(stage)
         if candidate is None and knowledge.sums:
-            stage = Stage(knowledge, loop, equations(knowledge, PRODUCTS + 1))
+            stage = PaulStage(knowledge, loop, equations(knowledge, PRODUCTS + 1))
             candidate = _cheapest(stage)
         if candidate is None:
             raise NoClosedForm(_refusal(stage, steps))
@@ -151,7 +151,7 @@ def paul(problem: Problem) -> StepSequence:
     return StepSequence(problem.size, tuple(steps))
 
 
-def _cheapest(stage: Stage) -> tuple[Step, tuple[Variable, ...]] | None:
+def _cheapest(stage: PaulStage) -> tuple[SequenceStep, tuple[Variable, ...]] | None:
     """The step of the fewest operations among the first of the simplest kind."""
     for kernels in _KERNELS:
         every = [
@@ -177,7 +177,7 @@ def _require_simple(problem: Problem) -> None:
             )
 
 
-def _refusal(stage: Stage, steps: Sequence[Step]) -> str:
+def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
     """Which joints are left, and what the simplest equations in them are like."""
     knowledge = stage.knowledge
     left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
@@ -186,7 +186,7 @@ def _refusal(stage: Stage, steps: Sequence[Step]) -> str:
     return f"no equation gives {left}{after}: {_simplest(stage)}"
 
 
-def _simplest(stage: Stage) -> str:
+def _simplest(stage: PaulStage) -> str:
     if not stage.equations:
         return "every equation of every split of the loop has more than two unknowns"
     groups = dict.fromkeys(

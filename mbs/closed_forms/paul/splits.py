@@ -49,7 +49,7 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class LoopSamples:
     """The loop in numbers, lengths divided by one of its own.
 
     Attributes:
@@ -75,7 +75,7 @@ class Knowledge:
 
     problem: Problem
     ring: Ring
-    samples: Samples
+    samples: LoopSamples
     known: frozenset[int] = frozenset()
     sums: tuple[tuple[Variable, int], ...] = ()
 
@@ -139,7 +139,7 @@ def beginning(problem: Problem, ring: Ring) -> Knowledge:
     return Knowledge(problem, ring, _samples(problem, ring))
 
 
-def _samples(problem: Problem, ring: Ring) -> Samples:
+def _samples(problem: Problem, ring: Ring) -> LoopSamples:
     stacked = casadi.vertcat(*(gap.pose.matrix for gap in ring.gaps))
     function = Function("gaps", [problem.given], [casadi.densify(stacked)])
     n, indices = len(ring.joints), [joint.index or 0 for joint in ring.joints]
@@ -148,7 +148,7 @@ def _samples(problem: Problem, ring: Ring) -> Samples:
     length = float(np.mean(np.linalg.norm(gaps[..., :3, 3], axis=-1))) or 1.0
     gaps[..., :3, 3] /= length
     slides = [not joint.is_rotational for joint in ring.joints]
-    return Samples(gaps, np.where(slides, q / length, q))
+    return LoopSamples(gaps, np.where(slides, q / length, q))
 
 
 # Rigid transforms as 15 x 15 matrices that act on the invariants of a point and a line.
@@ -261,7 +261,7 @@ class Side:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Split:
+class FrameSplit:
     """The equations of two frames: left = right, row by row.
 
     Attributes:
@@ -293,7 +293,7 @@ class _Pieces:
     slides: frozenset[int]
 
 
-def splits(knowledge: Knowledge) -> Iterator[Split]:
+def splits(knowledge: Knowledge) -> Iterator[FrameSplit]:
     """Every split of the loop whose sides have few unknown joints each."""
     whole = _pieces(knowledge, slice(0, SIZE))
     turning = _pieces(knowledge, _DIRECTION)
@@ -309,7 +309,7 @@ def splits(knowledge: Knowledge) -> Iterator[Split]:
 
 def _of_end(
     pieces: _Pieces, seed: Matrix, joint: tuple[int, bool], end: tuple[int, int]
-) -> Iterator[Split]:
+) -> Iterator[FrameSplit]:
     """The splits that look at one frame.
 
     Args:
@@ -330,7 +330,7 @@ def _of_end(
         for column in range(seed.shape[1]):
             sides = (Side(s.joints, s.values[:, :, column]) for s in (side, other))
             rows = _rows(axis, start, start // 2 in pieces.slides)
-            yield Split(start, point, axis + column, rows, *sides)
+            yield FrameSplit(start, point, axis + column, rows, *sides)
 
 
 def _rows(axis: int, start: int, slides: bool) -> tuple[int, ...]:
@@ -438,7 +438,7 @@ _MOST_JOINTS = 4
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Where an equation comes from: see `Split`.
+    """Where an equation comes from: see `FrameSplit`.
 
     Attributes:
         start: the frame from which one looks.
@@ -459,7 +459,7 @@ class Row:
 
 
 def simple_rows(
-    split: Split, slides: frozenset[int], most: int
+    split: FrameSplit, slides: frozenset[int], most: int
 ) -> Iterator[tuple[Row, dict[Members, Values]]]:
     """The rows that may have few unknowns, and their terms.
 

@@ -19,9 +19,15 @@ import numpy as np
 from casadi import SX
 
 from mbs.closed_forms.paul.equation import Equation, Key
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, angle_step, length_step, unsteady
+from mbs.closed_forms.paul.one_unknown import (
+    Candidate,
+    PaulStage,
+    angle_step,
+    length_step,
+    unsteady,
+)
 from mbs.closed_forms.paul.splits import Variable
-from mbs.closed_forms.sequence import Found, Step, real_quartic, step, trigonometric_quartic
+from mbs.closed_forms.sequence import Found, SequenceStep, real_quartic, step, trigonometric_quartic
 
 _SMALL = 1e-7
 """Factors and shares below it, of equations whose coefficients are of about one, count as zero:
@@ -71,7 +77,7 @@ class _Pair:
         return self.rows[0].variables[self.stays]
 
 
-def two_unknowns(stage: Stage) -> Iterator[Candidate]:
+def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
     """Steps that give one of two unknowns."""
     groups = dict[tuple[Variable, ...], list[Equation]]()
     for equation in stage.equations:
@@ -96,7 +102,7 @@ def _fits(row: Equation, stays: int) -> bool:
     )
 
 
-def _candidate(stage: Stage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
+def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
     forms = [_form_of_values(row, stays) for row in rows]
     power = _common_power(forms)
     if power is None:
@@ -194,7 +200,7 @@ def _size(G: list[Complex], slides: bool) -> Numbers:
     return [constant, 2 * first[0], -2 * first[1], 2 * second[0], -2 * second[1]]
 
 
-def _built(stage: Stage, pair: _Pair, shares: Any) -> Step:
+def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
     """The step."""
 
     def forms(row: Equation) -> _Form:
@@ -229,7 +235,7 @@ def _kind(pair: _Pair) -> str:
     return "type 6" if plain else "type 7"
 
 
-def _quartic(stage: Stage, variable: Variable, F: list[SX], unit: int) -> Step:
+def _quartic(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
     """The step with four roots."""
     number, shown = stage.number(variable), stage.term(variable)
     signs = SX.sym("sign", 2)

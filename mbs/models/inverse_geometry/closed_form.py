@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
-from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
+from mbs.closed_forms.sequence import Leaf, Problem, SequenceStep, StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.numbers import NONZERO
@@ -255,7 +255,7 @@ class InverseGeometry(ModelFunction):
         return tuple(self._sequence.label(b) for b in range(self.branches))
 
     @property
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> tuple[SequenceStep, ...]:
         """The equations in the order in which they are solved."""
         return tuple(self._sequence.steps)
 

@@ -10,7 +10,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.closed_forms.sequence import Problem, Step, StepSequence
+from mbs.closed_forms.sequence import Problem, SequenceStep, StepSequence
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain
 from mbs.models.inverse_geometry.closed_form import sequence_of
 from mbs.operations import simplify
@@ -214,7 +214,7 @@ def _head(chain: FrameChain, sequence: StepSequence) -> Iterator[str]:
     yield f"steps: {len(sequence.steps)}, branches: {sequence.branches}"
 
 
-def _sheet(number: int, one: Step, problem: Problem) -> Iterator[str]:
+def _sheet(number: int, one: SequenceStep, problem: Problem) -> Iterator[str]:
     yield f"{number}. {', '.join(one.names)}: {one.kind}"
     yield f"   {one.equation}"
     for name in one.signs:

@@ -131,7 +131,7 @@ def khalil_frames(
     home: dict[int, int] = {0: -1}
     base = {0: Pose.identity()}
     stubs: dict[int, int] = {}
-    for branch in (*spanning.branches, *_kept(spanning)):
+    for branch in (*spanning.branches, *_keep(spanning)):
         last, pose = _extend(drafts, base, home[branch.parent], branch)
         if branch.child < 0:
             stubs[id(branch.edge)] = last
@@ -172,7 +172,7 @@ def khalil_frames(
     return Framed(tree, tuple(draft.joint for draft in drafts), tuple(cuts), homes)
 
 
-def _kept(spanning: SpanningTree) -> list[Branch]:
+def _keep(spanning: SpanningTree) -> list[Branch]:
     """Cut joints with a motor, friction or a rotor: they stay, and their free end is welded."""
     return [Branch(edge, edge.a, -1, True) for edge in spanning.cuts if edge.joint.carries_effort]
 
@@ -191,7 +191,7 @@ def _extend(
     given = edge.khalil if branch.forward and nodes[branch.parent].is_identity() else None
     freedoms = edge.joint.freedoms if branch.forward else edge.joint.freedoms[::-1]
     for freedom in freedoms:
-        aligned = _aligned(freedom, branch.forward)
+        aligned = _align(freedom, branch.forward)
         drafts.append(
             _DescribedLink(
                 freedom.coordinate_of(edge.joint.name),
@@ -241,7 +241,7 @@ def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chose
     return chosen
 
 
-def _aligned(freedom: Freedom, forward: bool) -> Pose:
+def _align(freedom: Freedom, forward: bool) -> Pose:
     """The frame with z along the axis of a freedom, reversed when the joint is run backwards."""
     if freedom.motion not in _ALONG_Z:
         return Pose.identity()

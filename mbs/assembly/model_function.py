@@ -174,7 +174,7 @@ class ModelFunction(Function):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds the System too, so that names, defaults and checks go with it."""
-        return _unpickled, (self.serialize(), self._system, self._check_configuration)
+        return _unpickle, (self.serialize(), self._system, self._check_configuration)
 
     def __deepcopy__(self, dummy: Any = None) -> ModelFunction:
         """Itself: a Function never changes."""
@@ -438,7 +438,7 @@ def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | Non
     return full if full.shape[0] == rows else None
 
 
-def _unpickled(data: str, system: System, check: ConfigurationCheck | None) -> ModelFunction:
+def _unpickle(data: str, system: System, check: ConfigurationCheck | None) -> ModelFunction:
     return ModelFunction(Function.deserialize(data), system, check=check)
 
 

@@ -98,7 +98,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         bodies=_bodies(mechanism, graph, framed),
         frames=frames,
         named_frames=tuple(mechanism.frames),
-        numbered=_numbered(mechanism, frames, len(framed.tree.links)),
+        numbered=_number(mechanism, frames, len(framed.tree.links)),
         loops=_loop_rows(mechanism, framed),
         configuration=tuple(zero_position(framed.tree)),
         forces=attached_forces(mechanism, places, (coordinates, speeds, cut), symbols),
@@ -252,7 +252,7 @@ def _shapes(
     return tuple(rows)
 
 
-def _numbered(
+def _number(
     mechanism: Mechanism, frames: Mapping[str, tuple[int, Pose]], links: int
 ) -> dict[int, str]:
     """The bodies of the frames of a table, where their numbers are not those of the links."""

@@ -165,7 +165,7 @@ def symbolic(system: System, what: Sequence[str]) -> System:
             is an expression of other symbols already.
     """
     require_system(system)
-    rows = _chosen(system, _names(system, what))
+    rows = _choose(system, _names(system, what))
     _check_welds(system, rows)
     taken = {parameter.name for parameter in system.parameters}
     for row in rows:
@@ -192,7 +192,7 @@ def _names(system: System, what: Sequence[str]) -> list[str]:
     return names
 
 
-def _chosen(system: System, names: Sequence[str]) -> list[Adjustable]:
+def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
     """The numbers with these names or in these groups, in the order of the system."""
     rows = adjustables(system)
     single = {row.name: row for row in rows}

@@ -326,7 +326,7 @@ def _part(
     mechanism: Mechanism, joint: Joint, places: Places, symbols: Mapping[str, SX]
 ) -> WeldedPart | None:
     """The side of a weld that is not the world; None where both sides are welded elsewhere."""
-    sides = {port: _welded(mechanism, joint, port) for port in "ab"}
+    sides = {port: _weld(mechanism, joint, port) for port in "ab"}
     if (joint.name, "a") in sides["b"]:
         return None
     side, sign = ("a", -1) if (mechanism.world.name, "") in sides["b"] else ("b", 1)
@@ -341,7 +341,7 @@ def _part(
     return WeldedPart(frozenset(sides[side]), inertia, sign)
 
 
-def _welded(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:
+def _weld(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:
     """What is welded to one frame of a joint other than through the joint, in the order found."""
     found: dict[Port, None] = {(joint.name, port): None}
     queue = deque(found)
@@ -469,10 +469,10 @@ def attached_forces(
         AssemblyError: one acts on nothing that is there, or on nothing that moves.
     """
     forces = force_elements(mechanism)
-    return tuple(_attached(mechanism, force, places, tables, symbols) for force in forces)
+    return tuple(_attach(mechanism, force, places, tables, symbols) for force in forces)
 
 
-def _attached(
+def _attach(
     mechanism: Mechanism,
     force: ForceElement,
     places: Places,

@@ -165,14 +165,14 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 def gap_samples(ring: Ring, q: SX, p: SX) -> list[list[Matrix]]:
     """At some random positions and parameters the (4, 4) pose of every gap."""
-    return [[np.array(DM(T)) for T in values] for values in _evaluated(_matrices(ring.gaps), q, p)]
+    return [[np.array(DM(T)) for T in values] for values in _evaluate(_matrices(ring.gaps), q, p)]
 
 
 def _matrices(gaps: Iterable[Gap]) -> list[SX]:
     return [gap.pose.matrix for gap in gaps]
 
 
-def _evaluated(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
+def _evaluate(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
     rng = np.random.default_rng(_SURVEY_SEED)
     function = Function("samples", [q, p], values)
     return [
@@ -208,13 +208,13 @@ def parallel(pose: Pose, q: SX, p: SX) -> bool:
 
 def always_zero(values: SX, q: SX, p: SX) -> bool:
     """Whether every element is zero whatever the positions and parameters."""
-    samples = [np.array(value).ravel() for (value,) in _evaluated([values], q, p)]
+    samples = [np.array(value).ravel() for (value,) in _evaluate([values], q, p)]
     return all(bool(np.all(np.abs(sample) < _CLOSE)) for sample in samples)
 
 
 def constants(values: SX, q: SX, p: SX) -> list[float | None]:
     """Each element that is the same whatever the positions and parameters; None for the others."""
-    samples = np.array([np.array(value).ravel() for (value,) in _evaluated([values], q, p)])
+    samples = np.array([np.array(value).ravel() for (value,) in _evaluate([values], q, p)])
     same = np.all(np.abs(samples - samples[0]) < _CLOSE, axis=0)
     return [float(x) if fixed else None for x, fixed in zip(samples[0], same, strict=True)]
 

@@ -196,8 +196,8 @@ class StepSequence:
         leaf, first = self._start(), 0
         for step in self.steps:
             chosen = s[first : first + len(step.signs)]
-            leaf, first = _taken(leaf, step, given, chosen), first + len(step.signs)
-        return self._cropped(leaf)
+            leaf, first = _take(leaf, step, given, chosen), first + len(step.signs)
+        return self._crop(leaf)
 
     def leaves(self, given: SX) -> list[Leaf]:
         """The configurations of all branches in order; what they share is computed once."""
@@ -205,20 +205,20 @@ class StepSequence:
         for step in self.steps:
             choices = list(itertools.product((1, -1), repeat=len(step.signs)))
             leaves = [
-                _taken(leaf, step, given, SX(casadi.DM(choice)))
+                _take(leaf, step, given, SX(casadi.DM(choice)))
                 for leaf in leaves
                 for choice in choices
             ]
-        return [self._cropped(leaf) for leaf in leaves]
+        return [self._crop(leaf) for leaf in leaves]
 
     def _start(self) -> Leaf:
         return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
 
-    def _cropped(self, leaf: Leaf) -> Leaf:
+    def _crop(self, leaf: Leaf) -> Leaf:
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
-def _taken(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
+def _take(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
     """The configuration with one more step."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)

@@ -211,7 +211,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
                 *_tables(system, state, variables, real),
                 "\n" + NOINLINE,
                 code,
-                *(_shared(file) for file in ("closure.h", "closure.c", "watch.h", "watch.c")),
+                *(_share(file) for file in ("closure.h", "closure.c", "watch.h", "watch.c")),
                 (resources.files("mbs.export") / "c" / "step.c").read_text(encoding="utf-8"),
             ]
         ),
@@ -379,7 +379,7 @@ def _places(name: str, values: Sequence[int]) -> str:
     return f"static const int {name}[] = {{{', '.join(map(str, values)) or '0'}}};"
 
 
-def _shared(file: str) -> str:
+def _share(file: str) -> str:
     """A file that FMUs have too; what it includes of theirs stands before it here."""
     folder = resources.files("mbs.export.fmu") / "c"
     lines = (folder / file).read_text(encoding="utf-8").splitlines()

@@ -504,10 +504,10 @@ def _by_rules(
     if check.agrees and symbolic and not system.is_closed:
         doubt = checked_elsewhere(system, sample.columns, grouping, order, structure)
         return grouping, doubt or check
-    return _completed(sample, grouping, check, order, symbolic=symbolic)
+    return _complete(sample, grouping, check, order, symbolic=symbolic)
 
 
-def _completed(
+def _complete(
     sample: RegressorSample,
     grouping: Grouping,
     check: Check,

@@ -75,7 +75,7 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
         lines += ["", *_residuals(f"Errors, {title}", residuals)]
     remarks = [
         *_fit(estimate.residuals),
-        *_dropped(observations),
+        *_drop(observations),
         *_excitation(estimate),
         *_consistency(estimate),
         *_signs(estimate),
@@ -147,7 +147,7 @@ def _fit(residuals: Residuals) -> list[str]:
     ]
 
 
-def _dropped(observations: Observations) -> list[str]:
+def _drop(observations: Observations) -> list[str]:
     if not observations.dropped:
         return []
     rows = len(observations.time)

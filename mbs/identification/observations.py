@@ -310,11 +310,11 @@ def observe(regressor: Any, samples: Samples) -> Observations:
             singular configurations.
     """
     keep = led_samples(regressor, samples)
-    full = replace(_observed(regressor, samples), dropped=int(np.sum(~keep)))
+    full = replace(_observe(regressor, samples), dropped=int(np.sum(~keep)))
     return full if keep.all() else full.at(samples.time[keep])
 
 
-def _observed(regressor: Any, samples: Samples) -> Observations:
+def _observe(regressor: Any, samples: Samples) -> Observations:
     """Every instant; next to singular configurations the regressor is on straight lines."""
     return Observations(
         samples.time,
@@ -352,7 +352,7 @@ def observe_filtered(
     passed = [] if samples.bandwidth is None else [samples.bandwidth]
     if not passed + further:
         raise ModelError("observations: the samples were not filtered; give a bandwidth in Hz")
-    full, rate = _observed(regressor, samples), samples.rate
+    full, rate = _observe(regressor, samples), samples.rate
     narrowest = min(passed + further)
     step = max(round(rate / (KEPT_RATE * narrowest)), 1)
     ends = int(np.ceil(_SETTLED * rate / narrowest))
@@ -541,7 +541,7 @@ def _dynamic(system: System, samples: Samples, bandwidth: float, options: Any) -
     return observe_filtered(regressor(system, **options), samples)
 
 
-def _filtered(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
+def _filter(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
     """Momenta behind a filter whose corner is the bandwidth; no accelerations."""
     return observe_momentum(filtered_regressor(system, **options), samples, 2 * np.pi * bandwidth)
 
@@ -553,7 +553,7 @@ def _energy(system: System, samples: Samples, bandwidth: float, options: Any) ->
 
 
 EQUATIONS: Mapping[str, Callable[[System, Samples, float, Any], Observations]] = MappingProxyType(
-    {"dynamic": _dynamic, "filtered": _filtered, "energy": _energy}
+    {"dynamic": _dynamic, "filtered": _filter, "energy": _energy}
 )
 """Models by name: (system, samples, bandwidth, options of the columns) -> the equations."""
 
@@ -598,9 +598,9 @@ class ExcitationQuality:
         """What is wrong with the record, or an empty text."""
         parts = []
         if self.unseen:
-            parts.append(f"{_listed(self.unseen)} cannot be seen at all")
+            parts.append(f"{_list(self.unseen)} cannot be seen at all")
         if self.inseparable:
-            parts.append(f"{_listed(self.inseparable)} cannot be told apart")
+            parts.append(f"{_list(self.inseparable)} cannot be told apart")
         return " and ".join(parts)
 
 
@@ -655,6 +655,6 @@ def require_visible(observations: Observations) -> ExcitationQuality:
     return quality
 
 
-def _listed(names: tuple[str, ...]) -> str:
+def _list(names: tuple[str, ...]) -> str:
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

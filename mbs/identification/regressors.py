@@ -144,7 +144,7 @@ def columns_of(
         columns += _inertial(number)
         columns += [Column(f"{kind}{number}", kind, number, _unit(link, kind)) for kind in kinds]
     for pair in couplings:
-        columns += _coupled(system, pair)
+        columns += _couple(system, pair)
     return tuple(columns)
 
 
@@ -278,7 +278,7 @@ def _unit(link: Link, kind: str) -> str:
     return (_SLIDING if link.motion is Motion.PRISMATIC else _TURNING)[kind]
 
 
-def _coupled(system: System, pair: Joints) -> list[Column]:
+def _couple(system: System, pair: Joints) -> list[Column]:
     """The three parameters of a motor of two joints."""
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
         raise ModelError(

@@ -317,7 +317,7 @@ def limits_of(
         quantity: str, bound: Bound, units: Sequence[str], known: Mapping[str, Range] = free
     ) -> tuple[MotionLimit, ...]:
         pairs = _pairs(system, quantity, bound, known)
-        return tuple(MotionLimit(quantity, *row) for row in _joined(list(known), units, pairs))
+        return tuple(MotionLimit(quantity, *row) for row in _join(list(known), units, pairs))
 
     own, others = _positions(system, position, places)
     positions = rows("position", own, [joint.unit for joint in joints])
@@ -390,7 +390,7 @@ def _check_names(system: System, what: str, given: Mapping[str, Any], known: Seq
             )
 
 
-def _joined(
+def _join(
     names: Sequence[str], units: Sequence[str], pairs: Sequence[tuple[float, float]]
 ) -> list[tuple[str, str, float, float]]:
     rows = zip(names, units, pairs, strict=True)

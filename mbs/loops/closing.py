@@ -175,10 +175,10 @@ class Closing:
         start = np.array(q, dtype=float)
 
         def residual(x: Vector) -> tuple[Vector, Vector]:
-            return self.rows(_replaced(start, self.free, x))
+            return self.rows(_replace(start, self.free, x))
 
         root = gauss_newton(residual, start[self.free], tolerance=TOLERANCE * self.sizes)
-        found = _replaced(start, self.free, root.x)
+        found = _replace(start, self.free, root.x)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
@@ -253,7 +253,7 @@ def _functions(system: System) -> tuple[Function, Function, Function]:
     )
 
 
-def _replaced(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
+def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
     result = q.copy()
     result[list(indices)] = values
     return result

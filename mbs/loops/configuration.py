@@ -259,10 +259,10 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
     fits = np.allclose(v[rows], target[rows], rtol=1e-6, atol=1e-9)
     if not fits:
         return v, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
-    return _refined(J, rows, target[rows]), ""
+    return _refine(J, rows, target[rows]), ""
 
 
-def _refined(J: Vector, rows: list[int], target: Vector) -> Vector:
+def _refine(J: Vector, rows: list[int], target: Vector) -> Vector:
     """The smallest v (nv,) with J v = 0 and v[rows] = target, where there is one, to the last bit.
 
     A basis of what J leaves free carries 1e-14 of noise, which differs from processor to processor.

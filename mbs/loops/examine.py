@@ -157,7 +157,7 @@ def configuration_health(system: System) -> Function:
             for own in (rows, rows / row_sizes(system))
         )
         varies, passive = system.closure.varies, list(system.closure.passive)
-        J_p = _scaled(system, determining_rows(system, q).J)[:, passive]
+        J_p = _scale(system, determining_rows(system, q).J)[:, passive]
         leads = _independence(J_p.T if varies else J_p)
         return Function("health", [q, system.p], [residual, leads, opening], {"cse": True})
 
@@ -174,14 +174,14 @@ def row_independence(system: System) -> Function:
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
-        value = _independence(_scaled(system, independent_constraint_rows(system, q)))
+        value = _independence(_scale(system, independent_constraint_rows(system, q)))
         return Function("independence", [q, system.p], [value], {"cse": True})
 
     function: Function = system.cached("row independence", build)
     return function
 
 
-def _scaled(system: System, J: SX) -> SX:
+def _scale(system: System, J: SX) -> SX:
     """The kept rows, or all of them, in sizes that do not depend on units."""
     found, kept = scales(system), kept_rows(system)
     rows = found.rows[kept] if J.shape[0] == len(kept) else found.rows

@@ -341,14 +341,14 @@ def follow_active(system: System) -> Function:
             before = z
             z, closed = stage(led, q_k, p_k)
             good = good * closed
-        q = _merged(system, active, passive)(z, q_a)
+        q = _merge(system, active, passive)(z, q_a)
         return Function("follow", [q_a, p], [casadi.if_else(good, q, DM.nan(system.nq))])
 
     function: Function = system.cached("follow", build)
     return function
 
 
-def _merged(system: System, active: list[int], passive: list[int]) -> Function:
+def _merge(system: System, active: list[int], passive: list[int]) -> Function:
     z, q_a = SX.sym("z", len(passive)), SX.sym("q_a", len(active))
     q = SX.zeros(system.nq)
     q[passive], q[active] = z, q_a
@@ -359,7 +359,7 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
     q, z, q_a = (
         SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
     )
-    merged = _merged(system, active, passive)(z, q_a)
+    merged = _merge(system, active, passive)(z, q_a)
     rows = square_closure(system, q, passive)
     if system.closure is not None and not system.closure.varies:
         own = row_sizes(system)[list(system.closure.rows)]
@@ -377,7 +377,7 @@ def _stage(system: System, active: list[int], passive: list[int]) -> Function:
     led, q_a = MX.sym("led", len(passive)), MX.sym("q_a", len(active))
     p = MX.sym("p", system.p.numel())
     z = _newton(system, active, passive)(led, q_a, p)
-    q = _merged(system, active, passive)(z, q_a)
+    q = _merge(system, active, passive)(z, q_a)
     near = casadi.norm_inf(z - led) < LARGEST_MOVE
     good = casadi.logic_and(_closed(system)(q, p), near)
     return Function("stage", [led, q_a, p], [z, good])

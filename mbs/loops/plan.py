@@ -593,7 +593,7 @@ def _plan_to(system: System, frame: str | int) -> Posed:
     welded = replace(system, cuts=cuts, _cache={})
     at = _pose_and_slope(system, frame)
     p = closure_parameters(system)
-    undetermined = _posed_locked(system, at, p)
+    undetermined = _pose_locked(system, at, p)
     known = {*undetermined, *spin_indices(welded).values(), *range(first, first + _POSE)}
     plan = Posed(tuple(order_stages(welded, known, q)), first + _POSE, undetermined)
 
@@ -608,7 +608,7 @@ def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
     return Cut(joint, -1, link, goal, pose, True)
 
 
-def _posed_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
+def _pose_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
     """Independent joints that move while the frame stays."""
     q = regular_configuration(system)
     rows = np.vstack([Closing(system, p).rows(q)[1], np.array(at(q, p)[1])])

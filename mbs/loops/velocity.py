@@ -139,7 +139,7 @@ def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
     """
     small = [SX.sym(cut.edge.joint.name, 6) for cut in system.cuts]
     moved = tuple(
-        replace(cut, pose_b=cut.pose_b @ _displaced(d))
+        replace(cut, pose_b=cut.pose_b @ _displace(d))
         for cut, d in zip(system.cuts, small, strict=True)
     )
     rows = closure_rows(replace(system, cuts=moved, _cache={}), q)
@@ -175,7 +175,7 @@ def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wr
     return sum_wrenches(*exerted)
 
 
-def _displaced(d: SX) -> Pose:
+def _displace(d: SX) -> Pose:
     """A frame moved by d[:3] and turned by d[3:], both small."""
     return Pose(SX(DM.eye(3)) + skew(d[3:]), d[:3])
 

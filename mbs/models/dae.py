@@ -171,13 +171,13 @@ def implicit(system: System, form: str, held: Held | None = None) -> DaeEquation
         system,
         states=(casadi.vertcat(q, v), casadi.vertcat(a, lam, mu), u),
         ode=casadi.vertcat(position_rate(system.tree, q, speed), a),
-        alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _kept(rows, form)),
+        alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _keep(rows, form)),
         invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),
         motion=(q, v),
     )
 
 
-def _kept(rows: Rows, form: str) -> SX:
+def _keep(rows: Rows, form: str) -> SX:
     """What the algebraic equations of a form ask of the loops."""
     match form:
         case "index1":
@@ -385,7 +385,7 @@ class Dae(DaeEquations):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds all of it; its symbols are new ones of the same names."""
-        return _unpickled, packed({f.name: getattr(self, f.name) for f in fields(self)})
+        return _unpickle, packed({f.name: getattr(self, f.name) for f in fields(self)})
 
     def casadi(self) -> dict[str, SX]:
         """What `casadi.integrator` takes: x, z, u, p, ode, alg."""
@@ -554,5 +554,5 @@ def _start_algebraic(system: System, q: Array, v: Array, tau: Array, p: Array, s
     return z0
 
 
-def _unpickled(*parts: Any) -> Dae:
+def _unpickle(*parts: Any) -> Dae:
     return Dae(**unpacked(*parts))

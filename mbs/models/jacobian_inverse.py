@@ -53,11 +53,11 @@ class Selection:
     def of(self, system: System) -> tuple[SX, SquareJacobian]:
         """Symbols q, (nq, 1), and the matrix at them in blocks; formed once."""
         found: tuple[SX, SquareJacobian] = system.cached(
-            ("square_jacobian", self), lambda: self._formed(system)
+            ("square_jacobian", self), lambda: self._form(system)
         )
         return found
 
-    def _formed(self, system: System) -> tuple[SX, SquareJacobian]:
+    def _form(self, system: System) -> tuple[SX, SquareJacobian]:
         q = SX.sym("q", system.nq)
         frame, axes = system.frame(self.frame), system.frame(self.expressed_in)
         target = VelocityTarget(system.tree, q, system.p, frame, axes)

@@ -46,11 +46,11 @@ class _States(LaneCode):
 
     __slots__ = ()
 
-    def _written(self, graph: Graph, number: int) -> str:
+    def _write(self, graph: Graph, number: int) -> str:
         node = graph.nodes[number]
         if node.op == casadi.OP_INPUT:
             return f"i{node.args[0]}[{node.args[1]}]"
-        return LaneCode._written(self, graph, number)
+        return LaneCode._write(self, graph, number)
 
 
 def batch_source(
@@ -103,7 +103,7 @@ def batch_source(
             for k, size in enumerate(taken)
         ),
         *(f"    part{k}(in, out, w);" for k in range(len(pieces))),
-        *(_flagged([*zip(places, taken, strict=False)], flags, given[:shown]) if finite else ()),
+        *(_flag([*zip(places, taken, strict=False)], flags, given[:shown]) if finite else ()),
         *(
             f"    mbs_give(ports + {count + k}, k, many, {size}, out[{k}]);"
             for k, size in enumerate(given[:shown])
@@ -117,7 +117,7 @@ def batch_source(
     return BatchSource({"batch.c": "\n".join(lines), **headers}, _WIDEST * (starts[-1] + 1))
 
 
-def _flagged(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -> list[str]:
+def _flag(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -> list[str]:
     """What makes outputs NaN in lanes where an input is not finite, for x * 0 is NaN, or a flag 0.
 
     A flag is 1 or 0, or NaN where an input is.

@@ -501,7 +501,7 @@ class LaneCode(BlockCode):
         if op in VECTORS:
             text = f"{VECTORS[op]}({', '.join(map(self._vector, operands))})"
         else:
-            text = expression(self.graph, step, self._written)
+            text = expression(self.graph, step, self._write)
         return [f"  const mbs_lanes t{step} = {text};"]
 
     def _sincos(self, batch: SinCosGroup, lane: int) -> list[str]:
@@ -520,10 +520,10 @@ class LaneCode(BlockCode):
         return shared or node.op == casadi.OP_CONST
 
     def _vector(self, number: int) -> str:
-        text = self._written(self.graph, number)
+        text = self._write(self.graph, number)
         return f"mbs_all({text})" if self._is_scalar(number) else text
 
-    def _written(self, graph: Graph, number: int) -> str:
+    def _write(self, graph: Graph, number: int) -> str:
         node = graph.nodes[number]
         if node.op == casadi.OP_INPUT and not self.shared[node.args[0]]:
             return f"i{node.args[0]}[{node.args[1]} * MBS_ROW]"

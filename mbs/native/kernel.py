@@ -186,14 +186,14 @@ def function_table(function: Function, work: int) -> str:
     lines = [
         f"EXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}",
         f"EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}",
-        _chosen("double ", f"{name}_default_in", _defaults(function)),
-        _chosen("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
-        _chosen("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
+        _choose("double ", f"{name}_default_in", _defaults(function)),
+        _choose("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
+        _choose("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
     ]
     for kind, patterns in tables.items():
         names = [f"{name}_{kind}_{k}" for k in range(len(patterns))]
         lines += [_table(*row) for row in zip(names, patterns, strict=True)]
-        lines.append(_chosen(shape, f"{name}_{kind}", names))
+        lines.append(_choose(shape, f"{name}_{kind}", names))
     return "\n".join([*lines, _work(name, n_in, n_out, work)])
 
 
@@ -202,7 +202,7 @@ def _defaults(function: Function) -> list[str]:
     return [repr(x) if math.isfinite(x) else "NAN" for x in values]
 
 
-def _chosen(kind: str, name: str, answers: Sequence[str]) -> str:
+def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
     """A C function of a number that gives the answer of that number, else 0."""
     cases = "".join(f" case {k}: return {answer};" for k, answer in enumerate(answers))
     return f"EXPORT {kind}{name}(casadi_int i) {{ switch (i) {{{cases} default: return 0; }} }}"

@@ -416,7 +416,7 @@ def renaud(
         reference: link on the path whose origin the velocity J v belongs to, or None for the best.
     """
     found = survey(target)
-    ranked = _ranked(found, intermediate, reference)
+    ranked = _rank(found, intermediate, reference)
     counted = _COUNTED if len(found.frames) <= _MOST_PLACES else 1
     candidates = [
         (i, r, cheapest_jacobian(target.along((i, _HOME)), r)) for i, r in ranked[:counted]
@@ -435,7 +435,7 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
     return express(target.tree, target.q, target.axes, place, [p])[0]
 
 
-def _ranked(
+def _rank(
     found: Survey, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
     """Pairs of axes and reference, those with the fewest entries that vary first."""

@@ -192,7 +192,7 @@ def joint_axes(
         if link.motion.nv > 1:
             axes = _of_several(link, poses[j], before, motions[j], v[link.v])
         elif len(poses[j].run) > 1:
-            axes = _continued(poses[j], poses[i].spin, result[i], motions[j])
+            axes = _continue(poses[j], poses[i].spin, result[i], motions[j])
         else:
             axes = _of_one(link, poses[j], before, motions[j], v[link.v])
         result.append(axes)
@@ -239,7 +239,7 @@ def _of_one(
     return JointAxes(pose.spin, path, False, (line,), vector([w[0], w[1], own.w[2]]))
 
 
-def _continued(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
+def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
     """The axes of the joint before, at another point; `rotation` leads to them from its frame."""
     p = rotation.apply(pose.p)
     shift = tuple(ScrewDisplacement.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))

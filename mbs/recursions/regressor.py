@@ -132,10 +132,10 @@ def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
     elif isinstance(screw, ScrewDisplacement):
         body = body.shift(2, screw.t)
     constants = elements(body_through(pose.seat, body).parameters)
-    return ColumnSum(_grouped(constants), _XX if len(part) > 1 else None)
+    return ColumnSum(_group(constants), _XX if len(part) > 1 else None)
 
 
-def _grouped(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]:
+def _group(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]:
     """Columns with the same constant, but for its sign, together; those with zero left out."""
     groups: list[tuple[SX, list[tuple[int, int]]]] = []
     for column, constant in enumerate(constants):
@@ -188,7 +188,7 @@ class PathTwist:
 
 def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
     """For every link unit velocities of the joints from the base to it, in its frame."""
-    return _carried(tree, poses, _unit_twists(tree))
+    return _carry(tree, poses, _unit_twists(tree))
 
 
 def path_twist_rates(
@@ -202,7 +202,7 @@ def path_twist_rates(
         velocities: of the links.
     """
     pairs = zip(_unit_twists(tree), velocities, strict=True)
-    return _carried(tree, poses, [[twist.rate(v) for twist in own] for own, v in pairs])
+    return _carry(tree, poses, [[twist.rate(v) for twist in own] for own, v in pairs])
 
 
 def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
@@ -223,9 +223,7 @@ def _unit_twists(tree: Tree) -> list[list[PathTwist]]:
     ]
 
 
-def _carried(
-    tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]
-) -> list[list[PathTwist]]:
+def _carry(tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]) -> list[list[PathTwist]]:
     """To every link the twists of the links before it, and its own."""
     outer: list[list[PathTwist]] = []
     inner: list[list[PathTwist]] = []

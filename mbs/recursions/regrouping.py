@@ -36,7 +36,7 @@ def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]
         bodies[j], moved = _parts(link.motion, bodies[j])
         if link.antecedent >= 0:
             part = _seen_through(moved, link.motion, poses[j])
-            bodies[link.antecedent] = _joined(bodies[link.antecedent], part)
+            bodies[link.antecedent] = _join(bodies[link.antecedent], part)
     return bodies
 
 
@@ -62,7 +62,7 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
     return body_through(pose.seat, body)
 
 
-def _joined(body: Body, part: Body) -> Body:
+def _join(body: Body, part: Body) -> Body:
     """Two bodies welded together; numbers that cancel are zero, so that they fold."""
     both = zip(_moments(body), _moments(part), strict=True)
     return type(body)(*(_sum(a, b) for a, b in both))

@@ -137,7 +137,7 @@ def square_jacobian(
     asked = np.concatenate([found.linear(-1, None), found.angular(-1)], axis=1)
     whole = asked[:, rows][:, :, columns]
     B = _with_zeros(J[:, list(columns)], nonzero(view.B))
-    return _signed(B, view.B, view.blocks, X_inverse, whole)
+    return _sign(B, view.B, view.blocks, X_inverse, whole)
 
 
 def _values(target: VelocityTarget, A: SX) -> Array:
@@ -176,7 +176,7 @@ def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
     return casadi.densify(back)[:, [grouped.index(k) for k in rows]]
 
 
-def _signed(
+def _sign(
     B: SX, values: Array, blocks: tuple[Block, ...] | None, X_inverse: SX, whole: Array
 ) -> SquareJacobian:
     if blocks is None or _always_singular(values):

@@ -118,11 +118,11 @@ class EventStepper:
                         budget -= self._step(limit)
         except Failure as failure:
             raise failed(
-                solver.t, solver.h, str(failure), self._blamed(failure), solver.x.tolist()
+                solver.t, solver.h, str(failure), self._blame(failure), solver.x.tolist()
             ) from failure
         return False
 
-    def _blamed(self, failure: Failure) -> tuple[int, ...]:
+    def _blame(self, failure: Failure) -> tuple[int, ...]:
         return fired_of(self.fired) if str(failure) in ("settle", "standstill") else ()
 
     def _values(self, t: float, x: Array) -> Array:
@@ -226,11 +226,11 @@ class EventStepper:
         return b, right
 
     def _stop_at_event(self, a: float, b: float, right: Array) -> None:
-        b, right = self._located(a, b, right)
+        b, right = self._locate(a, b, right)
         self.due = self.armed & (right <= 0)
         self.solver.rewind(b)
 
-    def _located(self, a: float, b: float, right: Array) -> tuple[float, Array]:
+    def _locate(self, a: float, b: float, right: Array) -> tuple[float, Array]:
         """The first time after a at which an indicator is not positive, and all of them there.
 
         Secants with a safeguard, and the half of each value that stays (the Illinois rule).
@@ -309,8 +309,8 @@ def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> E
     stop: SolverError | Interrupted | None = None
     try:
         if solver.project is not None:
-            solver.x = _begun(solver)
-        watched = _watched(problem, p, solver)
+            solver.x = _begin(solver)
+        watched = _watch(problem, p, solver)
         while not table.full:
             if watched is None:
                 solver.fill(table, _CHUNK)
@@ -348,7 +348,7 @@ def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     return Rodas(slope, project, start, state, *control, jacobian=jacobian)
 
 
-def _begun(solver: Stepper) -> Array:
+def _begin(solver: Stepper) -> Array:
     """The first state, on the constraints."""
     assert solver.project is not None
     try:
@@ -379,7 +379,7 @@ def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
     return onto
 
 
-def _watched(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepper | None:
+def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepper | None:
     """The integration with its events, which has looked at the first state."""
     functions, project = problem.equations, solver.project
     indicators, rates, jump = functions.indicators, functions.rates, functions.jump

@@ -66,7 +66,7 @@ class Pose:
 
     def __matmul__(self, other: Pose) -> Pose:
         """T_ik from T_ij and T_jk."""
-        chain = _joined(self, other) if self.chain or other.chain else ()
+        chain = _join(self, other) if self.chain or other.chain else ()
         return Pose(
             _with_lone_ones(exact_product(self.R, other.R)),
             exact_product(self.R, other.p, self.p),
@@ -101,7 +101,7 @@ class Pose:
         return bool(casadi.is_equal(self.matrix, casadi.densify(SX(DM.eye(4))), 1))
 
 
-def _joined(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
+def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
     """The displacements of both, those without a turn by a symbol made one; empty if unknown."""
     joined: list[SymbolicRotation | Pose] = []
     for step in (*first.steps, *second.steps):

@@ -148,7 +148,7 @@ class JointSliders:
         )
         field.on("update:model-value", lambda: self._type(handle), args=[])
         field.on("blur", lambda: self._type(None), args=[])
-        field.on("change", lambda: self._written(made))
+        field.on("change", lambda: self._write(made))
         return made
 
     def _type(self, handle: Handle | None) -> None:
@@ -159,7 +159,7 @@ class JointSliders:
         self._held = handle
         await self._app.move(handle.place, float(event.args))
 
-    async def _written(self, item: _Slider) -> None:
+    async def _write(self, item: _Slider) -> None:
         self._typed = None
         try:
             value = number(str(item.field.value or ""), item.handle.name)

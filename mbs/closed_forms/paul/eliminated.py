@@ -48,13 +48,13 @@ def _of(
 ) -> Iterator[Candidate]:
     width = len(columns(others))
     for chosen in combinations(rows, width + 1):
-        K = _stacked(chosen, others)
+        K = _stack(chosen, others)
         minors = _minors(K)
         if np.min(np.max(np.abs(minors), axis=-1)) < DEPENDENT or np.any(
             np.max(np.abs(minors), axis=0) < DEPENDENT
         ):
             continue
-        own = _stacked(chosen, (variable,))
+        own = _stack(chosen, (variable,))
         XY = np.einsum("...k,...kc->...c", minors, own)
         size = np.linalg.norm(XY, axis=-1)
         if np.min(size) < DEPENDENT:
@@ -69,7 +69,7 @@ def _of(
         yield Candidate((order, unsteady(size), cost), (variable,), build)
 
 
-def _stacked(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
+def _stack(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
     return np.stack(np.broadcast_arrays(*(row_values(row, variables) for row in rows)), axis=-2)
 
 

@@ -153,7 +153,7 @@ def _equation(
     reduced = dict[Members, tuple[Values, list[Source]]]()
     for term, given in terms.items():
         turns = any(k not in slides for k, _ in term)
-        rest, source, values = _folded(term, given * (2 if turns else 1), slides, sums)
+        rest, source, values = _fold(term, given * (2 if turns else 1), slides, sums)
         before = reduced.get(rest)
         if before is None:
             reduced[rest] = values, [source]
@@ -175,7 +175,7 @@ def _equation(
     return equation if len(variables) <= PRODUCTS or equation.linear else None
 
 
-def _folded(
+def _fold(
     term: Members,
     values: Values,
     slides: frozenset[int],
@@ -274,13 +274,13 @@ def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key
         own = _own(knowledge, matrices, equation, source.term)
         if source.known:
             angle = sum((multiple * sums[number] for number, multiple in source.known), SX(0))
-            own = _turned(own, angle, source.conjugate)
+            own = _rotate(own, angle, source.conjugate)
         total = Factor(total.X + own.X, total.Y + own.Y)
     x, y = np.max(np.abs(part.values.real)), np.max(np.abs(part.values.imag))
     return Factor(total.X if x > ZERO else SX(0), total.Y if y > ZERO else SX(0))
 
 
-def _turned(own: Factor, angle: SX, conjugate: bool) -> Factor:
+def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
     """X and Y of G = X - i Y times e^i(angle), or of its conjugate."""
     c, s = casadi.cos(angle), casadi.sin(angle)
     X, Y = own.X * c + own.Y * s, own.Y * c - own.X * s
@@ -301,7 +301,7 @@ def _own(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, term:
             _coefficient(knowledge, matrices, equation.row, slides | cosines),
             _coefficient(knowledge, matrices, equation.row, slides | with_sine),
         )
-    return _mixed(knowledge, matrices, equation.row, (slides, angles))
+    return _mix(knowledge, matrices, equation.row, (slides, angles))
 
 
 def _has_partner(
@@ -320,7 +320,7 @@ def _has_partner(
     )
 
 
-def _mixed(
+def _mix(
     knowledge: Knowledge,
     matrices: RingMatrices,
     row: Row,

@@ -49,7 +49,7 @@ def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
     yield from (own for own in opened if own[0].single)
     for (first, a, text), (second, b, other) in combinations(opened, 2):
         for sense in (1, -1):
-            rest = _combined(first, second, sense)
+            rest = _combine(first, second, sense)
             if len(rest) == 1:
                 ((k, sign),) = rest.items()
                 value = SX(a + sense * b) / sign
@@ -60,7 +60,7 @@ def _angle(knowledge: Knowledge, k: int) -> Variable:
     return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 
-def _combined(first: Variable, second: Variable, sense: int) -> dict[int, int]:
+def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
     total = dict(first.members)
     for k, sign in second.members:
         total[k] = total.get(k, 0) + sense * sign

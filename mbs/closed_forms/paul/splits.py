@@ -395,7 +395,7 @@ def _through(side: Side, k: int, basis: Tensor) -> Side:
 
 def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
     joints = knowledge.unknown
-    gaps = [_merged(knowledge, k) for k in joints]
+    gaps = [_merge(knowledge, k) for k in joints]
     ways = [represented(T)[:, block, block] for T in gaps]
     back = [represented(inverse(T))[:, block, block] for T in gaps]
     turns = [_basis(knowledge, k, 1)[:, block, block] for k in joints]
@@ -404,7 +404,7 @@ def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
     return _Pieces(joints, ways, back, turns, turns_back, slides)
 
 
-def _merged(knowledge: Knowledge, k: int) -> Matrix:
+def _merge(knowledge: Knowledge, k: int) -> Matrix:
     """(samples, 4, 4) the transform to joint k from the unknown joint before it."""
     ring, samples = knowledge.ring, knowledge.samples
     T, n = samples.gaps[:, k], len(ring.joints)

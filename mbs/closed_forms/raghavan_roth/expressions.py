@@ -79,7 +79,7 @@ def eliminated(A: SX, values: Array, columns: int, rank: int) -> tuple[SX, Array
         factors = values[:, :, c] / chosen[:, None, c]
         values = values - factors[:, :, None] * chosen[:, None]
         for k in np.nonzero(np.any(np.abs(factors) > _ZERO, axis=0))[0]:
-            rows[k] = _cleared(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
+            rows[k] = _clear(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
     return SX(casadi.vertcat(*rows)[:, columns:]), values[:, :, columns:]
 
 
@@ -115,7 +115,7 @@ def _pivot(values: Array) -> tuple[int, int]:
     return int(r), int(c)
 
 
-def _cleared(row: SX, values: Array) -> SX:
+def _clear(row: SX, values: Array) -> SX:
     """The row with zeros for the entries that vanish at all samples."""
     cleared = SX(1, row.size2())
     for k in np.nonzero(np.any(np.abs(values) > _ZERO, axis=0))[0]:
@@ -125,14 +125,14 @@ def _cleared(row: SX, values: Array) -> SX:
 
 def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
     u = _pair(ways[5].inverse())[elimination.elements.tolist()]
-    once = _carried(elimination, ways[0].inverse(), _moved(elimination.first, u))
-    return _carried(elimination, ways[1].inverse(), _moved(elimination.second, once))
+    once = _carry(elimination, ways[0].inverse(), _moved(elimination.first, u))
+    return _carry(elimination, ways[1].inverse(), _moved(elimination.second, once))
 
 
 def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
     w = _pair(ways[4])[elimination.elements.tolist()]
-    once = _carried(elimination, ways[3], _moved(elimination.fifth, w))
-    twice = _carried(elimination, ways[2], _moved(elimination.fourth, once))
+    once = _carry(elimination, ways[3], _moved(elimination.fifth, w))
+    twice = _carry(elimination, ways[2], _moved(elimination.fourth, once))
     return [_moved(part[None], twice) for part in elimination.third]
 
 
@@ -141,7 +141,7 @@ def _moved(parts: Array, columns: SX) -> SX:
     return SX(casadi.horzcat(*(casadi.mtimes(_constant(part), columns) for part in parts)))
 
 
-def _carried(elimination: Elimination, T: Pose, columns: SX) -> SX:
+def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
     own = elimination.elements.tolist()
     X = SX(SIZE, SIZE)
     for t, slope in zip(casadi.vertsplit(T.p), SLOPES, strict=True):

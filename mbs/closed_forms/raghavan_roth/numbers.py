@@ -168,16 +168,16 @@ class Elimination:
             ways: (N, 6, 4, 4) of the loop.
         """
         u = pair(inverse(ways[:, 5]))[:, self.elements]
-        once = self._carried(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
+        once = self._carry(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
         twice = np.einsum("iab,nbj->naij", self.second, once)
-        return self._carried(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
+        return self._carry(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
 
     def left_side(self, ways: Array) -> Array:
         """(N, n3, s - 1, n4 n5) factors of the monomials x4^i x5^j, for each weight of joint 3."""
         w = pair(ways[:, 4])[:, self.elements]
-        once = self._carried(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
+        once = self._carry(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
         twice = np.einsum("iab,nbj->naij", self.fourth, once)
-        twice = self._carried(ways[:, 2], twice.reshape(*w.shape, -1))
+        twice = self._carry(ways[:, 2], twice.reshape(*w.shape, -1))
         left: Array = np.einsum("kab,nbm->nkam", self.third, twice)[:, :, 1:]
         return left
 
@@ -196,7 +196,7 @@ class Elimination:
         M[:, :, count:, 1 - raised : n4 + 1 - raised, raised : n5 + raised] = E
         return M.reshape(*M.shape[:3], -1)
 
-    def _carried(self, T: Array, columns: Array) -> Array:
+    def _carry(self, T: Array, columns: Array) -> Array:
         moved: Array = rho(T)[:, self.elements[:, None], self.elements] @ columns
         return moved
 
@@ -344,7 +344,7 @@ class Arrangement:
 
     def all_ways(self, T: Array) -> Array:
         """(N, 6, 4, 4) the ways for target poses T, (N, 4, 4) [m]."""
-        T = _scaled(T, self.length)
+        T = _scale(T, self.length)
         ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
         ways[:, self.index] = ways[:, self.index] @ self._pose(T) @ self.after
         return ways
@@ -369,7 +369,7 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
         offsets: (6,) angles from which the joints of the loop are counted [rad].
     """
     length = loop_length(arm)
-    G = _scaled(arm.gaps, length)
+    G = _scale(arm.gaps, length)
     back = inverse(G)
     ways = {1: np.array([*G[1:6], G[6]]), -1: np.array([*back[5:0:-1], back[0]])}
     after = {1: G[0], -1: back[6]}
@@ -394,7 +394,7 @@ def loop_length(arm: Arm) -> float:
     return inner if inner > _TINY_LENGTH * arm.length else arm.length
 
 
-def _scaled(T: Array, length: float) -> Array:
+def _scale(T: Array, length: float) -> Array:
     T = np.array(T, dtype=float)
     T[..., :3, 3] /= length
     return T
@@ -461,7 +461,7 @@ def pencil(elimination: Elimination, ways: Array) -> Pencil:
     rows, size = 2 * (len(elimination.elements) - 1 - rank), elimination.size
     if rows < size:
         return Pencil(elimination, rank, np.zeros((size, rows)), 0.0)
-    found = Pencil(elimination, rank, _mixed(size, rows), 0.0)
+    found = Pencil(elimination, rank, _mix(size, rows), 0.0)
     return replace(found, regularity=regularity(found.matrices(ways)))
 
 
@@ -480,7 +480,7 @@ def regularity(M: Array) -> float:
     return float(np.min(np.median(conditions, axis=1)))
 
 
-def _mixed(size: int, rows: int) -> Array:
+def _mix(size: int, rows: int) -> Array:
     """(size, rows) orthonormal rows, the identity where there are as many."""
     if rows == size:
         return np.eye(size)
@@ -663,7 +663,7 @@ def roots(M: Array) -> tuple[NDArray[np.int64], Array]:
         (m,) numbers of the matrix, ascending, and (m,) angles in [-pi, pi), of roots e^(i u) near
         the unit circle; a double root is there twice.
     """
-    offset, coefficients = _rotated(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
+    offset, coefficients = _rotate(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
     top, bottom = 1 + 1j * x, 1 - 1j * x
     size = np.log(np.abs(top) + NONZERO) - np.log(np.abs(bottom) + NONZERO)
@@ -684,7 +684,7 @@ def _companion(coefficients: Array) -> Array:
     return companion
 
 
-def _rotated(M: Array) -> tuple[Array, Array]:
+def _rotate(M: Array) -> tuple[Array, Array]:
     """Offsets (N,), and (N, d + 1, n, n) factors of 1, x, .. for u = offset + 2 atan x.
 
     Of eight offsets the one where the last factor, the matrix at x = infinity, is best conditioned.
@@ -706,12 +706,12 @@ def clusters(u: Array) -> list[tuple[float, int]]:
 
     Roots that several solutions share are one group; a wide group is also there in narrow ones.
     """
-    wide = _grouped(u, _COARSE)
-    narrow = [group for group in _grouped(u, _FINE) if not any(_same(group, own) for own in wide)]
+    wide = _group(u, _COARSE)
+    narrow = [group for group in _group(u, _FINE) if not any(_same(group, own) for own in wide)]
     return [(float(np.mean(group)), min(len(group), _LARGEST)) for group in wide + narrow]
 
 
-def _grouped(u: Array, gap: float) -> list[Array]:
+def _group(u: Array, gap: float) -> list[Array]:
     """Around the circle, from the widest gap on."""
     if len(u) < 2:
         return [u] if len(u) else []

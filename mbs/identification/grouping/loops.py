@@ -64,7 +64,7 @@ _SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))
 def cut_relations(system: System) -> Iterator[Relation]:
     """What a body in the common frame of a cut joint does is the same on either side of it."""
     for cut in system.cuts:
-        axis, shared = _shared(cut)
+        axis, shared = _share(cut)
         sides = [(cut.link_a, cut.pose_a, 1), (cut.link_b, cut.pose_b, -1)]
         through = {
             link: (lambda_transform(pose @ axis), sign) for link, pose, sign in sides if link >= 0
@@ -77,7 +77,7 @@ def cut_relations(system: System) -> Iterator[Relation]:
             yield relation
 
 
-def _shared(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
+def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
     """The frame in which a body is taken, and combinations that both sides see alike."""
     joint = cut.edge.joint
     freedoms = joint.freedoms

@@ -177,14 +177,14 @@ def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[Chain
         gathered: solutions, some of them more than once.
         chain: its joints in the system.
     """
-    found = _merged(target, gathered)
+    found = _merge(target, gathered)
     singular = [int(k) for k in np.flatnonzero(_singular(target, found))]
     unsettled = list[int]()
     dropped = set[int]()
     for k in singular:
         if k in dropped:
             continue
-        found[k], settled = _examined(target, found[k], chain)
+        found[k], settled = _examine(target, found[k], chain)
         if not settled:
             unsettled.append(k)
         dropped |= _on(target, found, k, [m for m in singular if m > k])
@@ -202,7 +202,7 @@ def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[Chain
     return _merged_again(target, [root for k, root in enumerate(found) if k not in dropped])
 
 
-def _merged(target: Target, gathered: Gathered) -> list[ChainRoot]:
+def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
     residual = target.residual(gathered.q) if len(gathered.q) else np.zeros(0)
     found = []
     for group in distinct(target, gathered.q):
@@ -218,12 +218,12 @@ def _singular(target: Target, found: list[ChainRoot]) -> NDArray[np.bool_]:
     return np.asarray(target.singular_values(q)[:, -1] < SINGULAR)
 
 
-def _examined(target: Target, root: ChainRoot, chain: ChainIndices) -> tuple[ChainRoot, bool]:
+def _examine(target: Target, root: ChainRoot, chain: ChainIndices) -> tuple[ChainRoot, bool]:
     """With its multiplicity or its self-motion, and whether that is certain."""
     dimension, direction = freedoms(reduction(target, root.q))
     found = curve(target, root.q, direction, dimension) if dimension else None
     if found is None:
-        return _isolated(target, root)
+        return _isolate(target, root)
     of = family(target, found, dimension, chain.indices, chain.whole)
     return replace(root, multiplicity=0, family=of), True
 
@@ -241,7 +241,7 @@ def _nearly_moving(target: Target, root: ChainRoot, chain: ChainIndices) -> Chai
     return replace(root, multiplicity=0, family=of)
 
 
-def _isolated(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
+def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
     """With its multiplicity, moved to where its roots meet, and whether it stays there."""
     q, count = root.q, 1
     for _ in range(_REFINEMENTS):

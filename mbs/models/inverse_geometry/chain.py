@@ -250,7 +250,7 @@ def target_poses(system: System, T: Any) -> NDArray[np.float64]:
     Raises:
         ModelError: one of them is no rigid transform; the message tells which, counted from 0.
     """
-    matrices = _stacked(system, T)
+    matrices = _stack(system, T)
     if matrices is None or matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
         shape = "" if matrices is None else f" of shape {matrices.shape}"
         raise ModelError(f"{system.name}: the poses are {quoted(T)}{shape}; give them as (N, 4, 4)")
@@ -264,7 +264,7 @@ def target_poses(system: System, T: Any) -> NDArray[np.float64]:
     return poses
 
 
-def _stacked(system: System, T: Any) -> NDArray[np.float64] | None:
+def _stack(system: System, T: Any) -> NDArray[np.float64] | None:
     """The numbers in an array of whatever shape; None where there is more than numbers."""
     if not isinstance(T, list | tuple):
         return pose_numbers(T)

@@ -58,7 +58,7 @@ def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> S
     require_method(chain.system, method, ("auto", *CLOSED_FORMS))
     found, reasons = list[StepSequence](), list[str]()
     for name in CLOSED_FORMS if method == "auto" else (method,):
-        steps = _kept(chain, name, p)
+        steps = _keep(chain, name, p)
         if isinstance(steps, str):
             reasons.append(f"{name}: {steps}")
             continue
@@ -92,7 +92,7 @@ def given_of(chain: FrameChain, T: SX) -> SX:
     return SX(casadi.vertcat(chain.system.p, casadi.vec(T[:3, :])))
 
 
-def _kept(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
+def _keep(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
     """The steps by one method, or why there are none; kept on the system."""
 
     def solve() -> StepSequence | str:

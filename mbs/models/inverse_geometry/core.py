@@ -65,7 +65,7 @@ def core() -> ctypes.CDLL | None:
     Raises:
         CompilerError: the compiler refused the code.
     """
-    return _loaded() if compiler_found() else None
+    return _load() if compiler_found() else None
 
 
 def core_of(arm: Arm) -> ctypes.CDLL | None:
@@ -78,7 +78,7 @@ def core_of(arm: Arm) -> ctypes.CDLL | None:
 
 
 @functools.cache
-def _loaded() -> ctypes.CDLL:
+def _load() -> ctypes.CDLL:
     folder = resources.files("mbs.native") / "runtime"
     names = [*_SOURCES, *(name + end for name in _PAIRS for end in (".c", ".h"))]
     files = {name: (folder / name).read_text(encoding="utf-8") for name in names}

@@ -113,7 +113,7 @@ def carried(
         if at == 1.0 or step <= _SMALLEST_STEP or smallest(tracker, point.J) <= SINGULAR:
             break
         to = min(1.0, at + step)
-        found = _stepped(tracker, point, pose(to))
+        found = _step(tracker, point, pose(to))
         if found is None:
             step = (to - at) / 2
         else:
@@ -133,11 +133,11 @@ def smallest(tracker: Tracker, J: Array) -> float:
     return float(values[J.shape[1] - 1 - tracker.slack])
 
 
-def _stepped(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
+def _step(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
     """The configuration at the next pose; None where the step is too long."""
     back, _ = _pseudo_inverse(tracker, point.J)
     led = point.x + back @ tracker.rows(point.x, T)[0]
-    found = _corrected(tracker, led, T)
+    found = _correct(tracker, led, T)
     if found is None or not tracker.may(found.x):
         return None
     ahead, miss = np.linalg.norm(led - point.x), np.linalg.norm(found.x - led)
@@ -146,7 +146,7 @@ def _stepped(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
     return found if near and change <= _CHANGE else None
 
 
-def _corrected(tracker: Tracker, x: Array, T: Array) -> PathPoint | None:
+def _correct(tracker: Tracker, x: Array, T: Array) -> PathPoint | None:
     """Newton's method; None where it does not contract, or leaves rows that should vanish."""
     before = np.inf
     r, J = tracker.rows(x, T)
@@ -550,10 +550,10 @@ def follow(
     poses = path_of(system, path, samples)
     q = _start(system, start, locked)
     target = goal(system, name, np.eye(4), None, parameters)
-    return _followed(follower(target, q, locked, limits), poses, q)
+    return _follow(follower(target, q, locked, limits), poses, q)
 
 
-def _followed(led: Follower, poses: Path, q: Array) -> Followed:
+def _follow(led: Follower, poses: Path, q: Array) -> Followed:
     tracker, x, T = led.tracker, led.scaled(q), led.pose(q)
     point, step = point_at(tracker, x, T), 1.0
     kept, reason = list[tuple[Array, float, float]](), ""

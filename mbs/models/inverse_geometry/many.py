@@ -72,7 +72,7 @@ def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: 
     """
     plain = _plain(chain, sequence, p)
     if len(T) < _MANY:
-        return _interpreted(plain, T)
+        return _interpret(plain, T)
     key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
     return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
 
@@ -87,7 +87,7 @@ def _machine_code(plain: Function) -> Function:
     return compiled(plain.map(_COLUMNS), derivatives=0, fast=True)
 
 
-def _interpreted(plain: Function, T: Array) -> PoseBatch:
+def _interpret(plain: Function, T: Array) -> PoseBatch:
     """By the interpreter, which needs no compiler first."""
     if not len(T):
         return _by_machine(plain, plain, T)
@@ -228,7 +228,7 @@ def with_configurations(
         q: (m, n) its solutions [rad or m].
         T: (4, 4) the pose.
     """
-    draft = _widened(draft, len(q))
+    draft = _widen(draft, len(q))
     columns = _nearest_columns(arm, draft.q[k], q)
     draft.valid[k] = False
     draft.valid[k, columns], draft.q[k, columns] = True, q
@@ -236,7 +236,7 @@ def with_configurations(
     return draft
 
 
-def _widened(draft: BranchSolutions, columns: int) -> BranchSolutions:
+def _widen(draft: BranchSolutions, columns: int) -> BranchSolutions:
     """With so many columns at least."""
     more = columns - draft.valid.shape[1]
     if more <= 0:
@@ -378,7 +378,7 @@ def solve_many(
 
     given = limits if system.is_closed else None
     if system.is_closed:
-        return _stacked(system, [solved(pose) for pose in poses])
+        return _stack(system, [solved(pose) for pose in poses])
     robot = _robot(frame_chain(system, frame, locked), method, p)
     draft = robot.draft(poses)
     for k in np.flatnonzero(draft.searched):
@@ -387,7 +387,7 @@ def solve_many(
         draft = with_configurations(draft, int(k), robot.arm, q, pose)
     q, valid = robot.whole(draft.q), draft.valid
     if leaves_out(limits):
-        q, within = _wound(bounds(system, limits, robot.chain.indices), q)
+        q, within = _unwind(bounds(system, limits, robot.chain.indices), q)
         valid = valid & within
     return ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
 
@@ -440,7 +440,7 @@ def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:
         return None
 
 
-def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
+def _stack(system: System, answers: list[Solutions]) -> ManySolutions:
     """The solutions of every pose side by side."""
     columns = max((len(answer) for answer in answers), default=0)
     shape = len(answers), columns
@@ -453,7 +453,7 @@ def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
     return ManySolutions(q, valid, residual, ("",) * columns, np.ones(len(answers), dtype=bool))
 
 
-def _wound(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
+def _unwind(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
     """Configurations (N, branches, nq) changed by whole turns, and whether all is within limits."""
     low, high = allowed.low - WITHIN, allowed.high + WITHIN
     missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)

@@ -327,19 +327,19 @@ def nearest(arm: Arm, T: Array) -> Nearest:
     """
     library = core.core_of(arm)
     if library is not None:
-        return _measured(arm, T, core.nearest_by(library, arm, T, _STARTS, SEED))
-    return _measured(arm, T, nearest_with_numpy(arm, T))
+        return _measure(arm, T, core.nearest_by(library, arm, T, _STARTS, SEED))
+    return _measure(arm, T, nearest_with_numpy(arm, T))
 
 
 def nearest_with_numpy(arm: Arm, T: Array) -> Array:
     """(n,) the configuration of `nearest` where there is no C compiler."""
     q, cost = descend(arm, T, random_configurations(arm, T, _STARTS, SEED))
-    best = [_refined(arm, T, q[k]) for k in _apart(cost)]
+    best = [_refine(arm, T, q[k]) for k in _apart(cost)]
     lowest = min(best, key=lambda found: found[1])
     return wrapped(arm, lowest[0])
 
 
-def _measured(arm: Arm, T: Array, q: Array) -> Nearest:
+def _measure(arm: Arm, T: Array, q: Array) -> Nearest:
     pose = arm.pose(q)
     gap = gap_to(T, pose)
     return Nearest(q, float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:])), pose)
@@ -354,7 +354,7 @@ def _apart(cost: Array) -> list[int]:
     return kept[:_KEPT]
 
 
-def _refined(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
+def _refine(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
     """Newton's method with differences of the slope; the configuration and its cost."""
     cost, slope = _sloped(arm, T, q)
     curvature: Array | None = None

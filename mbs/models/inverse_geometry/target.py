@@ -250,7 +250,7 @@ def _order(reduced: TargetReduction) -> tuple[int, Array]:
         radius, shift = (_MEETING / size**0.5) ** (1.0 / k), -float(g[k - 1] @ g[k]) / (k * size)
         if max(radius, abs(shift)) > _RADII[0]:
             continue
-        below = np.linalg.norm(_shifted(g, shift)[:k], axis=1) * radius ** np.arange(k)
+        below = np.linalg.norm(_shift(g, shift)[:k], axis=1) * radius ** np.arange(k)
         if np.all(below < _MEETING):
             order, middle = k, shift
     target = reduced.target
@@ -284,7 +284,7 @@ def _simple_roots(g: Array) -> list[float]:
     return found
 
 
-def _shifted(g: Array, by: float) -> Array:
+def _shift(g: Array, by: float) -> Array:
     """Taylor coefficients about another point."""
     orders = range(len(g))
     return np.array(

@@ -94,7 +94,7 @@ def close(
         if configuration.size:
             q = rest.copy()
             q[list(given)] = [*configuration, *chain.locked.values()]
-            found += _completed(system, given, q, p)
+            found += _complete(system, given, q, p)
     return found
 
 
@@ -188,7 +188,7 @@ def _plan_to(system: System, frame: str | int) -> Posed | str:
     return plan
 
 
-def _completed(
+def _complete(
     system: System, given: tuple[int, ...], q: Array, p: Array
 ) -> Iterable[ClosedConfiguration]:
     """The closed configurations with the given positions as in q, and the held ones."""

@@ -454,20 +454,20 @@ def _driven(wiring: _Wiring, function: Function) -> Function:
     t, x, z, u, p = symbols[:5]
     pushes, inputs, others, w = _parts(u, wiring.sizes)
     p = _parts(p, (motion.numel_in(4), p.numel() - motion.numel_in(4)))[0]
-    q, v = motion.call([t, x, z, _filled(wiring, kind, others), p])
+    q, v = motion.call([t, x, z, _fill(wiring, kind, others), p])
     if drive.effort is not None:
         pushes = casadi.densify(casadi.vec(drive.effort.call([t, q, v, w, p])[0]))
     if drive.device is not None:
         inputs = casadi.densify(casadi.vec(drive.device.call([t, q, v, w, p])[0]))
     given = casadi.vertcat(pushes, inputs, others)
-    return _written(function, symbols, given, kind)
+    return _write(function, symbols, given, kind)
 
 
 def _idle(wiring: _Wiring, function: Function) -> Function:
     """The function, which depends on no effort, with other inputs."""
     symbols = _symbols(wiring, function, SX)
     others = _parts(symbols[3], wiring.sizes)[2]
-    return _written(function, symbols, _filled(wiring, SX, others), SX)
+    return _write(function, symbols, _fill(wiring, SX, others), SX)
 
 
 def _symbols(wiring: _Wiring, function: Function, kind: Any) -> list[Any]:
@@ -477,7 +477,7 @@ def _symbols(wiring: _Wiring, function: Function, kind: Any) -> list[Any]:
     return [kind.sym(name, size) for name, size in zip(names, sizes, strict=False)]
 
 
-def _filled(wiring: _Wiring, kind: Any, others: Any) -> Any:
+def _fill(wiring: _Wiring, kind: Any, others: Any) -> Any:
     """The inputs that a function takes, zero where laws give them."""
     tau, u, _ = wiring.equations.sizes
     return casadi.vertcat(kind.zeros(tau), kind.zeros(u), others)
@@ -488,7 +488,7 @@ def _parts(u: Any, sizes: tuple[int, ...]) -> list[Any]:
     return parts
 
 
-def _written(function: Function, symbols: list[Any], u: Any, kind: Any) -> Function:
+def _write(function: Function, symbols: list[Any], u: Any, kind: Any) -> Function:
     options = {"cse": True} if kind is SX else {}
     values = function.call([*symbols[:3], u, *symbols[4:]])
     return Function(function.name(), symbols, values, options)

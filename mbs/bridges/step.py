@@ -68,7 +68,7 @@ def step(model: Model, substeps: int = 1, *, checked: bool = True) -> Function:
     dt = kind.sym("dt")
     settle = _settle(model, checked) if isinstance(model, Dae) else None
     after = None if settle is None else lambda x, middle, end, h: settle(x, middle, end, p, h)
-    x = advanced(lambda at: ode(at, u, p), start, dt, substeps, after)
+    x = advance(lambda at: ode(at, u, p), start, dt, substeps, after)
     if checked and isinstance(model, Dae):
         x = _flag(model, x, [start, u, p, dt])
     inputs = ["x", "u", "p", "dt"]
@@ -126,7 +126,7 @@ def _correction(dae: Dae) -> Function:
     return Function("correction", [dae.x, dae.p], [casadi.densify(change)], {"cse": True})
 
 
-def advanced(
+def advance(
     rate: Callable[[_T], _T],
     x: _T,
     duration: _T,

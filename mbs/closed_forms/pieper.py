@@ -121,7 +121,7 @@ def product(a: SX, b: SX) -> SX:
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
-def three_turns(
+def three_angle_steps(
     scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G: SX
 ) -> list[SequenceStep]:
     """The steps of three joints that turn.
@@ -177,10 +177,10 @@ def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
 
 
 def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
-    return turn_onto(scene, k, (start, end), 1.0)
+    return angle_step(scene, k, (start, end), 1.0)
 
 
-def turn_onto(
+def angle_step(
     scene: PieperLoop, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
 ) -> SequenceStep:
     """The turn of joint k that brings one vector of the plane onto the direction of another.
@@ -417,7 +417,7 @@ def _by_turning(reach: Reach) -> list[SequenceStep] | None:
     point = casadi.mtimes(reach.f[:2, :], b3)
     target = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + TINY_SQUARE)
     regular = () if K.is_constant() else (K / unit_K,)
-    return [third, turn_onto(scene, 1, (point, target), scene.length, regular)]
+    return [third, angle_step(scene, 1, (point, target), scene.length, regular)]
 
 
 def _parallel(
@@ -496,7 +496,7 @@ def _first(reach: Reach) -> SequenceStep:
     w = (reach.way @ scene.motion(1) @ f).p
     joint = scene.ring.joints[0]
     if joint.is_rotational:
-        return turn_onto(scene, 0, (w[:2], reach.p[:2]), scene.length)
+        return angle_step(scene, 0, (w[:2], reach.p[:2]), scene.length)
     return linear(scene, 0, SX(1), joint.sign * (reach.p[2] - w[2]))
 
 
@@ -524,7 +524,7 @@ def three_slides(scene: PieperLoop) -> list[SequenceStep]:
     first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in turns.gaps]))
     begun = PieperLoop(scene.problem, turns.rotated(first), scene.length)
     A, B, G = begun.after(0).pose.R, begun.after(1).pose.R, begun.after(2).pose.R.T
-    return [*three_turns(begun, (0, 1, 2), A, B, G), _slides(scene)]
+    return [*three_angle_steps(begun, (0, 1, 2), A, B, G), _slides(scene)]
 
 
 def _slides(scene: PieperLoop) -> SequenceStep:
@@ -634,7 +634,7 @@ def _steps(scene: PieperLoop) -> list[SequenceStep] | None:
         before = before @ scene.motion(k) @ scene.after(k).pose
     G = casadi.mtimes(ring.gaps[0].pose.R, before.R).T
     A, B = scene.after(3).pose.R, scene.after(4).pose.R
-    return [*steps, *three_turns(scene, (3, 4, 5), A, B, G)]
+    return [*steps, *three_angle_steps(scene, (3, 4, 5), A, B, G)]
 
 
 def _length(problem: Problem) -> SX:

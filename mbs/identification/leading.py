@@ -16,7 +16,7 @@ from mbs.loops.velocity import determining_rows
 
 Array = npt.NDArray[np.float64]
 
-LED = 2.5e-3
+REGULAR = 2.5e-3
 """Squared sine between rows of the passive joints, that of 3 degrees, below which configurations
 are taken as next to a singular one: the joints that follow magnify errors by 20 and more."""
 
@@ -63,10 +63,10 @@ def signed_leads(system: System) -> Function:
     return function
 
 
-def led(system: System, q: Array) -> npt.NDArray[np.bool_]:
+def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
     """(n,) whether a configuration, and the step from and to it, keeps clear of singular ones."""
     leads = leads_of(system, q)
-    good = np.abs(leads) > LED
+    good = np.abs(leads) > REGULAR
     crossed = np.sign(leads[1:]) != np.sign(leads[:-1])
     good[1:] &= ~crossed
     good[:-1] &= ~crossed

@@ -14,7 +14,7 @@ from casadi import DM, Function
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.identification.base_parameters import BaseParameters
-from mbs.identification.leading import led, positions
+from mbs.identification.leading import positions, regular
 from mbs.identification.record import ORDER, Samples, zero_phase
 from mbs.identification.regressors import (
     Column,
@@ -48,7 +48,7 @@ def led_rows(system: System, q: Array) -> Chosen:
     Raises:
         ModelError: they are less than half of all.
     """
-    good = led(system, q)
+    good = regular(system, q)
     if good.mean() < _FEWEST:
         names = ", ".join(system.speeds[k].name for k in system.active)
         raise ModelError(
@@ -130,16 +130,16 @@ def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
     Raises:
         ModelError: they are less than half of all.
     """
-    if samples.led is not None:
-        return samples.led
+    if samples.regular is not None:
+        return samples.regular
     if not _is_reduced(model):
         return np.ones(len(samples.time), dtype=bool)
     return led_rows(model.system, motion_of(model, samples)[0])
 
 
-def with_led(model: Any, samples: Samples) -> Samples:
-    """The samples with `led` found, so that other motions near them keep the same instants."""
-    return replace(samples, led=led_samples(model, samples))
+def with_regular(model: Any, samples: Samples) -> Samples:
+    """The samples with `regular` found, so that other motions near them keep the same instants."""
+    return replace(samples, regular=led_samples(model, samples))
 
 
 def _is_reduced(model: Any) -> bool:

@@ -623,7 +623,7 @@ class Samples:
         efforts: names of the efforts.
         effort_units: their units.
         bandwidth: of what was left by the filter [Hz], or None where nothing was filtered.
-        led: (n,) whether a configuration of a closed system keeps clear of singular ones; None
+        regular: (n,) whether a configuration of a closed system keeps clear of singular ones; None
             where that is still to be found.
     """
 
@@ -635,7 +635,7 @@ class Samples:
     efforts: tuple[str, ...]
     effort_units: tuple[str, ...]
     bandwidth: float | None = None
-    led: npt.NDArray[np.bool_] | None = None
+    regular: npt.NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time)

@@ -292,7 +292,7 @@ _SMALLEST_PART = 1e-4
 """Of the whole line, below which it is said to end."""
 
 
-def followed_configuration(
+def follow_configuration(
     system: System, target: Vector, locked: tuple[int, ...], p: Vector
 ) -> Vector:
     """The configuration reached from the assembled one while locked positions, and p, move.

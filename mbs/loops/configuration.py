@@ -19,7 +19,7 @@ from mbs.loops.closing import (
     Vector,
     closure_parameters,
     difference,
-    followed_configuration,
+    follow_configuration,
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.velocity import closure_jacobian
@@ -88,7 +88,7 @@ def solve(
     if guess:
         named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
         return _guessed_configuration(Closing(system, p, locked), target, named)
-    return followed_configuration(system, target, locked, p)
+    return follow_configuration(system, target, locked, p)
 
 
 def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) -> Vector:

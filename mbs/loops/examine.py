@@ -27,7 +27,7 @@ from mbs.solvers.rank import rank
 
 Vector = NDArray[np.float64]
 
-_LED = 1e-14
+_DETERMINED = 1e-14
 """Squared sine between rows of the passive joints below which these follow no longer."""
 
 
@@ -63,7 +63,7 @@ class ConfigurationState:
     @property
     def is_led(self) -> bool:
         """Whether the independent joints determine how the others move."""
-        return self.leads > _LED
+        return self.leads > _DETERMINED
 
 
 def examine(
@@ -93,7 +93,7 @@ def examine(
     )
 
 
-def require_led(system: System, q: Vector, p: Vector) -> None:
+def require_determined(system: System, q: Vector, p: Vector) -> None:
     """Refuse a configuration at which models in the independent joints have no sense.
 
     Args:
@@ -111,7 +111,7 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
             f"{system.name}: q leaves the loops open by {residual:.3g}; take a configuration of"
             " mbs.loops.solve"
         )
-    if leads <= _LED:
+    if leads <= _DETERMINED:
         names = ", ".join(system.speeds[k].name for k in system.active)
         raise SingularPosture(
             f"{system.name}: the configuration is singular, {names} cannot lead the other joints"
@@ -135,13 +135,13 @@ def loop_rows(system: System, q: SX) -> list[ValidityRow]:
             "undetermined",
             "hold of the independent joints, negative",
             -leads,
-            -_LED,
+            -_DETERMINED,
             "the independent joints do not determine the others",
         ),
     ]
 
 
-LED = ConfigurationCheck(loop_rows, require_led)
+DETERMINED = ConfigurationCheck(loop_rows, require_determined)
 """Closed loops whose independent joints lead the others."""
 
 

@@ -197,7 +197,7 @@ class Goal:
         root = gauss_newton(self.residual, q, tolerance=tolerance, iterations=_ITERATIONS)
         return Closed(root.x, root.residual, root.converged and self.closing.faces(root.x))
 
-    def approached(self, q: Vector) -> Closed:
+    def approach(self, q: Vector) -> Closed:
         """The configuration next to q with closed loops that is nearest to the pose."""
         root = levenberg_marquardt(lambda x: self.residual(x, _CLOSURE_WEIGHT), q)
         return self.closing.nearest(root.x)
@@ -309,7 +309,7 @@ def _refusal(target: Goal, start: Vector, tried: Sequence[Closed]) -> str:
     """Why no configuration was found: the loops stay open, or the pose is out of reach."""
     closing = target.closing
     best = sorted(tried, key=lambda found: found.residual)[:_FEWEST]
-    near = [target.approached(q) for q in (*(found.q for found in best), start)]
+    near = [target.approach(q) for q in (*(found.q for found in best), start)]
     gaps = [target.gap(found.q) for found in near if found.is_closed]
     title = f"{closing.system.name}: frame {quoted(target.frame)} cannot be brought to this pose"
     if not gaps:

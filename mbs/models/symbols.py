@@ -10,7 +10,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.examine import LED
+from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
@@ -76,7 +76,7 @@ def configuration_check(system: System, coordinates: str) -> ConfigurationCheck 
     Those of a reduced model close the loops, and its independent joints lead the others there.
     """
     require_system(system)
-    return LED if is_reduced(system, coordinates) else None
+    return DETERMINED if is_reduced(system, coordinates) else None
 
 
 def check_coordinates(system: System, coordinates: str) -> None:

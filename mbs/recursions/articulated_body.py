@@ -160,14 +160,14 @@ class Pivot:
         rest[3:] -= drive.momentum
         return Pivot(direction, column, rest, D, inverse, gain, ratio)
 
-    def transmitted(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
+    def transmit(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
         """The wrench (6, 1) that passes on to the antecedent, and the effort that accelerates."""
         left = effort - wrench[self.direction]
         wrench = wrench - self.gain * left
         wrench[self.direction] = effort - self.ratio * left
         return wrench, left
 
-    def accelerated(self, twist: SX, left: SX) -> tuple[SX, SX]:
+    def accelerate(self, twist: SX, left: SX) -> tuple[SX, SX]:
         """The acceleration (6, 1) behind the joint, and its part that the joint adds."""
         before = twist[self.direction]
         own = casadi.dot(self.gain, twist) - self.inverse * left + self.ratio * before
@@ -336,14 +336,14 @@ def _solution(
         link, joint = tree.links[j], joints[j]
         wrench = _moved_wrench(joint.inner, needed[j])
         for number, pivot in zip(_numbers(link), joint.pivots, strict=True):
-            wrench, left[number] = pivot.transmitted(wrench, efforts[number])
+            wrench, left[number] = pivot.transmit(wrench, efforts[number])
         if link.antecedent >= 0:
             needed[link.antecedent] += _moved_wrench(joint.outer, wrench)
     x, twists = zeros(tree.nv), [zeros(6)] * (len(tree.links) + 1)
     for j, link in enumerate(tree.links):
         twist = _moved_twist(joints[j].outer, twists[link.antecedent])
         for number, pivot in reversed(list(zip(_numbers(link), joints[j].pivots, strict=True))):
-            twist, x[number] = pivot.accelerated(twist, left[number])
+            twist, x[number] = pivot.accelerate(twist, left[number])
         twists[j] = _moved_twist(joints[j].inner, twist)
     return x
 

@@ -244,7 +244,7 @@ class Survey:
     J: Array
     units: Array
 
-    def combined(self, G: Array) -> Survey:
+    def combine(self, G: Array) -> Survey:
         """The same of other velocities, of which G (samples, nv, m) makes these."""
         parts = G / self.units[:, None]
         sizes = np.abs(parts).max(axis=(0, 1))

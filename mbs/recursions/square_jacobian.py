@@ -117,7 +117,7 @@ def square_jacobian(
     if G is None:
         places = _places(tree, found, columns)
     else:
-        found = found.combined(_values(target, G))
+        found = found.combine(_values(target, G))
         places = [*spread(found.on_path), len(found.frames) - 1]
     size = len(found.frames)
     views = _views(found, places, rows, columns)

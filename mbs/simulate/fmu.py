@@ -138,7 +138,7 @@ def _older(instance: Any, plan: Plan, points: dict[float, bool], recording: Reco
             apply(reached.time, False)
         if points[end] or reached.terminated:
             recording.row(reached.time)
-        recording.happened(reached.time)
+        recording.record_event(reached.time)
         if reached.terminated:
             return recording.ended(reached.time)
     return None
@@ -191,7 +191,7 @@ def _newer(
                 unsaid = reached.event or time >= following
                 following = run.event(time, jumped=time == end, otherwise=["event"] * unsaid)
             else:
-                recording.happened(time)
+                recording.record_event(time)
     return None
 
 
@@ -222,7 +222,7 @@ class _Newer:
             self.plan.tracks.setter(self.instance)(time, True)
         following = self.update()
         self.recording.row(time)
-        self.recording.happened(time, [(self.recording.name, words) for words in otherwise])
+        self.recording.record_event(time, [(self.recording.name, words) for words in otherwise])
         return following
 
     def update(self) -> float:
@@ -331,7 +331,7 @@ class _Exchange:
         self.clock.jump(time)
         following, ended = self.update()
         self.recording.row(time)
-        self.recording.happened(time, self._told(time, fired))
+        self.recording.record_event(time, self._told(time, fired))
         return following, ended
 
     def update(self) -> tuple[float, bool]:
@@ -477,7 +477,7 @@ _LOCK, _LOADING = threading.Lock(), threading.Lock()
 
 
 @contextmanager
-def heard(listener: Listener) -> Iterator[None]:
+def listening(listener: Listener) -> Iterator[None]:
     """While it lasts, messages of FMUs that this thread runs go to `listener`."""
     thread = threading.get_ident()
     with _LOCK:
@@ -809,7 +809,7 @@ def _simulate(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) -> 
     stop: SolverError | Interrupted | None = None
     with progress(name, plan.begin, plan.end, quiet=quiet) as reached:
         try:
-            with heard(listen), instance(plan.description, folder, plan.kind, watch) as unit:
+            with listening(listen), instance(plan.description, folder, plan.kind, watch) as unit:
                 recording = recording_of(unit, plan.description, variables, reached)
                 if plan.kind == "CoSimulation":
                     co_simulate(unit, plan, recording, watch)

@@ -9,7 +9,14 @@ import mbs
 from mbs.errors import ModelError
 from mbs.identification.exciting import Series, excitation
 from mbs.identification.identify import identify
-from mbs.identification.leading import LED, active_places, leads_of, led, positions, signed_leads
+from mbs.identification.leading import (
+    REGULAR,
+    active_places,
+    leads_of,
+    positions,
+    regular,
+    signed_leads,
+)
 from mbs.identification.record import Record
 
 
@@ -51,14 +58,14 @@ def test_leads_change_sign_where_the_parallelogram_is_flat():
         )
     assert (leads[turned < 1.5] > 0).all()
     assert (leads[turned > 1.7] < 0).all()
-    good = led(system, q)
+    good = regular(system, q)
     assert not good[(turned > 1.52) & (turned < 1.62)].any()
     assert good[turned < 1.4].all()
 
 
 def test_rows_next_to_a_singular_configuration_are_left_out_and_told():
     t, q, tau = swinging(0.9, 1.0)
-    assert 0.005 < np.mean(np.abs(leads_of(sr400(), q)) < LED) < 0.2
+    assert 0.005 < np.mean(np.abs(leads_of(sr400(), q)) < REGULAR) < 0.2
     noisy = q + 1e-5 * np.random.default_rng(1).normal(size=q.shape)
     found = identify(sr400(), Record.of(sr400(), t, noisy, tau), 6.0, quiet=True)
     assert found.estimate.residuals.total_percent < 0.6

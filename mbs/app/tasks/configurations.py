@@ -306,7 +306,7 @@ def _near(
         return None
     frame, T = wanted
     aim = goal(system, frame, T, None, parameters)
-    best = aim.approached(np.array(system.position(seed)))
+    best = aim.approach(np.array(system.position(seed)))
     if not best.is_closed:
         return None
     distance, angle = aim.gap(best.q)

@@ -17,7 +17,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
 from mbs.errors import DescriptionError, LoopError, MbsError, NoClosedForm, Unclosable
 from mbs.loops import Mode, modes
-from mbs.loops.closing import Closing, closure_parameters, followed_configuration
+from mbs.loops.closing import Closing, closure_parameters, follow_configuration
 from mbs.loops.function import independent_names
 
 # Configurations of the picture: joints that can be moved by hand, the others following.
@@ -104,7 +104,7 @@ def moved(system: System, q: Sequence[float], place: int, value: float) -> Vecto
         return _unit(system, target, place)
     p = closure_parameters(system)
     try:
-        found = followed_configuration(
+        found = follow_configuration(
             replace(system, configuration=tuple(q)), np.array(target), _held(system), p
         )
     except Unclosable as error:

@@ -403,4 +403,4 @@ def _whole(question: Question, found: Nearest) -> Nearest:
     whole = question.whole(found.q)
     if not np.all(np.isfinite(whole)):
         return replace(found, q=whole)
-    return replace(found, q=question.wishes.bounds.wound(whole, question.wishes.near))
+    return replace(found, q=question.wishes.bounds.wrap_to_limits(whole, question.wishes.near))

@@ -163,7 +163,7 @@ def nothing(arm: Arm, count: int) -> BranchSolutions:
     return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
 
 
-def drafted(
+def draft_solutions(
     chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, T: Array
 ) -> BranchSolutions:
     """The solutions by a closed form.
@@ -405,7 +405,7 @@ class _Robot:
     def draft(self, T: Array) -> BranchSolutions:
         """The solutions by a closed form, else by the general method."""
         if self.sequence is not None:
-            return drafted(self.chain, self.sequence, self.p, self.arm, T)
+            return draft_solutions(self.chain, self.sequence, self.p, self.arm, T)
         if self.general is not None:
             return general_draft(self.general, T)
         return nothing(self.arm, len(T))

@@ -122,7 +122,7 @@ def curve(
     along = direction / np.linalg.norm(direction)
     start = q / target.unit
     x = target.corrected(start, along[None, :], along[None, :] @ start)
-    return way.straight(x, direction) or way.followed(x, along)
+    return way.straight(x, direction) or way.follow(x, along)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,7 +146,7 @@ class _Way:
             return None
         return ConfigurationCurve(samples, turns, slope)
 
-    def followed(self, x: Array, direction: Array) -> ConfigurationCurve | None:
+    def follow(self, x: Array, direction: Array) -> ConfigurationCurve | None:
         """The self-motion by small steps, to where it closes or ends."""
         ahead, closed = self._walk(x, direction)
         if closed:

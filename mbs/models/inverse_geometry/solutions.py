@@ -72,7 +72,7 @@ class CoordinateLimits:
         nearest: Array = found[order[:_MOST_WINDINGS]]
         return nearest
 
-    def wound(self, q: Array, near: Array) -> Array:
+    def wrap_to_limits(self, q: Array, near: Array) -> Array:
         """(nq,) q changed by whole turns: each coordinate within limits if it can, near `near`."""
         options = [self._options(k, q[k], near[k]) for k in range(q.size)]
         plain = np.where(self.turns, near + _remainder(q - near), q)
@@ -241,7 +241,7 @@ class Solutions(Sequence[Solution]):
                 f"{self.system}: the configuration has {near.size} values, the robot has"
                 f" {len(self.names)}: {', '.join(self.names)}"
             )
-        wound = [replace(s, q=self._bounds.wound(s.q, near)) for s in self.solutions]
+        wound = [replace(s, q=self._bounds.wrap_to_limits(s.q, near)) for s in self.solutions]
         best = min(wound, key=lambda s: float(np.linalg.norm(s.q - near)))
         return replace(best, windings=self._bounds.windings(best.q, near))
 
@@ -435,7 +435,7 @@ class Wishes:
         return Solutions(self.system.name, names, tuple(kept), method, reason, nearest, self.bounds)
 
     def _solution(self, draft: RobotSolution) -> Solution:
-        q = self.bounds.wound(draft.q, self.near)
+        q = self.bounds.wrap_to_limits(draft.q, self.near)
         windings = self.bounds.windings(q, self.near)
         return Solution(
             q,

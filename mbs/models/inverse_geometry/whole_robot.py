@@ -98,7 +98,7 @@ def close(
     return found
 
 
-def posed(
+def configurations_at(
     system: System, frame: str | int, T: Array, p: Array, seed: Array | None = None
 ) -> list[ClosedConfiguration]:
     """The whole configurations that bring a frame to a pose, where balls or free bodies carry it.
@@ -137,7 +137,7 @@ def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
 
     Args:
         system: open or closed.
-        chain: the one that `close` gets, or the frame that `posed` gets.
+        chain: the one that `close` gets, or the frame that `configurations_at` gets.
 
     Returns:
         One sentence; None where all are found by closed forms.
@@ -299,7 +299,7 @@ def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Sol
     system = wishes.system
     name = terminal_frame(system) if frame is None else frame
     searched = why_searched(system, name)
-    found = posed(system, name, T, p, wishes.near)
+    found = configurations_at(system, name, T, p, wishes.near)
     method = "loops in closed form" if searched is None else "search"
     reason = "no configuration closes the loops and takes the frame to the pose"
     if searched is not None:

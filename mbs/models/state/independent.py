@@ -122,7 +122,7 @@ def with_unit_length(joints: Sequence[Orientation], q: SX) -> SX:
     return result
 
 
-def tied(system: System, joints: Sequence[Orientation], raw: SX, q: SX) -> SX:
+def tie_orientations(system: System, joints: Sequence[Orientation], raw: SX, q: SX) -> SX:
     """(k, 1) zero where q is moved from the state by none of the independent velocities.
 
     Args:
@@ -735,7 +735,7 @@ def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Func
     dependents, s = list(layout.dependents), point_of(system, layout, ())
     symbols, z = SX.sym("q", system.nq), s.z
     raw, q = positions_of(system, layout, s)
-    ties = tied(system, layout.orientations, raw, symbols)
+    ties = tie_orientations(system, layout.orientations, raw, symbols)
     kept = square_closure(system, symbols, dependents, ties)
     every = relative_rows(system, symbols)
     kept, every = casadi.substitute([kept, every], [symbols], [q])

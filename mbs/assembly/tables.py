@@ -669,7 +669,7 @@ def _on_coordinate(sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...]
     name = sensor.joint
     if name in cut and cut[name].kind not in ("revolute", "prismatic"):
         raise AssemblyError(
-            f"{sensor.name}: the joint of {name!r} is cut to open a loop and turns in all"
+            f"{sensor.name}: the joint of {name!r} is cut to open a loop and rotates in all"
             " directions; put a RelativeSensor between its frame_a and frame_b"
         )
     if not any(name in table for table in (q, v, cut)):

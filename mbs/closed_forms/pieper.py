@@ -451,10 +451,10 @@ def _by_sliding(reach: Reach) -> list[SequenceStep] | None:
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
     if reach.scene.ring.joints[0].is_rotational:
         return _slide_in_turn(reach, rows[0], rows[1][2], (left[0], left[1]))
-    return _two_slides(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
+    return _two_displacements(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
 
 
-def _two_slides(
+def _two_displacements(
     reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]
 ) -> list[SequenceStep] | None:
     """Joints 3 and 2 from along[k] x2 = left[k], two equations in the plane across joint 1."""
@@ -506,7 +506,7 @@ def _first(reach: Reach) -> SequenceStep:
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
-def three_slides(scene: PieperLoop) -> list[SequenceStep]:
+def three_displacements(scene: PieperLoop) -> list[SequenceStep]:
     """The steps of a loop of three revolute and three prismatic joints.
 
     Raises:
@@ -518,32 +518,32 @@ def three_slides(scene: PieperLoop) -> list[SequenceStep]:
     names = ", ".join(joint.name for joint in turns.joints)
     if any(scene.zero(gap.pose.R[:2, 2]) for gap in turns.gaps):
         raise NoClosedForm(
-            f"joints {names} turn and the others slide, but two of the three axes stay parallel,"
-            " so that the turns are not determined"
+            f"joints {names} are revolute and the others prismatic, but two of the three axes stay"
+            " parallel, so that the angles are not determined"
         )
     first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in turns.gaps]))
     begun = PieperLoop(scene.problem, turns.rotated(first), scene.length)
     A, B, G = begun.after(0).pose.R, begun.after(1).pose.R, begun.after(2).pose.R.T
-    return [*three_angle_steps(begun, (0, 1, 2), A, B, G), _slides(scene)]
+    return [*three_angle_steps(begun, (0, 1, 2), A, B, G), _displacements(scene)]
 
 
-def _slides(scene: PieperLoop) -> SequenceStep:
+def _displacements(scene: PieperLoop) -> SequenceStep:
     """The prismatic joints, from the sum of all translations around the loop."""
-    way, indices, columns = Pose.identity(), list[int](), list[SX]()
+    path, indices, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
-        way = way @ gap.pose
+        path = path @ gap.pose
         if joint.is_rotational:
-            way = way @ scene.motion(k)
+            path = path @ scene.motion(k)
         else:
-            columns.append(joint.sign * way.R[:, 2])
+            columns.append(joint.sign * path.R[:, 2])
             indices.append(k)
     M = casadi.horzcat(*columns)
     adjugate = casadi.horzcat(*(_cross(M, k) for k in range(3))).T
     determinant = casadi.dot(M[:, 0], _cross(M, 0))
     if scene.zero(determinant):
         names = ", ".join(scene.ring.joints[k].name for k in indices)
-        raise NoClosedForm(f"joints {names} slide in one plane, so that they are not determined")
-    r = -casadi.mtimes(adjugate, way.p) * determinant / (determinant * determinant + TINY_SQUARE)
+        raise NoClosedForm(f"joints {names} move in one plane, so that they are not determined")
+    r = -casadi.mtimes(adjugate, path.p) * determinant / (determinant * determinant + TINY_SQUARE)
     ends = [scene.suffix(k) for k in indices]
     values = {scene.index(k): r[m] for m, k in enumerate(indices)}
     return step(
@@ -551,7 +551,7 @@ def _slides(scene: PieperLoop) -> SequenceStep:
         "linear",
         _text(scene, indices, ends),
         {},
-        Found(values, (), (determinant * determinant,), _named(M, way.p, ends)),
+        Found(values, (), (determinant * determinant,), _named(M, path.p, ends)),
     )
 
 
@@ -603,7 +603,7 @@ def pieper(problem: Problem) -> StepSequence:
         )
     if sum(not joint.is_rotational for joint in problem.ring.joints) == 3:
         return StepSequence(
-            _JOINTS, three_slides(PieperLoop(problem, problem.ring, _length(problem)))
+            _JOINTS, three_displacements(PieperLoop(problem, problem.ring, _length(problem)))
         )
     scenes = _arrangements(problem)
     if not scenes:
@@ -707,7 +707,7 @@ def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
 def _refusal(names: list[str]) -> str:
     return (
         f"no three neighbouring axes of {names[0]} .. {names[-1]} meet in a point and no three"
-        " joints slide, so that Pieper's method does not apply; use the general method"
+        " joints are prismatic, so that Pieper's method does not apply; use the general method"
     )
 
 
@@ -717,5 +717,5 @@ def _degenerate(scenes: list[PieperLoop]) -> str:
     first, last = (", ".join(joint.name for joint in part) for part in (joints[:3], joints[3:]))
     return (
         f"the axes of {last} meet in a point, but the positions of {first} do not follow from"
-        " where it is wanted: the arm is singular in every configuration"
+        " the target: the arm is singular in every configuration"
     )

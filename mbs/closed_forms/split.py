@@ -36,11 +36,11 @@ def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
         q: symbols of positions, those of cut joints included.
         p: symbols of parameters.
     """
-    simple = _without_balls(ring)
+    simple = _without_spherical(ring)
     if len(simple.joints) > _MOST:
-        return f"a loop determines {_MOST} turns and slides at most"
+        return f"a loop determines {_MOST} revolute and prismatic joints at most"
     if all(joint.index is None for joint in simple.joints):
-        return "nothing but balls is unknown"
+        return "nothing but spherical joints is unknown"
     problem = _problem(simple, q, p)
     if isinstance(problem, str):
         return problem
@@ -51,7 +51,7 @@ def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
     return _root(simple, problem, sequence)
 
 
-def _without_balls(ring: Ring) -> Ring:
+def _without_spherical(ring: Ring) -> Ring:
     """The loop with three revolute joints about crossed axes in the place of each ball."""
     joints, gaps = list[ChainJoint](), list[Gap]()
     for joint, gap in zip(ring.joints, ring.gaps, strict=True):

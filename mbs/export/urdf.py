@@ -89,7 +89,7 @@ def _check(system: System) -> None:
         fail("it has force elements or a drive line")
     for link in system.tree.links:
         if link.motion is Motion.SPHERICAL:
-            fail(f"{link.name} is a ball joint")
+            fail(f"{link.name} is a spherical joint")
         if link.rotor is not None or not (link.stiffness.is_zero() and link.rest.is_zero()):
             fail(f"{link.name} has a rotor or a spring")
     for coupling in system.couplings:

@@ -291,7 +291,7 @@ def _couple(system: System, pair: Joints) -> list[Column]:
         raise ModelError(
             f"{system.name}: the coupling {quoted(tuple(pair))} joins {link.name!r}"
             f" ({link.motion.value}) and {second.name!r} ({second.motion.value}); name two joints"
-            " that both turn or both slide"
+            " that are both revolute or both prismatic"
         )
     return [Column(f"{k}{number}", k, number, _unit(link, k), other) for k in COUPLED]
 

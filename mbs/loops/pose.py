@@ -317,7 +317,7 @@ def _refusal(target: Goal, start: Vector, tried: Sequence[Closed]) -> str:
         return f"{title}; the best configuration found leaves {left}; change the guess"
     distance, angle = min(gaps, key=lambda gap: gap[0] ** 2 + gap[1] ** 2)
     away = [f"{round(distance, 6):.4g} m away"] * bool(set(target.rows) & set("xyz"))
-    away += [f"turned by {round(angle, 6):.4g} rad"] * bool(
+    away += [f"rotated by {round(angle, 6):.4g} rad"] * bool(
         set(target.rows) & {"orientation", "axis"}
     )
     named = target.rows != WHOLE or len(closing.system.active) >= 6

@@ -79,7 +79,7 @@ def test_what_urdf_cannot_say_is_refused(tmp_path):
     refused("puma560", "is a str; give a System or a Mechanism")
     ball = written_arm()
     ball.connect(ball.world, Spherical("ball"), ball.add(Body("b", mass=1, inertia=(1, 1, 1))))
-    refused(ball, "ball is a ball joint")
+    refused(ball, "ball is a spherical joint")
     sprung = Mechanism("m")
     body = sprung.add(Body("b", mass=1, inertia=(1, 1, 1)))
     sprung.connect(sprung.world, Revolute("j", stiffness=2.0), body)

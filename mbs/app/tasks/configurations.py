@@ -73,7 +73,7 @@ def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
     """
     if len(xyz) != 3 or len(rpy) != 3:
         raise ModelError(
-            f"a pose has three places and three angles, {len(xyz)} and {len(rpy)} were given;"
+            f"a pose has three coordinates and three angles, {len(xyz)} and {len(rpy)} were given;"
             " write x y z roll pitch yaw"
         )
     T = np.eye(4)

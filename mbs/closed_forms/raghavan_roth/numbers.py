@@ -535,12 +535,12 @@ def prepare(arm: Arm) -> Prepared:
         arm: of six joints.
 
     Raises:
-        ModelError: the arm has not six joints, or none that turns.
+        ModelError: the arm has not six joints, or none that is revolute.
     """
     if arm.size != 6 or bool(np.all(arm.prismatic)):
         raise ModelError(
             f"arm {' '.join(arm.names)}: the general inverse geometric model is for six joints of"
-            " which one turns at least; use method='search'"
+            " which one is revolute at least; use method='search'"
         )
     T = _reached(arm)
     tried = [

@@ -80,8 +80,8 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
     if ready is None and method == "general":
         raise ModelError(
             f"{chain.system.name}: the general method does not hold for the joints"
-            f" {', '.join(chain.names)}: it is for six joints, and not for all with slides; use"
-            " method='search'"
+            f" {', '.join(chain.names)}: it is for six joints, and not for all with prismatic ones;"
+            " use method='search'"
         )
     return _by_search(target) if ready is None else _by_general(target, ready)
 

@@ -330,7 +330,7 @@ def apart(distance: float, angle: float) -> str:
     """
     parts = [f"{distance:.4g} m away"] if distance > _SMALLEST else []
     if angle > _SMALLEST:
-        parts.append(f"turned by {math.degrees(angle):.4g} degrees")
+        parts.append(f"rotated by {math.degrees(angle):.4g} degrees")
     return " and ".join(parts) or "within rounding of it"
 
 

@@ -16,7 +16,7 @@ from mbs.assembly import Coordinate, System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError
-from mbs.identification.leading import active_places
+from mbs.identification.leading import active_indices
 from mbs.result import optional_module
 from mbs.text import did_you_mean, quoted
 
@@ -398,8 +398,8 @@ class Record:
         require_system(system)
         width = np.shape(q)[1] if np.ndim(q) == 2 else system.nq
         alone = system.is_closed and width == len(system.active) != system.nq
-        places = active_places(system) if alone else range(system.nq)
-        joints = [system.coordinates[k] for k in places]
+        indices = active_indices(system) if alone else range(system.nq)
+        joints = [system.coordinates[k] for k in indices]
         _check_joints(system, joints, width)
         speeds = [system.speeds[k] for k in system.active]
         _check_efforts(system, [c.name for c in speeds], tau)

@@ -207,14 +207,14 @@ def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Col
     Raises:
         ModelError: a column is not among them.
     """
-    places = {column.key: k for k, column in enumerate(every)}
+    indices = {column.key: k for k, column in enumerate(every)}
     for column in columns:
-        if column.key not in places:
+        if column.key not in indices:
             known = did_you_mean(column.name, [c.name for c in every])
             raise ModelError(
                 f"{system.name}: {quoted(column.name)} is no parameter of the system; {known}"
             )
-    return [places[column.key] for column in columns]
+    return [indices[column.key] for column in columns]
 
 
 def values_of(system: System, columns: Iterable[Column]) -> SX:

@@ -11,7 +11,7 @@ from mbs.identification.exciting import Series, excitation
 from mbs.identification.identify import identify
 from mbs.identification.leading import (
     REGULAR,
-    active_places,
+    active_indices,
     leads_of,
     positions,
     regular,
@@ -34,7 +34,7 @@ def swinging(middle, size, seed=3):
     rng = np.random.default_rng(seed)
     sine, cosine = size * rng.uniform(-0.4, 0.4, (2, 4, 6))
     S, C = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-    start = np.array([system.configuration[k] for k in active_places(system)])
+    start = np.array([system.configuration[k] for k in active_indices(system)])
     start[1] += middle
     q_a = start + S @ sine + C @ cosine
     v = (C * w) @ sine - (S * w) @ cosine
@@ -46,7 +46,7 @@ def swinging(middle, size, seed=3):
 
 def test_leads_change_sign_where_the_parallelogram_is_flat():
     system = sr400()
-    start = np.array([system.configuration[k] for k in active_places(system)])
+    start = np.array([system.configuration[k] for k in active_indices(system)])
     turned = np.linspace(0, 2.5, 26)
     q = positions(system, start + np.outer(turned, np.eye(6)[1]))
     leads = leads_of(system, q)

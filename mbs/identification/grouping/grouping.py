@@ -34,11 +34,11 @@ def quotient(value: SX, divisor: SX) -> SX:
     rest: list[SX] = []
     for factor in above:
         same = (k for k, other in enumerate(below) if casadi.is_equal(factor, other, _DEPTH))
-        place = next(same, None)
-        if place is None:
+        index = next(same, None)
+        if index is None:
             rest.append(factor)
         else:
-            del below[place]
+            del below[index]
     return SX(prod(rest, start=SX(1)) / prod(below, start=SX(1)))
 
 

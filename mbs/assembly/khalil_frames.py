@@ -105,8 +105,8 @@ class _Chosen:
 
     Attributes:
         via, placement: the frames that lead to it.
-        shift: from the described frame of the motion to the chosen one, a turn about and a slide
-            along the axis of the joint.
+        shift: from the described frame of the motion to the chosen one, a rotation about and a
+            translation along the axis of the joint.
         settled: whether the frame stays where it is.
     """
 

@@ -2,7 +2,7 @@
 
 Every joint gives the velocity z x L along its own axis, L being the vector from the joint to the
 point whose velocity is asked for; the axes in which the result is asked for may be those of any
-frame, and the nearer they are to the middle of the chain, the fewer turns are needed.
+frame, and the nearer they are to the middle of the chain, the fewer rotations are needed.
 
 Source: Renaud 1980; Khalil & Creusot 1997, eq. 3 and 5.
 """
@@ -80,7 +80,7 @@ class Outlook:
 
     @property
     def rotations(self) -> int:
-        """Number of turns on the longer branch."""
+        """Number of rotations on the longer branch."""
         return max(sum(isinstance(s, OtherRotation) for s in branch) for branch in self.branches)
 
 
@@ -102,8 +102,8 @@ def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> 
         seen: the frame that moves and the axes.
         reference: V is that of the point that is fixed on the frame and now at the origin of
             this link's frame, -1 for the base's; None for the frame's own origin.
-        matrices: for so many turns, counted from the axes, orientations are formed and applied;
-            beyond, each vector is turned by itself. It changes the operations, not the result.
+        matrices: for so many rotations, counted from the axes, orientations are formed and applied;
+            beyond, each vector is rotated by itself. It changes the operations, not the result.
     """
     J = zeros(6, seen.tree.nv)
     for branch, arms in zip(seen.branches, _arms(seen.branches, reference), strict=True):
@@ -139,7 +139,7 @@ def _place(branch: list[PathStep], reference: int | None) -> int | None:
 
 
 def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
-    """Ways to the end of the branch, after each step and before the first."""
+    """Vectors to the end of the branch, after each step and before the first."""
     arm, arms = zeros(), []
     for step in reversed(branch):
         arms.append(arm)
@@ -152,7 +152,7 @@ def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
 
 
 def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
-    """Ways to a reference that lies `arm` from the beginning of the branch."""
+    """Vectors to a reference that lies `arm` from the beginning of the branch."""
     arms = []
     for step in branch:
         match step:
@@ -253,7 +253,7 @@ class Survey:
 
     @property
     def on_path(self) -> range:
-        """Places of the base and of the links."""
+        """Indices of the base and of the links."""
         return range(len(self.frames) - 1)
 
     def linear(self, axes: int, reference: int | None) -> Array:
@@ -271,7 +271,7 @@ class Survey:
         return np.asarray(np.swapaxes(self.R[-1], 1, 2) @ self.R[axes])
 
     def separate_origins(self) -> list[int]:
-        """Places of links whose origins are not always where a later one's or the frame's is."""
+        """Indices of links whose origins are not always where a later one's or the frame's is."""
         seen, kept = [self.target_p], []
         for number in reversed(self.on_path):
             if all(np.abs(self.p[number] - other).max() > _ZERO for other in seen):

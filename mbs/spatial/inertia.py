@@ -110,7 +110,7 @@ class Inertia:
     def along_axis(self) -> tuple[Inertia, Inertia]:
         """Two bodies that make this one: YY, MZ and M are zero in the first.
 
-        The second is mass on the z axis: no turn about it can be felt.
+        The second is mass on the z axis: no rotation about it can be felt.
         """
         J, on_axis = SX(self.J), zeros(3, 3)
         on_axis[0, 0] = on_axis[1, 1] = self.J[1, 1]
@@ -191,7 +191,7 @@ class PseudoInertia:
     def along_axis(self) -> tuple[PseudoInertia, PseudoInertia]:
         """Two bodies that make this one: the first has no S33, MZ, M.
 
-        The second is mass on the z axis: no turn about it can be felt.
+        The second is mass on the z axis: no rotation about it can be felt.
         """
         S, on_axis, ms, height = SX(self.S), zeros(3, 3), SX(self.ms), zeros()
         on_axis[2, 2], S[2, 2] = S[2, 2], 0

@@ -117,11 +117,11 @@ class Khalil:
         return gamma.apply(vector([self.d, -self.r * alpha.s, self.b + self.r * alpha.c]))
 
     def rotate(self, angle: SX) -> Khalil:
-        """The frame turned further about its own z axis."""
+        """The frame rotated further about its own z axis."""
         return replace(self, theta=self.theta + angle)
 
     def shift(self, distance: SX) -> Khalil:
-        """The frame slid further along its own z axis."""
+        """The frame shifted further along its own z axis."""
         return replace(self, r=self.r + distance)
 
 
@@ -129,20 +129,20 @@ def frames_to(pose: Pose, size: float) -> tuple[Khalil, ...]:
     """The frames that lead to a pose, one after the other; the last one stands at it.
 
     It is one frame where the common perpendicular of the two axes is near. Otherwise fixed frames
-    come before it: one for a shift across both axes, one for every further turn by a symbol. What
-    holds of numbers is never said of a symbol: its sign, or that its sine is not zero.
+    come before it: one for a shift across both axes, one for every further rotation by a
+    symbol. What holds of numbers is never said of a symbol: its sign, or that its sine is not zero.
 
     Parallel axes leave one distance free: b is then zero and r takes the offset.
 
     Args:
-        pose: of numbers, or made of turns by symbols about coordinate axes.
+        pose: of numbers, or made of rotations by symbols about coordinate axes.
         size: of the mechanism, such as the length of its largest link [m].
 
     Raises:
         ValueError: symbols turn the pose in a way that its chain does not tell.
     """
     if not pose.chain and not pose.R.is_constant():
-        raise ValueError("a pose that symbols turn has no chain of turns")
+        raise ValueError("a pose that symbols rotate has no chain of rotations")
     segments, theta, r = _segments(pose, size)
     frames: list[Khalil] = []
     slide = SX(0)  # along z, left over by the segment before
@@ -179,7 +179,7 @@ class _Segment:
 def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
     """A pose as segments, then theta and r of the last frame."""
     segments: list[_Segment] = []
-    # what follows the last turn about x: a turn about z, then a shift in the axes that it makes
+    # what follows the last turn about x: a rotation about z, then a shift in the axes that it makes
     theta, x, y, z = SX(0), SX(0), SX(0), SX(0)
     for axis, angle, p in _elementary(pose):
         if axis == "z":
@@ -293,7 +293,7 @@ def _is_near(b: SX, r: SX, sine: float, size: float) -> bool:
 
 
 def _rotate(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
-    """The shift behind a turn about "x" or "z", seen from before it; zeros stay zeros."""
+    """The shift behind a rotation about "x" or "z", seen from before it; zeros stay zeros."""
     turn = axis_rotation(axis, angle)
     if axis == "x":
         y, z = exact_sum(turn.c * y, -turn.s * z), exact_sum(turn.s * y, turn.c * z)

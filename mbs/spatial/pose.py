@@ -15,7 +15,7 @@ from mbs.spatial.vectors import cross, elements, exact_product, is_zero, zeros
 
 @dataclass(frozen=True, slots=True)
 class SymbolicRotation:
-    """A turn about the axis "x", "y" or "z" by an angle [rad] that has a symbol in it."""
+    """A rotation about the axis "x", "y" or "z" by an angle [rad] that has a symbol in it."""
 
     axis: str
     angle: SX
@@ -28,10 +28,10 @@ class Pose:
     Attributes:
         R: (3, 3) orientation; its columns are the axes of j in frame i.
         p: (3, 1) origin of j in frame i [m].
-        chain: the displacements one after the other that make it, where symbols turn it: turns by
-            an angle with a symbol, and poses whose orientation is of numbers. From them the angles
-            are read off as they were written; the matrix would leave the sign of a sine open.
-            Empty where R is of numbers, and where symbols in R came from elsewhere.
+        chain: the displacements one after the other that make it, where symbols turn it: rotations
+            by an angle with a symbol, and poses whose orientation is of numbers. From them the
+            angles are read off as they were written; the matrix would leave the sign of a sine
+            open. Empty where R is of numbers, and where symbols in R came from elsewhere.
     """
 
     R: SX
@@ -50,7 +50,7 @@ class Pose:
 
     @staticmethod
     def about(axis: str, angle: SX) -> Pose:
-        """A frame with the same origin, turned by an angle [rad] about "x", "y" or "z"."""
+        """A frame with the same origin, rotated by an angle [rad] about "x", "y" or "z"."""
         R = axis_rotation(axis, angle).matrix
         return Pose(R, zeros(), () if R.is_constant() else (SymbolicRotation(axis, angle),))
 
@@ -102,7 +102,7 @@ class Pose:
 
 
 def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
-    """The displacements of both, those without a turn by a symbol made one; empty if unknown."""
+    """The displacements of both, constant rotations made one; empty if unknown."""
     joined: list[SymbolicRotation | Pose] = []
     for step in (*first.steps, *second.steps):
         if isinstance(step, Pose):
@@ -163,7 +163,7 @@ def transform_wrench(pose: Pose, wrench: Wrench) -> Wrench:
     return force, moment + cross(pose.p, force)
 
 
-# Elementary displacements: a turn about a coordinate axis with a translation along it.
+# Elementary displacements: a rotation about a coordinate axis with a translation along it.
 #
 # A link frame of Khalil and Kleinfinger is two or three of them from its antecedent. A wrench or
 # an inertia is moved through one for a handful of multiplications, where a pose would cost
@@ -202,7 +202,7 @@ class Displacement(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ScrewDisplacement:
-    """A turn about a coordinate axis and a translation along the same axis.
+    """A rotation about a coordinate axis and a translation along the same axis.
 
     Attributes:
         rotation: about the axis.
@@ -244,7 +244,7 @@ class ScrewDisplacement:
 
 @dataclass(frozen=True, slots=True)
 class FreeDisplacement:
-    """Any translation, then any turn.
+    """Any translation, then any rotation.
 
     Attributes:
         rotation: of frame j seen from frame i.

@@ -29,8 +29,8 @@ from mbs.spatial import Pose, axis_rotation, vector
 
 # Quantities that depend on one joint, and equations X e^(i q) = U in another.
 #
-# A linear form holds three factors: of cos q, sin q and 1 for a joint that turns, of r^2, r and 1
-# for one that slides. A symmetric (3, 3) matrix A of such factors stands for the sum of the
+# A linear form holds three factors: of cos q, sin q and 1 for a revolute joint, of r^2, r and 1
+# for a prismatic one. A symmetric (3, 3) matrix A of such factors stands for the sum of the
 # products, b^T A b with b = (cos q, sin q, 1) or (r^2, r, 1).
 
 
@@ -122,19 +122,19 @@ def product(a: SX, b: SX) -> SX:
 
 
 def three_angle_steps(
-    scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G: SX
+    scene: PieperLoop, revolute: tuple[int, int, int], A: SX, B: SX, G: SX
 ) -> list[SequenceStep]:
-    """The steps of three joints that turn.
+    """The steps of three revolute joints.
 
     Args:
         scene: whose joints they are.
-        turns: their numbers in the ring.
+        revolute: their numbers in the ring.
         A: (3, 3) rotation between the first two; no rotation about z.
         B: (3, 3) rotation between the last two, likewise.
         G: (3, 3) what they make, of joints that are known.
     """
-    first, middle, last = turns
-    Z1, Z2 = (_turn(scene, k) for k in (first, middle))
+    first, middle, last = revolute
+    Z1, Z2 = (_axis_rotation(scene, k) for k in (first, middle))
     seen = casadi.mtimes([A, Z2, B])
     column = casadi.mtimes([Z1, seen]).T @ G[:, 0]
     return [
@@ -144,7 +144,7 @@ def three_angle_steps(
     ]
 
 
-def _turn(scene: PieperLoop, k: int) -> SX:
+def _axis_rotation(scene: PieperLoop, k: int) -> SX:
     return SX(axis_rotation("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
@@ -183,12 +183,12 @@ def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
 def angle_step(
     scene: PieperLoop, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
 ) -> SequenceStep:
-    """The turn of joint k that brings one vector of the plane onto the direction of another.
+    """The angle of joint k that brings one vector of the plane onto the direction of another.
 
     Args:
         scene: whose joint it is.
         k: its number in the ring.
-        vectors: (2, 1) before the turn, and (2, 1) after it, of the same length.
+        vectors: (2, 1) before the rotation, and (2, 1) after it, of the same length.
         scale: of the size of both, in their unit.
         regular: what else must not vanish, free of units.
     """
@@ -268,7 +268,7 @@ def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> SequenceStep |
 def linear(
     scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0
 ) -> SequenceStep:
-    """A joint that slides, from factor x = value.
+    """A prismatic joint, from factor x = value.
 
     Args:
         scene: whose joint it is.
@@ -286,7 +286,7 @@ def linear(
 
 
 def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> SequenceStep | None:
-    """A joint that slides, from a polynomial; factors from the highest power."""
+    """A prismatic joint, from a polynomial; factors from the highest power."""
     degree = len(factors) - 1
     while degree and scene.zero(factors[0] * scene.length**degree / unit):
         factors, degree = factors[1:], degree - 1
@@ -370,18 +370,20 @@ def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | No
     f[:, 2] += way.p
     square = _square(f, way.p, point) if joint.is_rotational else _slid_square(f)
     reach = Reach(scene, scene.after(0).pose, f, square, p)
-    steps = _by_turning(reach) if scene.ring.joints[1].is_rotational else _by_sliding(reach)
+    steps = (
+        _second_revolute(reach) if scene.ring.joints[1].is_rotational else _second_prismatic(reach)
+    )
     return None if steps is None else [*steps, _first(reach)]
 
 
 def _square(f: SX, t: SX, point: SX) -> SX:
-    """The form of |f|^2, of a point that turns."""
+    """The form of |f|^2, of a point that rotates."""
     middle = 2 * casadi.mtimes(f.T, t)
     return SX(middle + constant(casadi.sumsqr(point) - casadi.sumsqr(t)))
 
 
 def _slid_square(f: SX) -> SX:
-    """The form of |f|^2, of a point that slides."""
+    """The form of |f|^2, of a point that translates."""
     u, v = f[:, 1], f[:, 2]
     return casadi.vertcat(casadi.sumsqr(u), 2 * casadi.dot(u, v), casadi.sumsqr(v))
 
@@ -398,8 +400,8 @@ def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
     return [turned, R[2, :].T], forms, [scene.length**2, scene.length]
 
 
-def _by_turning(reach: Reach) -> list[SequenceStep] | None:
-    """Joints 3 and 2 where joint 2 turns."""
+def _second_revolute(reach: Reach) -> list[SequenceStep] | None:
+    """Joints 3 and 2 where joint 2 is revolute."""
     scene = reach.scene
     (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
     Z1, Z2 = h - a[2] * reach.f[2, :].T, k - b[2] * reach.f[2, :].T
@@ -445,8 +447,8 @@ def _parallel(
     return None if joint is None else [third, joint]
 
 
-def _by_sliding(reach: Reach) -> list[SequenceStep] | None:
-    """Joints 3 and 2 where joint 2 slides."""
+def _second_prismatic(reach: Reach) -> list[SequenceStep] | None:
+    """Joints 3 and 2 where joint 2 is prismatic."""
     rows, forms, _ = _rows(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
     if reach.scene.ring.joints[0].is_rotational:
@@ -512,17 +514,17 @@ def three_displacements(scene: PieperLoop) -> list[SequenceStep]:
     Raises:
         NoClosedForm: two of the turning axes are always parallel, or the prismatic joints coplanar.
     """
-    turns = scene.ring
-    for k in reversed([k for k, joint in enumerate(turns.joints) if not joint.is_rotational]):
-        turns = turns.without(k)
-    names = ", ".join(joint.name for joint in turns.joints)
-    if any(scene.zero(gap.pose.R[:2, 2]) for gap in turns.gaps):
+    revolute = scene.ring
+    for k in reversed([k for k, joint in enumerate(revolute.joints) if not joint.is_rotational]):
+        revolute = revolute.without(k)
+    names = ", ".join(joint.name for joint in revolute.joints)
+    if any(scene.zero(gap.pose.R[:2, 2]) for gap in revolute.gaps):
         raise NoClosedForm(
             f"joints {names} are revolute and the others prismatic, but two of the three axes stay"
             " parallel, so that the angles are not determined"
         )
-    first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in turns.gaps]))
-    begun = PieperLoop(scene.problem, turns.rotated(first), scene.length)
+    first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in revolute.gaps]))
+    begun = PieperLoop(scene.problem, revolute.rotated(first), scene.length)
     A, B, G = begun.after(0).pose.R, begun.after(1).pose.R, begun.after(2).pose.R.T
     return [*three_angle_steps(begun, (0, 1, 2), A, B, G), _displacements(scene)]
 

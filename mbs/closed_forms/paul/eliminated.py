@@ -38,7 +38,7 @@ def eliminated(stage: PaulStage) -> Iterator[Candidate]:
         )[:_ROWS]
         for variable in variables:
             others = tuple(v for v in variables if v is not variable)
-            if variable.slides or len(columns(others)) > _MOST:
+            if variable.prismatic or len(columns(others)) > _MOST:
                 continue
             yield from _of(stage, inside, variable, others)
 
@@ -89,6 +89,6 @@ def _built(
         casadi.det(casadi.vertcat(*(casadi.horzcat(*k, o[c]) for k, o in zip(K, own, strict=True))))
         for c in range(3)
     )
-    slides = sum(v.slides for v in others)
-    power = sum(row.row.power for row in rows) - slides
+    prismatic = sum(v.prismatic for v in others)
+    power = sum(row.row.power for row in rows) - prismatic
     return angle_step(stage, variable, (SX(X), SX(Y), SX(-Z)), power)

@@ -52,7 +52,7 @@ def linear(stage: PaulStage) -> Iterator[Candidate]:
 def columns(variables: Variables) -> list[tuple[Variable, str]]:
     """What the equations are linear in."""
     return [
-        (variable, kind) for variable in variables for kind in ("r" if variable.slides else "cs")
+        (variable, kind) for variable in variables for kind in ("r" if variable.prismatic else "cs")
     ]
 
 
@@ -80,10 +80,10 @@ def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> l
     for variable in variables:
         key = key_of(variable, equation)
         if key is None:
-            factors += [SX(0)] * (1 if variable.slides else 2)
+            factors += [SX(0)] * (1 if variable.prismatic else 2)
             continue
         own = stage.factor(equation, key)
-        factors += [own.X] if variable.slides else [own.X, own.Y]
+        factors += [own.X] if variable.prismatic else [own.X, own.Y]
     return [*factors, stage.factor(equation, (0,) * len(equation.variables)).X]
 
 
@@ -119,14 +119,14 @@ def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -
     named, equation = _text(stage, table, variables)
     D, solved = _cramer(A, b)
     values, regular, at = dict[int, SX](), list[SX](), 0
-    power = sum(row.row.power for row in rows) - sum(variable.slides for variable in variables)
+    power = sum(row.row.power for row in rows) - sum(variable.prismatic for variable in variables)
     for variable in variables:
         index = stage.knowledge.index(variable)
-        if variable.slides:
+        if variable.prismatic:
             values[index] = divided(solved[at], D)
         else:
             values[index] = angle_of(solved[at + 1] * D, solved[at] * D).value
-        at += 1 if variable.slides else 2
+        at += 1 if variable.prismatic else 2
     if not D.is_constant():
         regular.append(SX((D / stage.matrices.length**power) ** 2))
     kind = _kind(variables)
@@ -137,7 +137,7 @@ def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -
 def _kind(variables: Variables) -> str:
     if len(variables) > 1:
         return "linear"
-    return "type 1" if variables[0].slides else "type 3"
+    return "type 1" if variables[0].prismatic else "type 3"
 
 
 def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:

@@ -96,9 +96,9 @@ def one_unknown(stage: PaulStage) -> Iterator[Candidate]:
     for equation in stage.equations:
         if len(equation.variables) != 1:
             continue
-        if not equation.variables[0].slides and set(equation.parts) <= {(0,), (1,)}:
+        if not equation.variables[0].prismatic and set(equation.parts) <= {(0,), (1,)}:
             yield _type_2(stage, equation)
-        elif equation.variables[0].slides and (2,) in equation.parts:
+        elif equation.variables[0].prismatic and (2,) in equation.parts:
             yield _quadratic(stage, equation)
 
 

@@ -35,11 +35,11 @@ class Variable:
     """A slide, an angle, or a sum of angles with signs.
 
     Attributes:
-        slides: whether it is the length of a prismatic joint.
+        prismatic: whether it is the length of a prismatic joint.
         members: number of each joint in the ring, and its sign; the first sign is +1.
     """
 
-    slides: bool
+    prismatic: bool
     members: Members
 
     @property
@@ -147,8 +147,8 @@ def _samples(problem: Problem, ring: Ring) -> LoopSamples:
     q = np.array([x[indices] for x, _ in problem.samples])
     length = float(np.mean(np.linalg.norm(gaps[..., :3, 3], axis=-1))) or 1.0
     gaps[..., :3, 3] /= length
-    slides = [not joint.is_rotational for joint in ring.joints]
-    return LoopSamples(gaps, np.where(slides, q / length, q))
+    prismatic = [not joint.is_rotational for joint in ring.joints]
+    return LoopSamples(gaps, np.where(prismatic, q / length, q))
 
 
 # Rigid transforms as 15 x 15 matrices that act on the invariants of a point and a line.
@@ -200,10 +200,10 @@ def represented_pose(pose: Pose, opposite: Pose) -> SX:
     return SX(casadi.sparsify(D))
 
 
-def joint_basis(slides: bool) -> Matrix:
+def joint_basis(prismatic: bool) -> Matrix:
     """(3, 15, 15) factors of 1, cos q, sin q of a rotation; of 1, r, r^2 of a translation."""
     T = np.broadcast_to(np.eye(4), (3, 4, 4)).copy()
-    if slides:
+    if prismatic:
         T[1, 2, 3], T[2, 2, 3] = 1.0, -1.0
         one, up, down = represented(T)
         return np.array([one, (up - down) / 2, (up + down) / 2 - one])
@@ -213,11 +213,11 @@ def joint_basis(slides: bool) -> Matrix:
     return np.array([mean, (one - half) / 2, quarter - mean])
 
 
-def motion(q: Matrix, slides: bool) -> Matrix:
+def motion(q: Matrix, prismatic: bool) -> Matrix:
     """(..., 4, 4) translation along z, or rotation about z."""
     T = np.zeros((*q.shape, 4, 4))
     T[..., range(4), range(4)] = 1.0
-    if slides:
+    if prismatic:
         T[..., 2, 3] = q
         return T
     c, s = np.cos(q), np.sin(q)
@@ -290,21 +290,21 @@ class _Pieces:
     back: list[Matrix]
     turns: list[Tensor]
     turns_back: list[Tensor]
-    slides: frozenset[int]
+    prismatic: frozenset[int]
 
 
 def splits(knowledge: Knowledge) -> Iterator[FrameSplit]:
     """Every split of the loop whose sides have few unknown joints each."""
     whole = _pieces(knowledge, slice(0, SIZE))
-    turning = _pieces(knowledge, _DIRECTION)
+    directions = _pieces(knowledge, _DIRECTION)
     w = np.zeros((SIZE, 1))
     w[[0, 8]] = 1.0
     for e, k in enumerate(whole.joints):
-        slides = k in whole.slides
-        for end in (2 * k, 2 * k + 1) if slides else (2 * k,):
-            yield from _of_end(whole, w, (e, slides), (end, 2))
-        for end in (2 * k,) if slides else (2 * k, 2 * k + 1):
-            yield from _of_end(turning, np.eye(3)[:, :2], (e, not slides), (end, 0))
+        prismatic = k in whole.prismatic
+        for end in (2 * k, 2 * k + 1) if prismatic else (2 * k,):
+            yield from _of_end(whole, w, (e, prismatic), (end, 2))
+        for end in (2 * k,) if prismatic else (2 * k, 2 * k + 1):
+            yield from _of_end(directions, np.eye(3)[:, :2], (e, not prismatic), (end, 0))
 
 
 def _of_end(
@@ -329,16 +329,16 @@ def _of_end(
             continue
         for column in range(seed.shape[1]):
             sides = (Side(s.joints, s.values[:, :, column]) for s in (side, other))
-            rows = _rows(axis, start, start // 2 in pieces.slides)
+            rows = _rows(axis, start, start // 2 in pieces.prismatic)
             yield FrameSplit(start, point, axis + column, rows, *sides)
 
 
-def _rows(axis: int, start: int, slides: bool) -> tuple[int, ...]:
+def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
     """The elements that are new: a turn of the frame about its z axis leaves the others."""
     after = start % 2 == 1
     if axis == 2:
-        return (3, 4, 6, 7, 9, 10, 12, 13) if after and not slides else tuple(range(1, SIZE))
-    if after and slides:
+        return (3, 4, 6, 7, 9, 10, 12, 13) if after and not prismatic else tuple(range(1, SIZE))
+    if after and prismatic:
         return ()
     return (6, 7) if after else (6, 7, 8)
 
@@ -400,8 +400,8 @@ def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
     back = [represented(inverse(T))[:, block, block] for T in gaps]
     turns = [_basis(knowledge, k, 1)[:, block, block] for k in joints]
     turns_back = [_basis(knowledge, k, -1)[:, block, block] for k in joints]
-    slides = frozenset(k for k in joints if not knowledge.ring.joints[k].is_rotational)
-    return _Pieces(joints, ways, back, turns, turns_back, slides)
+    prismatic = frozenset(k for k in joints if not knowledge.ring.joints[k].is_rotational)
+    return _Pieces(joints, ways, back, turns, turns_back, prismatic)
 
 
 def _merge(knowledge: Knowledge, k: int) -> Matrix:
@@ -459,13 +459,13 @@ class Row:
 
 
 def simple_rows(
-    split: FrameSplit, slides: frozenset[int], most: int
+    split: FrameSplit, prismatic: frozenset[int], most: int
 ) -> Iterator[tuple[Row, dict[Members, Values]]]:
     """The rows that may have few unknowns, and their terms.
 
     Args:
         split: of the loop.
-        slides: numbers of its prismatic joints.
+        prismatic: numbers of its prismatic joints.
         most: variables of a row with products of them.
     """
     offset = 0 if split.seed == 2 else -6
@@ -473,7 +473,7 @@ def simple_rows(
     if not rows:
         return
     sides = (split.left, split.right)
-    tables = [_table(side.joints, slides) for side in sides]
+    tables = [_table(side.joints, prismatic) for side in sides]
     masks = [np.max(np.abs(side.values[:, rows]), axis=0) > ZERO for side in sides]
     counts = np.sum([_counts(t, mask) for t, mask in zip(tables, masks, strict=True)], axis=0)
     variables, joints, long = counts
@@ -532,16 +532,16 @@ class _Table:
 
 
 @lru_cache(maxsize=4096)
-def _table(joints: tuple[int, ...], slides: frozenset[int]) -> _Table:
+def _table(joints: tuple[int, ...], prismatic: frozenset[int]) -> _Table:
     every = list(product((-1, 0, 1), repeat=len(joints)))
     terms = list[Members | None]()
     for row in every:
         term = tuple(
-            (k, {-1: 1, 1: 2}[e] if k in slides else e)
+            (k, {-1: 1, 1: 2}[e] if k in prismatic else e)
             for k, e in sorted(zip(joints, row, strict=True))
             if e
         )
-        leading = next((e for k, e in term if k not in slides), 1)
+        leading = next((e for k, e in term if k not in prismatic), 1)
         terms.append(term if leading > 0 else None)
     has = (np.array(every, dtype=int).reshape(len(every), len(joints)) != 0).astype(int)
     pairs = list(combinations(range(len(joints)), 2))

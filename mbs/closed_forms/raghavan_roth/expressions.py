@@ -176,20 +176,20 @@ class Characteristic:
         matrices: the parts M_k, (n, n) expressions of the problem's given.
         joint: name of the joint.
         index: its index in the problem's x.
-        slides: whether it slides.
+        prismatic: whether it slides.
         regularity: reciprocal condition of the matrix at positions that are no solutions.
     """
 
     matrices: tuple[SX, ...]
     joint: str
     index: int
-    slides: bool
+    prismatic: bool
     regularity: float
 
     def matrix(self, q: SX) -> SX:
         """(n, n) the matrix at a position of the joint [rad or m]."""
         first, *others = self.matrices
-        factors = (q, q * q) if self.slides else (casadi.cos(q), casadi.sin(q))
+        factors = (q, q * q) if self.prismatic else (casadi.cos(q), casadi.sin(q))
         parts = [SX(f * part) for f, part in zip(factors, others, strict=False)]
         return SX(sum(parts, first))
 
@@ -248,11 +248,11 @@ def _loops(problem: Problem) -> list[_Loop]:
     for ring in (problem.ring, problem.ring.reversed()):
         for first in range(6):
             own = ring.rotated(first)
-            slides = np.array([not joint.is_rotational for joint in own.joints])
-            if slides[5]:
+            prismatic = np.array([not joint.is_rotational for joint in own.joints])
+            if prismatic[5]:
                 continue
             ways = _numbers(problem, own, length)
-            pencils = (pencil(elimination, ways) for elimination in eliminations(slides))
+            pencils = (pencil(elimination, ways) for elimination in eliminations(prismatic))
             found += [_Loop(own, one, length) for one in pencils if one.regularity > REGULAR]
     return found
 

@@ -160,9 +160,9 @@ class CharacteristicFunction(ModelFunction):
         return self._found.joint
 
     @property
-    def slides(self) -> bool:
+    def prismatic(self) -> bool:
         """Whether it slides."""
-        return self._found.slides
+        return self._found.prismatic
 
 
 def characteristic_function(chain: FrameChain) -> Function:

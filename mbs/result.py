@@ -64,8 +64,8 @@ class Result:
     stopped: tuple[float, str] | None = None
 
     def __post_init__(self) -> None:
-        time = _frozen(self.time)
-        values = _frozen(self.values)
+        time = _freeze(self.time)
+        values = _freeze(self.values)
         if time.ndim != 1 or values.shape != (len(time), len(self.units)):
             raise ModelError(
                 f"result {self.name!r}: time has shape {time.shape} and values {values.shape} for "
@@ -267,7 +267,7 @@ class Result:
         return self.names.index(name)
 
 
-def _frozen(values: npt.ArrayLike) -> Array:
+def _freeze(values: npt.ArrayLike) -> Array:
     array = np.array(values, dtype=float)
     array.flags.writeable = False
     return array

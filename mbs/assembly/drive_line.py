@@ -166,7 +166,7 @@ def drive_line(mechanism: Mechanism) -> DriveLine:
         mine = [part for part in parts if turns[part.flanges[0].key].coordinate == name]
         changed[name] = _driven(mechanism, name, lead, mine, turns)
     links = {n: lead.owner.name for n, lead in leads.items() if not isinstance(lead.owner, Joint)}
-    return DriveLine(_lowered(mechanism, changed, turns), turns, parts, links)
+    return DriveLine(_lower(mechanism, changed, turns), turns, parts, links)
 
 
 def _turns(
@@ -284,7 +284,7 @@ def _driven(
     return replace(joint, actuated=joint.actuated or bool(devices), Ia=inertia)
 
 
-def _lowered(
+def _lower(
     mechanism: Mechanism, changed: Mapping[str, Joint], turns: Mapping[Key, FlangeTurn]
 ) -> Mechanism:
     """The mechanism with the joints that lead, couplings to the others, and forces."""

@@ -17,7 +17,7 @@ from mbs.components import Component, Fixed, Joint, Mechanism, Point, RigidBody
 from mbs.components.component import KhalilStep
 from mbs.components.couplings import Transmission
 from mbs.errors import AssemblyError
-from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose
+from mbs.spatial import Inertia, Khalil, MatrixRotation, Pose
 
 _SAME_PLACE = 1e-8
 """Distance [m] or angle [rad] by which welds on two ways around may differ: angles that files give
@@ -137,7 +137,7 @@ def inertia_of(node: BodyNode, mechanism: Mechanism, symbols: Mapping[str, SX]) 
     for (name, _), pose in node.members.items():
         component = mechanism.components[name]
         if isinstance(component, RigidBody):
-            total = total + component.inertial(symbols).seen_from(MatrixTurn(pose.R), pose.p)
+            total = total + component.inertial(symbols).seen_from(MatrixRotation(pose.R), pose.p)
     return total
 
 

@@ -5,7 +5,7 @@ Rz(gamma) Tz(b) commutes with the motion of the joint before, the gamma and b of
 a link are moved into theta and r of the link itself: frame j then sits where the classical
 notation puts it, with x along the common perpendicular to the next axis. Frames that a table gave
 stay as they were given. Where the common perpendicular is far, or a symbol may move it anywhere,
-the frame stays at the described origin, and fixed frames lead to it (`spatial.khalil.placed`).
+the frame stays at the described origin, and fixed frames lead to it (`spatial.khalil.frames_to`).
 
 Source: Khalil & Kleinfinger 1986, section 2.
 """
@@ -23,9 +23,9 @@ from mbs.assembly.tree import CarriedRotor, Frame, Link, Tree
 from mbs.components import Mechanism
 from mbs.components.joints import Freedom, Motion
 from mbs.expressions import to_sx
-from mbs.spatial import Inertia, Khalil, MatrixTurn, Pose, align_z, exact_product, placed
+from mbs.spatial import Inertia, Khalil, MatrixRotation, Pose, align_z, exact_product, frames_to
 
-_FLIP = Pose.turned(SX(DM([[1, 0, 0], [0, -1, 0], [0, 0, -1]])))
+_FLIP = Pose.rotation(SX(DM([[1, 0, 0], [0, -1, 0], [0, 0, -1]])))
 _EFFORTS = ("Ia", "Fv", "Fs", "Fs_width", "stiffness", "rest")
 """What acts on the velocity and position of every freedom of a joint."""
 
@@ -105,8 +105,8 @@ class _Chosen:
 
     Attributes:
         via, placement: the frames that lead to it.
-        shift: from the described frame of the motion to the chosen one, a turn about and a slide
-            along the axis of the joint.
+        shift: from the described frame of the motion to the chosen one, a rotation about and a
+            translation along the axis of the joint.
         settled: whether the frame stays where it is.
     """
 
@@ -131,7 +131,7 @@ def khalil_frames(
     home: dict[int, int] = {0: -1}
     base = {0: Pose.identity()}
     stubs: dict[int, int] = {}
-    for branch in (*spanning.branches, *_kept(spanning)):
+    for branch in (*spanning.branches, *_keep(spanning)):
         last, pose = _extend(drafts, base, home[branch.parent], branch)
         if branch.child < 0:
             stubs[id(branch.edge)] = last
@@ -165,14 +165,14 @@ def khalil_frames(
     for node, (link, pose) in zip(graph.nodes, homes, strict=True):
         if link >= 0:
             own = inertia_of(node, mechanism, symbols)
-            inertias[link] = inertias[link] + own.seen_from(MatrixTurn(pose.R), pose.p)
+            inertias[link] = inertias[link] + own.seen_from(MatrixRotation(pose.R), pose.p)
     gravity = casadi.vertcat(*(to_sx(g, symbols) for g in mechanism.world.gravity))
     rotors = [_rotor(draft.edge, place, symbols) for draft in drafts]
     tree = Tree(_links(drafts, chosen, inertias, rotors, symbols), gravity)
     return Framed(tree, tuple(draft.joint for draft in drafts), tuple(cuts), homes)
 
 
-def _kept(spanning: SpanningTree) -> list[Branch]:
+def _keep(spanning: SpanningTree) -> list[Branch]:
     """Cut joints with an effort, or without rows: they stay, and their free end is welded."""
     return [
         Branch(edge, edge.a, -1, True)
@@ -195,7 +195,7 @@ def _extend(
     given = edge.khalil if branch.forward and nodes[branch.parent].is_identity() else None
     freedoms = edge.joint.freedoms if branch.forward else edge.joint.freedoms[::-1]
     for freedom in freedoms:
-        aligned = _aligned(freedom, branch.forward)
+        aligned = _align(freedom, branch.forward)
         drafts.append(
             _DescribedLink(
                 freedom.coordinate_of(edge.joint.name),
@@ -231,11 +231,11 @@ def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chose
             stays = True
         else:
             pose = draft.pose if before is None else before.shift.inverse() @ draft.pose
-            *fixed, placement = placed(pose, size)
+            *fixed, placement = frames_to(pose, size)
             if before is not None and not before.settled:
                 first, *others = (*fixed, placement)
-                moved, left = first.divided()
-                before.placement = before.placement.turned(moved.gamma).slid(moved.b)
+                moved, left = first.split()
+                before.placement = before.placement.rotate(moved.gamma).shift(moved.b)
                 before.shift = moved.pose()
                 *fixed, placement = (left, *others)
             via = tuple(fixed)
@@ -245,11 +245,11 @@ def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chose
     return chosen
 
 
-def _aligned(freedom: Freedom, forward: bool) -> Pose:
+def _align(freedom: Freedom, forward: bool) -> Pose:
     """The frame with z along the axis of a freedom, reversed when the joint is run backwards."""
     if freedom.motion not in _ALONG_Z:
         return Pose.identity()
-    pose = Pose.turned(align_z(freedom.axis))
+    pose = Pose.rotation(align_z(freedom.axis))
     return pose if forward else pose @ _FLIP
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mbs.assembly.system import System
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import quaternion_slices
-from mbs.assembly.validity import Row, all_hold, plain_fault, plain_rows
+from mbs.assembly.validity import ValidityRow, all_hold, plain_fault, plain_rows
 from mbs.errors import MbsError, ModelError
 from mbs.native import compiled
 from mbs.numbers import doubles
@@ -107,7 +107,7 @@ class ConfigurationCheck:
         refuse: `refuse(system, q, p)` raises the error that says why numbers are not taken.
     """
 
-    rows: Callable[[System, SX], list[Row]]
+    rows: Callable[[System, SX], list[ValidityRow]]
     refuse: Callable[[System, Any, Any], None]
 
 
@@ -174,7 +174,7 @@ class ModelFunction(Function):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds the System too, so that names, defaults and checks go with it."""
-        return _unpickled, (self.serialize(), self._system, self._check_configuration)
+        return _unpickle, (self.serialize(), self._system, self._check_configuration)
 
     def __deepcopy__(self, dummy: Any = None) -> ModelFunction:
         """Itself: a Function never changes."""
@@ -193,7 +193,7 @@ class ModelFunction(Function):
             if self._asks and size and self._sizes.get(name, (0,))[0] == size
         )
 
-    def rows(self, q: SX) -> list[Row]:
+    def rows(self, q: SX) -> list[ValidityRow]:
         """What is asked of the inputs `asked`; empty where it is nothing.
 
         Args:
@@ -438,7 +438,7 @@ def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | Non
     return full if full.shape[0] == rows else None
 
 
-def _unpickled(data: str, system: System, check: ConfigurationCheck | None) -> ModelFunction:
+def _unpickle(data: str, system: System, check: ConfigurationCheck | None) -> ModelFunction:
     return ModelFunction(Function.deserialize(data), system, check=check)
 
 

@@ -105,7 +105,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
         bodies=_bodies(mechanism, graph, framed),
         frames=frames,
         named_frames=tuple(mechanism.frames),
-        numbered=_numbered(mechanism, frames, len(framed.tree.links)),
+        numbered=_number(mechanism, frames, len(framed.tree.links)),
         loops=_loop_rows(mechanism, framed, parts),
         configuration=tuple(zero_position(framed.tree)),
         parts=parts,
@@ -274,7 +274,7 @@ def _shapes(
     return tuple(rows)
 
 
-def _numbered(
+def _number(
     mechanism: Mechanism, frames: Mapping[str, tuple[int, Pose]], links: int
 ) -> dict[int, str]:
     """The bodies of the frames of a table, where their numbers are not those of the links."""

@@ -71,7 +71,7 @@ def prove(
     free = {(c.edge.joint.name, "free"): c.frames[0] for c in framed.cuts if c.welded}
     frames = {**places, **free}
     with np.errstate(all="ignore"):  # an expression need not have a value everywhere
-        described = _described(mechanism, framed, known, q)
+        described = _describe(mechanism, framed, known, q)
         told = np.array([np.broadcast_to(described[port], (len(rows), 4, 4)) for port in frames])
         found = _assembled(framed.tree, list(frames.values()), symbols, rows, q)
         off = np.abs(found - told)
@@ -101,7 +101,7 @@ def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
 # --- what the components say ---------------------------------------------------------------------
 
 
-def _described(
+def _describe(
     mechanism: Mechanism, framed: Framed, known: Mapping[str, Array], q: Mapping[str, Array]
 ) -> dict[tuple[str, str], Array]:
     """Where every body and joint stands in the world, and the free ends of kept cut joints."""

@@ -165,7 +165,7 @@ def symbolic(system: System, what: Sequence[str]) -> System:
             is an expression of other symbols already.
     """
     require_system(system)
-    rows = _chosen(system, _names(system, what))
+    rows = _choose(system, _names(system, what))
     _check_welds(system, rows)
     taken = {parameter.name for parameter in system.parameters}
     for row in rows:
@@ -192,7 +192,7 @@ def _names(system: System, what: Sequence[str]) -> list[str]:
     return names
 
 
-def _chosen(system: System, names: Sequence[str]) -> list[Adjustable]:
+def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
     """The numbers with these names or in these groups, in the order of the system."""
     rows = adjustables(system)
     single = {row.name: row for row in rows}
@@ -251,14 +251,14 @@ def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adju
 def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
     """Refuse inertial symbols of links every body of which some Fixed joint holds."""
     for number in sorted({int(r.owner[1]) for r in rows if r.kind in TEN_PARAMETERS}):
-        held = [j for j in system.joints if j.part is not None and j.frame_b[0] == number]
+        carriers = [j for j in system.joints if j.part is not None and j.frame_b[0] == number]
         bodies = [body.name for body in system.bodies if body.link == number + 1]
-        parts = [joint.part.ports for joint in held if joint.part is not None]
-        if held and all(any((body, "") in ports for ports in parts) for body in bodies):
+        parts = [joint.part.ports for joint in carriers if joint.part is not None]
+        if carriers and all(any((body, "") in ports for ports in parts) for body in bodies):
             raise ModelError(
                 f"{system.name}: the mass of link {number + 1} cannot become a symbol, since each"
-                f" of its bodies is held by {' or '.join(joint.name for joint in held)}; give the"
-                " body an mbs.Parameter where it is described"
+                f" of its bodies is carried by {' or '.join(joint.name for joint in carriers)};"
+                " give the body an mbs.Parameter where it is described"
             )
 
 

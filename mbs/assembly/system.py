@@ -260,7 +260,7 @@ class System:
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds all of it but the models that were built, which are built anew."""
         kept = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "_cache"}
-        return _unpickled, packed(kept)
+        return _unpickle, packed(kept)
 
     def __repr__(self) -> str:
         kind = "closed" if self.is_closed else "open"
@@ -434,17 +434,17 @@ class System:
         Raises:
             ModelError: a name is unknown, or a sequence has the wrong length.
         """
-        return self._filled(values, self.coordinates, list(self.configuration), "position")
+        return self._fill(values, self.coordinates, list(self.configuration), "position")
 
     def velocity(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Velocities v from values by name, the others zero; errors as for `position`."""
-        return self._filled(values, self.speeds, [0.0] * self.nv, "velocity")
+        return self._fill(values, self.speeds, [0.0] * self.nv, "velocity")
 
     def effort(self, values: Mapping[str, float] | Sequence[float] | None) -> list[float]:
         """Joint efforts tau from values by name, the others zero; errors as for `position`."""
-        return self._filled(values, self.speeds, [0.0] * self.nv, "effort")
+        return self._fill(values, self.speeds, [0.0] * self.nv, "effort")
 
-    def _filled(
+    def _fill(
         self,
         values: Mapping[str, float] | Sequence[float] | None,
         coordinates: Sequence[Coordinate],
@@ -557,5 +557,5 @@ class System:
         return ""
 
 
-def _unpickled(*parts: Any) -> System:
+def _unpickle(*parts: Any) -> System:
     return System(**unpacked(*parts))

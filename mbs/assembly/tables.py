@@ -32,7 +32,7 @@ from mbs.components.sensors import (
 )
 from mbs.components.shapes import Shape
 from mbs.errors import AssemblyError
-from mbs.spatial import Inertia, MatrixTurn, Pose
+from mbs.spatial import Inertia, MatrixRotation, Pose
 from mbs.text import did_you_mean
 
 Places = Mapping[tuple[str, str], tuple[int, Pose]]
@@ -323,7 +323,7 @@ def _part(
     mechanism: Mechanism, joint: Joint, places: Places, symbols: Mapping[str, SX]
 ) -> WeldedPart | None:
     """The side of a weld that is not the world; None where both sides are welded elsewhere."""
-    sides = {port: _welded(mechanism, joint, port) for port in "ab"}
+    sides = {port: _weld(mechanism, joint, port) for port in "ab"}
     if (joint.name, "a") in sides["b"]:
         return None
     side, sign = ("a", -1) if (mechanism.world.name, "") in sides["b"] else ("b", 1)
@@ -332,11 +332,13 @@ def _part(
         component = mechanism.components[name]
         if isinstance(component, RigidBody):
             pose = places[name, ""][1]
-            inertia = inertia + component.inertial(symbols).seen_from(MatrixTurn(pose.R), pose.p)
+            inertia = inertia + component.inertial(symbols).seen_from(
+                MatrixRotation(pose.R), pose.p
+            )
     return WeldedPart(frozenset(sides[side]), inertia, sign)
 
 
-def _welded(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:
+def _weld(mechanism: Mechanism, joint: Joint, port: str) -> list[Port]:
     """What is welded to one frame of a joint other than through the joint, in the order found."""
     found: dict[Port, None] = {(joint.name, port): None}
     queue = deque(found)
@@ -368,9 +370,9 @@ class CoordinateCoupling:
 
     Attributes:
         name: of the coupling.
-        driven, driver: numbers in q.
+        driven, driver: indices in q.
         coefficients: c_0, c_1, ...
-        others: number in q and factor of each further coordinate.
+        others: index in q and factor of each further coordinate.
     """
 
     name: str
@@ -540,7 +542,7 @@ def _on_coordinate(sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...]
     name = sensor.joint
     if name in cut and cut[name].kind not in ("revolute", "prismatic"):
         raise AssemblyError(
-            f"{sensor.name}: the joint of {name!r} is cut to open a loop and turns in all"
+            f"{sensor.name}: the joint of {name!r} is cut to open a loop and rotates in all"
             " directions; put a RelativeSensor between its frame_a and frame_b"
         )
     if not any(name in table for table in (q, v, cut)):

@@ -33,7 +33,7 @@ joints that do not determine the others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Row:
+class ValidityRow:
     """A number of a configuration and parameters that must not be larger than its bound.
 
     Attributes:
@@ -51,7 +51,7 @@ class Row:
     sentence: str
 
 
-def plain_rows(system: System, q: SX) -> list[Row]:
+def plain_rows(system: System, q: SX) -> list[ValidityRow]:
     """Rows of quaternions, of parameters that have bounds, and of what is computed from them.
 
     Args:
@@ -62,7 +62,7 @@ def plain_rows(system: System, q: SX) -> list[Row]:
     return [*quaternions, *_parameter_rows(system), *field_rows(system)]
 
 
-def quaternion_rows(system: System, q: SX, parts: Iterable[slice]) -> list[Row]:
+def quaternion_rows(system: System, q: SX, parts: Iterable[slice]) -> list[ValidityRow]:
     """The lengths of some quaternions.
 
     Args:
@@ -75,17 +75,17 @@ def quaternion_rows(system: System, q: SX, parts: Iterable[slice]) -> list[Row]:
         joint = system.coordinates[part.start].joint
         away = casadi.fabs(casadi.norm_2(q[part]) - 1)
         wrong = f"the quaternion of {joint} is not of unit length; divide it by its length"
-        rows.append(Row("quaternion", f"quaternion of {joint}", away, UNIT, wrong))
+        rows.append(ValidityRow("quaternion", f"quaternion of {joint}", away, UNIT, wrong))
     return rows
 
 
-def _parameter_rows(system: System) -> list[Row]:
+def _parameter_rows(system: System) -> list[ValidityRow]:
     symbols = system.symbol_table
     bounds = system.bounds.items()
     return [row for name, own in bounds for row in _bound_rows(name, symbols[name], own)]
 
 
-def field_rows(system: System) -> list[Row]:
+def field_rows(system: System) -> list[ValidityRow]:
     """What is computed from parameters, such as a mass of "M1 + M2", and has bounds.
 
     Args:
@@ -94,20 +94,20 @@ def field_rows(system: System) -> list[Row]:
     return [row for own in system.bounded for row in _bound_rows(own.name, own.value, own.bounds)]
 
 
-def _bound_rows(name: str, value: SX, bounds: Bounds) -> list[Row]:
+def _bound_rows(name: str, value: SX, bounds: Bounds) -> list[ValidityRow]:
     low, high = bounds
     rows = []
     if low is not None:
         wrong = f"{name} is too small; {out_of_bounds(-math.inf, low, None)}"
-        rows.append(Row("parameter", f"least value of {name}", -value, -low, wrong))
+        rows.append(ValidityRow("parameter", f"least value of {name}", -value, -low, wrong))
     if high is not None:
         wrong = f"{name} is too large; {out_of_bounds(math.inf, None, high)}"
-        rows.append(Row("parameter", f"greatest value of {name}", value, high, wrong))
+        rows.append(ValidityRow("parameter", f"greatest value of {name}", value, high, wrong))
     return rows
 
 
 def all_hold(
-    system: System, key: Hashable, inputs: Mapping[str, SX], rows: Iterable[Row]
+    system: System, key: Hashable, inputs: Mapping[str, SX], rows: Iterable[ValidityRow]
 ) -> Function:
     """``valid(..)`` of the inputs: 1 where every row holds, else 0, NaN too.
 

@@ -69,14 +69,14 @@ def collocation(
     basis = [knots[:, :-1], *(inside[:, k::points] for k in range(points))]
     u_points = u[:, [k for k in range(count) for _ in range(points)]]
     p = parameter_values(model, residual.size1_in("p"), p)
-    rates = casadi.vertcat(*(_combined(basis, slopes[:, k]) for k in range(points)))
+    rates = casadi.vertcat(*(_combine(basis, slopes[:, k]) for k in range(points)))
     total = points * count
     rates = casadi.reshape(rates, x.shape[0], total)
     fixed = [casadi.repmat(value, 1, total) for value in (p, grid.step)]
     (rows,) = grid.mapped(residual, total).call([inside, rates, z, u_points, *fixed])
     opti.subject_to(casadi.vec(rows) == 0)
     if scheme != "radau":
-        opti.subject_to(casadi.vec(knots[:, 1:] - _combined(basis, ends.ravel())) == 0)
+        opti.subject_to(casadi.vec(knots[:, 1:] - _combine(basis, ends.ravel())) == 0)
     return Transcription(
         opti=opti,
         x=knots,
@@ -138,7 +138,7 @@ def _residual(model: Model) -> Function:
     return Function("residual", [x, speed, z, u, p, h], [h * ode(x, u, p) - speed], names, ["rows"])
 
 
-def _combined(basis: list[MX], weights: np.ndarray[Any, Any]) -> MX:
+def _combine(basis: list[MX], weights: np.ndarray[Any, Any]) -> MX:
     terms = [float(w) * b for w, b in zip(weights, basis, strict=True)]
     total: MX = sum(terms[1:], terms[0])
     return total

@@ -103,13 +103,13 @@ def _slopes(jax: Any, function: Function) -> _Outputs:
                 J.reshape(function.numel_out(k), d.size) @ d
                 for J, d in zip(row, directions, strict=True)
             ]
-            result.append(_shaped(sum(terms), function.size_out(k)))
+            result.append(_shape(sum(terms), function.size_out(k)))
         return tuple(result)
 
     return product
 
 
-def _shaped(column: Any, size: tuple[int, int]) -> Any:
+def _shape(column: Any, size: tuple[int, int]) -> Any:
     """What CasADi stacks by columns, as a vector or a matrix."""
     rows, columns = size
     return column if columns == 1 else column.reshape(columns, rows).T

@@ -17,7 +17,7 @@ from mbs.bridges.opti import (
     require_counts,
     variable,
 )
-from mbs.bridges.step import advanced
+from mbs.bridges.step import advance
 
 
 def multiple_shooting(
@@ -54,7 +54,7 @@ def multiple_shooting(
     p = parameter_values(model, ode.size1_in("p"), p)
     every = casadi.repmat(p, 1, count)
     rates = grid.mapped(ode, count)
-    ends = advanced(lambda at: rates(at, u, every), x[:, :-1], grid.step, substeps)
+    ends = advance(lambda at: rates(at, u, every), x[:, :-1], grid.step, substeps)
     opti.subject_to(casadi.vec(x[:, 1:] - ends) == 0)
     return Transcription(
         opti=opti,

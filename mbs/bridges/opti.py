@@ -165,16 +165,16 @@ class Transcription:
         if u is not None:
             self._set("u", _columns("u", u, self.u.shape))
         if "x_points" in self.variables:
-            self._set("x_points", self._repeated(knots))
+            self._set("x_points", self._repeat(knots))
         if z is not None:
             rows = _columns("z", z, (self.z_points.shape[0], stages + 1))
-            self._set("z", self._repeated(rows))
+            self._set("z", self._repeat(rows))
 
     def _set(self, name: str, values: NDArray[np.float64]) -> None:
         if values.size:
             self.opti.set_initial(self.variables[name], values)
 
-    def _repeated(self, knots: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _repeat(self, knots: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.repeat(knots[:, 1:], len(self.weights), axis=1)
 
 

@@ -66,16 +66,16 @@ def step(model: Model, substeps: int = 1, *, checked: bool = True) -> Function:
     kind: Any = SX if ode.is_a("SXFunction") else MX
     start, u, p = (kind.sym(name, ode.size1_in(name)) for name in ("x", "u", "p"))
     dt = kind.sym("dt")
-    settle = _settled(model, checked) if isinstance(model, Dae) else None
+    settle = _settle(model, checked) if isinstance(model, Dae) else None
     after = None if settle is None else lambda x, middle, end, h: settle(x, middle, end, p, h)
-    x = advanced(lambda at: ode(at, u, p), start, dt, substeps, after)
+    x = advance(lambda at: ode(at, u, p), start, dt, substeps, after)
     if checked and isinstance(model, Dae):
-        x = _flagged(model, x, [start, u, p, dt])
+        x = _flag(model, x, [start, u, p, dt])
     inputs = ["x", "u", "p", "dt"]
     return Function("step", [start, u, p, dt], [x], inputs, ["x_next"], {"cse": True})
 
 
-def _flagged(dae: Dae, x: Any, inputs: Sequence[Any]) -> Any:
+def _flag(dae: Dae, x: Any, inputs: Sequence[Any]) -> Any:
     """The states x, all of them NaN where an input or one of them has no meaning."""
     # a sum is finite where everything is, and one comparison
     given, reached = (
@@ -88,7 +88,7 @@ def _flagged(dae: Dae, x: Any, inputs: Sequence[Any]) -> Any:
     return casadi.if_else(holds, x, math.nan)
 
 
-def _settled(dae: Dae, checked: bool) -> Function | None:
+def _settle(dae: Dae, checked: bool) -> Function | None:
     """``settle(x, middle, end, p, h) -> x``: what follows a substep; None where nothing does."""
     closed = dae.x.numel() < dae.q.numel() + dae.v.numel()
     if not dae.invariants.numel() and not closed:
@@ -126,7 +126,7 @@ def _correction(dae: Dae) -> Function:
     return Function("correction", [dae.x, dae.p], [casadi.densify(change)], {"cse": True})
 
 
-def advanced(
+def advance(
     rate: Callable[[_T], _T],
     x: _T,
     duration: _T,

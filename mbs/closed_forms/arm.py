@@ -101,7 +101,7 @@ def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
     stacked = casadi.vertcat(*(pose.matrix for pose in chain.between))
     function = Function("gaps", [symbols], [casadi.densify(stacked)])
     gaps = np.array(DM(function(p))).reshape(len(chain.gaps), 4, 4)
-    prismatic = np.array([not joint.turns for joint in chain.joints], dtype=bool)
+    prismatic = np.array([not joint.is_rotational for joint in chain.joints], dtype=bool)
     return Arm(tuple(joint.name for joint in chain.joints), prismatic, gaps)
 
 
@@ -132,13 +132,13 @@ square, 1e-18, and next to a half turn the differences that give the axis are ro
 seven digits."""
 
 
-def gap_to(wanted: Array, T: Array) -> Array:
-    """(..., 6) what is missing from poses T to the wanted one: translation [m], rotation [rad].
+def gap_to(target: Array, T: Array) -> Array:
+    """(..., 6) what is missing from poses T to the target one: translation [m], rotation [rad].
 
-    To first order it is the [V; w] that leads there in unit time; it vanishes at the wanted pose
+    To first order it is the [V; w] that leads there in unit time; it vanishes at the target pose
     alone.
     """
-    R = wanted[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
+    R = target[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
     vector = np.stack(
         [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
         axis=-1,
@@ -151,7 +151,7 @@ def gap_to(wanted: Array, T: Array) -> Array:
     if np.any(half_turn):
         turn = np.where(half_turn, angle, 0.0)
         rotation = rotation + turn[..., None] * _half_turn_axis(R)
-    return np.concatenate([wanted[..., :3, 3] - T[..., :3, 3], rotation], axis=-1)
+    return np.concatenate([target[..., :3, 3] - T[..., :3, 3], rotation], axis=-1)
 
 
 def _half_turn_axis(R: Array) -> Array:

@@ -7,38 +7,38 @@ from collections.abc import Callable
 from casadi import SX
 
 from mbs.closed_forms.planar import along_normal, planar
-from mbs.closed_forms.roots import Root
+from mbs.closed_forms.roots import LoopBranches
 from mbs.closed_forms.spatial import (
     aim,
     at_distance,
-    ball,
     bennett,
-    confined,
+    confine,
     free_body,
     orientation,
-    slides,
+    prismatic,
+    spherical,
     spin,
 )
 from mbs.closed_forms.split import split
 from mbs.components.joints import Motion
 from mbs.recursions.chain import Ring
 
-_KERNELS: tuple[Callable[[Ring, SX, SX], Root | None], ...] = (
+_KERNELS: tuple[Callable[[Ring, SX, SX], LoopBranches | None], ...] = (
     free_body,
-    ball,
+    spherical,
     spin,
-    slides,
+    prismatic,
     planar,
     at_distance,
     aim,
     bennett,
     orientation,
     along_normal,
-    confined,
+    confine,
 )
 
 
-def closed_form(ring: Ring, q: SX, p: SX) -> Root | str:
+def closed_form(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
     """The ways to find some of the positions of a loop, or why no kernel fits.
 
     The others follow once these are known.
@@ -52,10 +52,10 @@ def closed_form(ring: Ring, q: SX, p: SX) -> Root | str:
         return "a free body is in it"
     for kernel in _KERNELS:
         root = kernel(ring, q, p)
-        if root is not None and any(root.ways.values()):
+        if root is not None and any(root.branches.values()):
             return root
     found = split(ring, q, p)
-    if isinstance(found, Root):
+    if isinstance(found, LoopBranches):
         return found
     unknown = ", ".join(joint.name for joint in ring.joints)
     count = len(ring.joints)

@@ -1,4 +1,4 @@
-"""Pieper's method: arms with three axes through one point, or with three joints that slide."""
+"""Pieper's method: arms with three axes through one point, or with three prismatic joints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mbs.closed_forms.sequence import (
     Found,
     Problem,
     Root,
-    Step,
+    SequenceStep,
     StepSequence,
     cosine_root,
     real_quartic,
@@ -25,12 +25,12 @@ from mbs.closed_forms.sequence import (
 )
 from mbs.errors import NoClosedForm
 from mbs.recursions.chain import ChainJoint, Gap, Ring
-from mbs.spatial import Pose, axis_turn, vector
+from mbs.spatial import Pose, axis_rotation, vector
 
 # Quantities that depend on one joint, and equations X e^(i q) = U in another.
 #
-# A linear form holds three factors: of cos q, sin q and 1 for a joint that turns, of r^2, r and 1
-# for one that slides. A symmetric (3, 3) matrix A of such factors stands for the sum of the
+# A linear form holds three factors: of cos q, sin q and 1 for a revolute joint, of r^2, r and 1
+# for a prismatic one. A symmetric (3, 3) matrix A of such factors stands for the sum of the
 # products, b^T A b with b = (cos q, sin q, 1) or (r^2, r, 1).
 
 
@@ -50,13 +50,13 @@ class PieperLoop:
 
     def x(self, k: int) -> SX:
         """The symbol of the position of joint k of the ring."""
-        return SX(self.problem.x[self.place(k)])
+        return SX(self.problem.x[self.index(k)])
 
-    def place(self, k: int) -> int:
+    def index(self, k: int) -> int:
         """The place of joint k of the ring."""
-        place = self.ring.joints[k].place
-        assert place is not None
-        return place
+        index = self.ring.joints[k].index
+        assert index is not None
+        return index
 
     def after(self, k: int) -> Gap:
         """The way from joint k to the next."""
@@ -86,7 +86,7 @@ class PieperLoop:
 def basis(scene: PieperLoop, k: int) -> SX:
     """(3, 1) what the factors of a form in joint k multiply."""
     x = scene.x(k)
-    if scene.ring.joints[k].turns:
+    if scene.ring.joints[k].is_rotational:
         return casadi.vertcat(casadi.cos(x), casadi.sin(x), 1)
     return casadi.vertcat(x * x, x, 1)
 
@@ -94,7 +94,7 @@ def basis(scene: PieperLoop, k: int) -> SX:
 def moved_point(joint: ChainJoint, point: SX) -> SX:
     """(3, 3) forms of the coordinates of a point that the joint moves."""
     x, y, z, sign = point[0], point[1], point[2], joint.sign
-    if joint.turns:
+    if joint.is_rotational:
         return casadi.vertcat(
             casadi.horzcat(x, -sign * y, 0), casadi.horzcat(y, sign * x, 0), casadi.horzcat(0, 0, z)
         )
@@ -114,25 +114,27 @@ def product(a: SX, b: SX) -> SX:
     return SX((outer + outer.T) / 2)
 
 
-# Three turns whose axes meet, or are taken by themselves, from the rotation they make.
+# Three revolute joints whose axes meet, or are taken by themselves, from the rotation they make.
 #
 # Z(q1) A Z(q2) B Z(q3) = G; the element G_zz holds the middle one alone.
 #
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
-def three_turns(scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G: SX) -> list[Step]:
-    """The steps of three joints that turn.
+def three_angle_steps(
+    scene: PieperLoop, revolute: tuple[int, int, int], A: SX, B: SX, G: SX
+) -> list[SequenceStep]:
+    """The steps of three revolute joints.
 
     Args:
         scene: whose joints they are.
-        turns: their numbers in the ring.
-        A: (3, 3) rotation between the first two; no turn about z.
+        revolute: their numbers in the ring.
+        A: (3, 3) rotation between the first two; no rotation about z.
         B: (3, 3) rotation between the last two, likewise.
         G: (3, 3) what they make, of joints that are known.
     """
-    first, middle, last = turns
-    Z1, Z2 = (_turn(scene, k) for k in (first, middle))
+    first, middle, last = revolute
+    Z1, Z2 = (_axis_rotation(scene, k) for k in (first, middle))
     seen = casadi.mtimes([A, Z2, B])
     column = casadi.mtimes([Z1, seen]).T @ G[:, 0]
     return [
@@ -142,11 +144,11 @@ def three_turns(scene: PieperLoop, turns: tuple[int, int, int], A: SX, B: SX, G:
     ]
 
 
-def _turn(scene: PieperLoop, k: int) -> SX:
-    return SX(axis_turn("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
+def _axis_rotation(scene: PieperLoop, k: int) -> SX:
+    return SX(axis_rotation("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
-def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> Step:
+def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceStep:
     """The joint in the middle, from row^T Z column = G_zz."""
     joint = scene.ring.joints[k]
     sign = SX.sym(joint.name)
@@ -157,7 +159,7 @@ def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> Step:
     root = _square_angle(X, Y, Z, sign, G) if square else cosine_root(X, Y, Z, sign)
     end = scene.suffix(k)
     found = Found(
-        {scene.place(k): root.value},
+        {scene.index(k): root.value},
         () if square else (root.real,),
         (root.regular,),
         {f"X{end}": X, f"Y{end}": Y, f"Z{end}": Z},
@@ -174,19 +176,19 @@ def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
     return Root(SX(angle), SX(1), SX(1))
 
 
-def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> Step:
-    return turn_onto(scene, k, (start, end), 1.0)
+def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
+    return angle_step(scene, k, (start, end), 1.0)
 
 
-def turn_onto(
+def angle_step(
     scene: PieperLoop, k: int, vectors: tuple[SX, SX], scale: SX | float, regular: Sequence[SX] = ()
-) -> Step:
-    """The turn of joint k that brings one vector of the plane onto the direction of another.
+) -> SequenceStep:
+    """The angle of joint k that brings one vector of the plane onto the direction of another.
 
     Args:
         scene: whose joint it is.
         k: its number in the ring.
-        vectors: (2, 1) before the turn, and (2, 1) after it, of the same length.
+        vectors: (2, 1) before the rotation, and (2, 1) after it, of the same length.
         scale: of the size of both, in their unit.
         regular: what else must not vanish, free of units.
     """
@@ -199,7 +201,7 @@ def turn_onto(
     q, n = joint.name, scene.suffix(k)
     text = f"X{n} cos({q}) - Y{n} sin({q}) = U{n}, Y{n} cos({q}) + X{n} sin({q}) = V{n}"
     coefficients = {f"X{n}": X, f"Y{n}": Y, f"U{n}": U, f"V{n}": V}
-    found = Found({scene.place(k): value}, (), (size, *regular), coefficients)
+    found = Found({scene.index(k): value}, (), (size, *regular), coefficients)
     return step(scene.problem, "type 3", text, {}, found)
 
 
@@ -211,7 +213,7 @@ _SMALL = 1e-30
 rounding, and the root is then finite."""
 
 
-def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
+def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> SequenceStep | None:
     """Joint k from form = 0; None where the form does not depend on the joint.
 
     Args:
@@ -220,7 +222,7 @@ def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
         form: (3, 1) factors, see `forms`.
         unit: of the size of what the form is a sum of, in its unit.
     """
-    if not scene.ring.joints[k].turns:
+    if not scene.ring.joints[k].is_rotational:
         return _polynomial(scene, k, [form[0], form[1], form[2]], unit)
     if scene.zero(form[:2] / unit):
         return None
@@ -228,7 +230,7 @@ def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
     q, n, sign = joint.name, scene.suffix(k), SX.sym(joint.name)
     root = cosine_root(form[0], form[1], -form[2], sign, unit)
     found = Found(
-        {scene.place(k): root.value},
+        {scene.index(k): root.value},
         (root.real,),
         (root.regular,),
         {f"X{n}": form[0], f"Y{n}": form[1], f"Z{n}": -form[2]},
@@ -236,7 +238,7 @@ def root_of_form(scene: PieperLoop, k: int, form: SX, unit: SX) -> Step | None:
     return step(scene.problem, "type 2", f"X{n} cos({q}) + Y{n} sin({q}) = Z{n}", {q: sign}, found)
 
 
-def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
+def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> SequenceStep | None:
     """Joint k from b^T A b = 0; None where it does not depend on the joint.
 
     Args:
@@ -245,7 +247,7 @@ def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
         A: (3, 3) symmetric, factors of the products, see `forms`.
         unit: of the size of what it is a sum of, in its unit.
     """
-    if not scene.ring.joints[k].turns:
+    if not scene.ring.joints[k].is_rotational:
         powers = [A[0, 0], 2 * A[0, 1], A[1, 1] + 2 * A[0, 2], 2 * A[1, 2], A[2, 2]]
         return _polynomial(scene, k, powers, unit)
     mean = (A[0, 0] + A[1, 1]) / 2
@@ -259,12 +261,14 @@ def root_of_square(scene: PieperLoop, k: int, A: SX, unit: SX) -> Step | None:
     named = dict(zip((f"A{n}", f"B{n}", f"X{n}", f"Y{n}"), casadi.vertsplit(a[:4]), strict=True))
     named[f"Z{n}"] = -a[4]
     text = f"A{n} cos(2 {q}) + B{n} sin(2 {q}) + X{n} cos({q}) + Y{n} sin({q}) = Z{n}"
-    found = Found({scene.place(k): root.value}, (root.real,), (root.regular,), named)
+    found = Found({scene.index(k): root.value}, (root.real,), (root.regular,), named)
     return step(scene.problem, "quartic", text, signs, found)
 
 
-def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0) -> Step:
-    """A joint that slides, from factor x = value.
+def linear(
+    scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float = 1.0
+) -> SequenceStep:
+    """A prismatic joint, from factor x = value.
 
     Args:
         scene: whose joint it is.
@@ -277,12 +281,12 @@ def linear(scene: PieperLoop, k: int, factor: SX, value: SX, scale: SX | float =
     r, n, size = joint.name, scene.suffix(k), factor / scale
     x = value / scale * size / (size * size + TINY_SQUARE)
     regular = () if factor.is_constant() else (size * size,)
-    found = Found({scene.place(k): x}, (), regular, {f"X{n}": factor, f"Y{n}": value})
+    found = Found({scene.index(k): x}, (), regular, {f"X{n}": factor, f"Y{n}": value})
     return step(scene.problem, "type 1", f"X{n} {r} = Y{n}", {}, found)
 
 
-def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Step | None:
-    """A joint that slides, from a polynomial; factors from the highest power."""
+def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> SequenceStep | None:
+    """A prismatic joint, from a polynomial; factors from the highest power."""
     degree = len(factors) - 1
     while degree and scene.zero(factors[0] * scene.length**degree / unit):
         factors, degree = factors[1:], degree - 1
@@ -301,7 +305,7 @@ def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Step 
         five = casadi.vertcat(*[SX(0)] * (4 - degree), *factors)
         both = casadi.vertcat(*signs.values())
         root = real_quartic(five, both, scene.length, unit)
-    found = Found({scene.place(k): root.value}, (root.real,), (root.regular,), named)
+    found = Found({scene.index(k): root.value}, (root.real,), (root.regular,), named)
     kind = "quadratic" if degree == 2 else "quartic"
     return step(scene.problem, kind, text, signs, found)
 
@@ -325,7 +329,7 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
     return Root(SX((middle + root.value) * length), SX(root.real / size), SX(a * a))
 
 
-# Three joints that carry a point to where it is wanted.
+# Three joints that carry a point to where it has to be.
 #
 # J1 [R1 t1] J2 f = p, where f(q3) is the point seen after joint 2. What joint 1 leaves unchanged
 # gives two equations in which joint 2 stands linearly, and joint 2 is eliminated from them; what
@@ -336,14 +340,14 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reach:
-    """The wanted position of a point.
+    """The target position of a point.
 
     Attributes:
         scene: whose first three joints carry it.
         way: (R1, t1) from joint 1 to joint 2.
         f: (3, 3) forms in joint 3 of the point seen after joint 2.
         square: (3, 1) form of |f|^2.
-        p: (3, 1) the wanted position [m].
+        p: (3, 1) the target position [m].
     """
 
     scene: PieperLoop
@@ -353,31 +357,33 @@ class Reach:
     p: SX
 
 
-def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[Step] | None:
+def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | None:
     """The steps of joints 3, 2 and 1; None where these three cannot be found so.
 
     Args:
         scene: whose first three joints they are.
         point: (3, 1) seen after joint 3 [m].
-        p: (3, 1) where it is wanted, seen before joint 1 [m].
+        p: (3, 1) where it has to be, seen before joint 1 [m].
     """
     joint, way = scene.ring.joints[2], scene.after(1).pose
     f = casadi.mtimes(way.R, moved_point(joint, point))
     f[:, 2] += way.p
-    square = _square(f, way.p, point) if joint.turns else _slid_square(f)
+    square = _square(f, way.p, point) if joint.is_rotational else _slid_square(f)
     reach = Reach(scene, scene.after(0).pose, f, square, p)
-    steps = _by_turning(reach) if scene.ring.joints[1].turns else _by_sliding(reach)
+    steps = (
+        _second_revolute(reach) if scene.ring.joints[1].is_rotational else _second_prismatic(reach)
+    )
     return None if steps is None else [*steps, _first(reach)]
 
 
 def _square(f: SX, t: SX, point: SX) -> SX:
-    """The form of |f|^2, of a point that turns."""
+    """The form of |f|^2, of a point that rotates."""
     middle = 2 * casadi.mtimes(f.T, t)
     return SX(middle + constant(casadi.sumsqr(point) - casadi.sumsqr(t)))
 
 
 def _slid_square(f: SX) -> SX:
-    """The form of |f|^2, of a point that slides."""
+    """The form of |f|^2, of a point that translates."""
     u, v = f[:, 1], f[:, 2]
     return casadi.vertcat(casadi.sumsqr(u), 2 * casadi.dot(u, v), casadi.sumsqr(v))
 
@@ -385,7 +391,7 @@ def _slid_square(f: SX) -> SX:
 def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
     """Two equations a . (J2 f) = h: vectors a, forms h, and the units of h."""
     scene, R, t = reach.scene, reach.way.R, reach.way.p
-    if not scene.ring.joints[0].turns:
+    if not scene.ring.joints[0].is_rotational:
         rows = [R[k, :].T for k in (0, 1)]
         return rows, [constant(reach.p[k] - t[k]) for k in (0, 1)], [scene.length] * 2
     known = casadi.sumsqr(reach.p) - casadi.sumsqr(t)
@@ -394,8 +400,8 @@ def _rows(reach: Reach) -> tuple[list[SX], list[SX], list[SX]]:
     return [turned, R[2, :].T], forms, [scene.length**2, scene.length]
 
 
-def _by_turning(reach: Reach) -> list[Step] | None:
-    """Joints 3 and 2 where joint 2 turns."""
+def _second_revolute(reach: Reach) -> list[SequenceStep] | None:
+    """Joints 3 and 2 where joint 2 is revolute."""
     scene = reach.scene
     (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
     Z1, Z2 = h - a[2] * reach.f[2, :].T, k - b[2] * reach.f[2, :].T
@@ -411,14 +417,14 @@ def _by_turning(reach: Reach) -> list[Step] | None:
         return None
     b3 = basis(scene, 2)
     point = casadi.mtimes(reach.f[:2, :], b3)
-    wanted = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + TINY_SQUARE)
+    target = casadi.vertcat(casadi.dot(U, b3), casadi.dot(V, b3)) * K / (K * K + TINY_SQUARE)
     regular = () if K.is_constant() else (K / unit_K,)
-    return [third, turn_onto(scene, 1, (point, wanted), scene.length, regular)]
+    return [third, angle_step(scene, 1, (point, target), scene.length, regular)]
 
 
 def _parallel(
     reach: Reach, first: tuple[SX, SX, SX], second: tuple[SX, SX, SX]
-) -> list[Step] | None:
+) -> list[SequenceStep] | None:
     """Joints 3 and 2 where joint 2 stands in both equations in the same way, or in one alone."""
     scene, (a, Z1, unit), (b, Z2, unit_b) = reach.scene, first, second
     if scene.zero(b[:2] * scene.length / unit_b):
@@ -441,16 +447,18 @@ def _parallel(
     return None if joint is None else [third, joint]
 
 
-def _by_sliding(reach: Reach) -> list[Step] | None:
-    """Joints 3 and 2 where joint 2 slides."""
+def _second_prismatic(reach: Reach) -> list[SequenceStep] | None:
+    """Joints 3 and 2 where joint 2 is prismatic."""
     rows, forms, _ = _rows(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
-    if reach.scene.ring.joints[0].turns:
+    if reach.scene.ring.joints[0].is_rotational:
         return _slide_in_turn(reach, rows[0], rows[1][2], (left[0], left[1]))
-    return _two_slides(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
+    return _two_displacements(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
 
 
-def _two_slides(reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]) -> list[Step] | None:
+def _two_displacements(
+    reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]
+) -> list[SequenceStep] | None:
     """Joints 3 and 2 from along[k] x2 = left[k], two equations in the plane across joint 1."""
     scene, sign = reach.scene, reach.scene.ring.joints[1].sign
     third = root_of_form(scene, 2, along[1] * left[0] - along[0] * left[1], scene.length)
@@ -461,7 +469,9 @@ def _two_slides(reach: Reach, along: tuple[SX, SX], left: tuple[SX, SX]) -> list
     return [third, linear(scene, 1, square, sign * value)]
 
 
-def _slide_in_turn(reach: Reach, a: SX, along: SX, left: tuple[SX, SX]) -> list[Step] | None:
+def _slide_in_turn(
+    reach: Reach, a: SX, along: SX, left: tuple[SX, SX]
+) -> list[SequenceStep] | None:
     """Joints 3 and 2 where joint 1 turns and joint 2 slides.
 
     With r the way of joint 2: r^2 / 2 + (f_z + a_z) r = left[0] and along r = left[1].
@@ -481,68 +491,69 @@ def _slide_in_turn(reach: Reach, a: SX, along: SX, left: tuple[SX, SX]) -> list[
     return [third, linear(scene, 1, along, sign * casadi.dot(left[1], b3))]
 
 
-def _first(reach: Reach) -> Step:
+def _first(reach: Reach) -> SequenceStep:
     """Joint 1, once the other two are known."""
     scene = reach.scene
-    f = Pose.moved(casadi.mtimes(reach.f, basis(scene, 2)))
+    f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))
     w = (reach.way @ scene.motion(1) @ f).p
     joint = scene.ring.joints[0]
-    if joint.turns:
-        return turn_onto(scene, 0, (w[:2], reach.p[:2]), scene.length)
+    if joint.is_rotational:
+        return angle_step(scene, 0, (w[:2], reach.p[:2]), scene.length)
     return linear(scene, 0, SX(1), joint.sign * (reach.p[2] - w[2]))
 
 
-# Three joints that slide, anywhere in the loop: the turns first, then three linear equations.
+# Three prismatic joints, anywhere in the loop: the revolute joints first, then three
+# linear equations.
 #
 # Source: Pieper 1968; Khalil & Creusot 1997, section 3.3 for the types of equations.
 
 
-def three_slides(scene: PieperLoop) -> list[Step]:
-    """The steps of a loop of three joints that turn and three that slide.
+def three_displacements(scene: PieperLoop) -> list[SequenceStep]:
+    """The steps of a loop of three revolute and three prismatic joints.
 
     Raises:
-        NoClosedForm: two of the turning axes are always parallel, or the slides coplanar.
+        NoClosedForm: two of the turning axes are always parallel, or the prismatic joints coplanar.
     """
-    turns = scene.ring
-    for k in reversed([k for k, joint in enumerate(turns.joints) if not joint.turns]):
-        turns = turns.without(k)
-    names = ", ".join(joint.name for joint in turns.joints)
-    if any(scene.zero(gap.pose.R[:2, 2]) for gap in turns.gaps):
+    revolute = scene.ring
+    for k in reversed([k for k, joint in enumerate(revolute.joints) if not joint.is_rotational]):
+        revolute = revolute.without(k)
+    names = ", ".join(joint.name for joint in revolute.joints)
+    if any(scene.zero(gap.pose.R[:2, 2]) for gap in revolute.gaps):
         raise NoClosedForm(
-            f"joints {names} turn and the others slide, but two of the three axes stay parallel,"
-            " so that the turns are not determined"
+            f"joints {names} are revolute and the others prismatic, but two of the three axes stay"
+            " parallel, so that the angles are not determined"
         )
-    first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in turns.gaps]))
-    begun = PieperLoop(scene.problem, turns.rotated(first), scene.length)
+    first = int(np.argmax([len(casadi.symvar(gap.pose.R)) for gap in revolute.gaps]))
+    begun = PieperLoop(scene.problem, revolute.rotated(first), scene.length)
     A, B, G = begun.after(0).pose.R, begun.after(1).pose.R, begun.after(2).pose.R.T
-    return [*three_turns(begun, (0, 1, 2), A, B, G), _slides(scene)]
+    return [*three_angle_steps(begun, (0, 1, 2), A, B, G), _displacements(scene)]
 
 
-def _slides(scene: PieperLoop) -> Step:
-    """The joints that slide, from the sum of all ways around the loop."""
-    way, places, columns = Pose.identity(), list[int](), list[SX]()
+def _displacements(scene: PieperLoop) -> SequenceStep:
+    """The prismatic joints, from the sum of all translations around the loop."""
+    path, indices, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
-        way = way @ gap.pose
-        if joint.turns:
-            way = way @ scene.motion(k)
+        path = path @ gap.pose
+        if joint.is_rotational:
+            path = path @ scene.motion(k)
         else:
-            columns.append(joint.sign * way.R[:, 2])
-            places.append(k)
+            columns.append(joint.sign * path.R[:, 2])
+            indices.append(k)
     M = casadi.horzcat(*columns)
     adjugate = casadi.horzcat(*(_cross(M, k) for k in range(3))).T
     determinant = casadi.dot(M[:, 0], _cross(M, 0))
     if scene.zero(determinant):
-        names = ", ".join(scene.ring.joints[k].name for k in places)
-        raise NoClosedForm(f"joints {names} slide in one plane, so that they are not determined")
-    r = -casadi.mtimes(adjugate, way.p) * determinant / (determinant * determinant + TINY_SQUARE)
-    ends = [scene.suffix(k) for k in places]
-    values = {scene.place(k): r[m] for m, k in enumerate(places)}
+        names = ", ".join(scene.ring.joints[k].name for k in indices)
+        raise NoClosedForm(f"joints {names} move in one plane, so that they are not determined")
+    r = -casadi.mtimes(adjugate, path.p) * determinant / (determinant * determinant + TINY_SQUARE)
+    ends = [scene.suffix(k) for k in indices]
+    values = {scene.index(k): r[m] for m, k in enumerate(indices)}
     return step(
         scene.problem,
         "linear",
-        _text(scene, places, ends),
+        _text(scene, indices, ends),
         {},
-        Found(values, (), (determinant * determinant,), _named(M, way.p, ends)),
+        Found(values, (), (determinant * determinant,), _named(M, path.p, ends)),
     )
 
 
@@ -556,8 +567,8 @@ def _named(M: SX, p: SX, ends: list[str]) -> dict[str, SX]:
     return named | {f"{axis}0": p[m] for m, axis in enumerate("XYZ")}
 
 
-def _text(scene: PieperLoop, places: list[int], ends: list[str]) -> str:
-    names = [scene.ring.joints[k].name for k in places]
+def _text(scene: PieperLoop, indices: list[int], ends: list[str]) -> str:
+    names = [scene.ring.joints[k].name for k in indices]
     rows = (
         " + ".join(f"{axis}{end} {name}" for end, name in zip(ends, names, strict=True))
         for axis in "XYZ"
@@ -592,9 +603,9 @@ def pieper(problem: Problem) -> StepSequence:
             f"the loop has {problem.size} unknown joints ({', '.join(names)}), and Pieper's method"
             " takes six"
         )
-    if sum(not joint.turns for joint in problem.ring.joints) == 3:
+    if sum(not joint.is_rotational for joint in problem.ring.joints) == 3:
         return StepSequence(
-            _JOINTS, three_slides(PieperLoop(problem, problem.ring, _length(problem)))
+            _JOINTS, three_displacements(PieperLoop(problem, problem.ring, _length(problem)))
         )
     scenes = _arrangements(problem)
     if not scenes:
@@ -611,13 +622,13 @@ def _cost(sequence: StepSequence) -> tuple[int, int]:
     return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
 
 
-def _steps(scene: PieperLoop) -> list[Step] | None:
+def _steps(scene: PieperLoop) -> list[SequenceStep] | None:
     """The steps where the axes of the last three joints meet; None where the first three differ."""
     ring = scene.ring
     first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
-    point = (scene.after(2).pose @ Pose.moved(vector([0, 0, first]))).p
-    wanted = (scene.after(5).inverse().pose @ Pose.moved(vector([0, 0, last]))).p
-    steps = three_joints(scene, point, wanted)
+    point = (scene.after(2).pose @ Pose.translation(vector([0, 0, first]))).p
+    target = (scene.after(5).inverse().pose @ Pose.translation(vector([0, 0, last]))).p
+    steps = three_joints(scene, point, target)
     if steps is None:
         return None
     before = Pose.identity()
@@ -625,7 +636,7 @@ def _steps(scene: PieperLoop) -> list[Step] | None:
         before = before @ scene.motion(k) @ scene.after(k).pose
     G = casadi.mtimes(ring.gaps[0].pose.R, before.R).T
     A, B = scene.after(3).pose.R, scene.after(4).pose.R
-    return [*steps, *three_turns(scene, (3, 4, 5), A, B, G)]
+    return [*steps, *three_angle_steps(scene, (3, 4, 5), A, B, G)]
 
 
 def _length(problem: Problem) -> SX:
@@ -651,7 +662,7 @@ def _pose_comes_first(scene: PieperLoop) -> bool:
     return counts[1] == max(counts)
 
 
-def _regular(problem: Problem, steps: list[Step]) -> bool:
+def _regular(problem: Problem, steps: list[SequenceStep]) -> bool:
     """Whether the steps determine every joint of a generic configuration."""
     x, given = problem.x, problem.given
     return not any(
@@ -662,7 +673,7 @@ def _regular(problem: Problem, steps: list[Step]) -> bool:
 
 
 def _concurrent(problem: Problem, length: SX) -> list[int]:
-    """The numbers k such that joints k, k + 1 and k + 2 turn about axes through one point."""
+    """The numbers k such that joints k, k + 1 and k + 2 rotate about axes through one point."""
     gaps, joints = problem.ring.gaps, problem.ring.joints
     after = [gaps[(k + 1) % _JOINTS].pose for k in range(_JOINTS)]
     ahead, behind = [_height(way) for way in after], [_height(way.inverse()) for way in after]
@@ -675,7 +686,7 @@ def _concurrent(problem: Problem, length: SX) -> list[int]:
     values = np.array(problem.at_samples(casadi.vertcat(*rows)))
     meet = np.all(np.abs(values[:, :, 2:]) < ZERO, axis=(0, 2))
     bent = np.all(np.abs(values[:, :, :2]) > ZERO, axis=(0, 2))
-    three = [all(joints[(k + m) % _JOINTS].turns for m in range(3)) for k in range(_JOINTS)]
+    three = [all(joints[(k + m) % _JOINTS].is_rotational for m in range(3)) for k in range(_JOINTS)]
     return [k for k in (3, 0, 1, 2, 4, 5) if meet[k] and bent[k] and three[k]]
 
 
@@ -698,7 +709,7 @@ def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
 def _refusal(names: list[str]) -> str:
     return (
         f"no three neighbouring axes of {names[0]} .. {names[-1]} meet in a point and no three"
-        " joints slide, so that Pieper's method does not apply; use the general method"
+        " joints are prismatic, so that Pieper's method does not apply; use the general method"
     )
 
 
@@ -708,5 +719,5 @@ def _degenerate(scenes: list[PieperLoop]) -> str:
     first, last = (", ".join(joint.name for joint in part) for part in (joints[:3], joints[3:]))
     return (
         f"the axes of {last} meet in a point, but the positions of {first} do not follow from"
-        " where it is wanted: the arm is singular in every configuration"
+        " the target: the arm is singular in every configuration"
     )

@@ -1,117 +1,123 @@
-"""Plane loops of three unknown joints: turns and slides, parallelograms."""
+"""Plane loops of three unknown joints: revolute and prismatic joints, parallelograms."""
 
 from __future__ import annotations
 
 import casadi
 from casadi import SX
 
+from mbs.closed_forms.centres import with_spherical
 from mbs.closed_forms.ring import always_zero, gap_samples, is_planar, with_elbow, without_idle
 from mbs.closed_forms.roots import (
+    LoopBranches,
     Positions,
-    Root,
     across,
+    angle_onto,
     in_plane,
     last_angle,
     positions,
     root_angle,
     signed,
     square,
-    turn_onto,
 )
-from mbs.closed_forms.spatial import with_balls
 from mbs.components.joints import Motion
 from mbs.recursions.chain import Ring, frames_at_zero
 
-# A planar loop with three unknown turns: the law of cosines at the one in the middle.
+# A planar loop with three unknown revolute joints: the law of cosines at the one in the middle.
 #
-# With g the way from the first axis to the third, d2 and d3 the links between, seen in the plane:
+# With g the path from the first axis to the third, d2 and d3 the links between, seen in the plane:
 # |d2 + R d3| = |g| is X cos t + Y sin t = Z in the middle angle t. The sign says to which side of
-# the stretched position the middle joint is turned.
+# the stretched position the middle joint is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 8.
 
 
-def three_turns(ring: Ring) -> Root:
-    """The two ways to close a planar loop of three unknown turns.
+def three_revolute(ring: Ring) -> LoopBranches:
+    """The two branches of a planar loop of three unknown revolute joints.
 
     Args:
         ring: its joints a, b, c; b is the one in the middle, c may be spherical.
     """
-    return Root({label: _three_turns_root(ring, sign) for label, sign in signed(ring.joints[1])})
+    return LoopBranches(
+        {label: _three_revolute_root(ring, sign) for label, sign in signed(ring.joints[1])}
+    )
 
 
-def _three_turns_root(ring: Ring, sign: int) -> Positions:
+def _three_revolute_root(ring: Ring, sign: int) -> Positions:
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     g, d2, d3 = (in_plane(p) for p in (X1.inverse().p, X2.p, X3.p))
     R1, R2, R3 = (in_plane(pose.R) for pose in (X1, X2, X3))
     m = R2.T @ d2
     Z = (square(g) - square(m) - square(d3)) / 2
     b = root_angle(m.T @ d3, -across(m, d3), Z, sign)
-    a = turn_onto(d2 + R2 @ (b.matrix @ d3), g)
+    a = angle_onto(d2 + R2 @ (b.matrix @ d3), g)
     before = R1[0, :] @ a.matrix @ R2 @ b.matrix @ R3
     return positions(ring.joints, (a.value, b.value, last_angle(before)))
 
 
-# A planar loop with two unknown turns and a slide: a quadratic equation in the displacement.
+# A planar loop with two unknown revolute joints and a prismatic one: a quadratic equation in the
+# displacement.
 #
 # Seen from the first axis, the third one moves along a line e + r u; its distance is that of the
-# known way g: r = -u.e +- sqrt(g^2 - (u x e)^2). The sign says which end of the stroke it is.
+# known path g: r = -u.e +- sqrt(g^2 - (u x e)^2). The sign says which end of the stroke it is.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equations of types 2 and 4.
 
 
-def one_slide(ring: Ring) -> Root:
-    """The two ways to close a planar loop of two unknown turns with a slide between them.
+def one_prismatic(ring: Ring) -> LoopBranches:
+    """The two branches of a planar loop of a prismatic joint between two revolute ones.
 
     Args:
-        ring: its joints a, b, c; b is the slide, c may be spherical.
+        ring: its joints a, b, c; b is the prismatic one, c may be spherical.
     """
-    return Root({label: _one_slide_root(ring, sign) for label, sign in signed(ring.joints[1])})
+    return LoopBranches(
+        {label: _one_prismatic_root(ring, sign) for label, sign in signed(ring.joints[1])}
+    )
 
 
-def _one_slide_root(ring: Ring, sign: int) -> Positions:
+def _one_prismatic_root(ring: Ring, sign: int) -> Positions:
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R = X2.R @ X3.R
     g, e, u = (in_plane(p) for p in (X1.inverse().p, X2.p + X2.R @ X3.p, X2.R[:, 2]))
     r = sign * casadi.sqrt(square(g) - across(u, e) ** 2) - u.T @ e
-    a = turn_onto(e + u * r, g)
+    a = angle_onto(e + u * r, g)
     before = in_plane(X1.R)[0, :] @ a.matrix @ in_plane(R)
     return positions(ring.joints, (a.value, r, last_angle(before)))
 
 
-# A planar loop with one unknown turn and two slides: the turn is what is missing, then linear.
+# A planar loop with one unknown revolute joint and two prismatic ones: the angle is what is
+# missing, then linear.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equations of types 1 and 3.
 
 
-def two_slides(ring: Ring) -> Root:
-    """The only way to close a planar loop of an unknown turn and two slides.
+def two_prismatic(ring: Ring) -> LoopBranches:
+    """The only branch of a planar loop of an unknown revolute joint and two prismatic ones.
 
     Args:
-        ring: its joints a, b, c; a is the turn.
+        ring: its joints a, b, c; a is the revolute one.
     """
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R = X2.R @ X3.R
     e, u, v = (in_plane(p) for p in (X2.p + X2.R @ X3.p + R @ X1.p, X2.R[:, 2], R[:, 2]))
     a, whole = last_angle(in_plane(R @ X1.R)), across(u, v)
     values = (a, -across(e, v) / whole, -across(u, e) / whole)
-    return Root({"": positions(ring.joints, values)})
+    return LoopBranches({"": positions(ring.joints, values)})
 
 
 # A planar loop of equal opposite sides: the parallelogram, and its mirror image that crosses.
 #
-# The known way g from the first axis to the third one runs over an axis that splits it into P and
+# The known path g from the first axis to the third one runs over an axis that splits it into P and
 # Q, as long as the two unknown links, B and A. One solution is A = Q, B = P, whatever the
 # position; the other one is its mirror image about g. Told apart by this and not by a side,
 # either keeps its label through the flat position, where they meet.
 
 
-def parallelogram(ring: Ring, pivot: int) -> Root:
-    """The two ways to close a loop that can be a parallelogram.
+def parallelogram(ring: Ring, pivot: int) -> LoopBranches:
+    """The two branches of a loop that can be a parallelogram.
 
     Args:
         ring: its joints a, b, c; b is opposite to the known axis.
-        pivot: which known axis of the way from c to a that is.
+        pivot: which known axis of the path from c to a that is.
     """
     name = ring.joints[1].name
     X1 = ring.gaps[0].pose
@@ -119,7 +125,7 @@ def parallelogram(ring: Ring, pivot: int) -> Root:
     g = in_plane(back.p)
     Q = g - in_plane((back @ ring.gaps[0].pivots[pivot]).p)
     mirrored = g * (2 * (Q.T @ g) / square(g)) - Q
-    return Root(
+    return LoopBranches(
         {
             f"{name}:parallel": _parallelogram_root(ring, Q, g - Q),
             f"{name}:crossed": _parallelogram_root(ring, mirrored, g - mirrored),
@@ -131,57 +137,57 @@ def _parallelogram_root(ring: Ring, A: SX, B: SX) -> Positions:
     """Positions with the first link along A and the second along B, both seen before joint a."""
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R1, R2, R3 = (in_plane(pose.R) for pose in (X1, X2, X3))
-    a = turn_onto(in_plane(X2.p), A)
-    b = turn_onto(in_plane(X3.p), R2.T @ (a.matrix.T @ B))
+    a = angle_onto(in_plane(X2.p), A)
+    b = angle_onto(in_plane(X3.p), R2.T @ (a.matrix.T @ B))
     before = R1[0, :] @ a.matrix @ R2 @ b.matrix @ R3
     return positions(ring.joints, (a.value, b.value, last_angle(before)))
 
 
-_BALL, _SLIDE = Motion.SPHERICAL, Motion.PRISMATIC
+_SPHERICAL, _PRISMATIC = Motion.SPHERICAL, Motion.PRISMATIC
 
 
-def planar(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The ways to close a plane loop; None where it is none, or too much of it is unknown.
+def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The branches of a plane loop; None where it is none, or too much of it is unknown.
 
-    What a closing joint can do out of the plane is left out; a ball, or three turns about one
-    point, stand for a turn.
+    What a closing joint can do out of the plane is left out; a spherical joint, or three revolute
+    joints whose axes meet in one point, stand for a revolute joint.
     """
-    ring = with_balls(ring, q, p)
-    balls = sum(joint.motion is _BALL for joint in ring.joints)
-    while len(ring.joints) > 3 and not balls:
+    ring = with_spherical(ring, q, p)
+    spherical = sum(joint.motion is _SPHERICAL for joint in ring.joints)
+    while len(ring.joints) > 3 and not spherical:
         smaller = without_idle(ring, gap_samples(ring, q, p))
         if smaller is ring:
             return None
         ring = smaller
-    if len(ring.joints) != 3 or balls > 1:
+    if len(ring.joints) != 3 or spherical > 1:
         return None
-    ring = _ball_last(ring)
+    ring = _spherical_last(ring)
     if not is_planar(ring, gap_samples(ring, q, p)):
         return None
-    slides = [k for k, joint in enumerate(ring.joints) if joint.motion is _SLIDE]
-    return _flat(ring, slides, q, p)
+    prismatic = [k for k, joint in enumerate(ring.joints) if joint.motion is _PRISMATIC]
+    return _planar_branches(ring, prismatic, q, p)
 
 
-def _ball_last(ring: Ring) -> Ring:
+def _spherical_last(ring: Ring) -> Ring:
     for k, joint in enumerate(ring.joints):
-        if joint.motion is _BALL:
+        if joint.motion is _SPHERICAL:
             return ring.rotated((k + 1) % len(ring.joints))
     return ring
 
 
-def _flat(ring: Ring, slides: list[int], q: SX, p: SX) -> Root:
-    has_ball = ring.joints[2].motion is _BALL
-    if len(slides) == 1:
-        slide = slides[0]
-        if has_ball and slide == 0:
-            ring, slide = _ball_last(ring.reversed()), 1
-        return one_slide(ring.rotated((slide + 2) % 3))
-    if len(slides) == 2:
-        turn = next(k for k in range(3) if k not in slides)
-        return two_slides(ring.rotated(turn))
-    ring = ring if has_ball else with_elbow(ring, q)
+def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBranches:
+    has_spherical = ring.joints[2].motion is _SPHERICAL
+    if len(prismatic) == 1:
+        index = prismatic[0]
+        if has_spherical and index == 0:
+            ring, index = _spherical_last(ring.reversed()), 1
+        return one_prismatic(ring.rotated((index + 2) % 3))
+    if len(prismatic) == 2:
+        revolute = next(k for k in range(3) if k not in prismatic)
+        return two_prismatic(ring.rotated(revolute))
+    ring = ring if has_spherical else with_elbow(ring, q)
     pivot = _opposite(ring, q, p)
-    return three_turns(ring) if pivot is None else parallelogram(ring, pivot)
+    return three_revolute(ring) if pivot is None else parallelogram(ring, pivot)
 
 
 def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
@@ -196,26 +202,27 @@ def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
     return None
 
 
-# A loop whose turns are all about one direction: the one slide that has a part along it.
+# A loop whose rotations have one direction: the one prismatic joint that has a part along it.
 #
-# Along the direction n of the turns only that slide moves anything: n.e + (n.u) s = 0, linear.
-# What is left is a plane loop. A ball may stand in the loop, which keeps a point.
+# Along the direction n of the revolute axes only that prismatic joint moves anything: n.e + (n.u)
+# s = 0, linear. What is left is a plane loop. A spherical joint may stand in the loop, which keeps
+# a point.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 1.
 
 
-def along_normal(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The slide along the turns of a loop; None where it is not the only one, or not all agree."""
-    ring = with_balls(ring, q, p)
+def along_normal(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The displacement along parallel revolute axes; None where more than one joint has a part."""
+    ring = with_spherical(ring, q, p)
     kinds = [joint.motion for joint in ring.joints]
     if kinds.count(Motion.SPHERICAL) > 1 or Motion.REVOLUTE not in kinds:
         return None
     if Motion.SPHERICAL in kinds:
         ring = ring.rotated((kinds.index(Motion.SPHERICAL) + 1) % len(kinds))
     poses = frames_at_zero(ring.gaps)
-    turns = [pose for k, pose in enumerate(poses) if ring.joints[k].motion is Motion.REVOLUTE]
-    normal = turns[0].R[:, 2]
-    if not all(always_zero(in_plane(turn.R.T @ normal), q, p) for turn in turns):
+    revolute = [pose for k, pose in enumerate(poses) if ring.joints[k].motion is Motion.REVOLUTE]
+    normal = revolute[0].R[:, 2]
+    if not all(always_zero(in_plane(pose.R.T @ normal), q, p) for pose in revolute):
         return None
     moving = {
         k: slope
@@ -227,4 +234,4 @@ def along_normal(ring: Ring, q: SX, p: SX) -> Root | None:
         return None
     ((k, slope),) = moving.items()
     end = poses[-1].p
-    return Root({"": positions([ring.joints[k]], [-casadi.dot(normal, end) / slope])})
+    return LoopBranches({"": positions([ring.joints[k]], [-casadi.dot(normal, end) / slope])})

@@ -37,54 +37,54 @@ from mbs.spatial import Pose, align_z, vector
 
 # Where positions stand: those of q, then those of cut joints, then the spins of rods.
 #
-# A rod between two balls may spin about its own line, which no closure row sees: one velocity of
-# a quaternion is independent then, and no element of q belongs to it. Its position here is the
-# angle by which the rod is turned about its line [rad], from where the shortest way leads from
-# its orientation in the assembled configuration.
+# A rod between two spherical joints may spin about its own line, which no closure row sees: one
+# velocity of a quaternion is independent then, and no element of q belongs to it. Its position here
+# is the angle by which the rod is rotated about its line [rad], from where the shortest rotation
+# leads from its orientation in the assembled configuration.
 
 
-def cut_places(system: System) -> tuple[int, ...]:
+def cut_indices(system: System) -> tuple[int, ...]:
     """Where the positions of each cut joint begin, and the end of all."""
     counts = [max(1, len(cut.edge.joint.freedoms)) for cut in system.cuts]
     return tuple(system.nq + sum(counts[:k]) for k in range(len(counts) + 1))
 
 
-def spin_places(system: System) -> dict[int, int]:
-    """The place of each spin, by the number in q at which the quaternion of its ball begins."""
-    balls = [
+def spin_indices(system: System) -> dict[int, int]:
+    """The index of each spin, by the one in q at which the quaternion of its joint begins."""
+    spherical = [
         link.q.start
         for link in system.tree.links
         for k in system.free
         if link.motion is Motion.SPHERICAL and link.v.start <= k < link.v.stop
     ]
-    first = cut_places(system)[-1]
-    return {start: first + number for number, start in enumerate(balls)}
+    first = cut_indices(system)[-1]
+    return {start: first + number for number, start in enumerate(spherical)}
 
 
 def extent(system: System) -> int:
     """How many positions there are, those of cut joints and spins included."""
-    return cut_places(system)[-1] + len(spin_places(system))
+    return cut_indices(system)[-1] + len(spin_indices(system))
 
 
-def independent_places(system: System) -> list[int]:
-    """The places of the independent joints, in the order of `system.free`.
+def independent_indices(system: System) -> list[int]:
+    """The indices of the independent joints, in the order of `system.free`.
 
     Raises:
-        NoClosedForm: a body is free, or a ball turns freely in more than one way.
+        NoClosedForm: a body is free, or a spherical joint rotates freely in more than one way.
     """
-    spins, places = spin_places(system), list[int]()
+    spins, indices = spin_indices(system), list[int]()
     for k in system.free:
         link = next(link for link in system.tree.links if link.v.start <= k < link.v.stop)
-        place = link.q.start if link.motion.nq == 1 else spins.get(link.q.start)
-        if place is None or place in places:
+        index = link.q.start if link.motion.nq == 1 else spins.get(link.q.start)
+        if index is None or index in indices:
             raise NoClosedForm(_unplaced(system, link))
-        places.append(place)
-    return places
+        indices.append(index)
+    return indices
 
 
 def _unplaced(system: System, link: Link) -> str:
     return (
-        f"{system.name}: the quaternion of {link.name} turns freely, and the positions of"
+        f"{system.name}: the quaternion of {link.name} rotates freely, and the positions of"
         " independent joints cannot tell how; use mbs.loops.solve without branch"
     )
 
@@ -100,7 +100,7 @@ def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
     Args:
         system: whose loop it is.
         number: of the cut joint.
-        known: numbers in q of the positions that are known.
+        known: indices in q of the positions that are known.
         q: (nq, 1) symbols followed by those of cut joints, of which the known ones are used.
     """
     builder, cut = ChainBuilder(known, q), system.cuts[number]
@@ -112,30 +112,30 @@ def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
 
 
 def _spins(system: System) -> dict[int, Spin]:
-    """Of the balls of rods, by the number in q at which their quaternions begin."""
+    """Of the spherical joints of rods, by the index in q at which their quaternions begin."""
     rest = {link.q.start: system.configuration[link.q] for link in system.tree.links}
-    return {start: Spin(place, rest[start]) for start, place in spin_places(system).items()}
+    return {start: Spin(index, rest[start]) for start, index in spin_indices(system).items()}
 
 
 def _pass_cut(builder: ChainBuilder, system: System, number: int) -> None:
     """Back through the freedoms of the cut joint, from its frame_b to its frame_a."""
     joint = system.cuts[number].edge.joint
-    ball = ChainJoint(joint.name, Motion.SPHERICAL, None, -1, cut=True)
+    spherical = ChainJoint(joint.name, Motion.SPHERICAL, None, -1, cut=True)
     freedoms = joint.freedoms
     if isinstance(joint, Spherical):
-        builder.through(ball)
+        builder.through(spherical)
         return
     if isinstance(joint, Rod):
-        builder.through(ball)
-        builder.over(Pose.moved(vector([to_sx(joint.length, system.symbol_table), 0, 0])))
-        builder.through(ball)
+        builder.through(spherical)
+        builder.over(Pose.translation(vector([to_sx(joint.length, system.symbol_table), 0, 0])))
+        builder.through(spherical)
         return
     if isinstance(joint, PointOnLine):
-        builder.through(ball)
+        builder.through(spherical)
         freedoms = (Freedom(Motion.PRISMATIC, joint.axis),)
-    first = cut_places(system)[number]
+    first = cut_indices(system)[number]
     for k, freedom in reversed(list(enumerate(freedoms))):
-        aligned = Pose.turned(align_z(freedom.axis))
+        aligned = Pose.rotation(align_z(freedom.axis))
         name = freedom.coordinate_of(joint.name)
         builder.over(aligned)
         builder.past(ChainJoint(name, freedom.motion, first + k, -1, cut=True))
@@ -159,20 +159,20 @@ PARAMETERS = (0.4, 1.6)
 """Between which symbols get random values: of the size of one, positive, and not near zero, so that
 they may be lengths."""
 _POSITIONS = (-1.5, 1.5)
-"""The same of positions [rad or m]: of both signs, and turns within a quarter turn."""
+"""The same of positions [rad or m]: of both signs, and angles within a quarter turn."""
 _Z = np.array([0.0, 0.0, 1.0])
 
 
 def gap_samples(ring: Ring, q: SX, p: SX) -> list[list[Matrix]]:
     """At some random positions and parameters the (4, 4) pose of every gap."""
-    return [[np.array(DM(T)) for T in values] for values in _evaluated(_matrices(ring.gaps), q, p)]
+    return [[np.array(DM(T)) for T in values] for values in _evaluate(_matrices(ring.gaps), q, p)]
 
 
 def _matrices(gaps: Iterable[Gap]) -> list[SX]:
     return [gap.pose.matrix for gap in gaps]
 
 
-def _evaluated(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
+def _evaluate(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
     rng = np.random.default_rng(_SURVEY_SEED)
     function = Function("samples", [q, p], values)
     return [
@@ -208,13 +208,13 @@ def parallel(pose: Pose, q: SX, p: SX) -> bool:
 
 def always_zero(values: SX, q: SX, p: SX) -> bool:
     """Whether every element is zero whatever the positions and parameters."""
-    samples = [np.array(value).ravel() for (value,) in _evaluated([values], q, p)]
+    samples = [np.array(value).ravel() for (value,) in _evaluate([values], q, p)]
     return all(bool(np.all(np.abs(sample) < _CLOSE)) for sample in samples)
 
 
 def constants(values: SX, q: SX, p: SX) -> list[float | None]:
     """Each element that is the same whatever the positions and parameters; None for the others."""
-    samples = np.array([np.array(value).ravel() for (value,) in _evaluated([values], q, p)])
+    samples = np.array([np.array(value).ravel() for (value,) in _evaluate([values], q, p)])
     same = np.all(np.abs(samples - samples[0]) < _CLOSE, axis=0)
     return [float(x) if fixed else None for x, fixed in zip(samples[0], same, strict=True)]
 
@@ -222,16 +222,16 @@ def constants(values: SX, q: SX, p: SX) -> list[float | None]:
 def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
     """The loop less the freedoms of its cut joint that a plane loop never uses.
 
-    These slide along the common normal of a loop, or turn about an axis across it.
+    These translate along the common normal of a loop, or rotate about an axis across it.
     """
-    start = _first_turn(ring)
+    start = _first_revolute(ring)
     if start is None:
         return ring
     for k in reversed(range(len(ring.joints))):
         joint = ring.joints[k]
         if joint.cut and joint.motion is not Motion.SPHERICAL:
             cosine = abs(_normal(samples[0], start, k)[2])
-            idle = cosine < _CLOSE if joint.turns else cosine > 1 - _CLOSE
+            idle = cosine < _CLOSE if joint.is_rotational else cosine > 1 - _CLOSE
             if idle:
                 return ring.without(k)
     return ring
@@ -248,24 +248,24 @@ def with_elbow(ring: Ring, q: SX) -> Ring:
 
 
 def is_planar(ring: Ring, samples: list[list[Matrix]]) -> bool:
-    """Whether all turns are about one direction, and all slides across it.
+    """Whether all rotations are about one direction, and all translations across it.
 
-    A spherical joint, the last one of the loop, may stand for a turn.
+    A spherical joint, the last one of the loop, may stand for a revolute one.
     """
-    start = _first_turn(ring)
+    start = _first_revolute(ring)
     if start is None:
         return False
-    ball = any(joint.motion is Motion.SPHERICAL for joint in ring.joints)
+    spherical = any(joint.motion is Motion.SPHERICAL for joint in ring.joints)
     n = len(ring.joints)
-    ends = range(start + 1, n) if ball else range(start + 1, start + n + 1)
+    ends = range(start + 1, n) if spherical else range(start + 1, start + n + 1)
     return all(
         _fits(ring.joints[k % n].motion, _normal(gaps, start, k)) for gaps in samples for k in ends
     )
 
 
-def _first_turn(ring: Ring) -> int | None:
-    turns = (k for k, joint in enumerate(ring.joints) if joint.motion is Motion.REVOLUTE)
-    return next(turns, None)
+def _first_revolute(ring: Ring) -> int | None:
+    revolute = (k for k, joint in enumerate(ring.joints) if joint.motion is Motion.REVOLUTE)
+    return next(revolute, None)
 
 
 def _normal(gaps: list[Matrix], start: int, end: int) -> Matrix:
@@ -326,14 +326,14 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
     It ends early where joints move at two of them while the given stay.
 
     Args:
-        ring: a loop of turns and slides.
+        ring: a loop of revolute and prismatic joints.
         given: (m, 1) the symbols of its gaps.
         p: those of them that are parameters keep their random values, the others may move.
     """
     n, rng = len(ring.joints), np.random.default_rng(_SEED)
     parameters = {symbol.name() for symbol in casadi.symvar(p)}
     names = [symbol.name() for symbol in casadi.vertsplit(given)] if given.numel() else []
-    held = np.array([False] * n + [name in parameters for name in names])
+    fixed = np.array([False] * n + [name in parameters for name in names])
     x = SX.sym("x", n)
     every = casadi.vertcat(x, given)
     r = closure_of(ring, x)
@@ -341,9 +341,9 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
     samples = list[Sample]()
     for _ in range(_TRIES):
         start = np.where(
-            held, rng.uniform(*PARAMETERS, held.size), rng.uniform(*_POSITIONS, held.size)
+            fixed, rng.uniform(*PARAMETERS, fixed.size), rng.uniform(*_POSITIONS, fixed.size)
         )
-        closed = _closed(function, start, held)
+        closed = _closed(function, start, fixed)
         if closed is not None:
             J = np.array(function(closed)[1])[:, :n]
             samples.append(Sample(closed[:n], closed[n:], rank(J, _LOOSE)))
@@ -353,16 +353,16 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
     return samples
 
 
-def _closed(function: Function, start: Vector, held: NDArray[np.bool_]) -> Vector | None:
+def _closed(function: Function, start: Vector, fixed: NDArray[np.bool_]) -> Vector | None:
     def residual(free: Vector) -> tuple[Vector, Vector]:
         whole = start.copy()
-        whole[~held] = free
+        whole[~fixed] = free
         r, J = (np.array(value) for value in function(whole))
-        return r.ravel(), J[:, ~held]
+        return r.ravel(), J[:, ~fixed]
 
-    root = gauss_newton(residual, start[~held], iterations=_ITERATIONS)
+    root = gauss_newton(residual, start[~fixed], iterations=_ITERATIONS)
     if not root.converged:
         return None
     whole = start.copy()
-    whole[~held] = root.x
+    whole[~fixed] = root.x
     return whole

@@ -1,4 +1,4 @@
-"""What a kernel finds: every way to close a loop, as expressions of what is known."""
+"""What a kernel finds: every branch of a loop, as expressions of what is known."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from mbs.components.joints import Motion
 from mbs.recursions.chain import ChainJoint
 
 Positions = Mapping[int, SX]
-"""Position of each unknown joint, by its number in q."""
+"""Position of each unknown joint, by its index in q."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spun:
+class RodSpin:
     """The spin of a rod at a configuration whose quaternion is known.
 
     Attributes:
-        place: number of the spin among the positions.
+        index: number of the spin among the positions.
         angle: expression of all positions [rad].
     """
 
-    place: int
+    index: int
     angle: SX
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Root:
-    """The ways to close a loop.
+class LoopBranches:
+    """The branches of a loop.
 
     Attributes:
-        ways: positions by label, such as "j3:+"; the label is empty where there is one way only.
-        spun: the spin on which they depend, if they do.
+        branches: positions by label, such as "j3:+"; the label is empty where there is one alone.
+        spin: the spin on which they depend, if they do.
     """
 
-    ways: Mapping[str, Positions]
-    spun: Spun | None = None
+    branches: Mapping[str, Positions]
+    spin: RodSpin | None = None
 
 
 def positions(joints: Sequence[ChainJoint], values: Sequence[SX]) -> Positions:
-    """Positions in q from those along the way around the loop; balls are left out."""
+    """Positions in q from those along the path around the loop; spherical joints are left out."""
     return {
-        joint.place: joint.sign * value
+        joint.index: joint.sign * value
         for joint, value in zip(joints, values, strict=True)
-        if joint.place is not None and joint.motion is not Motion.SPHERICAL
+        if joint.index is not None and joint.motion is not Motion.SPHERICAL
     }
 
 
@@ -96,7 +96,7 @@ def root_angle(X: SX, Y: SX, Z: SX, sign: int) -> Angle:
     return Angle(X * Z - Y * W, Y * Z + X * W, size)
 
 
-def turn_onto(a: SX, b: SX) -> Angle:
+def angle_onto(a: SX, b: SX) -> Angle:
     """The turn that brings a, (2, 1), onto b, (2, 1), which is as long."""
     fixed = a if a.is_constant() else b
     return Angle(a[0] * b[0] + a[1] * b[1], across(a, b), fixed[0] * fixed[0] + fixed[1] * fixed[1])
@@ -118,5 +118,5 @@ def in_plane(matrix: SX) -> SX:
 
 
 def last_angle(before: SX) -> SX:
-    """The turn about z that undoes the turn `before`, of which the first row is used [rad]."""
+    """The rotation about z that undoes the turn `before`, of which the first row is used [rad]."""
     return SX(casadi.atan2(before[0, 1], before[0, 0]))

@@ -66,11 +66,11 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class SequenceStep:
     """Some joints of a loop, from the given and from the joints found before.
 
     Attributes:
-        places: numbers in x of what it gives; beyond the joints those of further angles.
+        indices: indices in x of what it gives; beyond the joints those of further angles.
         names: of these, as they stand in the equation.
         kind: of the equation, such as "type 2" or "quartic".
         equation: as one reads it, in terms of the coefficients, such as
@@ -83,7 +83,7 @@ class Step:
             free of units that vanishes where the step leaves a joint undetermined.
     """
 
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     names: tuple[str, ...]
     kind: str
     equation: str
@@ -109,7 +109,9 @@ class Found:
     coefficients: Mapping[str, SX] | None = None
 
 
-def step(problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], found: Found) -> Step:
+def step(
+    problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], found: Found
+) -> SequenceStep:
     """A step from the expressions that make it up.
 
     Args:
@@ -124,14 +126,14 @@ def step(problem: Problem, kind: str, equation: str, signs: Mapping[str, SX], fo
     columns = (found.values.values(), found.real, found.regular, coefficients.values())
     outputs = [casadi.densify(SX(casadi.vertcat(*column))) for column in columns]
     function = Function("step", [problem.x, problem.given, SX(s)], outputs, {"cse": True})
-    places = tuple(found.values)
-    names = tuple(_name(problem, place) for place in places)
-    return Step(places, names, kind, equation, tuple(signs), tuple(coefficients), function)
+    indices = tuple(found.values)
+    names = tuple(_name(problem, index) for index in indices)
+    return SequenceStep(indices, names, kind, equation, tuple(signs), tuple(coefficients), function)
 
 
-def _name(problem: Problem, place: int) -> str:
-    names = {joint.place: joint.name for joint in problem.ring.joints}
-    return names.get(place, str(problem.x[place]))
+def _name(problem: Problem, index: int) -> str:
+    names = {joint.index: joint.name for joint in problem.ring.joints}
+    return names.get(index, str(problem.x[index]))
 
 
 # Steps one after the other: a configuration for every choice of their signs.
@@ -143,7 +145,7 @@ class Leaf:
 
     Attributes:
         x: (n, 1) positions of the joints.
-        real: (r, 1) every radicand on the way.
+        real: (r, 1) every radicand on the path.
         regular: (e, 1) every quantity that must not vanish.
         coefficients: by name, those of every step.
     """
@@ -167,7 +169,7 @@ class StepSequence:
     """
 
     size: int
-    steps: Sequence[Step]
+    steps: Sequence[SequenceStep]
 
     @property
     def signs(self) -> tuple[str, ...]:
@@ -194,8 +196,8 @@ class StepSequence:
         leaf, first = self._start(), 0
         for step in self.steps:
             chosen = s[first : first + len(step.signs)]
-            leaf, first = _taken(leaf, step, given, chosen), first + len(step.signs)
-        return self._cropped(leaf)
+            leaf, first = _take(leaf, step, given, chosen), first + len(step.signs)
+        return self._crop(leaf)
 
     def leaves(self, given: SX) -> list[Leaf]:
         """The configurations of all branches in order; what they share is computed once."""
@@ -203,24 +205,24 @@ class StepSequence:
         for step in self.steps:
             choices = list(itertools.product((1, -1), repeat=len(step.signs)))
             leaves = [
-                _taken(leaf, step, given, SX(casadi.DM(choice)))
+                _take(leaf, step, given, SX(casadi.DM(choice)))
                 for leaf in leaves
                 for choice in choices
             ]
-        return [self._cropped(leaf) for leaf in leaves]
+        return [self._crop(leaf) for leaf in leaves]
 
     def _start(self) -> Leaf:
         return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
 
-    def _cropped(self, leaf: Leaf) -> Leaf:
+    def _crop(self, leaf: Leaf) -> Leaf:
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
-def _taken(leaf: Leaf, step: Step, given: SX, s: SX) -> Leaf:
+def _take(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
     """The configuration with one more step."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
-    x[list(step.places)] = values
+    x[list(step.indices)] = values
     named = dict(zip(step.coefficients, casadi.vertsplit(coefficients), strict=True))
     return Leaf(
         x,

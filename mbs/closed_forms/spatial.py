@@ -1,4 +1,4 @@
-"""Loops in space: joints from centres they turn about, distances, orientations and slides.
+"""Loops in space: joints from centres, distances, orientations and translations.
 
 What lies beyond such a centre only sees a point, whatever the joints in it do.
 """
@@ -13,109 +13,44 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tables import CoordinateCoupling
-from mbs.closed_forms.ring import always_zero, axes_meet, meeting_point, parallel, with_elbow
+from mbs.closed_forms.centres import (
+    Centre,
+    centres,
+    with_spherical,
+)
+from mbs.closed_forms.ring import always_zero, parallel, with_elbow
 from mbs.closed_forms.roots import (
     Angle,
+    LoopBranches,
     Positions,
-    Root,
-    Spun,
+    RodSpin,
     across,
+    angle_onto,
     in_plane,
     last_angle,
     positions,
     root_angle,
     signed,
     square,
-    turn_onto,
 )
 from mbs.components.joints import Motion
-from mbs.recursions.chain import Chain, ChainJoint, Gap, Ring, frames_at_zero
+from mbs.recursions.chain import Chain, ChainJoint, Ring, frames_at_zero
 from mbs.spatial import Pose, cross, quaternion_rotation, vector
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Centre:
-    """Consecutive unknown joints that leave one point where it is.
-
-    Attributes:
-        first: number of the first of them in the loop.
-        count: how many: one ball, or two or three turns.
-        before: (3, 1) the point in the frame before the first one.
-        after: (3, 1) the point in the frame after the last one.
-    """
-
-    first: int
-    count: int
-    before: SX
-    after: SX
-
-    def places(self, size: int) -> list[int]:
-        """Its joints in a loop of so many joints."""
-        return [(self.first + k) % size for k in range(self.count)]
-
-
-def centres(ring: Ring, q: SX, p: SX) -> list[Centre]:
-    """Every ball of a loop, and every two or three neighbours that turn about one point."""
-    found = list[Centre]()
-    for k, joint in enumerate(ring.joints):
-        if joint.motion is Motion.SPHERICAL:
-            found.append(Centre(k, 1, vector([0, 0, 0]), vector([0, 0, 0])))
-        elif _turns(ring, k, 2) and axes_meet(_gap(ring, k + 1), q, p):
-            first, second = meeting_point(_gap(ring, k + 1))
-            found.append(Centre(k, 2, vector([0, 0, first]), vector([0, 0, second])))
-            if _turns(ring, k, 3):
-                seen = _gap(ring, k + 2).inverse()
-                third = seen.p + seen.R @ vector([0, 0, second])
-                if always_zero(third[0:2], q, p):
-                    found.append(Centre(k, 3, vector([0, 0, first]), vector([0, 0, third[2]])))
-    return found
-
-
-def with_balls(ring: Ring, q: SX, p: SX) -> Ring:
-    """The loop with a ball in the place of every three turns whose axes meet in one point."""
-    for centre in centres(ring, q, p):
-        if centre.count == 3 and len(ring.joints) > 3:
-            return with_balls(collapsed(ring, centre), q, p)
-    return ring
-
-
-def collapsed(ring: Ring, centre: Centre) -> Ring:
-    """The loop begun at a centre, with a ball in its place."""
-    begun = ring.rotated(centre.first)
-    joints, gaps = begun.joints[centre.count :], begun.gaps[centre.count :]
-    name = ", ".join(joint.name for joint in begun.joints[: centre.count])
-    ball = ChainJoint(name, Motion.SPHERICAL, None, 1)
-    first = begun.gaps[0].then(Pose.moved(centre.before))
-    leave = Gap(Pose.moved(-centre.after))
-    if not joints:
-        return Ring((ball,), (first.after(leave),))
-    return Ring((ball, *joints), (first, gaps[0].after(leave), *gaps[1:]))
-
-
-def _gap(ring: Ring, k: int) -> Pose:
-    return ring.gaps[k % len(ring.gaps)].pose
-
-
-def _turns(ring: Ring, first: int, count: int) -> bool:
-    """Whether so many different neighbours are turns."""
-    n = len(ring.joints)
-    among = [ring.joints[(first + k) % n] for k in range(count)]
-    return count <= n and all(joint.motion is Motion.REVOLUTE for joint in among)
-
-
-# Two turns whose axes meet, as in a universal joint, that aim a known point at a known point.
+# Two revolute joints whose axes meet, as in a universal joint, that aim a known point at a known
+# point.
 #
-# What the second turn can change along the axis of the first gives X cos t + Y sin t = Z. The
-# sign says to which side of the plane of the two axes the second joint is turned.
+# What the second revolute joint can change along the axis of the first gives X cos t + Y sin t = Z.
+# The sign says to which side of the plane of the two axes the second joint is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
 
-def aim(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The two ways to aim a link at its other end; None unless two centres are all that is unknown.
+def aim(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The branches that aim a link at its other end; None unless two centres are all unknown.
 
     Args:
-        ring: the loop, of which one centre is made of two turns.
+        ring: the loop, of which one centre is made of two revolute joints.
         q: symbols of positions.
         p: symbols of parameters.
     """
@@ -125,43 +60,43 @@ def aim(ring: Ring, q: SX, p: SX) -> Root | None:
         for other in found:
             next_to = (one.first + one.count - other.first) % n == 0
             if one.count == 2 and next_to and other.count == n - 2:
-                return _aimed(ring.rotated(one.first), one, other)
+                return _aim_branches(ring.rotated(one.first), one, other)
     return None
 
 
-def _aimed(ring: Ring, one: Centre, other: Centre) -> Root:
-    ways = signed(ring.joints[1])
-    return Root({label: _aim_root(ring, one, other, sign) for label, sign in ways})
+def _aim_branches(ring: Ring, one: Centre, other: Centre) -> LoopBranches:
+    branches = signed(ring.joints[1])
+    return LoopBranches({label: _aim_root(ring, one, other, sign) for label, sign in branches})
 
 
 def _aim_root(ring: Ring, one: Centre, other: Centre, sign: int) -> Positions:
     X1, X2, X3 = (gap.pose for gap in ring.gaps[:3])
     back = X1.inverse()
-    goal = back.p + back.R @ other.after - one.before
+    target = back.p + back.R @ other.after - one.before
     arm, x = X3.p + X3.R @ other.before - one.after, X2.R[2, :].T
     dot = x[0] * arm[0] + x[1] * arm[1]
-    b = root_angle(dot, -across(x, arm), goal[2] - x[2] * arm[2], sign)
-    turned = casadi.vertcat(b.matrix @ in_plane(arm), arm[2])
-    a = turn_onto(in_plane(X2.R @ turned), in_plane(goal))
+    b = root_angle(dot, -across(x, arm), target[2] - x[2] * arm[2], sign)
+    rotated = casadi.vertcat(b.matrix @ in_plane(arm), arm[2])
+    a = angle_onto(in_plane(X2.R @ rotated), in_plane(target))
     return positions(ring.joints[:2], (a.value, b.value))
 
 
-# A ball as the only unknown joint: the quaternion of a known orientation.
+# A spherical joint as the only unknown joint: the quaternion of a known orientation.
 #
 # Of the four formulas the one with the largest denominator is taken, so that nothing is lost at
-# half turns; the quaternion is the one whose first element is not negative.
+# half rotations; the quaternion is the one whose first element is not negative.
 #
 # Source: Shepperd 1978.
 
 
-def ball(ring: Ring, q: SX, p: SX) -> Root | None:
+def spherical(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The orientation of a spherical joint of the tree; None unless it alone is unknown."""
     joint = ring.joints[0]
-    if len(ring.joints) != 1 or joint.motion is not Motion.SPHERICAL or joint.place is None:
+    if len(ring.joints) != 1 or joint.motion is not Motion.SPHERICAL or joint.index is None:
         return None
     R = ring.gaps[0].pose.R
     quaternion = unit_quaternion(R.T if joint.sign > 0 else R)
-    return Root({"": {joint.place + k: quaternion[k] for k in range(4)}})
+    return LoopBranches({"": {joint.index + k: quaternion[k] for k in range(4)}})
 
 
 def unit_quaternion(R: SX) -> SX:
@@ -184,11 +119,11 @@ def unit_quaternion(R: SX) -> SX:
     return SX(signed / casadi.norm_2(signed))
 
 
-# A ball that two joints confine to a plane: a turn brings it there.
+# A spherical joint that two joints confine to a plane: a rotation brings it there.
 #
-# Two parallel turns, a turn and a slide across it, or two slides leave a point in a plane with
-# the normal n. A turn beyond them brings the ball into that plane: X cos t + Y sin t = Z. Then
-# the loop is plane.
+# Two parallel revolute joints, a revolute and a prismatic joint across it, or two prismatic joints
+# leave a point in a plane with the normal n. A rotation beyond them brings the spherical joint into
+# that plane: X cos t + Y sin t = Z. Then the loop is plane.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
@@ -196,24 +131,24 @@ def unit_quaternion(R: SX) -> SX:
 _Z = (0.0, 0.0, 1.0)
 
 
-def confined(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The turn that brings a ball into the plane of two others; None where none does so.
+def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The rotation that brings a spherical joint into the plane of two others, or None.
 
     Args:
-        ring: the loop, of which a ball and three joints are unknown.
+        ring: the loop, of which a spherical joint and three joints are unknown.
         q: symbols of positions.
         p: symbols of parameters.
     """
-    ring = with_balls(ring, q, p)
-    balls = [k for k, joint in enumerate(ring.joints) if joint.motion is Motion.SPHERICAL]
-    if len(balls) != 1 or len(ring.joints) != 4:
+    ring = with_spherical(ring, q, p)
+    spherical = [k for k, joint in enumerate(ring.joints) if joint.motion is Motion.SPHERICAL]
+    if len(spherical) != 1 or len(ring.joints) != 4:
         return None
-    begun = ring.rotated((balls[0] + 1) % 4)
-    for way in (begun, begun.reversed().rotated(1)):
-        if way.joints[0].turns:
-            normal = _normal(way, q, p)
-            if normal is not None and not _keeps(way, normal, q, p):
-                return _brought(way, normal)
+    begun = ring.rotated((spherical[0] + 1) % 4)
+    for path in (begun, begun.reversed().rotated(1)):
+        if path.joints[0].is_rotational:
+            normal = _normal(path, q, p)
+            if normal is not None and not _is_across(path, normal, q, p):
+                return _confine_branches(path, normal)
     return None
 
 
@@ -230,21 +165,21 @@ def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
     return vector(_Z) if parallel(between, q, p) else None
 
 
-def _keeps(ring: Ring, normal: SX, q: SX, p: SX) -> bool:
-    """Whether the first turn moves nothing along the normal either."""
+def _is_across(ring: Ring, normal: SX, q: SX, p: SX) -> bool:
+    """Whether the first revolute joint moves nothing along the normal either."""
     return always_zero(in_plane(ring.gaps[1].pose.R @ normal), q, p)
 
 
-def _brought(ring: Ring, normal: SX) -> Root:
-    """The first turn, from the ball seen before it and its place along the normal after it."""
+def _confine_branches(ring: Ring, normal: SX) -> LoopBranches:
+    """The first joint, from the spherical one before it and its height on the normal behind it."""
     X1, X2, X3, X4 = (gap.pose for gap in ring.gaps)
-    joint, goal = ring.joints[0], X1.inverse().p
+    joint, target = ring.joints[0], X1.inverse().p
     m = X2.R @ normal
-    Z = casadi.dot(normal, (X3 @ Pose.moved(X4.p)).p) + casadi.dot(m, X2.p)
-    X, Y = casadi.dot(in_plane(m), in_plane(goal)), across(in_plane(m), in_plane(goal))
-    return Root(
+    Z = casadi.dot(normal, (X3 @ Pose.translation(X4.p)).p) + casadi.dot(m, X2.p)
+    X, Y = casadi.dot(in_plane(m), in_plane(target)), across(in_plane(m), in_plane(target))
+    return LoopBranches(
         {
-            label: positions([joint], [root_angle(X, Y, Z - m[2] * goal[2], sign).value])
+            label: positions([joint], [root_angle(X, Y, Z - m[2] * target[2], sign).value])
             for label, sign in signed(joint)
         }
     )
@@ -253,12 +188,14 @@ def _brought(ring: Ring, normal: SX) -> Root:
 # Two coupled coordinates: the driven one by its polynomial, the driver where that is a line.
 
 
-def coupled(coupling: CoordinateCoupling, known: Container[int], q: SX) -> Root | str:
+def coupled_position(
+    coupling: CoordinateCoupling, known: Container[int], q: SX
+) -> LoopBranches | str:
     """The unknown one of coupled coordinates, or why it does not follow.
 
     Args:
         coupling: one of whose coordinates is known.
-        known: numbers in q of known positions.
+        known: indices in q of known positions.
         q: (nq, 1) symbols of positions.
     """
     terms = coupling.coefficients
@@ -267,39 +204,39 @@ def coupled(coupling: CoordinateCoupling, known: Container[int], q: SX) -> Root 
         return "more than one of its coordinates are unknown"
     (number,) = unknown
     if number == coupling.driven:
-        return Root({"": {number: coupling.value(q)}})
+        return LoopBranches({"": {number: coupling.value(q)}})
     if number == coupling.driver and len(terms) != 2:
         return "its driver follows from a polynomial that is not of degree one"
     # linear in the unknown one, whose factor is its slope
     slope = terms[1] if number == coupling.driver else dict(coupling.others)[number]
     rest = casadi.substitute(coupling.value(q), q[number], SX(0))
-    return Root({"": {number: (q[coupling.driven] - rest) / slope}})
+    return LoopBranches({"": {number: (q[coupling.driven] - rest) / slope}})
 
 
 # One joint that brings two centres of a loop to the distance that a rigid link between them
 # tells.
 #
-# The centres are balls, or turns whose axes meet. Seen from the joint, one of them is at m, the
-# other one at d beyond the joint. A turn gives X cos t + Y sin t = Z, a slide a quadratic
-# equation. These are the revolute and the prismatic joint "with length constraint" of Modelica's
-# assemblies.
+# The centres are spherical joints, or revolute joints whose axes meet. Seen from the joint, one of
+# them is at m, the other one at d beyond the joint. A revolute joint gives X cos t + Y sin t = Z, a
+# prismatic joint a quadratic equation. These are the revolute and the prismatic joint "with length
+# constraint" of Modelica's assemblies.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2; Otter et al. 2003.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Span:
-    """A rigid link between two centres, and the way around the loop from its end to its start.
+    """A rigid link between two centres, and the path around the loop from its end to its start.
 
     Attributes:
-        chain: on that way.
-        goal: (3, 1) the end of the link, before the first gap.
+        chain: on that path.
+        target: (3, 1) the end of the link, before the first gap.
         start: (3, 1) the start of the link, after the last gap.
         squared: the square of its length.
     """
 
     chain: Chain
-    goal: SX
+    target: SX
     start: SX
     squared: SX
 
@@ -310,7 +247,7 @@ def spans(ring: Ring, q: SX, p: SX) -> Iterator[Span]:
     found = centres(ring, q, p)
     for one in found:
         for other in found:
-            apart = not set(one.places(n)) & set(other.places(n))
+            apart = not set(one.joints(n)) & set(other.joints(n))
             if apart and (one.first + one.count - other.first) % n == 0:
                 yield _span(ring.rotated(one.first), one, other)
 
@@ -327,115 +264,122 @@ def _span(begun: Ring, one: Centre, other: Centre) -> Span:
     )
 
 
-def at_distance(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The two ways to place a joint so that a rigid link fits; None where no link asks for it."""
+def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The two branches of a joint where a rigid link fits; None where no link asks for it."""
     for span in spans(ring, q, p):
         if len(span.chain.joints) == 1:
             m, d = _ends(span)
             idle = any(always_zero(in_plane(end), q, p) for end in (m, d))
-            if not (idle and span.chain.joints[0].turns):
+            if not (idle and span.chain.joints[0].is_rotational):
                 return _at_distance(span.chain.joints[0], m, d, span.squared)
     return None
 
 
 def _ends(span: Span) -> tuple[SX, SX]:
-    """What the joint turns or moves, and the rest of the link, seen from it."""
+    """What the joint moves, and the rest of the link, seen from it."""
     before, after = (gap.pose for gap in span.chain.gaps)
     back = before.inverse()
-    return -(back.p + back.R @ span.goal), after.p + after.R @ span.start
+    return -(back.p + back.R @ span.target), after.p + after.R @ span.start
 
 
-def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> Root:
+def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> LoopBranches:
     def value(sign: int) -> SX:
-        if joint.turns:
+        if joint.is_rotational:
             Z = (squared - square(m) - square(d)) / 2 - m[2] * d[2]
             return root_angle(m[0] * d[0] + m[1] * d[1], -across(m, d), Z, sign).value
         w = m + d
         return SX(sign * casadi.sqrt(squared - w[0] * w[0] - w[1] * w[1]) - w[2])
 
-    return Root({label: positions([joint], (value(sign),)) for label, sign in signed(joint)})
+    return LoopBranches(
+        {label: positions([joint], (value(sign),)) for label, sign in signed(joint)}
+    )
 
 
-# A free body as the only unknown joint: its place and quaternion follow from its pose.
+# A free body as the only unknown joint: its position and quaternion follow from its pose.
 
 
-def free_body(ring: Ring, q: SX, p: SX) -> Root | None:
+def free_body(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """The pose of a free body; None unless it alone is unknown."""
     joint = ring.joints[0]
-    if len(ring.joints) != 1 or joint.motion is not Motion.FREE or joint.place is None:
+    if len(ring.joints) != 1 or joint.motion is not Motion.FREE or joint.index is None:
         return None
     pose = ring.gaps[0].pose
     pose = pose.inverse() if joint.sign > 0 else pose
     values = casadi.vertcat(pose.p, unit_quaternion(pose.R))
-    return Root({"": {joint.place + k: values[k] for k in range(7)}})
+    return LoopBranches({"": {joint.index + k: values[k] for k in range(7)}})
 
 
-# Three unknown turns from orientations alone.
+# Three unknown revolute joints from orientations alone.
 #
 # R_a X_2 R_b X_3 R_c = X_1': the element on the third row and column holds the middle angle
 # alone, X cos t + Y sin t = Z. The sign says to which side of the plane of the two other axes the
-# middle joint is turned.
+# middle joint is rotated.
 #
 # Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
 
 
-def sphere(ring: Ring) -> Root:
-    """The two ways to close a loop of three unknown turns, as far as orientations go.
+def orientations(ring: Ring) -> LoopBranches:
+    """The two branches of a loop of three unknown revolute joints, as far as orientations go.
 
     Args:
         ring: its joints a, b, c; b is the one in the middle.
     """
-    return Root({label: _sphere_root(ring, sign) for label, sign in signed(ring.joints[1])})
+    return LoopBranches(
+        {label: _orientations_root(ring, sign) for label, sign in signed(ring.joints[1])}
+    )
 
 
-def _sphere_root(ring: Ring, sign: int) -> Positions:
+def _orientations_root(ring: Ring, sign: int) -> Positions:
     R1, R2, R3 = (gap.pose.R for gap in ring.gaps)
     x, y = R2[2, :].T, R3[:, 2]
     dot = x[0] * y[0] + x[1] * y[1]
     b = root_angle(dot, -across(x, y), R1[2, 2] - x[2] * y[2], sign)
-    turned = casadi.vertcat(b.matrix @ in_plane(y), y[2])
-    a = turn_onto(in_plane(R2 @ turned), R1[2, 0:2].T)
+    rotated = casadi.vertcat(b.matrix @ in_plane(y), y[2])
+    a = angle_onto(in_plane(R2 @ rotated), R1[2, 0:2].T)
     row = casadi.vertcat(b.matrix.T @ in_plane(x), x[2])
-    c: Angle = turn_onto(in_plane(R1[:, 2]), in_plane(R3.T @ row))
+    c: Angle = angle_onto(in_plane(R1[:, 2]), in_plane(R3.T @ row))
     return positions(ring.joints, (a.value, b.value, c.value))
 
 
-# Turns from the orientations around a loop, before anything is known of its slides.
+# Turns from the orientations around a loop, before anything is known of its prismatic joints.
 #
-# Turns about one direction are one: the loop is made of up to three directions. One turn is what
-# is missing; of two directions each turn brings the other axis to where it belongs, those that
-# share their direction with others staying unknown; three turns are solved as a spherical loop.
+# Rotations about one direction are one: the loop is made of up to three directions. One angle is
+# what is missing; of two directions each rotation brings the other axis to where it belongs, those
+# that share their direction with others staying unknown; three revolute joints are solved as a
+# spherical loop.
 #
 # Source: Khalil & Creusot 1997, section 3.3; for RCCC loops Duffy 1980.
 
 
-def orientation(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The turns that orientations alone give; None where there is none."""
+def orientation(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The revolute joints that orientations alone determine; None where there is none."""
     if any(joint.motion not in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints):
         return None
-    turns = _turns_alone(ring)
-    directions, shared = _directions(turns, q, p)
+    revolute = _revolute_alone(ring)
+    directions, shared = _directions(revolute, q, p)
     match len(directions.joints):
         case 1 if not shared:
             (joint,) = directions.joints
-            return Root({"": positions([joint], [last_angle(in_plane(directions.gaps[0].pose.R))])})
+            return LoopBranches(
+                {"": positions([joint], [last_angle(in_plane(directions.gaps[0].pose.R))])}
+            )
         case 2 if len(shared) < 2:
-            return _of_two(directions, shared)
-        case 3 if not shared and _is_oriented(ring, turns, q, p):
-            return sphere(with_elbow(directions, q))
+            return _two_orientations(directions, shared)
+        case 3 if not shared and _is_oriented(ring, revolute, q, p):
+            return orientations(with_elbow(directions, q))
     return None
 
 
-def _turns_alone(ring: Ring) -> Ring:
-    """The loop with its slides held at zero."""
+def _revolute_alone(ring: Ring) -> Ring:
+    """The loop with its prismatic joints locked at zero."""
     for k, joint in enumerate(ring.joints):
         if joint.motion is Motion.PRISMATIC:
-            return _turns_alone(ring.without(k))
+            return _revolute_alone(ring.without(k))
     return ring
 
 
 def _directions(ring: Ring, q: SX, p: SX) -> tuple[Ring, frozenset[str]]:
-    """One turn for each direction, and the names of those that stand for several."""
+    """One joint for each direction, and the names of those that stand for several."""
     shared, k = set[str](), 0
     while k < len(ring.joints) > 1:
         if parallel(ring.gaps[k].pose, q, p):
@@ -447,59 +391,59 @@ def _directions(ring: Ring, q: SX, p: SX) -> tuple[Ring, frozenset[str]]:
     return ring, frozenset(shared)
 
 
-def _is_oriented(ring: Ring, turns: Ring, q: SX, p: SX) -> bool:
-    """Whether positions do not hinder three turns: slides are free, or the axes meet."""
-    if len(ring.joints) == len(turns.joints):
+def _is_oriented(ring: Ring, revolute: Ring, q: SX, p: SX) -> bool:
+    """Whether positions do not hinder three rotations: translations are free, or the axes meet."""
+    if len(ring.joints) == len(revolute.joints):
         return any(centre.count == 3 for centre in centres(ring, q, p))
-    return len(ring.joints) == len(turns.joints) + 3
+    return len(ring.joints) == len(revolute.joints) + 3
 
 
-def _of_two(ring: Ring, shared: frozenset[str]) -> Root:
+def _two_orientations(ring: Ring, shared: frozenset[str]) -> LoopBranches:
     values: dict[int, SX] = {}
     for begun in (ring, ring.rotated(1)):
         joint, (R1, R2) = begun.joints[0], (gap.pose.R for gap in begun.gaps)
         if joint.name not in shared:
-            turn = turn_onto(R2[0:2, 2], R1[2, 0:2].T)
-            values |= positions([joint], [turn.value])
-    return Root({"": values})
+            revolute = angle_onto(R2[0:2, 2], R1[2, 0:2].T)
+            values |= positions([joint], [revolute.value])
+    return LoopBranches({"": values})
 
 
-# Slides alone, or with all turns about one point: linear equations.
+# Prismatic joints alone, or with all rotations about one point: linear equations.
 #
-# X_1 .. X_n with the slides at zero leaves a gap e; the slides move along u_1 .. u_m, m <= 3, and
-# e + u_1 s_1 + .. + u_m s_m = 0. With fewer than three the normal equations are solved, which
-# lose nothing where the loop closes.
+# X_1 .. X_n with the prismatic joints at zero leaves a gap e; the prismatic joints move along u_1
+# .. u_m, m <= 3, and e + u_1 s_1 + .. + u_m s_m = 0. With fewer than three the normal equations are
+# solved, which lose nothing where the loop closes.
 
 
 _MOST = 3
 
 
-def slides(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The only displacements that close a loop; None where a turn has a say in them."""
+def prismatic(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The only displacements that close a loop; None where a rotation has a say in them."""
     number = sum(joint.motion is Motion.PRISMATIC for joint in ring.joints)
     if not 1 <= number <= _MOST:
         return None
     if number == len(ring.joints):
         nowhere = Centre(0, 0, vector([0, 0, 0]), vector([0, 0, 0]))
-        return _slid(ring, nowhere)
+        return _prismatic_branches(ring, nowhere)
     for centre in centres(ring, q, p):
         if centre.count + number == len(ring.joints):
-            return _slid(ring.rotated(centre.first), centre)
+            return _prismatic_branches(ring.rotated(centre.first), centre)
     return None
 
 
-def _slid(ring: Ring, centre: Centre) -> Root:
-    """The slides that lead from the centre, the first one of the loop, back to it."""
+def _prismatic_branches(ring: Ring, centre: Centre) -> LoopBranches:
+    """The prismatic joints that lead from the centre, the first one of the loop, back to it."""
     joints = ring.joints[centre.count :]
-    poses = frames_at_zero(ring.gaps[centre.count :], Pose.moved(-centre.after))
+    poses = frames_at_zero(ring.gaps[centre.count :], Pose.translation(-centre.after))
     axes, pose = [pose.R[:, 2] for pose in poses], poses[-1]
     if centre.count:
         pose = pose @ ring.gaps[0].pose
     e = pose.p + pose.R @ centre.before
-    return Root({"": positions(joints, _solved(axes, -e))})
+    return LoopBranches({"": positions(joints, _combination(axes, -e))})
 
 
-def _solved(u: Sequence[SX], e: SX) -> list[SX]:
+def _combination(u: Sequence[SX], e: SX) -> list[SX]:
     """The combination of one to three vectors that gives e."""
     if len(u) == 1:
         return [casadi.dot(u[0], e) / casadi.sumsqr(u[0])]
@@ -512,49 +456,50 @@ def _solved(u: Sequence[SX], e: SX) -> list[SX]:
     return [casadi.dot(e, normal) / volume for normal in across]
 
 
-# A rod between two balls as all that is unknown: aimed the shortest way, and turned about itself.
+# A rod between two spherical joints as all that is unknown: aimed by the shortest rotation, and
+# rotated about itself.
 #
-# The ball turns the vector u of the rod onto the known vector w. From the orientation R_0 of the
-# assembled configuration the shortest turn M leads R_0 u onto w; before both the rod may spin
-# about u.
+# The spherical joint rotates the vector u of the rod onto the known vector w. From the orientation
+# R_0 of the assembled configuration the shortest rotation M takes R_0 u onto w; before both the rod
+# may spin about u.
 
 
-def spin(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The orientation of a rod that spins; None unless it and another ball are all that is unknown.
+def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The orientation of a rod that spins; None where more than its two joints is unknown.
 
     Args:
         ring: the loop.
         q: symbols of positions, that of the spin included.
         p: symbols of parameters.
     """
-    ring = with_balls(ring, q, p)
+    ring = with_spherical(ring, q, p)
     for first, joint in enumerate(ring.joints):
-        balls = all(other.motion is Motion.SPHERICAL for other in ring.joints)
-        if balls and len(ring.joints) == 2 and joint.spin is not None:
-            return _aimed_rod(ring.rotated(first), joint, q)
+        spherical = all(other.motion is Motion.SPHERICAL for other in ring.joints)
+        if spherical and len(ring.joints) == 2 and joint.spin is not None:
+            return _rod_branches(ring.rotated(first), joint, q)
     return None
 
 
-def _aimed_rod(ring: Ring, joint: ChainJoint, q: SX) -> Root:
+def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
     before, after = ring.gaps[0].pose.inverse().p, ring.gaps[1].pose.p
     u, w = (after, before) if joint.sign > 0 else (before, after)
     u, w = u / casadi.norm_2(u), w / casadi.norm_2(w)
     assert joint.spin is not None
-    assert joint.place is not None
+    assert joint.index is not None
     rest = SX(casadi.DM(list(joint.spin.rest)))
-    shortest = _product(_shortest(quaternion_rotation(rest) @ u, w), rest)
-    half = q[joint.spin.place] / 2
-    turned = _product(shortest, casadi.vertcat(casadi.cos(half), casadi.sin(half) * u))
-    turned = casadi.if_else(turned[0] < 0, -turned, turned)
-    way = {joint.place + k: turned[k] for k in range(4)}
-    given = q[joint.place : joint.place + 4]
+    shortest = _product(_shortest_rotation(quaternion_rotation(rest) @ u, w), rest)
+    half = q[joint.spin.index] / 2
+    rotated = _product(shortest, casadi.vertcat(casadi.cos(half), casadi.sin(half) * u))
+    rotated = casadi.if_else(rotated[0] < 0, -rotated, rotated)
+    path = {joint.index + k: rotated[k] for k in range(4)}
+    given = q[joint.index : joint.index + 4]
     left = _product(casadi.vertcat(shortest[0], -shortest[1:4]), given)
     angle = 2 * casadi.atan2(casadi.dot(u, left[1:4]), left[0])
-    return Root({"": way}, Spun(joint.spin.place, SX(angle)))
+    return LoopBranches({"": path}, RodSpin(joint.spin.index, SX(angle)))
 
 
-def _shortest(a: SX, b: SX) -> SX:
-    """The quaternion that turns the unit vector a onto b about their common normal."""
+def _shortest_rotation(a: SX, b: SX) -> SX:
+    """The quaternion that rotates the unit vector a onto b about their common normal."""
     whole = casadi.vertcat(1 + casadi.dot(a, b), cross(a, b))
     return SX(whole / casadi.norm_2(whole))
 
@@ -565,9 +510,9 @@ def _product(a: SX, b: SX) -> SX:
     return casadi.vertcat(a[0] * b[0] - casadi.dot(a[1:4], b[1:4]), vector)
 
 
-# A point that two or three slides move and as many rigid links hold: spheres that meet.
+# A point that two or three prismatic joints move and as many rigid links hold: spheres that meet.
 #
-# Each link tells the distance of a point on what the slides move from a known centre: s'M s + 2
+# Each link tells the distance of a point on what these joints move from a known centre: s'M s + 2
 # c_i's + k_i = 0 in the displacements s. Their differences are linear; the line that they leave
 # is cut with the first sphere. The sign says on which side of the plane of the centres the point
 # is, the first three of which are counted counterclockwise about its normal (of two centres: to
@@ -581,7 +526,7 @@ class _Sphere:
     """s'M s + 2 c's + k = 0.
 
     Attributes:
-        M: (n, n) of the directions of the slides.
+        M: (n, n) of the axes of the prismatic joints.
         c: (n, 1).
         k: what is left.
     """
@@ -591,69 +536,69 @@ class _Sphere:
     k: SX
 
 
-def slid_places(span: Span) -> frozenset[int] | None:
-    """Numbers in q of the slides between the ends of a link, where these are two or three."""
+def prismatic_indices(span: Span) -> frozenset[int] | None:
+    """Indices in q of the joints between the ends of a link, where two or three are prismatic."""
     if any(joint.motion is not Motion.PRISMATIC for joint in span.chain.joints):
         return None
-    places = frozenset(joint.place for joint in span.chain.joints if joint.place is not None)
-    return places if len(places) in (2, 3) else None
+    indices = frozenset(joint.index for joint in span.chain.joints if joint.index is not None)
+    return indices if len(indices) in (2, 3) else None
 
 
 def independent_links(spans: Mapping[int, Span], q: SX, p: SX) -> list[int] | None:
     """Which links hold the point, the others holding it likewise; None where they are too few.
 
     Args:
-        spans: with the same slides between their ends, by number of the loop.
+        spans: with the same prismatic joints between their ends, by number of the loop.
         q: symbols of positions.
         p: symbols of parameters.
     """
-    places = sorted(slid_places(next(iter(spans.values()))) or ())
+    indices = sorted(prismatic_indices(next(iter(spans.values()))) or ())
     found, centres = list[int](), list[SX]()
     for number, span in spans.items():
-        centre = _sphere(span, places).c
+        centre = _sphere(span, indices).c
         apart = [other - centres[0] for other in (*centres[1:], centre) if centres]
-        if not centres or not always_zero(_spanned(apart), q, p):
+        if not centres or not always_zero(_span_normal(apart), q, p):
             found.append(number)
             centres.append(centre)
-        if len(found) == len(places):
+        if len(found) == len(indices):
             return found
     return None
 
 
-def _spanned(a: Sequence[SX]) -> SX:
+def _span_normal(a: Sequence[SX]) -> SX:
     """What vanishes where vectors do not differ in direction."""
     return a[0] if len(a) == 1 else cross(a[0], a[1])
 
 
-def held_point(name: str, spans: Sequence[Span]) -> Root:
-    """The two places of a point that rigid links hold.
+def point_on_links(name: str, spans: Sequence[Span]) -> LoopBranches:
+    """The two positions of a point that rigid links hold.
 
     Args:
         name: for the labels.
-        spans: as many as there are slides between the ends of each of them.
+        spans: as many as there are prismatic joints between the ends of each of them.
     """
-    places = sorted(slid_places(spans[0]) or ())
-    spheres = [_sphere(span, places) for span in spans]
+    indices = sorted(prismatic_indices(spans[0]) or ())
+    spheres = [_sphere(span, indices) for span in spans]
     first = spheres[0]
     base, along = _line(spheres)
     A, B = casadi.bilin(first.M, along, along), casadi.dot(along, first.M @ base + first.c)
     C = casadi.bilin(first.M, base, base) + 2 * casadi.dot(first.c, base) + first.k
     root = casadi.sqrt(B * B - A * C)
-    ways = {}
+    branches = {}
     for label, sign in (("+", 1), ("-", -1)):
         point = base + along * ((sign * root - B) / A)
-        ways[f"{name}:{label}"] = {place: point[k] for k, place in enumerate(places)}
-    return Root(ways)
+        branches[f"{name}:{label}"] = {index: point[k] for k, index in enumerate(indices)}
+    return LoopBranches(branches)
 
 
-def _sphere(span: Span, places: Sequence[int]) -> _Sphere:
-    *poses, end = frames_at_zero(span.chain.gaps, Pose.moved(-span.goal))
+def _sphere(span: Span, indices: Sequence[int]) -> _Sphere:
+    *poses, end = frames_at_zero(span.chain.gaps, Pose.translation(-span.target))
     axes = {
-        joint.place: joint.sign * at.R[:, 2]
+        joint.index: joint.sign * at.R[:, 2]
         for joint, at in zip(span.chain.joints, poses, strict=True)
     }
     e = end.p + end.R @ span.start
-    U = casadi.horzcat(*(axes[place] for place in places))
+    U = casadi.horzcat(*(axes[index] for index in indices))
     return _Sphere(U.T @ U, U.T @ e, casadi.sumsqr(e) - span.squared)
 
 
@@ -670,10 +615,10 @@ def _line(spheres: Sequence[_Sphere]) -> tuple[SX, SX]:
     return base / casadi.sumsqr(along), along
 
 
-# Bennett's loop: four turns about skew axes, which moves nevertheless.
+# Bennett's loop: four revolute joints of skew axes, which moves nevertheless.
 #
-# Opposite links are alike, so that a half turn about a line takes the loop onto itself: it swaps
-# the axes next to the known one, and takes the known axis to the one opposite. The line lies
+# Opposite links are alike, so that a half rotation about a line takes the loop onto itself: it
+# swaps the axes next to the known one, and takes the known axis to the one opposite. The line lies
 # along the sum or the difference of the swapped axes; only one of them closes the loop, all the
 # way round.
 #
@@ -689,36 +634,38 @@ class _Axes:
     after: SX
 
 
-def bennett(ring: Ring, q: SX, p: SX) -> Root | None:
-    """The only way to close a loop of three unknown turns and a known one; None for other loops."""
-    turns = all(joint.motion is Motion.REVOLUTE for joint in ring.joints)
-    if len(ring.joints) != 3 or not turns:
+def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
+    """The only branch of a loop of three unknown revolute joints and a known one, or None."""
+    revolute = all(joint.motion is Motion.REVOLUTE for joint in ring.joints)
+    if len(ring.joints) != 3 or not revolute:
         return None
     for first in range(3):
         begun = ring.rotated(first)
         known = begun.gaps[0].pivots
         if len(known) == 1 and not any(gap.pivots for gap in begun.gaps[1:]):
-            ways = _closing(begun, known[0], q, p)
-            if len(ways) == 1:
-                return Root({"": positions(ring.rotated(first).joints, [t.value for t in ways[0]])})
+            branches = _closing(begun, known[0], q, p)
+            if len(branches) == 1:
+                return LoopBranches(
+                    {"": positions(ring.rotated(first).joints, [t.value for t in branches[0]])}
+                )
     return None
 
 
 def _closing(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
-    """The angles by the half turns that close the loop at every position of the known joint."""
+    """The angles by the half rotations that close the loop at every position of the known joint."""
     axes = _Axes(vector(_Z), known.R[:, 2], ring.gaps[0].pose.R[:, 2])
     found = list[list[Angle]]()
     for side in (1, -1):
-        if not _alike(ring, axes, side, q, p):
+        if not _has_equal_twists(ring, axes, side, q, p):
             continue
         for swap in (1, -1):
             angles = _angles(ring, axes, swap, side * swap)
-            if always_zero(_opening(ring, angles), q, p):
+            if always_zero(_closure_gap(ring, angles), q, p):
                 found.append(angles)
     return found
 
 
-def _alike(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
+def _has_equal_twists(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
     """Whether the twists of the unknown links are those of the known ones opposite."""
     _, R2, R3 = (gap.pose.R for gap in ring.gaps)
     first = R2[2, 2] - side * casadi.dot(axes.before, axes.known)
@@ -727,27 +674,27 @@ def _alike(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
 
 
 def _angles(ring: Ring, axes: _Axes, swap: int, sense: int) -> list[Angle]:
-    """The three angles when the half turn takes the axis after the known one to swap x before."""
+    """The angles when the half rotation takes the axis after the known one to swap x before."""
     R1, R2, R3 = (gap.pose.R for gap in ring.gaps)
     line = axes.after + swap * axes.before
     across = 2 * casadi.dot(line, axes.known) / casadi.sumsqr(line)
     opposite = sense * (across * line - axes.known)
-    a = turn_onto(in_plane(R2[:, 2]), in_plane(R1.T @ opposite))
-    before = Pose.turned(R2.T @ _turned(a).R.T @ R1.T).R @ axes.before
-    b = turn_onto(in_plane(R3[:, 2]), in_plane(before))
-    c = turn_onto(in_plane(opposite), R3[2, 0:2].T)
+    a = angle_onto(in_plane(R2[:, 2]), in_plane(R1.T @ opposite))
+    before = Pose.rotation(R2.T @ _rotation(a).R.T @ R1.T).R @ axes.before
+    b = angle_onto(in_plane(R3[:, 2]), in_plane(before))
+    c = angle_onto(in_plane(opposite), R3[2, 0:2].T)
     return [a, b, c]
 
 
-def _opening(ring: Ring, angles: list[Angle]) -> SX:
+def _closure_gap(ring: Ring, angles: list[Angle]) -> SX:
     """What stays open of the loop, positions and directions."""
     pose = Pose.identity()
     for gap, angle in zip(ring.gaps, angles, strict=True):
-        pose = pose @ gap.pose @ _turned(angle)
+        pose = pose @ gap.pose @ _rotation(angle)
     return casadi.vec(pose.matrix - Pose.identity().matrix)
 
 
-def _turned(angle: Angle) -> Pose:
+def _rotation(angle: Angle) -> Pose:
     c, s = casadi.cos(angle.value), casadi.sin(angle.value)
     rows = (casadi.horzcat(c, -s, 0), casadi.horzcat(s, c, 0), casadi.horzcat(SX(0), 0, 1))
-    return Pose.turned(casadi.vertcat(*rows))
+    return Pose.rotation(casadi.vertcat(*rows))

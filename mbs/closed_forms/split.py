@@ -1,4 +1,4 @@
-"""Any loop of turns and slides, by Paul's method: split in every way, its simplest equations first.
+"""Any loop of revolute and prismatic joints, by Paul's method: the simplest equations first.
 
 Source: Paul 1981, section 3.7; Khalil & Dombre 2002, section 4.4.
 """
@@ -13,8 +13,8 @@ from casadi import DM, SX
 
 from mbs.closed_forms.paul import paul
 from mbs.closed_forms.ring import closed_samples
-from mbs.closed_forms.roots import Root
-from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
+from mbs.closed_forms.roots import LoopBranches
+from mbs.closed_forms.sequence import Leaf, Problem, SequenceStep, StepSequence
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
 from mbs.recursions.chain import ChainJoint, Gap, Ring
@@ -22,25 +22,25 @@ from mbs.spatial import Pose
 
 _MOST = 6
 _ENOUGH = 3
-_AXES = Pose.turned(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
+_AXES = Pose.rotation(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
 
 
-def split(ring: Ring, q: SX, p: SX) -> Root | str:
-    """The ways to find the turns and slides of a loop, or why there is none.
+def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
+    """The ways to find the revolute and prismatic joints of a loop, or why there is none.
 
-    A ball counts as three turns, of which nothing is asked. The label of a way has the signs of
-    all steps with several roots, each named after its joint.
+    A spherical joint counts as three revolute joints, of which nothing is asked. The label of a way
+    has the signs of all steps with several roots, each named after its joint.
 
     Args:
         ring: the loop.
         q: symbols of positions, those of cut joints included.
         p: symbols of parameters.
     """
-    simple = _without_balls(ring)
+    simple = _without_spherical(ring)
     if len(simple.joints) > _MOST:
-        return f"a loop determines {_MOST} turns and slides at most"
-    if all(joint.place is None for joint in simple.joints):
-        return "nothing but balls is unknown"
+        return f"a loop determines {_MOST} revolute and prismatic joints at most"
+    if all(joint.index is None for joint in simple.joints):
+        return "nothing but spherical joints is unknown"
     problem = _problem(simple, q, p)
     if isinstance(problem, str):
         return problem
@@ -51,8 +51,8 @@ def split(ring: Ring, q: SX, p: SX) -> Root | str:
     return _root(simple, problem, sequence)
 
 
-def _without_balls(ring: Ring) -> Ring:
-    """The loop with three turns about crossed axes in the place of each ball."""
+def _without_spherical(ring: Ring) -> Ring:
+    """The loop with three revolute joints about crossed axes in the place of each ball."""
     joints, gaps = list[ChainJoint](), list[Gap]()
     for joint, gap in zip(ring.joints, ring.gaps, strict=True):
         gaps.append(gap)
@@ -76,30 +76,30 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
         return "they can move while all that is known stays"
     if len(samples) < _ENOUGH:
         return "no configuration that closes it was found"
-    joints = tuple(replace(joint, place=k) for k, joint in enumerate(ring.joints))
+    joints = tuple(replace(joint, index=k) for k, joint in enumerate(ring.joints))
     names = [joint.name for joint in joints] + [f"x{k + 1}" for k in range(n)]
     x = casadi.vertcat(*map(SX.sym, names))
     own = replace(ring, joints=joints)
     return Problem(own, x, given, [(sample.x, sample.given) for sample in samples])
 
 
-def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> Root:
-    places = {k: joint.place for k, joint in enumerate(ring.joints) if joint.place is not None}
-    needed = _up_to(sequence, set(places))
-    ways = dict[str, dict[int, SX]]()
+def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
+    indices = {k: joint.index for k, joint in enumerate(ring.joints) if joint.index is not None}
+    needed = _up_to(sequence, set(indices))
+    branches = dict[str, dict[int, SX]]()
     for branch, leaf in enumerate(needed.leaves(problem.given)):
         x = _where_real(leaf)
-        ways[needed.label(branch)] = {place: SX(x[k]) for k, place in places.items()}
-    return Root(ways)
+        branches[needed.label(branch)] = {index: SX(x[k]) for k, index in indices.items()}
+    return LoopBranches(branches)
 
 
-def _up_to(sequence: StepSequence, wanted: set[int]) -> StepSequence:
-    """The first steps, until they have given what is wanted."""
-    steps = list[Step]()
+def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
+    """The first steps, until they have given what is asked for."""
+    steps = list[SequenceStep]()
     for step in sequence.steps:
-        if wanted:
+        if target:
             steps.append(step)
-            wanted = wanted - set(step.places)
+            target = target - set(step.indices)
     return replace(sequence, steps=tuple(steps))
 
 

@@ -53,7 +53,7 @@ class Translation:
 
     def pose(self, symbols: SymbolTable) -> Pose:
         """The displaced frame seen from the one before."""
-        return Pose.moved(vector(to_sx(value, symbols) for value in (self.x, self.y, self.z)))
+        return Pose.translation(vector(to_sx(value, symbols) for value in (self.x, self.y, self.z)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Oriented:
 
     def pose(self, symbols: SymbolTable) -> Pose:
         """The turned frame seen from the one before."""
-        return Pose.turned(SX(DM(self.rows)))
+        return Pose.rotation(SX(DM(self.rows)))
 
 
 @dataclass(frozen=True, slots=True)

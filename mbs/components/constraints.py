@@ -183,7 +183,7 @@ class RollingDisc(Constraint):
 
     def on_plane(self, pose: Pose) -> Pose:
         """Frame_b in axes at frame_a whose z is the normal of the plane."""
-        return Pose.turned(align_z(self.normal)).inverse() @ pose
+        return Pose.rotation(align_z(self.normal)).inverse() @ pose
 
     def contact(self, pose: Pose, symbols: SymbolTable) -> Contact:
         """Where it touches the plane.

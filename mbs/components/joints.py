@@ -104,7 +104,7 @@ def weld_rows(pose: Pose) -> Rows:
 
 def along_z(pose: Pose, axis: Sequence[float]) -> Pose:
     """The pose in axes whose z is the axis."""
-    inside = Pose.turned(align_z(axis))
+    inside = Pose.rotation(align_z(axis))
     return inside.inverse() @ pose @ inside
 
 

@@ -87,4 +87,4 @@ def turned(axis: str, angle: Any) -> Pose:
 
 def shifted(x: Any = 0, y: Any = 0, z: Any = 0) -> Pose:
     """A displacement [m]."""
-    return Pose.moved(vector([SX(x), SX(y), SX(z)]))
+    return Pose.translation(vector([SX(x), SX(y), SX(z)]))

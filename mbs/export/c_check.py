@@ -9,7 +9,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly.model_function import ModelFunction
-from mbs.assembly.validity import Kind, Row
+from mbs.assembly.validity import Kind, ValidityRow
 from mbs.native.bare_source import Real
 
 STATUS_OF: dict[Kind, str] = {
@@ -91,7 +91,7 @@ def check_of(model: Function, real: Real) -> StatusCheck | None:
     return StatusCheck(function, tuple(STATUS_OF[row.kind] for row in rows) * columns)
 
 
-def _holds(rows: Sequence[Row], real: Real) -> SX:
+def _holds(rows: Sequence[ValidityRow], real: Real) -> SX:
     """A comparison with NaN is false."""
     single = _SINGLE if real == "float" else {}
     values = [row.residual <= single.get(row.kind, row.bound) for row in rows]

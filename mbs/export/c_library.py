@@ -17,7 +17,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction
 from mbs.errors import ExportError, ModelError
 from mbs.export.c_check import NO_FAST_MATH, STATUS, StatusCheck, check_of
-from mbs.export.c_step import Step, step_texts
+from mbs.export.c_step import StepTexts, step_texts
 from mbs.files import path_of, write_texts
 from mbs.native.bare_source import NOINLINE, Real, Target, bare_source, literal
 from mbs.native.compiled import generated, require_function, require_names, unwritten
@@ -532,7 +532,7 @@ def _all_finite(arrays: Iterable[tuple[str, int]], real: Real) -> str:
     return f"{size}({total}) <= {largest} ||\n        ({one_by_one})"
 
 
-def _header(entries: Sequence[_Entry], steps: Mapping[str, Step], library: _Library) -> str:
+def _header(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library: _Library) -> str:
     guard = f"MBS_{library.name.upper()}_H"
     texts = [STATUS]
     if library.bare:
@@ -593,7 +593,7 @@ def _elements(model: Function, name: str) -> str:
     return ": " + ", ".join(in_c_comment(f"{e} [{unit}]") for e, unit in known) if known else ""
 
 
-def _example(entries: Sequence[_Entry], steps: Mapping[str, Step], library: _Library) -> str:
+def _example(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library: _Library) -> str:
     head = (
         f"/* {_MARK}. */\n#include <stdio.h>\n"
         f'#include "{library.name}.h"\n\nint main(void) {{\n  int failed = 0;\n'

@@ -156,7 +156,7 @@ _EXAMPLE = """\
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class StepTexts:
     """The texts of a system's motion.
 
     Attributes:
@@ -170,7 +170,7 @@ class Step:
     example: str
 
 
-def step_texts(system: System, name: str, library: str, real: Real, mark: str) -> Step:
+def step_texts(system: System, name: str, library: str, real: Real, mark: str) -> StepTexts:
     """The C of the motion of a system.
 
     Args:
@@ -203,7 +203,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
     sizes = _sizes(system, state, variables, work)
     words = {"name": name, "upper": name.upper(), "real": f"{library}_real", "library": library}
     title = in_c_comment(system.name)
-    return Step(
+    return StepTexts(
         _header(system, variables, sizes, {**words, "title": title}),
         "\n".join(
             [
@@ -211,7 +211,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
                 *_tables(system, state, variables, real),
                 "\n" + NOINLINE,
                 code,
-                *(_shared(file) for file in ("closure.h", "closure.c", "watch.h", "watch.c")),
+                *(_share(file) for file in ("closure.h", "closure.c", "watch.h", "watch.c")),
                 (resources.files("mbs.export") / "c" / "step.c").read_text(encoding="utf-8"),
             ]
         ),
@@ -379,7 +379,7 @@ def _places(name: str, values: Sequence[int]) -> str:
     return f"static const int {name}[] = {{{', '.join(map(str, values)) or '0'}}};"
 
 
-def _shared(file: str) -> str:
+def _share(file: str) -> str:
     """A file that FMUs have too; what it includes of theirs stands before it here."""
     folder = resources.files("mbs.export.fmu") / "c"
     lines = (folder / file).read_text(encoding="utf-8").splitlines()

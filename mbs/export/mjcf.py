@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Mapping
 from typing import Any
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import casadi
@@ -30,11 +29,10 @@ from mbs.components import (
 )
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
+from mbs.export.robot_files import system_of, write_xml
 from mbs.expressions import to_sx
-from mbs.files import path_of, write_text
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose
-from mbs.text import quoted
 
 Vector = NDArray[np.float64]
 
@@ -81,15 +79,9 @@ def mjcf(
         ModelError: it is neither, or has something that the format cannot say.
         ExportError: the file cannot be written.
     """
-    if isinstance(system, Mechanism):
-        system = system.assemble()
-    if not isinstance(system, System):
-        raise ModelError(
-            f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
-        )
+    system = system_of(system)
     root = _Writer(system, parameters).model()
-    ElementTree.indent(root)
-    write_text(ElementTree.tostring(root, encoding="unicode") + "\n", path_of(path))
+    write_xml(root, path)
 
 
 class _Writer:
@@ -357,7 +349,7 @@ class _Writer:
         elif isinstance(joint, Revolute):
             # two points of the axis
             for k, along in enumerate((-_APART / 2, _APART / 2)):
-                shift = Pose.moved(SX(DM(along * np.array(joint.axis))))
+                shift = Pose.translation(SX(DM(along * np.array(joint.axis))))
                 ends = [(number, pose @ shift) for number, pose in (frame_a, frame_b)]
                 name = joint.name if not k else self._unused(f"{joint.name}_axis")
                 self._equality(equalities, "connect", name, *ends)

@@ -16,13 +16,13 @@ from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
+from mbs.export.robot_files import system_of
 from mbs.files import path_of
 from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable, write_par
 from mbs.formats.table import BODY_SCALARS, GEOMETRY
 from mbs.operations.graph import graph_of
-from mbs.spatial import Khalil, Pose, align_z, placed
+from mbs.spatial import Khalil, Pose, align_z, frames_to
 from mbs.spatial.inertia import TEN_PARAMETERS
-from mbs.text import quoted
 
 Text = Callable[[SX], str]
 """What writes a scalar of numbers and symbols in the grammar of expressions."""
@@ -50,12 +50,7 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
         DescriptionError: a symbol is named like a joint variable of the format.
         ExportError: the file cannot be written.
     """
-    if isinstance(system, Mechanism):
-        system = system.assemble()
-    if not isinstance(system, System):
-        raise ModelError(
-            f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
-        )
+    system = system_of(system)
     write_par(robot_table(system), path_of(path))
 
 
@@ -92,7 +87,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
             (cut.link_b, cut.pose_b, fixed),
         ):
             axis = cut.edge.joint.freedoms[0].axis
-            *via, own = placed(pose @ Pose.turned(align_z(axis)), size)
+            *via, own = frames_to(pose @ Pose.rotation(align_z(axis)), size)
             before = number[link_number]
             for frame in via:
                 frames.append(FrameRow(before, 2, None, **_geometry(frame, text)))

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 import casadi
 import numpy as np
@@ -20,11 +20,10 @@ from mbs.assembly.tree import Link, zero_position
 from mbs.components import Fixed, Mechanism, Prismatic, Revolute, Spherical, Universal
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
+from mbs.export.robot_files import system_of, write_xml
 from mbs.export.urdf import Numbers, angles, inertia_of, inverse, limits_of, text_of
-from mbs.files import path_of, write_bytes
 from mbs.formats.urdf import UNLIMITED
 from mbs.spatial.rotation import quaternion_rotation
-from mbs.text import quoted
 
 Array = NDArray[np.float64]
 
@@ -66,17 +65,10 @@ def sdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
             than a fixed, revolute, prismatic, ball or universal one, or a symbol has no value.
         ExportError: the file cannot be written.
     """
-    if isinstance(system, Mechanism):
-        system = system.assemble()
-    if not isinstance(system, System):
-        raise ModelError(
-            f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
-        )
+    system = system_of(system)
     _check(system)
     root = _SdfWriting(system, Numbers(system, "SDF")).file()
-    indent(root)
-    content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
-    write_bytes(content, path_of(path))
+    write_xml(root, path)
 
 
 def _refused(system: System, what: str) -> ModelError:

@@ -257,7 +257,7 @@ def ssp(
     files = _files(components)
     contents = {part: _content(part, file) for part, file in files.items()}
     sources = _sources(files, contents)
-    described = {part: _described(part, file) for part, file in files.items()}
+    described = {part: _describe(part, file) for part, file in files.items()}
     values = _start_values(described, start or {})
     parts = {
         part: SspPart(part, sources[part], described[part], values.get(part, {})) for part in files
@@ -266,7 +266,7 @@ def ssp(
     title = target.stem if name is None else name
     text = structure_description(title, parts.values(), links, _span(parts.values(), stop_time))
     archive = {sources[part]: content for part, content in contents.items()}
-    write_bytes(_zipped({"SystemStructure.ssd": text.encode(), **archive}), target)
+    write_bytes(_zip({"SystemStructure.ssd": text.encode(), **archive}), target)
     return target
 
 
@@ -307,7 +307,7 @@ def _content(part: str, file: Path) -> bytes:
         ) from error
 
 
-def _described(part: str, file: Path) -> Any:
+def _describe(part: str, file: Path) -> Any:
     import fmpy
 
     try:
@@ -460,7 +460,7 @@ def _span(parts: Iterable[SspPart], stop_time: float | None) -> tuple[float, flo
     return start, float(stop)
 
 
-def _zipped(files: Mapping[str, bytes]) -> bytes:
+def _zip(files: Mapping[str, bytes]) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for file, content in files.items():

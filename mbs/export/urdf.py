@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 import casadi
 import numpy as np
@@ -19,7 +19,7 @@ from mbs.assembly.tree import Link
 from mbs.components import Mechanism
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.files import path_of, write_bytes
+from mbs.export.robot_files import system_of, write_xml
 from mbs.formats.urdf import UNLIMITED
 from mbs.text import quoted
 
@@ -44,21 +44,14 @@ def urdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
         path: of the .urdf file.
 
     Raises:
-        ModelError: it is neither, it has loops, a ball joint, springs, rotors, force elements or
-            other gravity than 9.81 m/s^2 along -z, or a symbol has no value.
+        ModelError: it is neither, it has loops, a spherical joint, springs, rotors, force elements
+            or other gravity than 9.81 m/s^2 along -z, or a symbol has no value.
         ExportError: the file cannot be written.
     """
-    if isinstance(system, Mechanism):
-        system = system.assemble()
-    if not isinstance(system, System):
-        raise ModelError(
-            f"{quoted(system)} is a {type(system).__name__}; give a System or a Mechanism"
-        )
+    system = system_of(system)
     _check(system)
     root = _Writing(system, Numbers(system, "URDF")).robot()
-    indent(root)
-    content = tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
-    write_bytes(content, path_of(path))
+    write_xml(root, path)
 
 
 class Numbers:
@@ -96,7 +89,7 @@ def _check(system: System) -> None:
         fail("it has force elements or a drive line")
     for link in system.tree.links:
         if link.motion is Motion.SPHERICAL:
-            fail(f"{link.name} is a ball joint")
+            fail(f"{link.name} is a spherical joint")
         if link.rotor is not None or not (link.stiffness.is_zero() and link.rest.is_zero()):
             fail(f"{link.name} has a rotor or a spring")
     for coupling in system.couplings:

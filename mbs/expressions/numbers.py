@@ -27,7 +27,7 @@ def number(value: Scalar, where: str) -> float:
     Raises:
         ExpressionError: it is not of the grammar, has a symbol in it, or is True or False.
     """
-    found = _found(value, where)
+    found = _find(value, where)
     if found is None:
         raise ExpressionError(
             f"{where}: {_given(value)} is not a number; write one, such as 0.3 or pi/2"
@@ -37,13 +37,13 @@ def number(value: Scalar, where: str) -> float:
 
 def whole_number(value: Scalar, where: str) -> int:
     """The whole number that a text or an expression is; arguments and errors as for `number`."""
-    found = _found(value, where)
+    found = _find(value, where)
     if found is None or not found.is_integer():
         raise ExpressionError(f"{where}: {_given(value)} is not a whole number; write one")
     return int(found)
 
 
-def _found(value: Scalar, where: str) -> float | None:
+def _find(value: Scalar, where: str) -> float | None:
     return None if isinstance(value, bool) else to_float(expression(value, where))
 
 

@@ -490,10 +490,10 @@ class Joints:
         x, y, z = (float(value) for value in mjcf.data.jnt_pos[j])
         at, anchor = point.at(x, y, z), moved.at(x, y, z)
         if j in mjcf.locked:
-            mechanism.connect(_displaced(mjcf, j, at, mjcf.locked[j] - mjcf.drawn(j)), anchor)
+            mechanism.connect(_displace(mjcf, j, at, mjcf.locked[j] - mjcf.drawn(j)), anchor)
         elif mjcf.has_one_axis(j):
             joint = self._joint(j)
-            mechanism.connect(_displaced(mjcf, j, at, -mjcf.drawn(j)), joint, anchor)
+            mechanism.connect(_displace(mjcf, j, at, -mjcf.drawn(j)), joint, anchor)
         else:
             mechanism.connect(at, self._joint(j), anchor)
 
@@ -550,7 +550,7 @@ def _is_root(mjcf: MjcfModel, k: int) -> bool:
     return int(mjcf.data.body_parentid[k]) == 0 and int(mjcf.data.body_mocapid[k]) < 0
 
 
-def _displaced(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
+def _displace(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
     """The frame moved along or about the axis of a hinge or slide [rad or m]."""
     if position == 0:
         return point
@@ -1200,7 +1200,7 @@ def read_mjcf(
     name = _model_name(path)
     mujoco = _mujoco()
     notes = Notes(str(path), strict)
-    model, assets = _compiled(mujoco, str(path), notes)
+    model, assets = _compile(mujoco, str(path), notes)
     mjcf = MjcfModel.of(mujoco, model, notes)
     if base == "fixed":
         mjcf = replace(mjcf, locked={**mjcf.locked, **dict.fromkeys(_free_joints(mjcf), 0.0)})
@@ -1282,7 +1282,7 @@ def _mujoco() -> Any:
     return mujoco
 
 
-def _compiled(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
+def _compile(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
     """The model without what has no part in the motion; the whole of it where that fails."""
     reasons: list[str] = []
     for stripped in (True, False):

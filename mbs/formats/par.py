@@ -117,7 +117,7 @@ class ParFile:
         """
         lines, comments = _without_comments(text)
         entries, remarks = _entries(path, lines), _line_remarks(path, comments)
-        said = [_said(comment) for _, comment in reversed(comments)]  # the first of a kind counts
+        said = [_say(comment) for _, comment in reversed(comments)]  # the first of a kind counts
         quotes = {key: value[1:] for key, value in said if value[:1] == "'"}
         name, closed, _ = quotes.get("Robotname", "").partition("'")
         source = quotes.get("Source", "")
@@ -184,7 +184,7 @@ def _without_comments(text: str) -> tuple[list[str], list[tuple[int, str]]]:
     return "".join(kept).splitlines(), comments
 
 
-def _said(comment: str) -> tuple[str, str]:
+def _say(comment: str) -> tuple[str, str]:
     """What a comment such as `Source = 'a book'` speaks of, and what it says."""
     key, _, value = comment.partition("=")
     return " ".join(key.split()), value.strip()
@@ -214,7 +214,7 @@ def _line_remarks(
 ) -> dict[tuple[str, str], tuple[int, str]]:
     remarks: dict[tuple[str, str], tuple[int, str]] = {}
     for line, comment in comments:
-        key, value = _said(comment)
+        key, value = _say(comment)
         kind, _, name = key.partition(" ")
         if kind not in _REMARKS or not _REMARKED.fullmatch(name) or "=" not in comment:
             continue
@@ -299,7 +299,7 @@ def split_variable(where: str, value: Expression, j: int, sigma: int) -> tuple[s
         if isinstance(term, Parameter) and term.name == variable and sign > 0:
             found += 1
         else:
-            rest = _added(rest, sign, term)
+            rest = _add(rest, sign, term)
     constant = Number(0.0) if rest is None else rest
     if found != 1 or any(p.name == variable for p in parameters_of(constant)):
         raise DescriptionError(
@@ -339,7 +339,7 @@ def _terms(value: Expression, variable: str, sign: int = 1) -> Iterator[tuple[in
         yield sign, value
 
 
-def _added(rest: Expression | None, sign: int, term: Expression) -> Expression:
+def _add(rest: Expression | None, sign: int, term: Expression) -> Expression:
     if rest is None:
         return term if sign > 0 else -term
     return rest + term if sign > 0 else rest - term

@@ -940,7 +940,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
             f"{path}: the root element is <{quoted(root.tag)[1:-1]}>, not <sdf>; give an SDF file"
         )
     file = _SdfFile(notes, _version(root, notes), _Frames(str(path)))
-    world, model = _chosen(root, notes)
+    world, model = _choose(root, notes)
     name = component_name(model.get("name") or "")
     if not name:
         name = component_name(Path(path).stem) or "robot"
@@ -985,7 +985,7 @@ def _version(root: Element, notes: Notes) -> tuple[int, ...]:
     return version
 
 
-def _chosen(root: Element, notes: Notes) -> tuple[Element | None, Element]:
+def _choose(root: Element, notes: Notes) -> tuple[Element | None, Element]:
     """The world, where there is one, and the model that is read."""
     worlds = root.findall("world")
     if len(worlds) > 1:

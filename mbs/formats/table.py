@@ -476,7 +476,7 @@ def to_mechanism(table: RobotTable) -> Mechanism:
         row = rows.get(j, InertiaRow(j))
         links[j] = mechanism.add(_body(j, row))
         mechanism.numbered[j] = links[j].name
-        point = _placed(table, j, links)
+        point = _place(table, j, links)
         if frame.sigma == 2:
             mechanism.connect(point, links[j])
         else:
@@ -497,11 +497,11 @@ def _close(
     moving, fixed = loop.cut
     scalars = _joint(table, moving, row, bool(table.frames[moving - 1].actuated))
     joint = _CLOSING[loop.joint](**scalars)
-    mechanism.connect(_placed(table, moving, links), joint, _placed(table, fixed, links))
+    mechanism.connect(_place(table, moving, links), joint, _place(table, fixed, links))
     mechanism.cut(joint)
 
 
-def _placed(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
+def _place(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
     """Where frame j is before its joint moves it, on a link that is there already.
 
     Its antecedent may be the fixed end frame of a loop, which stands on a link in its turn.

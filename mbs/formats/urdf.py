@@ -267,7 +267,7 @@ def read_tree(root: Element, notes: Notes) -> UrdfTree:
         few = ", ".join(map(quoted, roots[:5])) + (" ..." if len(roots) > 5 else "")
         found = f"the roots {few}" if roots else "no root but a cycle"
         raise DescriptionError(f"{path}: the links have {found}; connect them as one tree")
-    return UrdfTree(notes, roots[0], links, _ordered(path, roots[0], links, joints))
+    return UrdfTree(notes, roots[0], links, _order(path, roots[0], links, joints))
 
 
 def _links(root: Element, notes: Notes) -> dict[str, Element]:
@@ -357,7 +357,7 @@ def _joint_element(
     return JointElement(name, ends[0], ends[1], element)
 
 
-def _ordered(
+def _order(
     path: str, root: str, links: Iterable[str], joints: Iterable[JointElement]
 ) -> tuple[JointElement, ...]:
     children: dict[str, list[JointElement]] = {name: [] for name in links}

@@ -68,7 +68,7 @@ def parse_content(path: str, content: bytes, notes: Notes | None = None) -> Elem
     except (expat.ExpatError, LookupError, ValueError):
         pass  # an encoding that expat does not know raises the last two
     notes = Notes(path) if notes is None else notes
-    text = _mended(content, notes)
+    text = _mend(content, notes)
     builder = _Builder(path)
     try:
         return builder.parse(text)
@@ -146,7 +146,7 @@ _MENDS = (
 )
 
 
-def _mended(content: bytes, notes: Notes) -> str:
+def _mend(content: bytes, notes: Notes) -> str:
     """A text that expat takes, its lines those of the file."""
     declared = _DECLARED.search(content[:200])
     encoding = declared.group(1).decode() if declared else "utf-8"
@@ -174,11 +174,11 @@ def _mended(content: bytes, notes: Notes) -> str:
         if found is not None:
             line = text[: found.start()].count("\n") + 1
             notes.add("ignored", element, what, line)
-            text = _replaced(pattern, by, text)
+            text = _replace(pattern, by, text)
     return text.lstrip("\ufeff")
 
 
-def _replaced(pattern: re.Pattern[str], by: str, text: str) -> str:
+def _replace(pattern: re.Pattern[str], by: str, text: str) -> str:
     """The text with every match replaced, its ends of lines kept."""
 
     def replacement(found: re.Match[str]) -> str:

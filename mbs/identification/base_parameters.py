@@ -271,8 +271,8 @@ def grouped_by_rules(
         configurations: that close the loops; none for an open system.
         structure: of its tree.
     """
-    places = _places(columns)
-    grouping = _by_tree(structure, Grouping.none(len(columns)), places)
+    indices = _column_indices(columns)
+    grouping = _by_tree(structure, Grouping.none(len(columns)), indices)
     sampled = sampler(system)
     if not system.is_closed:
         return without_zeros(grouping, sampled)
@@ -282,30 +282,30 @@ def grouped_by_rules(
         *turning_relations(system, configurations, base_moves=structure.base_moves),
     ]
     for relation in relations:
-        terms = _terms(relation, places)
+        terms = _terms(relation, indices)
         if terms is not None:
             grouping = related(grouping, terms, lambda k: columns[k].link, sampled)
     return without_zeros(grouping, sampled)
 
 
-def _by_tree(structure: Structure, grouping: Grouping, places: Mapping[Key, int]) -> Grouping:
+def _by_tree(structure: Structure, grouping: Grouping, indices: Mapping[Key, int]) -> Grouping:
     for removal in tree_rules(structure):
-        dropped, terms = places.get(removal.parameter), _terms(removal.effects, places)
+        dropped, terms = indices.get(removal.parameter), _terms(removal.effects, indices)
         if dropped is not None and terms is not None and dropped in grouping.columns[dropped]:
             grouping = grouping.replaced(dropped, terms)
     return grouping
 
 
-def _places(columns: Sequence[Column]) -> dict[Key, int]:
+def _column_indices(columns: Sequence[Column]) -> dict[Key, int]:
     """Numbers of the parameters of one link or joint."""
     return {(c.link - 1, c.kind): k for k, c in enumerate(columns) if not c.other}
 
 
-def _terms(effects: Mapping[Key, SX], places: Mapping[Key, int]) -> Terms | None:
+def _terms(effects: Mapping[Key, SX], indices: Mapping[Key, int]) -> Terms | None:
     """The combination in numbers of columns; None when a parameter of it is no column."""
-    if any(key not in places for key in effects):
+    if any(key not in indices for key in effects):
         return None
-    return {places[key]: x for key, x in effects.items()}
+    return {indices[key]: x for key, x in effects.items()}
 
 
 # Base inertial parameters: the fewest parameters that give the same equations of motion.
@@ -354,7 +354,7 @@ class BaseParameters:
         return len(self.kept)
 
     @property
-    def places(self) -> list[int]:
+    def indices(self) -> list[int]:
         """Numbers of the kept columns among all."""
         return [self.columns.index(column) for column in self.kept]
 
@@ -410,7 +410,7 @@ class BaseParameters:
         inputs += [self.system.p] if self.system.parameters else []
         grouped = self.function(*inputs)
         values = SX.zeros(len(self.columns))
-        values[self.places] = grouped
+        values[self.indices] = grouped
         return with_parameters(self.system, self.columns, values)
 
 
@@ -504,10 +504,10 @@ def _by_rules(
     if check.agrees and symbolic and not system.is_closed:
         doubt = checked_elsewhere(system, sample.columns, grouping, order, structure)
         return grouping, doubt or check
-    return _completed(sample, grouping, check, order, symbolic=symbolic)
+    return _complete(sample, grouping, check, order, symbolic=symbolic)
 
 
-def _completed(
+def _complete(
     sample: RegressorSample,
     grouping: Grouping,
     check: Check,

@@ -317,9 +317,9 @@ def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphas
     at = {(column.kind, column.link): k for k, column in enumerate(columns)}
     for link, P in pseudo_inertias(columns, values).items():
         inverse = np.linalg.inv(P)
-        places = [at[kind, link] for kind in INERTIAL]
+        indices = [at[kind, link] for kind in INERTIAL]
         units = [inverse @ _unit(k) for k in range(10)]
-        H[np.ix_(places, places)] += emphasis * np.array(
+        H[np.ix_(indices, indices)] += emphasis * np.array(
             [[np.trace(X @ Y) for Y in units] for X in units]
         )
     size = np.sqrt(np.maximum(np.diag(H), NONZERO))

@@ -540,12 +540,12 @@ def excitation(
     )
     form = _form(series)
     chosen = _columns(system, columns)
-    smooth = _smoothed(system, limits, form)
+    smooth = _smooth(system, limits, form)
     function = instant(smooth, chosen, limits)
     programme = Programme(
         form.period, form.harmonics, form.samples, function, CRITERIA[objective], limits
     )
-    measured = partial(_measured, system, chosen, programme)
+    measured = partial(_measure, system, chosen, programme)
     steps = _FIRST_ROUNDS * (starts if starts > 1 else 0)
     with progress(f"{system.name}: excitation", 0.0, steps + rounds, quiet=quiet) as reached:
         x = _best(programme, np.random.default_rng(seed), starts, reached)
@@ -599,7 +599,7 @@ def _within(
     )
 
 
-def _measured(
+def _measure(
     system: System, columns: tuple[Column, ...], programme: Programme, x: Array
 ) -> Trajectory:
     """The motion with its condition numbers and margins, of the system as it is."""
@@ -652,7 +652,7 @@ def _columns(
     return chosen
 
 
-def _smoothed(system: System, limits: MotionLimits, form: Series) -> System:
+def _smooth(system: System, limits: MotionLimits, form: Series) -> System:
     """The system with Coulomb friction that changes sign over a part of the largest velocity."""
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)

@@ -28,7 +28,7 @@ from mbs.identification.observations import (
     Observations,
     excitation_quality,
     stacked,
-    with_led,
+    with_regular,
 )
 from mbs.identification.record import Record, Samples, smoothed
 from mbs.identification.regressors import INERTIAL, Joints, regressor
@@ -75,7 +75,7 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
         lines += ["", *_residuals(f"Errors, {title}", residuals)]
     remarks = [
         *_fit(estimate.residuals),
-        *_dropped(observations),
+        *_drop(observations),
         *_excitation(estimate),
         *_consistency(estimate),
         *_signs(estimate),
@@ -147,7 +147,7 @@ def _fit(residuals: Residuals) -> list[str]:
     ]
 
 
-def _dropped(observations: Observations) -> list[str]:
+def _drop(observations: Observations) -> list[str]:
     if not observations.dropped:
         return []
     rows = len(observations.time)
@@ -331,7 +331,7 @@ def identify(
         D = regressor(system, **options)
         base = base_parameters(system, columns=D.columns)
         reached(_MODEL_DONE)
-        samples = tuple(with_led(D, smoothing(one, bandwidth)) for one in records)
+        samples = tuple(with_regular(D, smoothing(one, bandwidth)) for one in records)
         full = stacked([EQUATIONS[equations](system, s, bandwidth, options) for s in samples])
         grouped = full.grouped(base)
         reached(_EQUATIONS_DONE)

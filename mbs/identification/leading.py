@@ -16,7 +16,7 @@ from mbs.loops.velocity import determining_rows
 
 Array = npt.NDArray[np.float64]
 
-LED = 2.5e-3
+REGULAR = 2.5e-3
 """Squared sine between rows of the passive joints, that of 3 degrees, below which configurations
 are taken as next to a singular one: the joints that follow magnify errors by 20 and more."""
 
@@ -63,10 +63,10 @@ def signed_leads(system: System) -> Function:
     return function
 
 
-def led(system: System, q: Array) -> npt.NDArray[np.bool_]:
+def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
     """(n,) whether a configuration, and the step from and to it, keeps clear of singular ones."""
     leads = leads_of(system, q)
-    good = np.abs(leads) > LED
+    good = np.abs(leads) > REGULAR
     crossed = np.sign(leads[1:]) != np.sign(leads[:-1])
     good[1:] &= ~crossed
     good[:-1] &= ~crossed
@@ -109,13 +109,13 @@ def _determinant(A: SX) -> SX:
 # Configurations of all joints from the positions of the independent ones.
 
 
-def active_places(system: System) -> list[int]:
+def active_indices(system: System) -> list[int]:
     """Places in q of the independent joints, in the order of `system.active`.
 
     Raises:
         ModelError: an independent velocity is not the rate of one position.
     """
-    links, places = system.tree.links, []
+    links, indices = system.tree.links, []
     for k in system.active:
         link = next(link for link in links if link.v.start <= k < link.v.stop)
         if link.motion.nq != 1:
@@ -124,8 +124,8 @@ def active_places(system: System) -> list[int]:
                 " position is not the integral of one velocity; independent joints must be"
                 " revolute or prismatic"
             )
-        places.append(link.q.start)
-    return places
+        indices.append(link.q.start)
+    return indices
 
 
 def configuration_of(system: System, q_a: MX) -> MX:
@@ -149,9 +149,9 @@ def _near_configuration(system: System, q: MX) -> MX:
 
     Closed forms give angles between -pi and pi, which would jump within a motion.
     """
-    places, rows = active_places(system), casadi.vertsplit(q)
+    indices, rows = active_indices(system), casadi.vertsplit(q)
     for k, coordinate in enumerate(system.coordinates):
-        if coordinate.unit == "rad" and k not in places:
+        if coordinate.unit == "rad" and k not in indices:
             turned = rows[k] - system.configuration[k]
             rows[k] = system.configuration[k] + casadi.atan2(casadi.sin(turned), casadi.cos(turned))
     return MX(casadi.vertcat(*rows))

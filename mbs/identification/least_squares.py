@@ -12,7 +12,7 @@ from casadi import DM, MX, SX, Function
 
 from mbs.errors import ModelError, SolverError
 from mbs.identification.estimate import Estimate, repetition
-from mbs.identification.leading import active_places, configuration_of, is_explicit
+from mbs.identification.leading import active_indices, configuration_of, is_explicit
 from mbs.identification.observations import Observations, known_of, motion_of, require_visible
 from mbs.identification.record import Samples
 from mbs.identification.triangle import triangle, triangle_solved
@@ -401,7 +401,7 @@ def simulated_motion(
             " than zero"
         )
     q, v, _ = motion_of(regressor, samples)
-    q_a = q[:, active_places(regressor.system)]
+    q_a = q[:, active_indices(regressor.system)]
     acceleration = _acceleration(regressor, K, 2 * np.pi * follow)
     step = _runge_kutta(acceleration, 1.0 / samples.rate)
     inputs = np.hstack([q_a, v, samples.tau - known_of(regressor, samples)]).T

@@ -68,7 +68,7 @@ class Setting:
             return self.bodies_of(part).values
         except SolverError:
             values = np.zeros(len(self.base.columns))
-            values[self.base.places] = weighted(part).values
+            values[self.base.indices] = weighted(part).values
             return values
 
 

@@ -14,7 +14,7 @@ from casadi import DM, Function
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.identification.base_parameters import BaseParameters
-from mbs.identification.leading import led, positions
+from mbs.identification.leading import positions, regular
 from mbs.identification.record import ORDER, Samples, zero_phase
 from mbs.identification.regressors import (
     Column,
@@ -48,7 +48,7 @@ def led_rows(system: System, q: Array) -> Chosen:
     Raises:
         ModelError: they are less than half of all.
     """
-    good = led(system, q)
+    good = regular(system, q)
     if good.mean() < _FEWEST:
         names = ", ".join(system.speeds[k].name for k in system.active)
         raise ModelError(
@@ -130,16 +130,16 @@ def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
     Raises:
         ModelError: they are less than half of all.
     """
-    if samples.led is not None:
-        return samples.led
+    if samples.regular is not None:
+        return samples.regular
     if not _is_reduced(model):
         return np.ones(len(samples.time), dtype=bool)
     return led_rows(model.system, motion_of(model, samples)[0])
 
 
-def with_led(model: Any, samples: Samples) -> Samples:
-    """The samples with `led` found, so that other motions near them keep the same instants."""
-    return replace(samples, led=led_samples(model, samples))
+def with_regular(model: Any, samples: Samples) -> Samples:
+    """The samples with `regular` found, so that other motions near them keep the same instants."""
+    return replace(samples, regular=led_samples(model, samples))
 
 
 def _is_reduced(model: Any) -> bool:
@@ -310,11 +310,11 @@ def observe(regressor: Any, samples: Samples) -> Observations:
             singular configurations.
     """
     keep = led_samples(regressor, samples)
-    full = replace(_observed(regressor, samples), dropped=int(np.sum(~keep)))
+    full = replace(_observe(regressor, samples), dropped=int(np.sum(~keep)))
     return full if keep.all() else full.at(samples.time[keep])
 
 
-def _observed(regressor: Any, samples: Samples) -> Observations:
+def _observe(regressor: Any, samples: Samples) -> Observations:
     """Every instant; next to singular configurations the regressor is on straight lines."""
     return Observations(
         samples.time,
@@ -352,7 +352,7 @@ def observe_filtered(
     passed = [] if samples.bandwidth is None else [samples.bandwidth]
     if not passed + further:
         raise ModelError("observations: the samples were not filtered; give a bandwidth in Hz")
-    full, rate = _observed(regressor, samples), samples.rate
+    full, rate = _observe(regressor, samples), samples.rate
     narrowest = min(passed + further)
     step = max(round(rate / (KEPT_RATE * narrowest)), 1)
     ends = int(np.ceil(_SETTLED * rate / narrowest))
@@ -541,7 +541,7 @@ def _dynamic(system: System, samples: Samples, bandwidth: float, options: Any) -
     return observe_filtered(regressor(system, **options), samples)
 
 
-def _filtered(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
+def _filter(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
     """Momenta behind a filter whose corner is the bandwidth; no accelerations."""
     return observe_momentum(filtered_regressor(system, **options), samples, 2 * np.pi * bandwidth)
 
@@ -553,7 +553,7 @@ def _energy(system: System, samples: Samples, bandwidth: float, options: Any) ->
 
 
 EQUATIONS: Mapping[str, Callable[[System, Samples, float, Any], Observations]] = MappingProxyType(
-    {"dynamic": _dynamic, "filtered": _filtered, "energy": _energy}
+    {"dynamic": _dynamic, "filtered": _filter, "energy": _energy}
 )
 """Models by name: (system, samples, bandwidth, options of the columns) -> the equations."""
 
@@ -598,9 +598,9 @@ class ExcitationQuality:
         """What is wrong with the record, or an empty text."""
         parts = []
         if self.unseen:
-            parts.append(f"{_listed(self.unseen)} cannot be seen at all")
+            parts.append(f"{_list(self.unseen)} cannot be seen at all")
         if self.inseparable:
-            parts.append(f"{_listed(self.inseparable)} cannot be told apart")
+            parts.append(f"{_list(self.inseparable)} cannot be told apart")
         return " and ".join(parts)
 
 
@@ -655,6 +655,6 @@ def require_visible(observations: Observations) -> ExcitationQuality:
     return quality
 
 
-def _listed(names: tuple[str, ...]) -> str:
+def _list(names: tuple[str, ...]) -> str:
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

@@ -16,7 +16,7 @@ from mbs.assembly import Coordinate, System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError
-from mbs.identification.leading import active_places
+from mbs.identification.leading import active_indices
 from mbs.result import optional_module
 from mbs.text import did_you_mean, quoted
 
@@ -181,7 +181,7 @@ def _check_rate(record: Record, k: int) -> None:
     assert record.v is not None
     v, steps = record.v[:, k], np.diff(record.time)
     travelled = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])
-    moved, by_rate = (_detrended(record.time, x) for x in (record.q[:, k], travelled))
+    moved, by_rate = (_detrend(record.time, x) for x in (record.q[:, k], travelled))
     size = float(np.linalg.norm(moved))
     if size <= _STILL or np.linalg.norm(by_rate) <= _STILL:
         return
@@ -200,7 +200,7 @@ def _check_rate(record: Record, k: int) -> None:
         )
 
 
-def _detrended(time: Array, values: Array) -> Array:
+def _detrend(time: Array, values: Array) -> Array:
     """Without the straight line that fits best."""
     basis = np.column_stack([np.ones_like(time), time - time.mean()])
     line = basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
@@ -398,8 +398,8 @@ class Record:
         require_system(system)
         width = np.shape(q)[1] if np.ndim(q) == 2 else system.nq
         alone = system.is_closed and width == len(system.active) != system.nq
-        places = active_places(system) if alone else range(system.nq)
-        joints = [system.coordinates[k] for k in places]
+        indices = active_indices(system) if alone else range(system.nq)
+        joints = [system.coordinates[k] for k in indices]
         _check_joints(system, joints, width)
         speeds = [system.speeds[k] for k in system.active]
         _check_efforts(system, [c.name for c in speeds], tau)
@@ -623,7 +623,7 @@ class Samples:
         efforts: names of the efforts.
         effort_units: their units.
         bandwidth: of what was left by the filter [Hz], or None where nothing was filtered.
-        led: (n,) whether a configuration of a closed system keeps clear of singular ones; None
+        regular: (n,) whether a configuration of a closed system keeps clear of singular ones; None
             where that is still to be found.
     """
 
@@ -635,7 +635,7 @@ class Samples:
     efforts: tuple[str, ...]
     effort_units: tuple[str, ...]
     bandwidth: float | None = None
-    led: npt.NDArray[np.bool_] | None = None
+    regular: npt.NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time)
@@ -748,7 +748,7 @@ def smoothed(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
     even = _without_gaps(record, bandwidth)
     rate = _rate(even)
     q = zero_phase(even.q, rate, bandwidth, order)
-    return _trimmed(even, q, central_difference(q, rate), bandwidth, order)
+    return _trim(even, q, central_difference(q, rate), bandwidth, order)
 
 
 def smoothed_with_velocity(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
@@ -768,7 +768,7 @@ def smoothed_with_velocity(record: Record, bandwidth: float, order: int = ORDER)
     assert even.v is not None
     rate = _rate(even)
     q, v = (zero_phase(x, rate, bandwidth, order) for x in (even.q, even.v))
-    return _trimmed(even, q, v, bandwidth, order)
+    return _trim(even, q, v, bandwidth, order)
 
 
 def _without_gaps(record: Record, bandwidth: float) -> Record:
@@ -790,7 +790,7 @@ def _rate(record: Record) -> float:
     return (len(record.time) - 1) / float(record.time[-1] - record.time[0])
 
 
-def _trimmed(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Samples:
+def _trim(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Samples:
     """Accelerations, filtered efforts, and the rows that are worth keeping."""
     rate = _rate(even)
     a = central_difference(v, rate)

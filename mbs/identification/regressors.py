@@ -145,7 +145,7 @@ def columns_of(
         columns += _inertial(number)
         columns += [Column(f"{kind}{number}", kind, number, _unit(link, kind)) for kind in kinds]
     for pair in couplings:
-        columns += _coupled(system, pair)
+        columns += _couple(system, pair)
     return tuple(columns)
 
 
@@ -208,14 +208,14 @@ def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Col
     Raises:
         ModelError: a column is not among them.
     """
-    places = {column.key: k for k, column in enumerate(every)}
+    indices = {column.key: k for k, column in enumerate(every)}
     for column in columns:
-        if column.key not in places:
+        if column.key not in indices:
             known = did_you_mean(column.name, [c.name for c in every])
             raise ModelError(
                 f"{system.name}: {quoted(column.name)} is no parameter of the system; {known}"
             )
-    return [places[column.key] for column in columns]
+    return [indices[column.key] for column in columns]
 
 
 def values_of(system: System, columns: Iterable[Column]) -> SX:
@@ -279,7 +279,7 @@ def _unit(link: Link, kind: str) -> str:
     return (_SLIDING if link.motion is Motion.PRISMATIC else _TURNING)[kind]
 
 
-def _coupled(system: System, pair: Joints) -> list[Column]:
+def _couple(system: System, pair: Joints) -> list[Column]:
     """The three parameters of a motor of two joints."""
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
         raise ModelError(
@@ -292,7 +292,7 @@ def _coupled(system: System, pair: Joints) -> list[Column]:
         raise ModelError(
             f"{system.name}: the coupling {quoted(tuple(pair))} joins {link.name!r}"
             f" ({link.motion.value}) and {second.name!r} ({second.motion.value}); name two joints"
-            " that both turn or both slide"
+            " that are both revolute or both prismatic"
         )
     return [Column(f"{k}{number}", k, number, _unit(link, k), other) for k in COUPLED]
 
@@ -660,10 +660,10 @@ def power_regressor(
     an interval for the columns of friction of the energy model.
 
     Args:
-        system: open or closed; q must close the loops.
-        columns: as for `regressor`.
-        coordinates: of a closed system, "independent" or "tree".
-        choice: rotors, friction, offsets, couplings; see `columns_of`.
+        system: as for `energy_regressor`, and so are the others.
+        columns: likewise.
+        coordinates: likewise.
+        choice: likewise.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); P (1, n) with `columns`.

@@ -16,7 +16,7 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.errors import ModelError
 from mbs.identification.leading import (
     CLEAR,
-    active_places,
+    active_indices,
     configuration_of,
     is_explicit,
     leads_of,
@@ -307,8 +307,8 @@ def limits_of(
         ModelError: a limit has not as many values as there are independent joints, it is empty or
             of no joint, or an independent joint has no range of positions.
     """
-    places = active_places(system)
-    joints = [system.coordinates[k] for k in places]
+    indices = active_indices(system)
+    joints = [system.coordinates[k] for k in indices]
     rates = [RATE_UNITS[joint.unit] for joint in joints]
     free: dict[str, Range] = dict.fromkeys((joint.name for joint in joints), None)
     motors = {row.name: row for row in system.speeds}
@@ -317,9 +317,9 @@ def limits_of(
         quantity: str, bound: Bound, units: Sequence[str], known: Mapping[str, Range] = free
     ) -> tuple[MotionLimit, ...]:
         pairs = _pairs(system, quantity, bound, known)
-        return tuple(MotionLimit(quantity, *row) for row in _joined(list(known), units, pairs))
+        return tuple(MotionLimit(quantity, *row) for row in _join(list(known), units, pairs))
 
-    own, others = _positions(system, position, places)
+    own, others = _positions(system, position, indices)
     positions = rows("position", own, [joint.unit for joint in joints])
     for limit in positions:
         if not (np.isfinite(limit.lower) and np.isfinite(limit.upper)):
@@ -363,7 +363,7 @@ def _leading(system: System) -> tuple[MotionLimit, ...]:
 
 
 def _positions(
-    system: System, bound: Bound, places: Sequence[int]
+    system: System, bound: Bound, indices: Sequence[int]
 ) -> tuple[Bound, tuple[tuple[int, MotionLimit], ...]]:
     """Ranges of the independent joints, and limits of the others with their places in q."""
     ranges: dict[str, Range] = {c.name: c.limits for c in system.coordinates}
@@ -373,11 +373,11 @@ def _positions(
         ranges |= bound
     passive = []
     for k, c in enumerate(system.coordinates):
-        if k not in places and ranges[c.name] is not None:
+        if k not in indices and ranges[c.name] is not None:
             lower, upper = _pair(system, "position", ranges[c.name], c.name)
             passive.append((k, MotionLimit("position", c.name, c.unit, lower, upper)))
     if bound is None or isinstance(bound, Mapping):
-        bound = [ranges[system.coordinates[k].name] for k in places]
+        bound = [ranges[system.coordinates[k].name] for k in indices]
     return bound, tuple(passive)
 
 
@@ -390,7 +390,7 @@ def _check_names(system: System, what: str, given: Mapping[str, Any], known: Seq
             )
 
 
-def _joined(
+def _join(
     names: Sequence[str], units: Sequence[str], pairs: Sequence[tuple[float, float]]
 ) -> list[tuple[str, str, float, float]]:
     rows = zip(names, units, pairs, strict=True)
@@ -514,7 +514,7 @@ class Trajectory:
         span = periods * self.series.period
         time = np.linspace(0.0, span, round(span * rate) + 1)
         values = np.hstack([self.q(time), self.v(time), self.a(time)])
-        joints = [self.system.coordinates[k] for k in active_places(self.system)]
+        joints = [self.system.coordinates[k] for k in active_indices(self.system)]
         rates = [RATE_UNITS[joint.unit] for joint in joints]
         units = {f"{joint.name}.q": joint.unit for joint in joints}
         units |= {f"{j.name}.v": unit for j, unit in zip(joints, rates, strict=True)}

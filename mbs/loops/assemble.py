@@ -33,7 +33,7 @@ def assemble(
     system = open_system(mechanism, (*guess, *active))
     check_parts(system)
     _check_guess(system, guess)
-    chosen = _chosen(system, active)
+    chosen = _choose(system, active)
     if system.cuts or system.couplings or any(p.element.binds for p in system.parts):
         return analyse(system, guess, chosen)
     known = [coordinate.name for coordinate in system.coordinates]
@@ -41,7 +41,7 @@ def assemble(
     return replace(system, configuration=tuple(system.position(start)), _cache={})
 
 
-def _chosen(system: System, active: Sequence[str]) -> tuple[int, ...]:
+def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
     """The numbers of the velocities that the user named."""
     names = [speed.name for speed in system.speeds]
     for name in active:

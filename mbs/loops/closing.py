@@ -39,11 +39,11 @@ def mechanism_size(system: System) -> SX:
     """
 
     def build() -> SX:
-        places = [k for k, is_length in enumerate(_lengths(system)) if is_length]
-        if not places:
+        indices = [k for k, is_length in enumerate(_lengths(system)) if is_length]
+        if not indices:
             return SX(1)
         q = SX.sym("q", system.nq)
-        rows = closure_rows(system, q)[places]
+        rows = closure_rows(system, q)[indices]
         turns = [k for k, c in enumerate(system.coordinates) if not c.unit.startswith("m")]
         levers = casadi.jacobian(rows, q)[:, turns]
         lengths = casadi.vertcat(rows, casadi.vec(levers.nz[:])) if levers.nnz() else rows
@@ -130,22 +130,22 @@ class Closed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Closing:
-    """The closure rows and quaternion norms of a system, some positions held.
+    """The closure rows and quaternion norms of a system, some positions locked.
 
     Attributes:
         system: with loops, not necessarily analysed.
         p: (np,) values of its parameters.
-        held: positions that must not change.
+        locked: positions that must not change.
     """
 
     system: System
     p: Vector
-    held: tuple[int, ...] = ()
+    locked: tuple[int, ...] = ()
 
     @property
     def free(self) -> list[int]:
         """The positions that may change."""
-        return [k for k in range(self.system.nq) if k not in self.held]
+        return [k for k in range(self.system.nq) if k not in self.locked]
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
@@ -171,10 +171,10 @@ class Closing:
         start = np.array(q, dtype=float)
 
         def residual(x: Vector) -> tuple[Vector, Vector]:
-            return self.rows(_replaced(start, self.free, x))
+            return self.rows(_replace(start, self.free, x))
 
         root = gauss_newton(residual, start[self.free], tolerance=TOLERANCE * self.sizes)
-        found = _replaced(start, self.free, root.x)
+        found = _replace(start, self.free, root.x)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def nearby(self, q: Vector, reach: float, tries: int, seed: int) -> Iterator[Vector]:
@@ -208,10 +208,10 @@ class Closing:
         distance, other = gaps[name]
         return f"{name} open by {distance:.3g} m and {other:.3g} in direction cosines"
 
-    def held_positions(self, q: Vector) -> str:
-        """The held positions at q in words; empty when none is held."""
+    def locked_positions(self, q: Vector) -> str:
+        """The locked positions at q in words; empty when none is locked."""
         names = [coordinate.name for coordinate in self.system.coordinates]
-        return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.held)
+        return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
     def _functions(self) -> tuple[Function, Function, Function]:
         functions: tuple[Function, Function, Function] = self.system.cached(
@@ -249,9 +249,9 @@ def _functions(system: System) -> tuple[Function, Function, Function]:
     )
 
 
-def _replaced(q: Vector, places: Sequence[int], values: Vector) -> Vector:
+def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
     result = q.copy()
-    result[list(places)] = values
+    result[list(indices)] = values
     return result
 
 
@@ -279,36 +279,36 @@ def within_half_turn(system: System, q: Vector) -> Vector:
 
 
 _LARGEST_STEP = 0.2
-"""Of a held position in one step [rad or m]."""
+"""Of a locked position in one step [rad or m]."""
 LARGEST_MOVE = 0.3
 """Of any other position from where its slope led; more may be another branch [rad or m]."""
 _LONGEST_LINE = 400.0
-"""Of a held position, in all [rad or m]."""
+"""Of a locked position, in all [rad or m]."""
 _SMALLEST_PART = 1e-4
 """Of the whole line, below which it is said to end."""
 
 
-def followed_configuration(
-    system: System, target: Vector, held: tuple[int, ...], p: Vector
+def follow_configuration(
+    system: System, target: Vector, locked: tuple[int, ...], p: Vector
 ) -> Vector:
-    """The configuration reached from the assembled one while held positions, and p, move.
+    """The configuration reached from the assembled one while locked positions, and p, move.
 
     Args:
         system: with loops; its configuration is where the line starts.
-        target: (nq,) of which the held positions count.
-        held: numbers in q.
+        target: (nq,) of which the locked positions count.
+        locked: indices in q.
         p: (np,) values of the parameters at the end of the line.
 
     Returns:
-        q (nq,), its held positions equal to the target's.
+        q (nq,), its locked positions equal to the target's.
 
     Raises:
         Unclosable: the line leaves what this branch can reach; the message says where.
     """
     start, p_start = np.array(system.configuration), closure_parameters(system)
-    places, free = list(held), [k for k in range(system.nq) if k not in held]
-    way = target[places] - start[places]
-    length = float(np.max(np.abs(way), initial=0.0))
+    indices, free = list(locked), [k for k in range(system.nq) if k not in locked]
+    change = target[indices] - start[indices]
+    length = float(np.max(np.abs(change), initial=0.0))
     if length > _LONGEST_LINE:
         raise Unclosable(
             f"{system.name}: a position is {length:.3g} rad or m away from the assembled"
@@ -320,9 +320,9 @@ def followed_configuration(
     while done < 1.0:
         to = min(1.0, done + part)
         trial = q.copy()
-        trial[places] = target[places] if to == 1.0 else start[places] + to * way
+        trial[indices] = target[indices] if to == 1.0 else start[indices] + to * change
         trial[free] += (to - done) * slope
-        closing = Closing(system, p if to == 1.0 else p_start + to * (p - p_start), held)
+        closing = Closing(system, p if to == 1.0 else p_start + to * (p - p_start), locked)
         found = closing.nearest(trial)
         if found.is_closed and np.max(np.abs(found.q - trial), initial=0.0) < LARGEST_MOVE:
             slope = (found.q[free] - q[free]) / (to - done)
@@ -331,10 +331,9 @@ def followed_configuration(
             part, slope = part / 2, slope if part > 8 * _SMALLEST_PART else np.zeros(len(free))
             if part < _SMALLEST_PART:
                 raise Unclosable(
-                    f"{system.name}: {closing.held_positions(target) or 'the configuration'}"
-                    " cannot be"
-                    " reached from the assembled configuration, whose branch ends near"
-                    f" {closing.held_positions(q) or 'it'}; give a guess of other joints to choose"
-                    " another branch, or other positions"
+                    f"{system.name}: {closing.locked_positions(target) or 'the configuration'}"
+                    " cannot be reached from the assembled configuration, whose branch ends near"
+                    f" {closing.locked_positions(q) or 'it'}; give a guess of other joints to"
+                    " choose another branch, or other positions"
                 )
     return q

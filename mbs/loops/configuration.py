@@ -19,7 +19,7 @@ from mbs.loops.closing import (
     Vector,
     closure_parameters,
     difference,
-    followed_configuration,
+    follow_configuration,
 )
 from mbs.loops.function import configuration_on, fixed_positions, independent_names
 from mbs.loops.velocity import closure_jacobian
@@ -82,13 +82,13 @@ def solve(
     target = np.array(system.position({**(guess or {}), **fixed}))
     if all(name in names for name in fixed):
         fixed = {**dict.fromkeys(names, 0.0), **fixed}
-    held = tuple(k for k, c in enumerate(system.coordinates) if c.name in fixed)
+    locked = tuple(k for k, c in enumerate(system.coordinates) if c.name in fixed)
     if not system.is_closed:
         return target
     if guess:
         named = [k for k, c in enumerate(system.coordinates) if c.name in guess]
-        return _guessed_configuration(Closing(system, p, held), target, named)
-    return followed_configuration(system, target, held, p)
+        return _guessed_configuration(Closing(system, p, locked), target, named)
+    return follow_configuration(system, target, locked, p)
 
 
 def _guessed_configuration(closing: Closing, start: Vector, named: list[int]) -> Vector:
@@ -121,7 +121,7 @@ def _unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
     near: Vector = start + difference(closing.system, q, start)
     for part in quaternion_slices(closing.system.tree):
         near[part] = q[part]
-    near[list(closing.held)] = q[list(closing.held)]
+    near[list(closing.locked)] = q[list(closing.locked)]
     return near if closing.openness(near) < CLOSED else q
 
 
@@ -144,7 +144,7 @@ def closed_configuration(closing: Closing, start: Vector, restarts: int = _RESTA
         if best is None or found.residual < best.residual:
             best = found
     assert best is not None
-    at = closing.held_positions(start)
+    at = closing.locked_positions(start)
     raise Unclosable(
         f"{closing.system.name}: the loop cannot be closed{' with ' + at if at else ''}; the best"
         f" configuration found leaves {closing.gap(best.q)}; change lengths or guesses"
@@ -250,25 +250,25 @@ def smallest_velocity(system: System, J: Vector, v0: Values) -> tuple[Vector, st
         v (nv,); the velocities of v0 as text where no v has them, else an empty one.
     """
     free = null_space(J)
-    wanted = np.array(system.velocity(v0))
+    target = np.array(system.velocity(v0))
     names = [speed.name for speed in system.speeds]
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
-    v: Vector = free @ np.linalg.lstsq(free[rows], wanted[rows], rcond=None)[0]
+    v: Vector = free @ np.linalg.lstsq(free[rows], target[rows], rcond=None)[0]
     # what does not fit differs by about its own size, what fits by rounding
-    fits = np.allclose(v[rows], wanted[rows], rtol=1e-6, atol=1e-9)
+    fits = np.allclose(v[rows], target[rows], rtol=1e-6, atol=1e-9)
     if not fits:
-        return v, ", ".join(f"{names[k]} = {wanted[k]:g}" for k in rows)
-    return _refined(J, rows, wanted[rows]), ""
+        return v, ", ".join(f"{names[k]} = {target[k]:g}" for k in rows)
+    return _refine(J, rows, target[rows]), ""
 
 
-def _refined(J: Vector, rows: list[int], wanted: Vector) -> Vector:
-    """The smallest v (nv,) with J v = 0 and v[rows] = wanted, where there is one, to the last bit.
+def _refine(J: Vector, rows: list[int], target: Vector) -> Vector:
+    """The smallest v (nv,) with J v = 0 and v[rows] = target, where there is one, to the last bit.
 
     A basis of what J leaves free carries 1e-14 of noise, which differs from processor to processor.
     """
     K = np.vstack([J, np.eye(J.shape[1])[rows]])
-    goal = np.concatenate([np.zeros(len(J)), wanted])
+    goal = np.concatenate([np.zeros(len(J)), target])
     v = np.zeros(J.shape[1])
     for _ in range(_REFINEMENTS):
         v += smallest_solution(K, goal - np.sum(K * v, axis=1), RELATIVE_GAP)

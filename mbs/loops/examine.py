@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, require_system
-from mbs.assembly.validity import Row
+from mbs.assembly.validity import ValidityRow
 from mbs.errors import ModelError, SingularPosture, Unclosable
 from mbs.loops.closing import OPEN, closure_parameters, row_sizes
 from mbs.loops.closure import closure_rows
@@ -27,7 +27,7 @@ from mbs.solvers.rank import rank
 
 Vector = NDArray[np.float64]
 
-_LED = 1e-14
+_DETERMINED = 1e-14
 """Squared sine between rows of the passive joints below which these follow no longer."""
 
 
@@ -63,7 +63,7 @@ class ConfigurationState:
     @property
     def is_led(self) -> bool:
         """Whether the independent joints determine how the others move."""
-        return self.leads > _LED
+        return self.leads > _DETERMINED
 
 
 def examine(
@@ -93,7 +93,7 @@ def examine(
     )
 
 
-def require_led(system: System, q: Vector, p: Vector) -> None:
+def require_determined(system: System, q: Vector, p: Vector) -> None:
     """Refuse a configuration at which models in the independent joints have no sense.
 
     Args:
@@ -111,7 +111,7 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
             f"{system.name}: q leaves the loops open by {residual:.3g}; take a configuration of"
             " mbs.loops.solve"
         )
-    if leads <= _LED:
+    if leads <= _DETERMINED:
         names = ", ".join(system.speeds[k].name for k in system.active)
         raise SingularPosture(
             f"{system.name}: the configuration is singular, {names} cannot lead the other joints"
@@ -121,7 +121,7 @@ def require_led(system: System, q: Vector, p: Vector) -> None:
         )
 
 
-def loop_rows(system: System, q: SX) -> list[Row]:
+def loop_rows(system: System, q: SX) -> list[ValidityRow]:
     """What a configuration of closed loops must fulfil for models in the independent joints.
 
     Args:
@@ -130,18 +130,18 @@ def loop_rows(system: System, q: SX) -> list[Row]:
     """
     _, leads, opening = configuration_health(system)(q, system.p)
     return [
-        Row("open", "opening of the loops", opening, OPEN, "the loops are open"),
-        Row(
+        ValidityRow("open", "opening of the loops", opening, OPEN, "the loops are open"),
+        ValidityRow(
             "undetermined",
             "hold of the independent joints, negative",
             -leads,
-            -_LED,
+            -_DETERMINED,
             "the independent joints do not determine the others",
         ),
     ]
 
 
-LED = ConfigurationCheck(loop_rows, require_led)
+DETERMINED = ConfigurationCheck(loop_rows, require_determined)
 """Closed loops whose independent joints lead the others."""
 
 
@@ -157,7 +157,7 @@ def configuration_health(system: System) -> Function:
             for own in (rows, rows / row_sizes(system))
         )
         varies, passive = system.closure.varies, list(system.closure.passive)
-        J_p = _scaled(system, determining_rows(system, q).J)[:, passive]
+        J_p = _scale(system, determining_rows(system, q).J)[:, passive]
         leads = _independence(J_p.T if varies else J_p)
         return Function("health", [q, system.p], [residual, leads, opening], {"cse": True})
 
@@ -174,14 +174,14 @@ def row_independence(system: System) -> Function:
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
-        value = _independence(_scaled(system, independent_constraint_rows(system, q)))
+        value = _independence(_scale(system, independent_constraint_rows(system, q)))
         return Function("independence", [q, system.p], [value], {"cse": True})
 
     function: Function = system.cached("row independence", build)
     return function
 
 
-def _scaled(system: System, J: SX) -> SX:
+def _scale(system: System, J: SX) -> SX:
     """The kept rows, or all of them, in sizes that do not depend on units."""
     found, kept = scales(system), kept_rows(system)
     rows = found.rows[kept] if J.shape[0] == len(kept) else found.rows

@@ -11,7 +11,7 @@ from casadi import DM, MX, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function
-from mbs.closed_forms.ring import extent, independent_places
+from mbs.closed_forms.ring import extent, independent_indices
 from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closing import LARGEST_MOVE, Vector, closure_parameters, relative_rows, row_sizes
 from mbs.loops.closure import facing, square_closure
@@ -59,10 +59,10 @@ def independent_positions(system: System, values: Given) -> list[float]:
         ModelError: another joint is named, or a value is not finite.
     """
     fixed, names = fixed_positions(system, values), independent_names(system)
-    places = dict(zip(names, independent_places(system), strict=True))
-    spins = {name: x for name, x in fixed.items() if places.get(name, 0) >= system.nq}
+    indices = dict(zip(names, independent_indices(system), strict=True))
+    spins = {name: x for name, x in fixed.items() if indices.get(name, 0) >= system.nq}
     whole = system.position({name: x for name, x in fixed.items() if name not in spins})
-    spun = system.velocity(spins)
+    spin = system.velocity(spins)
     for name in fixed:
         if name not in names:
             raise ModelError(
@@ -70,12 +70,12 @@ def independent_positions(system: System, values: Given) -> list[float]:
                 f" positions of the independent joints {', '.join(names)}"
             )
     return [
-        whole[place] if place < system.nq else spun[k]
-        for k, place in zip(system.free, places.values(), strict=True)
+        whole[index] if index < system.nq else spin[k]
+        for k, index in zip(system.free, indices.values(), strict=True)
     ]
 
 
-# What positions an independent joint can reach on a branch, the others held.
+# What positions an independent joint can reach on a branch, the others locked.
 
 
 _POINTS = 721
@@ -94,7 +94,7 @@ def reachable(system: System, loops: Function, q_a: Vector, p: Vector) -> str:
         p: (np,) parameters.
     """
     texts = []
-    for number, k in enumerate(independent_places(system)):
+    for number, k in enumerate(independent_indices(system)):
         if k >= system.nq:
             continue
         is_reached = _test(loops, q_a, p, number)
@@ -254,9 +254,9 @@ def configuration_on(
 
 def _configuration(system: System, stages: Sequence[Stage], ways: Sequence[int], q_a: SX) -> SX:
     q = SX.zeros(extent(system))
-    q[independent_places(system)] = q_a
+    q[independent_indices(system)] = q_a
     for stage, way in zip(stages, ways, strict=True):
-        q[list(stage.places)] = stage.values(q, system.p)[:, way]
+        q[list(stage.indices)] = stage.values(q, system.p)[:, way]
     return q[: system.nq]
 
 
@@ -321,8 +321,8 @@ def follow_active(system: System) -> Function:
     """
 
     def build() -> Function:
-        active = independent_places(system)
-        if any(place >= system.nq for place in active):
+        active = independent_indices(system)
+        if any(index >= system.nq for index in active):
             raise NoClosedForm(
                 f"{system.name}: a rod spins about its line, which no position of q follows; use a"
                 " configuration of mbs.loops.solve"
@@ -341,14 +341,14 @@ def follow_active(system: System) -> Function:
             before = z
             z, closed = stage(led, q_k, p_k)
             good = good * closed
-        q = _merged(system, active, passive)(z, q_a)
+        q = _merge(system, active, passive)(z, q_a)
         return Function("follow", [q_a, p], [casadi.if_else(good, q, DM.nan(system.nq))])
 
     function: Function = system.cached("follow", build)
     return function
 
 
-def _merged(system: System, active: list[int], passive: list[int]) -> Function:
+def _merge(system: System, active: list[int], passive: list[int]) -> Function:
     z, q_a = SX.sym("z", len(passive)), SX.sym("q_a", len(active))
     q = SX.zeros(system.nq)
     q[passive], q[active] = z, q_a
@@ -359,7 +359,7 @@ def _newton(system: System, active: list[int], passive: list[int]) -> Function:
     q, z, q_a = (
         SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
     )
-    merged = _merged(system, active, passive)(z, q_a)
+    merged = _merge(system, active, passive)(z, q_a)
     rows = square_closure(system, q, passive)
     if system.closure is not None and not system.closure.varies:
         own = row_sizes(system)[list(system.closure.rows)]
@@ -377,7 +377,7 @@ def _stage(system: System, active: list[int], passive: list[int]) -> Function:
     led, q_a = MX.sym("led", len(passive)), MX.sym("q_a", len(active))
     p = MX.sym("p", system.p.numel())
     z = _newton(system, active, passive)(led, q_a, p)
-    q = _merged(system, active, passive)(z, q_a)
+    q = _merge(system, active, passive)(z, q_a)
     near = casadi.norm_inf(z - led) < LARGEST_MOVE
     good = casadi.logic_and(_closed(system)(q, p), near)
     return Function("stage", [led, q_a, p], [z, good])

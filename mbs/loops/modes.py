@@ -11,7 +11,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
-from mbs.closed_forms.ring import extent, independent_places
+from mbs.closed_forms.ring import extent, independent_indices
 from mbs.errors import LoopError, ModelError
 from mbs.loops.closing import (
     CLOSED,
@@ -82,7 +82,7 @@ def modes(
         )
     p = closure_parameters(system, parameters)
     start = np.zeros(extent(system))
-    start[independent_places(system)] = independent_positions(system, q_active)
+    start[independent_indices(system)] = independent_positions(system, q_active)
     found: list[Mode] = []
     for q, branch in every_configuration(stages, start, p):
         mode = _checked(system, q[: system.nq], branch, p)
@@ -125,7 +125,8 @@ class WorkingMode:
         q: (nq) the configuration [rad or m], angles within half a turn of zero, the first element
             of a quaternion not negative.
         residual: largest row of the loops and of the pose there.
-        hits: how many starts led to it; where some mode has one alone, others are likely missing.
+        hits: how many starts ended there; where some mode has one alone, others are likely
+            missing.
     """
 
     q: tuple[float, ...]
@@ -148,7 +149,7 @@ def working_modes(
 
     Nothing proves that the list is complete; `hits` tells how well it was searched. The starts are
     the same at every call. The search ends early after at least 60 of them, once the last three
-    quarters led to nothing new and every mode was met twice.
+    quarters found nothing new and every mode was met twice.
 
     Args:
         system: as for `solve_pose`, and so are frame, T, rows and parameters.
@@ -169,7 +170,7 @@ def working_modes(
             there may be configurations without number.
         ModelError: as for `solve_pose`; or reach or tries is not above zero.
     """
-    wanted = goal(system, frame, T, rows, parameters)
+    target = goal(system, frame, T, rows, parameters)
     if not (isinstance(tries, int) and tries >= 1 and isinstance(reach, int | float) and reach > 0):
         raise ModelError(
             f"{system.name}: reach is {quoted(reach)} and tries {quoted(tries)}; give a reach above"
@@ -179,9 +180,9 @@ def working_modes(
     found: list[WorkingMode] = []
     newest = 0
     for number, start in enumerate(_starts(system, middle, reach, tries), start=1):
-        configuration, known = wanted.nearest(start), len(found)
+        configuration, known = target.nearest(start), len(found)
         if configuration.is_closed:
-            _add(wanted, found, _tidy(wanted, configuration.q))
+            _add(target, found, _tidy(target, configuration.q))
         newest = number if len(found) > known else newest
         if number >= max(_LEAST, 4 * newest) and all(mode.hits > 1 for mode in found):
             break
@@ -197,14 +198,14 @@ def _starts(system: System, middle: Vector, reach: float, tries: int) -> list[Ve
     return drawn
 
 
-def _add(wanted: Goal, found: list[WorkingMode], q: Vector) -> None:
-    system = wanted.closing.system
+def _add(target: Goal, found: list[WorkingMode], q: Vector) -> None:
+    system = target.closing.system
     for number, mode in enumerate(found):
         if _distance(system, np.array(mode.q), q) < _SAME_WORKING_MODE:
             found[number] = replace(mode, hits=mode.hits + 1)
             return
-    _require_isolated(wanted, q)
-    residual = float(np.max(np.abs(wanted.residual(q)[0])))
+    _require_isolated(target, q)
+    residual = float(np.max(np.abs(target.residual(q)[0])))
     found.append(WorkingMode(tuple(float(x) for x in q), residual, 1))
 
 
@@ -212,53 +213,54 @@ def _distance(system: System, q: Vector, other: Vector) -> float:
     return float(np.max(np.abs(difference(system, q, other)), initial=0.0))
 
 
-def _tidy(wanted: Goal, q: Vector) -> Vector:
+def _tidy(target: Goal, q: Vector) -> Vector:
     """The configuration with small angles where that is the same one: not so across a gear."""
-    system = wanted.closing.system
+    system = target.closing.system
     tidy = within_half_turn(system, q)
     for part in quaternion_slices(system.tree):
         tidy[part] *= -1.0 if tidy[part.start] < 0 else 1.0
-    return tidy if wanted.openness(tidy) < CLOSED else q
+    return tidy if target.openness(tidy) < CLOSED else q
 
 
-def _require_isolated(wanted: Goal, q: Vector) -> None:
+def _require_isolated(target: Goal, q: Vector) -> None:
     """Refuse a configuration that can move, at least to first order, while the frame stays.
 
     Raises:
         LoopError: names the joints that move most.
     """
-    system = wanted.closing.system
-    slope = wanted.residual(q)[1]
+    system = target.closing.system
+    slope = target.residual(q)[1]
     if rank(slope, _LOOSE) == system.nq:
         return
     motion = np.abs(np.linalg.svd(slope)[2][-1])
     names = [c.name for k, c in enumerate(system.coordinates) if motion[k] > motion.max() / 10]
     raise LoopError(
-        f"{system.name}: {', '.join(names)} can move while frame {quoted(wanted.frame)} stays at"
+        f"{system.name}: {', '.join(names)} can move while frame {quoted(target.frame)} stays at"
         " this pose, so configurations cannot be counted; take another pose, name more rows, or use"
         " mbs.loops.solve_pose for one configuration"
     )
 
 
-# Configurations that close the loops with some positions held, as far as random starts lead there.
+# Configurations that close the loops with some positions locked, as far as random starts lead
+# there.
 
 
 _START_TRIES, _LEAST_STARTS, _START_SEED = 300, 40, 20260107
 _REACH = np.pi
 """Of a random start from the given positions: all angles, and as many metres."""
 _SAME_START = 1e-6
-"""As `_SAME_WORKING_MODE`, with positions held in place of a pose."""
+"""As `_SAME_WORKING_MODE`, with positions locked in place of a pose."""
 
 
 def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:
     """Configurations found by Gauss-Newton from random starts, always the same ones.
 
-    The search ends early after at least 40 starts, once the last three quarters led to nothing new
-    and every configuration was met twice.
+    The search ends early after at least 40 starts, once the last three quarters found
+    nothing new and every configuration was met twice.
 
     Args:
-        closing: the rows, and the positions that are held.
-        start: (nq,) of which the held positions count; the starts are taken about the others.
+        closing: the rows, and the positions that are locked.
+        start: (nq,) of which the locked positions count; the starts are taken about the others.
 
     Returns:
         Configurations (nq,) with angles within half a turn of zero; nothing proves that these are
@@ -295,7 +297,7 @@ def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
 def _tidy_start(closing: Closing, q: Vector) -> Vector:
     """The configuration with small angles where that is the same one: not so across a gear."""
     tidy = within_half_turn(closing.system, q)
-    tidy[list(closing.held)] = q[list(closing.held)]
+    tidy[list(closing.locked)] = q[list(closing.locked)]
     return tidy if closing.openness(tidy) < OPEN else q
 
 

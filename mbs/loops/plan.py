@@ -25,18 +25,18 @@ from mbs.closed_forms.kernels import closed_form
 from mbs.closed_forms.ring import (
     constants,
     extent,
-    independent_places,
+    independent_indices,
     loop_links,
     ring_of,
-    spin_places,
+    spin_indices,
 )
-from mbs.closed_forms.roots import Root
+from mbs.closed_forms.roots import LoopBranches
 from mbs.closed_forms.spatial import (
     Span,
-    coupled,
-    held_point,
+    coupled_position,
     independent_links,
-    slid_places,
+    point_on_links,
+    prismatic_indices,
     spans,
     unit_quaternion,
 )
@@ -50,12 +50,12 @@ from mbs.recursions.route import relative_pose
 from mbs.solvers.rank import null_space, rank
 from mbs.spatial import Pose
 
-# One step of a plan, and which of its ways lead to a configuration.
+# One step of a plan, and which of its branches lead to a configuration.
 
 
 _NEAR = 1e-5
-"""Difference of positions [rad or m] between a way and a configuration that it leads to: closed to
-1e-12, a configuration is known to the square root, 1e-6, where two ways meet."""
+"""Difference of positions [rad or m] between a branch and a configuration that it leads to: closed
+to 1e-12, a configuration is known to the square root, 1e-6, where two branches meet."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,29 +64,29 @@ class Stage:
 
     Attributes:
         name: of the cut joint or of the coupling.
-        places: numbers in q of what it gives; beyond the end of q those of cut joints.
-        labels: of the ways to close it; one empty label where there is a single way.
+        indices: indices in q of what it gives; beyond the end of q those of cut joints.
+        labels: of the branches; one empty label where there is a single one.
         values: Function of q with the positions of cut joints, of which known ones are used, and
-            p; one row a place, one column a way.
-        spun: place of the spin on which these depend, and Function of the same arguments that
+            p; one row an index, one column a branch.
+        spin: place of the spin on which these depend, and Function of the same arguments that
             gives it where the quaternion is known; None where there is none.
-        chosen: number of the way in which the system was assembled.
+        chosen: number of the branch in which the system was assembled.
     """
 
     name: str
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     labels: tuple[str, ...]
     values: Function
-    spun: tuple[int, Function] | None = None
+    spin: tuple[int, Function] | None = None
     chosen: int = 0
 
 
-def ways_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tuple[int, ...]:
-    """The ways of all stages that lead to the closed configuration q; as far as they do.
+def branches_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tuple[int, ...]:
+    """The branches of all stages that lead to the closed configuration q; as far as they do.
 
     What a stage gives of cut joints is not in q: whether it fits is seen in later stages.
     """
-    return ways_from(system, stages, started_at(system, q), q, p)
+    return branches_from(system, stages, started_at(system, q), q, p)
 
 
 def started_at(system: System, q: Vector, known: Collection[int] | None = None) -> Vector:
@@ -98,16 +98,16 @@ def started_at(system: System, q: Vector, known: Collection[int] | None = None) 
         known: their places, those of the independent joints when left out.
     """
     start = np.zeros(extent(system))
-    given = independent_places(system) if known is None else known
-    places = [k for k in given if k < system.nq]
-    start[places] = q[places]
+    given = independent_indices(system) if known is None else known
+    indices = [k for k in given if k < system.nq]
+    start[indices] = q[indices]
     return start
 
 
-def ways_from(
+def branches_from(
     system: System, stages: Sequence[Stage], start: Vector, q: Vector, p: Vector
 ) -> tuple[int, ...]:
-    """The ways of all stages that lead to the closed configuration q; as far as they do.
+    """The branches of all stages that lead to the closed configuration q; as far as they do.
 
     Args:
         system: whose loops they are.
@@ -119,16 +119,16 @@ def ways_from(
     if not stages:
         return ()
     stage, longest = stages[0], tuple[int, ...]()
-    if stage.spun:
-        place, angle = stage.spun
-        start[place] = float(angle(np.concatenate([q, start[system.nq :]]), p))
+    if stage.spin:
+        index, angle = stage.spin
+        start[index] = float(angle(np.concatenate([q, start[system.nq :]]), p))
     values = np.array(stage.values(start, p))
-    for way in range(len(stage.labels)):
+    for branch in range(len(stage.labels)):
         reached = start.copy()
-        reached[list(stage.places)] = values[:, way]
-        if _agree(system, stage.places, reached, q):
-            ways = (way, *ways_from(system, stages[1:], reached, q, p))
-            longest = max(longest, ways, key=len)
+        reached[list(stage.indices)] = values[:, branch]
+        if _agree(system, stage.indices, reached, q):
+            branches = (branch, *branches_from(system, stages[1:], reached, q, p))
+            longest = max(longest, branches, key=len)
             if len(longest) == len(stages):
                 break
     return longest
@@ -150,24 +150,24 @@ def every_configuration(
         return
     stage, rest = stages[0], stages[1:]
     values = np.array(stage.values(q, p))
-    for way, label in enumerate(stage.labels):
-        if np.all(np.isfinite(values[:, way])):
+    for column, label in enumerate(stage.labels):
+        if np.all(np.isfinite(values[:, column])):
             longer = q.copy()
-            longer[list(stage.places)] = values[:, way]
+            longer[list(stage.indices)] = values[:, column]
             yield from every_configuration(rest, longer, p, branch + ((label,) if label else ()))
 
 
-def _agree(system: System, places: Sequence[int], reached: Vector, q: Vector) -> bool:
+def _agree(system: System, indices: Sequence[int], reached: Vector, q: Vector) -> bool:
     """Whether the positions of the tree are those of q, up to whole turns and signs."""
     gap = difference(system, reached[: system.nq], q)
-    return bool(np.all(np.abs(gap[[k for k in places if k < system.nq]]) < _NEAR))
+    return bool(np.all(np.abs(gap[[k for k in indices if k < system.nq]]) < _NEAR))
 
 
-# A plan held against configurations: it must give them back, and none of its ways may leave loops
-# open.
+# A plan compared with configurations: it must give them back, and none of its branches may leave
+# loops open.
 #
 # Kernels use what must hold where a loop closes. In loops that move by their special measures
-# alone that may not be enough: such a plan is refused, and a way that never closes is left out.
+# alone that may not be enough: such a plan is refused, and a branch that never closes is left out.
 
 
 _MOVE = 0.2
@@ -184,7 +184,7 @@ Start = Callable[[Vector], Vector]
 def verify(
     system: System, stages: Sequence[Stage], started: Start | None = None
 ) -> tuple[Stage, ...]:
-    """The stages with the ways of the assembled configuration, seen to hold at others as well.
+    """The stages with the branches of the assembled configuration, which hold at others as well.
 
     Args:
         system: whose loops they are.
@@ -199,51 +199,53 @@ def verify(
     configuration = np.array(system.configuration)
     nearby = Closing(system, p).nearby(configuration, _MOVE, _TRIES, _SEED)
     configurations = [configuration, *islice(nearby, _CHECKS)]
-    ways = [ways_from(system, stages, start(q), q, p) for q in configurations]
-    shortest = min(ways, key=len)
+    branches = [branches_from(system, stages, start(q), q, p) for q in configurations]
+    shortest = min(branches, key=len)
     if len(shortest) < len(stages):
         raise NoClosedForm(
             f"{system.name}: the loop of {stages[len(shortest)].name} does not close as the"
             " directions of its axes suggest; use mbs.loops.solve without branch"
         )
-    chosen = [replace(stage, chosen=way) for stage, way in zip(stages, ways[0], strict=True)]
+    chosen = [
+        replace(stage, chosen=branch) for stage, branch in zip(stages, branches[0], strict=True)
+    ]
     starts = [start(q) for q in configurations]
-    return tuple(_without_open_ways(system, chosen, starts, p))
+    return tuple(_without_open_branches(system, chosen, starts, p))
 
 
-def _without_open_ways(
+def _without_open_branches(
     system: System, stages: Sequence[Stage], starts: Sequence[Vector], p: Vector
 ) -> list[Stage]:
     result = list[Stage]()
     for number, stage in enumerate(stages):
         kept = [
-            way
-            for way in range(len(stage.labels))
-            if way == stage.chosen
-            or any(_may_close(system, stages, number, way, start, p) for start in starts)
+            branch
+            for branch in range(len(stage.labels))
+            if branch == stage.chosen
+            or any(_may_close(system, stages, number, branch, start, p) for start in starts)
         ]
         result.append(stage if len(kept) == len(stage.labels) else _only(stage, kept))
     return result
 
 
 def _may_close(
-    system: System, stages: Sequence[Stage], number: int, way: int, start: Vector, p: Vector
+    system: System, stages: Sequence[Stage], number: int, branch: int, start: Vector, p: Vector
 ) -> bool:
-    """Whether another way of one stage closes the loops or leads nowhere, the others as chosen."""
+    """Whether another branch of one stage closes the loops or ends, the others as chosen."""
     reached = start.copy()
     for k, stage in enumerate(stages):
         values = np.array(stage.values(reached, p))
-        reached[list(stage.places)] = values[:, way if k == number else stage.chosen]
+        reached[list(stage.indices)] = values[:, branch if k == number else stage.chosen]
     if not np.all(np.isfinite(reached)):
         return True
     return Closing(system, p).openness(reached[: system.nq]) < OPEN
 
 
 def _only(stage: Stage, kept: Sequence[int]) -> Stage:
-    """The stage with these ways alone."""
+    """The stage with these branches alone."""
     q, p = (casadi.SX.sym(name, stage.values.size1_in(k)) for k, name in enumerate("qp"))
     values = Function("ways", [q, p], [stage.values(q, p)[:, list(kept)]])
-    labels = tuple(stage.labels[way] for way in kept)
+    labels = tuple(stage.labels[branch] for branch in kept)
     return replace(stage, labels=labels, values=values, chosen=kept.index(stage.chosen))
 
 
@@ -263,7 +265,7 @@ def plan(system: System) -> tuple[Stage, ...]:
     require_system(system)
 
     def build() -> tuple[Stage, ...]:
-        return plan_from(system, independent_places(system)) if system.closure else ()
+        return plan_from(system, independent_indices(system)) if system.closure else ()
 
     stages: tuple[Stage, ...] = system.cached("closed form", build)
     return stages
@@ -312,13 +314,13 @@ class _Work:
     def take(self, stage: Stage) -> None:
         """Count what a stage gives as known."""
         self.stages.append(stage)
-        self.known |= set(stage.places)
+        self.known |= set(stage.indices)
         if len(stage.labels) == 1:
             p = self.system.p
             found = constants(stage.values(self.q, p), self.q, p)
-            for place, number in zip(stage.places, found, strict=True):
+            for index, number in zip(stage.indices, found, strict=True):
                 if number is not None:
-                    self.values[place] = number
+                    self.values[index] = number
 
     def ring(self, number: int) -> Ring:
         """The loop of a cut joint."""
@@ -326,7 +328,7 @@ class _Work:
 
 
 def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
-    """The stages in their order, not yet held against configurations.
+    """The stages in their order, not yet compared with configurations.
 
     Args:
         system: whose loops they are.
@@ -351,10 +353,10 @@ def order_stages(system: System, known: Collection[int], q: SX) -> list[Stage]:
                 waiting.append(number)
                 reasons[number] = outcome
         if waiting and len(work.stages) == before:
-            held = _held(work, waiting)
-            if held is None:
+            undetermined = _point_stage(work, waiting)
+            if undetermined is None:
                 raise NoClosedForm(_refusal(system, waiting, reasons))
-            work.take(held)
+            work.take(undetermined)
         pending = waiting
     _require_all(system, work.known)
     return work.stages
@@ -378,25 +380,25 @@ def _attempt(work: _Work, number: int) -> Stage | str | None:
     return root if isinstance(root, str) else _stage(work, joint.name, root)
 
 
-def _held(work: _Work, waiting: Sequence[int]) -> Stage | None:
+def _point_stage(work: _Work, waiting: Sequence[int]) -> Stage | None:
     """Slides that several loops share and the rigid links in these hold, if there are such."""
     system, groups = work.system, dict[frozenset[int], dict[int, Span]]()
     for number in waiting:
         if number < len(system.cuts) and not _is_bound(system, number):
             for span in spans(work.ring(number), work.q, system.p):
-                places = slid_places(span)
-                if places:
-                    groups.setdefault(places, {}).setdefault(number, span)
+                indices = prismatic_indices(span)
+                if indices:
+                    groups.setdefault(indices, {}).setdefault(number, span)
     for found in groups.values():
         numbers = independent_links(found, work.q, system.p)
         if numbers:
             name = system.cuts[numbers[-1]].edge.joint.name
-            return _stage(work, name, held_point(name, [found[k] for k in numbers]))
+            return _stage(work, name, point_on_links(name, [found[k] for k in numbers]))
     return None
 
 
 def _is_bound(system: System, number: int) -> bool:
-    """Whether a loop is closed by what is not made of turns, slides and balls."""
+    """Whether a loop has joints other than revolute, prismatic and spherical."""
     joint = system.cuts[number].edge.joint
     return isinstance(joint, Constraint) and not isinstance(joint, (PointOnLine, Rod))
 
@@ -416,19 +418,19 @@ def _bound_by_part(work: _Work, number: int) -> str | None:
 def _coupling_stage(work: _Work, coupling: CoordinateCoupling) -> Stage | str | None:
     if work.known.issuperset(coupling.coordinates):
         return None
-    root = coupled(coupling, work.known, work.q)
+    root = coupled_position(coupling, work.known, work.q)
     return root if isinstance(root, str) else _stage(work, coupling.name, root)
 
 
-def _stage(work: _Work, name: str, root: Root) -> Stage:
-    arguments, ways = [work.q, work.system.p], list(root.ways.values())
-    places = tuple(sorted(ways[0]))
-    columns = [casadi.vertcat(*(way[place] for place in places)) for way in ways]
+def _stage(work: _Work, name: str, root: LoopBranches) -> Stage:
+    arguments, branches = [work.q, work.system.p], list(root.branches.values())
+    indices = tuple(sorted(branches[0]))
+    columns = [casadi.vertcat(*(branch[index] for index in indices)) for branch in branches]
     values = Function("ways", arguments, [casadi.densify(casadi.horzcat(*columns))])
-    if root.spun is None:
-        return Stage(name, places, tuple(root.ways), values)
-    angle = Function("spin", arguments, [root.spun.angle])
-    return Stage(name, places, tuple(root.ways), values, (root.spun.place, angle))
+    if root.spin is None:
+        return Stage(name, indices, tuple(root.branches), values)
+    angle = Function("spin", arguments, [root.spin.angle])
+    return Stage(name, indices, tuple(root.branches), values, (root.spin.index, angle))
 
 
 def _refusal(system: System, waiting: Sequence[int], reasons: dict[int, str]) -> str:
@@ -468,17 +470,17 @@ class Known:
     Attributes:
         independent: those of the given joints that do not depend on each other.
         dependent: the others of them.
-        held: independent joints that nothing given determines.
+        undetermined: independent joints that nothing given determines.
     """
 
     independent: tuple[int, ...]
     dependent: tuple[int, ...] = ()
-    held: tuple[int, ...] = ()
+    undetermined: tuple[int, ...] = ()
 
     @property
-    def places(self) -> tuple[int, ...]:
+    def indices(self) -> tuple[int, ...]:
         """What is known of q at the start."""
-        return self.independent + self.held
+        return self.independent + self.undetermined
 
 
 def complete(system: System, given: Sequence[int]) -> Known:
@@ -486,52 +488,54 @@ def complete(system: System, given: Sequence[int]) -> Known:
 
     Args:
         system: the assembled mechanism.
-        given: numbers in q of turns and slides.
+        given: indices in q of revolute and prismatic joints.
 
     Raises:
-        NoClosedForm: balls or free bodies beside them move in some of their ways only.
+        NoClosedForm: spherical joints or free bodies beside them move in some of their ways only.
     """
     free = null_space(
         Closing(system, closure_parameters(system)).rows(regular_configuration(system))[1]
     )
     independent = _raising(free, given, ())
     dependent = tuple(k for k in given if k not in independent)
-    return Known(independent, dependent, held_beside(system, free, independent))
+    return Known(independent, dependent, undetermined_beside(system, free, independent))
 
 
-def held_beside(system: System, free: Vector, first: tuple[int, ...]) -> tuple[int, ...]:
-    """Joints that determine the rest of a motion: motors, other turns and slides, then balls.
+def undetermined_beside(system: System, free: Vector, first: tuple[int, ...]) -> tuple[int, ...]:
+    """Joints that determine the rest: motors, other revolute and prismatic, then spherical ones.
 
     Args:
         system: the assembled mechanism.
         free: (nq, m) directions in which the positions can move.
-        first: numbers in q of what is known, independent.
+        first: indices in q of what is known, independent.
 
     Raises:
-        NoClosedForm: balls or free bodies move in some of their ways only.
+        NoClosedForm: spherical joints or free bodies move in some of their ways only.
     """
     simple = [link for link in system.tree.links if link.motion.nq == 1]
     motors = [link.q.start for link in simple if link.v.start in system.free]
     others = [link.q.start for link in simple if link.q.start not in motors]
-    held = _raising(free, [*motors, *others], first)
-    left = free.shape[1] - len(first) - len(held) - len(spin_places(system))
+    undetermined = _raising(free, [*motors, *others], first)
+    left = free.shape[1] - len(first) - len(undetermined) - len(spin_indices(system))
     loose = [link for link in system.tree.links if link.motion.nq > 1]
     for link in loose:
-        places = tuple(range(link.q.start, link.q.stop))
-        if _gain(free, (*first, *held), places) == link.motion.nv:
-            held, left = (*held, *places), left - link.motion.nv
+        indices = tuple(range(link.q.start, link.q.stop))
+        if _gain(free, (*first, *undetermined), indices) == link.motion.nv:
+            undetermined, left = (*undetermined, *indices), left - link.motion.nv
     if left > 0:
         names = ", ".join(link.name for link in loose)
         raise NoClosedForm(
-            f"{system.name}: {names or 'a joint'} can move while all turns and slides stay, in a"
-            " way that no position tells; use mbs.loops.working_modes"
+            f"{system.name}: {names or 'a joint'} can move while all revolute and prismatic joints"
+            " stay, in a way that no position tells; use mbs.loops.working_modes"
         )
-    return held
+    return undetermined
 
 
-def _gain(free: Vector, taken: tuple[int, ...], places: tuple[int, ...]) -> int:
+def _gain(free: Vector, taken: tuple[int, ...], indices: tuple[int, ...]) -> int:
     """How many more directions the positions tell."""
-    return rank(free[[*taken, *places]], _LOOSE) - (rank(free[list(taken)], _LOOSE) if taken else 0)
+    return rank(free[[*taken, *indices]], _LOOSE) - (
+        rank(free[list(taken)], _LOOSE) if taken else 0
+    )
 
 
 def regular_configuration(system: System) -> Vector:
@@ -565,17 +569,17 @@ class Posed:
     Attributes:
         stages: in their order.
         size: how many positions there are, seven of the pose at their end.
-        held: numbers in q of independent joints that the pose does not determine.
+        undetermined: indices in q of independent joints that the pose does not determine.
     """
 
     stages: tuple[Stage, ...]
     size: int
-    held: tuple[int, ...]
+    undetermined: tuple[int, ...]
 
     def started(self, T: Vector, q: Vector) -> Vector:
-        """All positions, with those of the pose T (4, 4) and, as in q (nq,), those held."""
+        """All positions, with those of the pose T (4, 4) and, as in q (nq,), the undetermined."""
         start = np.zeros(self.size)
-        start[list(self.held)] = q[list(self.held)]
+        start[list(self.undetermined)] = q[list(self.undetermined)]
         start[-_POSE:-4] = T[:3, 3]
         start[-4:] = _quaternion(T[:3, :3])
         return start
@@ -606,9 +610,9 @@ def _plan_to(system: System, frame: str | int) -> Posed:
     welded = replace(system, cuts=cuts, _cache={})
     at = _pose_and_slope(system, frame)
     p = closure_parameters(system)
-    held = _posed_locked(system, at, p)
-    known = {*held, *spin_places(welded).values(), *range(first, first + _POSE)}
-    plan = Posed(tuple(order_stages(welded, known, q)), first + _POSE, held)
+    undetermined = _pose_locked(system, at, p)
+    known = {*undetermined, *spin_indices(welded).values(), *range(first, first + _POSE)}
+    plan = Posed(tuple(order_stages(welded, known, q)), first + _POSE, undetermined)
 
     def started(configuration: Vector) -> Vector:
         return plan.started(np.array(at(configuration, p)[0]), configuration)
@@ -621,11 +625,11 @@ def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
     return Cut(joint, -1, link, goal, pose, True)
 
 
-def _posed_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
+def _pose_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
     """Independent joints that move while the frame stays."""
     q = regular_configuration(system)
     rows = np.vstack([Closing(system, p).rows(q)[1], np.array(at(q, p)[1])])
-    return held_beside(system, null_space(rows), ())
+    return undetermined_beside(system, null_space(rows), ())
 
 
 def _pose_and_slope(system: System, frame: str | int) -> Function:

@@ -37,8 +37,8 @@ _WANTED = (
 )
 
 
-def wanted_pose(system: System, T: Any) -> Array:
-    """The pose that is wanted, its orientation exactly orthonormal.
+def target_pose(system: System, T: Any) -> Array:
+    """The target pose, its orientation exactly orthonormal.
 
     Args:
         system: named in messages.
@@ -123,7 +123,7 @@ def _skewed_axes(R: Array, name: str) -> str:
     return faults[worst]
 
 
-# What a frame is wanted to do: its pose, or some rows of it, beside the closure of the loops.
+# What is asked of a frame: its pose, or some rows of it, beside the closure of the loops.
 
 
 ROWS = {"x": (0,), "y": (1,), "z": (2,), "orientation": tuple(range(3, 12)), "axis": (9, 10, 11)}
@@ -140,19 +140,19 @@ long is better replaced by the next start."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """A pose that a frame is wanted to have while the loops are closed.
+    """A pose that a frame is to have while the loops are closed.
 
     Attributes:
         closing: the closure rows; no position is held.
-        frame: that is wanted there.
+        frame: that is to be there.
         rows: names of the rows of the pose that count.
-        wanted: (12,) origin [m], then the axes x, y, z of the frame, in the base.
+        target: (12,) origin [m], then the axes x, y, z of the frame, in the base.
     """
 
     closing: Closing
     frame: str | int
     rows: tuple[str, ...]
-    wanted: Vector
+    target: Vector
 
     @property
     def elements(self) -> list[int]:
@@ -161,15 +161,15 @@ class Goal:
 
     def at(self, T: Vector) -> Goal:
         """The same goal at another pose (4, 4)."""
-        return replace(self, wanted=_elements(T))
+        return replace(self, target=_elements(T))
 
     def gap(self, q: Vector) -> tuple[float, float]:
         """How far the frame is away at q, (nq,): distance [m] and angle [rad] of what counts."""
-        place = self.pose(q)[0] - self.wanted
+        index = self.pose(q)[0] - self.target
         own = [k for k in self.elements if k < 3]
-        axes = np.where(np.isin(range(12), self.elements), place, 0.0)[3:].reshape(3, 3)
+        axes = np.where(np.isin(range(12), self.elements), index, 0.0)[3:].reshape(3, 3)
         chord = float(np.linalg.norm(axes)) / (np.sqrt(2) if "orientation" in self.rows else 1)
-        return float(np.linalg.norm(place[own])), 2 * float(np.arcsin(min(1.0, chord / 2)))
+        return float(np.linalg.norm(index[own])), 2 * float(np.arcsin(min(1.0, chord / 2)))
 
     def residual(self, q: Vector, weight: float = 1.0) -> tuple[Vector, Vector]:
         """Closure rows times a weight, then those of the pose, and the slope by q, (m, nq)."""
@@ -177,7 +177,7 @@ class Goal:
         pose, slope = self.pose(q)
         e = self.elements
         return (
-            np.concatenate([weight * r, pose[e] - self.wanted[e]]),
+            np.concatenate([weight * r, pose[e] - self.target[e]]),
             np.vstack([weight * J, slope[e]]),
         )
 
@@ -197,7 +197,7 @@ class Goal:
         root = gauss_newton(self.residual, q, tolerance=tolerance, iterations=_ITERATIONS)
         return Closed(root.x, root.residual, root.converged and self.closing.faces(root.x))
 
-    def approached(self, q: Vector) -> Closed:
+    def approach(self, q: Vector) -> Closed:
         """The configuration next to q with closed loops that is nearest to the pose."""
         root = levenberg_marquardt(lambda x: self.residual(x, _CLOSURE_WEIGHT), q)
         return self.closing.nearest(root.x)
@@ -228,7 +228,7 @@ def goal(
     system.frame(frame)
     closing = Closing(system, closure_parameters(system, parameters))
     chosen = WHOLE if rows is None else _named(system, rows)
-    return Goal(closing, frame, chosen, _elements(wanted_pose(system, T)))
+    return Goal(closing, frame, chosen, _elements(target_pose(system, T)))
 
 
 def _named(system: System, rows: Sequence[str]) -> tuple[str, ...]:
@@ -278,7 +278,7 @@ def solve_pose(
     Args:
         system: open or closed.
         frame: a body, a named frame, or the number of a link.
-        T: (4, 4) wanted pose in the base, homogeneous [m]; an orientation that is orthonormal but
+        T: (4, 4) target pose in the base, homogeneous [m]; an orientation that is orthonormal but
             for 1e-6 is rounded to the nearest one.
         rows: what of the pose counts: "x", "y", "z", "orientation", and "axis" for the z axis of
             the frame alone; the whole pose when left out. A robot of fewer than six freedoms needs
@@ -294,33 +294,33 @@ def solve_pose(
         Unclosable: no configuration was found; the message says how near the frame comes.
         ModelError: there is no such frame, row or coordinate, or T is no pose.
     """
-    wanted = goal(system, frame, T, rows, parameters)
+    target = goal(system, frame, T, rows, parameters)
     start = np.array(system.position(guess))
     tried: list[Closed] = []
-    for q in starts(start, wanted.closing.free):
-        found = wanted.nearest(q)
+    for q in starts(start, target.closing.free):
+        found = target.nearest(q)
         if found.is_closed:
             return found.q
         tried.append(found)
-    raise Unclosable(_refusal(wanted, start, tried))
+    raise Unclosable(_refusal(target, start, tried))
 
 
-def _refusal(wanted: Goal, start: Vector, tried: Sequence[Closed]) -> str:
+def _refusal(target: Goal, start: Vector, tried: Sequence[Closed]) -> str:
     """Why no configuration was found: the loops stay open, or the pose is out of reach."""
-    closing = wanted.closing
+    closing = target.closing
     best = sorted(tried, key=lambda found: found.residual)[:_FEWEST]
-    near = [wanted.approached(q) for q in (*(found.q for found in best), start)]
-    gaps = [wanted.gap(found.q) for found in near if found.is_closed]
-    title = f"{closing.system.name}: frame {quoted(wanted.frame)} cannot be brought to this pose"
+    near = [target.approach(q) for q in (*(found.q for found in best), start)]
+    gaps = [target.gap(found.q) for found in near if found.is_closed]
+    title = f"{closing.system.name}: frame {quoted(target.frame)} cannot be brought to this pose"
     if not gaps:
         left = closing.gap(best[0].q)
         return f"{title}; the best configuration found leaves {left}; change the guess"
     distance, angle = min(gaps, key=lambda gap: gap[0] ** 2 + gap[1] ** 2)
-    away = [f"{round(distance, 6):.4g} m away"] * bool(set(wanted.rows) & set("xyz"))
-    away += [f"turned by {round(angle, 6):.4g} rad"] * bool(
-        set(wanted.rows) & {"orientation", "axis"}
+    away = [f"{round(distance, 6):.4g} m away"] * bool(set(target.rows) & set("xyz"))
+    away += [f"rotated by {round(angle, 6):.4g} rad"] * bool(
+        set(target.rows) & {"orientation", "axis"}
     )
-    named = wanted.rows != WHOLE or len(closing.system.active) >= 6
+    named = target.rows != WHOLE or len(closing.system.active) >= 6
     remedy = "" if named else f"name the rows=[...] that count, of {', '.join(ROWS)}, or "
     return (
         f"{title}; the nearest configuration found with closed loops leaves it"

@@ -12,7 +12,7 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
-from mbs.loops.examine import LED
+from mbs.loops.examine import DETERMINED
 from mbs.loops.velocity import acceleration_bias, determining_rows
 from mbs.solvers.linear import solve_square
 from mbs.spatial import zeros
@@ -45,7 +45,7 @@ def reduction_matrix(system: System) -> Function:
         q = SX.sym("q", system.nq)
         return [("q", q)], [("G", reduction(system, q).G)]
 
-    return model_function(system, ("reduction_matrix",), build, LED)
+    return model_function(system, ("reduction_matrix",), build, DETERMINED)
 
 
 def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
@@ -54,7 +54,7 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     Args:
         system: with closed loops.
         q: (nq, 1) symbols of positions that close the loops.
-        v_a: (m, 1) independent velocities, or None when gamma is not wanted.
+        v_a: (m, 1) independent velocities, or None when gamma is not target.
     """
     closure = system.closure
     assert closure is not None

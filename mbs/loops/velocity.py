@@ -29,7 +29,7 @@ from mbs.loops.closure import (
 from mbs.recursions.force_elements import sum_wrenches
 from mbs.recursions.parts import parts_at
 from mbs.recursions.route import relative_pose
-from mbs.spatial import Pose, Wrench, add_wrenches, carried, cross, skew, vector
+from mbs.spatial import Pose, Wrench, add_wrenches, cross, skew, transform_wrench, vector
 
 
 def closure_jacobian(system: System) -> Function:
@@ -139,7 +139,7 @@ def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
     """
     small = [SX.sym(cut.edge.joint.name, 6) for cut in system.cuts]
     moved = tuple(
-        replace(cut, pose_b=cut.pose_b @ _displaced(d))
+        replace(cut, pose_b=cut.pose_b @ _displace(d))
         for cut, d in zip(system.cuts, small, strict=True)
     )
     rows = closure_rows(replace(system, cuts=moved, _cache={}), q)
@@ -170,7 +170,7 @@ def on_links(system: System, q: SX, wrenches: dict[str, Wrench]) -> dict[int, Wr
         for link, sign in ((cut.link_a, 1), (cut.link_b, -1)):
             if link >= 0:
                 T = relative_pose(system.tree, q, (link, Pose.identity()), cut.frames[1])
-                f, m = carried(T, wrenches[cut.edge.joint.name])
+                f, m = transform_wrench(T, wrenches[cut.edge.joint.name])
                 exerted.append({link: (sign * f, sign * m)})
     return sum_wrenches(*exerted)
 
@@ -196,13 +196,13 @@ def part_wrenches(system: System, q: SX, lam: SX) -> dict[int, Wrench]:
                 part, at = parts[group.name], moving if kind == "velocities" else still
                 loads = at.loads_of_rows(part, lam[first:last], velocities=kind == "velocities")
                 for (link, pose), load in zip(part.frames, loads, strict=True):
-                    f, m = carried(pose, (load.force, load.moment))
+                    f, m = transform_wrench(pose, (load.force, load.moment))
                     exerted.append({link: (-f, -m)} if link >= 0 else {})
             first = last
     return sum_wrenches(*exerted)
 
 
-def _displaced(d: SX) -> Pose:
+def _displace(d: SX) -> Pose:
     """A frame moved by d[:3] and turned by d[3:], both small."""
     return Pose(SX(DM.eye(3)) + skew(d[3:]), d[:3])
 

@@ -64,8 +64,8 @@ class Contacts:
 
     Attributes:
         names: of the coordinates.
-        velocities: numbers in v.
-        positions: numbers in q; None where there is friction alone.
+        velocities: indices in v.
+        positions: indices in q; None where there is friction alone.
         stops, frictions: the elements, None where there is none.
         bounds: (k, 1) lower limits, then upper ones; zero where there is none.
         has_lower, has_upper, has_friction: (k, 1) 1 where there is one.

@@ -21,7 +21,7 @@ from mbs.errors import ModelError, NoClosedForm, Unclosable
 from mbs.loops.closure import independent_closure, row_groups
 from mbs.loops.configuration import Values, start
 from mbs.loops.function import function
-from mbs.loops.plan import plan, ways_at
+from mbs.loops.plan import branches_at, plan
 from mbs.loops.reduction import reduction_matrix
 from mbs.loops.velocity import acceleration_bias, independent_constraint_rows
 from mbs.models.contacts import require_no_contacts
@@ -174,13 +174,13 @@ def implicit(system: System, form: str, held: Held | None = None) -> DaeEquation
         system,
         states=(casadi.vertcat(q, v, system.z), casadi.vertcat(a, lam, mu), u),
         ode=casadi.vertcat(position_rate(system.tree, q, speed), a, rates),
-        alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _kept(rows, form)),
+        alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _keep(rows, form)),
         invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),
         motion=(q, v),
     )
 
 
-def _kept(rows: Rows, form: str) -> SX:
+def _keep(rows: Rows, form: str) -> SX:
     """What the algebraic equations of a form ask of the loops."""
     match form:
         case "index1":
@@ -395,7 +395,7 @@ class Dae(DaeEquations):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A pickle holds all of it; its symbols are new ones of the same names."""
-        return _unpickled, packed({f.name: getattr(self, f.name) for f in fields(self)})
+        return _unpickle, packed({f.name: getattr(self, f.name) for f in fields(self)})
 
     def casadi(self) -> dict[str, SX]:
         """What `casadi.integrator` takes: x, z, u, p, ode, alg."""
@@ -539,7 +539,7 @@ def _winds(system: System) -> bool:
 def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
     """The labels of the closed configuration q."""
     stages = plan(system)
-    ways = ways_at(system, stages, q, p)
+    ways = branches_at(system, stages, q, p)
     if len(ways) < len(stages):
         raise Unclosable(
             f"{system.name}: the closed form of the loop of {stages[len(ways)].name} does not give"
@@ -610,5 +610,5 @@ def _start_algebraic(system: System, point: tuple[Array, ...], size: int) -> Arr
     return z0
 
 
-def _unpickled(*parts: Any) -> Dae:
+def _unpickle(*parts: Any) -> Dae:
     return Dae(**unpacked(*parts))

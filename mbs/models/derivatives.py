@@ -261,8 +261,8 @@ def inverse_dynamics_derivatives(
         key = ("idm_derivatives", chosen, coordinates, names)
         return model_function(system, key, symbols, configuration_check(system, coordinates))
 
-    candidates = ("ad",) if is_reduced(system, coordinates) else _compared(system, "analytical")
-    return _chosen(system, ("idm_derivatives", coordinates, names), method, build, candidates)
+    candidates = ("ad",) if is_reduced(system, coordinates) else _compare(system, "analytical")
+    return _choose(system, ("idm_derivatives", coordinates, names), method, build, candidates)
 
 
 def direct_dynamics_derivatives(
@@ -319,15 +319,15 @@ def direct_dynamics_derivatives(
 
         key = ("ddm_derivatives", chosen, coordinates, names)
         if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
-            staged: Function = system.cached(key, lambda: _staged(system, names))
+            staged: Function = system.cached(key, lambda: _stage(system, names))
             return staged
         return model_function(system, key, symbols, configuration_check(system, coordinates))
 
-    candidates = ("implicit",) if system.is_closed else _compared(system, "implicit")
-    return _chosen(system, ("ddm_derivatives", coordinates, names), method, build, candidates)
+    candidates = ("implicit",) if system.is_closed else _compare(system, "implicit")
+    return _choose(system, ("ddm_derivatives", coordinates, names), method, build, candidates)
 
 
-def _staged(system: System, names: tuple[str, ...]) -> Function:
+def _stage(system: System, names: tuple[str, ...]) -> Function:
     """The derivatives of accelerations of a large tree."""
     inputs, outputs = staged_accelerations(system, names)
     labels = ["q", "v", "tau", "p"][: len(inputs)], [*(f"da_d{name}" for name in names), "a"]
@@ -368,7 +368,7 @@ def _check_method(system: System, coordinates: str, method: str, known: tuple[st
         )
 
 
-def _compared(system: System, recursive: str) -> tuple[str, ...]:
+def _compare(system: System, recursive: str) -> tuple[str, ...]:
     """The recursive method, and the differentiated one while it may win."""
     behind: list[int] = []
     for link in system.tree.links:
@@ -377,7 +377,7 @@ def _compared(system: System, recursive: str) -> tuple[str, ...]:
     return (recursive,) if max(behind) > _COMPARED else (recursive, "ad")
 
 
-def _chosen(
+def _choose(
     system: System,
     key: tuple[object, ...],
     method: str,

@@ -11,7 +11,7 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.examine import LED
+from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import reduction
 from mbs.models.symbols import check_coordinates, is_reduced
 from mbs.recursions.jacobian import VelocityTarget
@@ -48,16 +48,16 @@ class Selection:
     @property
     def check(self) -> ConfigurationCheck | None:
         """What refuses the configurations that functions of the matrix cannot take."""
-        return LED if self.reduced else None
+        return DETERMINED if self.reduced else None
 
     def of(self, system: System) -> tuple[SX, SquareJacobian]:
         """Symbols q, (nq, 1), and the matrix at them in blocks; formed once."""
         found: tuple[SX, SquareJacobian] = system.cached(
-            ("square_jacobian", self), lambda: self._formed(system)
+            ("square_jacobian", self), lambda: self._form(system)
         )
         return found
 
-    def _formed(self, system: System) -> tuple[SX, SquareJacobian]:
+    def _form(self, system: System) -> tuple[SX, SquareJacobian]:
         q = SX.sym("q", system.nq)
         frame, axes = system.frame(self.frame), system.frame(self.expressed_in)
         target = VelocityTarget(system.tree, q, system.p, frame, axes)

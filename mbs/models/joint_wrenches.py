@@ -42,7 +42,7 @@ from mbs.recursions.parts import PartsAt, parts_at
 from mbs.recursions.route import relative_pose
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.solvers.linear import solve_saddle, solve_square
-from mbs.spatial import Pose, PseudoInertia, Wrench, add_wrenches, carried, cross, zeros
+from mbs.spatial import Pose, PseudoInertia, Wrench, add_wrenches, cross, transform_wrench, zeros
 
 # Wrenches of joints that weld two bodies into one link, as a force sensor between them feels.
 
@@ -85,7 +85,7 @@ def weld_wrench(
     for wrench in exerted:
         if wrench is not None:
             total = add_wrenches(total, wrench)
-    f, m = carried(pose.inverse(), total)
+    f, m = transform_wrench(pose.inverse(), total)
     return part.sign * f, part.sign * m
 
 
@@ -93,7 +93,7 @@ def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench
     """What the body of frame_a or frame_b, `side`, exerts on a joint, in the frame of its link."""
     T = relative_pose(system.tree, q, (link, Pose.identity()), row.frame_b)
     sign = 1 if side == "a" else -1
-    f, m = carried(T, wrench)
+    f, m = transform_wrench(T, wrench)
     return sign * f, sign * m
 
 
@@ -292,6 +292,6 @@ def _at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wr
     """The wrench that a joint of the tree transmits, on the body of frame_b."""
     link = max(joint.frame_a[0], joint.frame_b[0])
     T = relative_pose(tree, q, joint.frame_b, (link, Pose.identity()))
-    f, m = carried(T, through[link])
+    f, m = transform_wrench(T, through[link])
     sign = 1 if link == joint.frame_b[0] else -1
     return sign * f, sign * m

@@ -38,7 +38,7 @@ def jacobian(
     """``jacobian(q) -> J``: velocity of a frame, [V; w] = J v, V being that of its origin.
 
     With form="renaud" it is ``jacobian_renaud(q) -> R6, L, J``, three factors whose product is
-    that matrix: R6 turns from an intermediate frame into the wanted axes, L moves the velocity of
+    that matrix: R6 turns from an intermediate frame into the target axes, L moves the velocity of
     a reference point to the origin of the frame, J is in the intermediate frame, where it has the
     fewest terms.
 

@@ -16,7 +16,7 @@ from mbs.components.component import in_plane
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.loops.closure import cut_twist
-from mbs.loops.examine import LED
+from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import reduction, tree_rows
 from mbs.loops.velocity import acceleration_bias, determining_rows, independent_constraint_rows
 from mbs.models.symbols import ModelSymbols, symbols_of
@@ -64,7 +64,7 @@ def velocity_closure(system: System) -> Function:
         ]
         return [("q", q)], outputs
 
-    return model_function(system, ("velocity_closure",), build, LED)
+    return model_function(system, ("velocity_closure",), build, DETERMINED)
 
 
 def acceleration_closure(system: System, coordinates: str = "independent") -> Function:
@@ -104,7 +104,7 @@ def acceleration_closure(system: System, coordinates: str = "independent") -> Fu
         outputs = [("Psi", values[0][:r]), ("Phi", values[0][r:]), ("G_dot", values[1])]
         return [("q", s.q), (f"v{s.suffix}", s.v)], outputs
 
-    return model_function(system, ("acceleration_closure", coordinates), build, LED)
+    return model_function(system, ("acceleration_closure", coordinates), build, DETERMINED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -64,7 +64,7 @@ def product(a: Polynomial, b: Polynomial) -> Polynomial:
     result: Polynomial = {}
     for m, x in a.items():
         for n, y in b.items():
-            _add(result, _joined(m, n), x * y)
+            _add(result, _join(m, n), x * y)
     return _within_reason({m: c for m, c in result.items() if c})
 
 
@@ -76,7 +76,7 @@ def _add(result: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
     result[monomial] = Fraction(0) if cancelled else both
 
 
-def _joined(m: Monomial, n: Monomial) -> Monomial:
+def _join(m: Monomial, n: Monomial) -> Monomial:
     powers = dict(m)
     for atom, power in n:
         powers[atom] = powers.get(atom, 0) + power
@@ -491,7 +491,7 @@ def _constant_and_factors(
             continue
         number *= parts.number
         for part, power in parts.factors:
-            polynomial, scale = _scaled(part)
+            polynomial, scale = _scale(part)
             number *= scale**power
             written = writer.text(polynomial)
             found = constants if writer.is_constant(polynomial) else powers
@@ -522,7 +522,7 @@ def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | N
     return parts if all(abs(a - b) <= allowed for a, b in pairs) else None
 
 
-def _scaled(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:
+def _scale(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:
     """The polynomial with a positive first term and coefficients of usual size, and its scale."""
     first = next(iter(polynomial.values()))
     largest = max(abs(coefficient) for coefficient in polynomial.values())

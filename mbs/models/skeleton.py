@@ -366,7 +366,7 @@ def _mass_centre(marks: _Marks, number: int) -> int | None:
     mass = Function("mass", [marks.system.p], [inertia.m])(marks.system.parameter_values())
     if not float(mass) > 0:
         return None
-    return marks.point((number - 1, Pose.moved(inertia.ms / inertia.m)))
+    return marks.point((number - 1, Pose.translation(inertia.ms / inertia.m)))
 
 
 def _function(system: System, marks: _Marks) -> Function:

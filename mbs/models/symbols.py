@@ -10,14 +10,14 @@ from casadi import SX, Function
 from mbs.assembly import System
 from mbs.assembly.model_function import ConfigurationCheck, Named, model_function, require_system
 from mbs.errors import ModelError
-from mbs.loops.examine import LED
+from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
 from mbs.recursions.parts import PartsAt, parts_at
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.velocities import Acceleration, moving_base, resting_base
-from mbs.spatial import Wrench, carried
+from mbs.spatial import Wrench, transform_wrench
 
 COORDINATES = ("independent", "tree")
 
@@ -77,7 +77,7 @@ def configuration_check(system: System, coordinates: str) -> ConfigurationCheck 
     Those of a reduced model close the loops, and its independent joints lead the others there.
     """
     require_system(system)
-    return LED if is_reduced(system, coordinates) else None
+    return DETERMINED if is_reduced(system, coordinates) else None
 
 
 def check_coordinates(system: System, coordinates: str) -> None:
@@ -191,7 +191,9 @@ def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
     exerted: list[dict[int, Wrench]] = []
     for column, row in enumerate(system.bodies):
         link, pose = system.frames[row.name]
-        exerted.append({link: carried(pose, (wrenches[0:3, column], wrenches[3:6, column]))})
+        exerted.append(
+            {link: transform_wrench(pose, (wrenches[0:3, column], wrenches[3:6, column]))}
+        )
     return sum_wrenches(*exerted)
 
 

@@ -7,7 +7,7 @@ from casadi import SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.assembly.validity import Row, plain_rows
+from mbs.assembly.validity import ValidityRow, plain_rows
 from mbs.loops.examine import loop_rows
 
 
@@ -57,5 +57,5 @@ def validity_rows(system: System) -> tuple[str, ...]:
     return tuple(row.name for row in _rows(system, SX.sym("q", system.nq)))
 
 
-def _rows(system: System, q: SX) -> list[Row]:
+def _rows(system: System, q: SX) -> list[ValidityRow]:
     return [*plain_rows(system, q), *(loop_rows(system, q) if system.is_closed else [])]

@@ -149,7 +149,7 @@ def with_array_calls(function: Function, library: Path | None, like: Any = None)
     result: Any = function if like is None else like(function)
     call = array_builtin(function, library, like is not None) if library else None
     result.__class__ = _class_with_arrays(type(result))
-    result._arrays = call or _declined
+    result._arrays = call or _decline
     result._last = None if like is None else default_of_last(function, like.__self__)
     result._inputs = function.n_in()
     result._guard = getattr(result, "guard", lambda: None)() if library else None
@@ -200,7 +200,7 @@ class ArrayCalls:
                 return result if out is None else out
         result = super().__call__(*args, **kwargs)  # type: ignore[misc]
         if out is not None:
-            return _copied(self, result, out)
+            return _copy(self, result, out)
         arrays = bool(args) and not kwargs and all(isinstance(x, _ARRAYS) for x in args)
         return _numpy(result) if arrays else result
 
@@ -225,7 +225,7 @@ def _class_with_arrays(base: type) -> type:
     return _CLASSES.setdefault(base, made)
 
 
-def _declined(*_: Any) -> None:
+def _decline(*_: Any) -> None:
     """The answer of a builtin that takes nothing."""
 
 
@@ -249,7 +249,7 @@ def _numpy(result: Any) -> Any:
     return array.ravel() if array.shape[1] == 1 else array
 
 
-def _copied(function: Any, result: Any, out: Any) -> Any:
+def _copy(function: Any, result: Any, out: Any) -> Any:
     """`out` with the result in it."""
     if isinstance(result, dict):
         result = tuple(result.values())

@@ -14,8 +14,8 @@ import numpy as np
 from casadi import Function
 
 from mbs.native.c_code import (
-    Batch,
     BlockCode,
+    SinCosGroup,
     Step,
     blocks,
     constant,
@@ -66,7 +66,7 @@ class FloatCode(BlockCode):
 
     def values(self, step: Step) -> list[str]:
         """See BlockCode."""
-        assert not isinstance(step, Batch)
+        assert not isinstance(step, SinCosGroup)
         form = _LITERAL.sub(r"\g<0>f", _CALL.sub(r"\1f(", form_of(self.graph, step)))
         text = form.format(*(_float_operand(self.graph, n) for n in self.graph.operands(step)))
         return [f"  const float t{step} = {text};"]

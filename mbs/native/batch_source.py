@@ -9,7 +9,7 @@ from itertools import accumulate
 import casadi
 from casadi import Function
 
-from mbs.native.c_code import Batch, BlockCode, LaneCode, blocks, schedule, slots
+from mbs.native.c_code import BlockCode, LaneCode, SinCosGroup, blocks, schedule, slots
 from mbs.native.kernel import BLOCK, HEADERS
 from mbs.operations.graph import Graph, graph_of
 
@@ -46,11 +46,11 @@ class _States(LaneCode):
 
     __slots__ = ()
 
-    def _written(self, graph: Graph, number: int) -> str:
+    def _write(self, graph: Graph, number: int) -> str:
         node = graph.nodes[number]
         if node.op == casadi.OP_INPUT:
             return f"i{node.args[0]}[{node.args[1]}]"
-        return LaneCode._written(self, graph, number)
+        return LaneCode._write(self, graph, number)
 
 
 def batch_source(
@@ -72,7 +72,9 @@ def batch_source(
     graph = graph_of(function)
     pieces = blocks(graph, schedule(graph), block)
     where = slots(graph, pieces)
-    angles = sum(len(step.angles) for steps in pieces for step in steps if isinstance(step, Batch))
+    angles = sum(
+        len(step.angles) for steps in pieces for step in steps if isinstance(step, SinCosGroup)
+    )
     sincos = "mbs_sincos_wide" if angles <= _INLINE else "mbs_sincos_wide_call"
     code: BlockCode = _States(graph, where, sincos, [False] * len(graph.inputs))
     taken = [port.sparsity.nnz() for port in graph.inputs]
@@ -101,7 +103,7 @@ def batch_source(
             for k, size in enumerate(taken)
         ),
         *(f"    part{k}(in, out, w);" for k in range(len(pieces))),
-        *(_flagged([*zip(places, taken, strict=False)], flags, given[:shown]) if finite else ()),
+        *(_flag([*zip(places, taken, strict=False)], flags, given[:shown]) if finite else ()),
         *(
             f"    mbs_give(ports + {count + k}, k, many, {size}, out[{k}]);"
             for k, size in enumerate(given[:shown])
@@ -115,7 +117,7 @@ def batch_source(
     return BatchSource({"batch.c": "\n".join(lines), **headers}, _WIDEST * (starts[-1] + 1))
 
 
-def _flagged(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -> list[str]:
+def _flag(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -> list[str]:
     """What makes outputs NaN in lanes where an input is not finite, for x * 0 is NaN, or a flag 0.
 
     A flag is 1 or 0, or NaN where an input is.

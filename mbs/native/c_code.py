@@ -139,7 +139,7 @@ _FREE = (casadi.OP_INPUT, casadi.OP_CONST)
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class SinCosGroup:
     """Sines and cosines computed at once.
 
     Attributes:
@@ -151,7 +151,7 @@ class Batch:
     results: tuple[tuple[int, int], ...]
 
 
-Step: TypeAlias = int | Batch
+Step: TypeAlias = int | SinCosGroup
 """A node to compute by its own operation, or a batch."""
 
 
@@ -214,17 +214,17 @@ def blocks(graph: Graph, steps: Sequence[Step], size: int) -> list[list[Step]]:
 
 
 def _weight(step: Step) -> int:
-    return _BATCH_SIZE if isinstance(step, Batch) else 1
+    return _BATCH_SIZE if isinstance(step, SinCosGroup) else 1
 
 
 def needs(graph: Graph, step: Step) -> tuple[int, ...]:
     """The nodes that must be known before a step."""
-    return step.angles if isinstance(step, Batch) else graph.operands(step)
+    return step.angles if isinstance(step, SinCosGroup) else graph.operands(step)
 
 
 def gives(step: Step) -> tuple[int, ...]:
     """The nodes that are known after a step."""
-    return tuple(n for n, _ in step.results) if isinstance(step, Batch) else (step,)
+    return tuple(n for n, _ in step.results) if isinstance(step, SinCosGroup) else (step,)
 
 
 def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
@@ -247,7 +247,7 @@ def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) ->
     return sorted(wanted)
 
 
-def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[list[Batch]]:
+def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[list[SinCosGroup]]:
     """The batches, those first that need no others."""
     depth = [0] * len(graph.nodes)
     levels: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
@@ -262,7 +262,7 @@ def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[
     return [_split(levels[level]) for level in sorted(levels)]
 
 
-def _split(angles: dict[int, list[tuple[int, int]]]) -> list[Batch]:
+def _split(angles: dict[int, list[tuple[int, int]]]) -> list[SinCosGroup]:
     result = []
     every = list(angles.items())
     for k in range(0, len(every), LANES):
@@ -270,7 +270,7 @@ def _split(angles: dict[int, list[tuple[int, int]]]) -> list[Batch]:
         places = [
             (number, part + lane) for lane, (_, uses) in enumerate(some) for number, part in uses
         ]
-        result.append(Batch(tuple(angle for angle, _ in some), tuple(places)))
+        result.append(SinCosGroup(tuple(angle for angle, _ in some), tuple(places)))
     return result
 
 
@@ -426,7 +426,7 @@ class BlockCode:
 
     def values(self, step: Step) -> list[str]:
         """Lines that declare what a step gives."""
-        if not isinstance(step, Batch):
+        if not isinstance(step, SinCosGroup):
             return [f"  const double t{step} = {expression(self.graph, step)};"]
         angles = [operand(self.graph, n) for n in step.angles]
         angles += ["0.0"] * (LANES - len(angles))
@@ -491,7 +491,7 @@ class LaneCode(BlockCode):
 
     def values(self, step: Step) -> list[str]:
         """See BlockCode."""
-        if isinstance(step, Batch):
+        if isinstance(step, SinCosGroup):
             return [line for k in range(len(step.angles)) for line in self._sincos(step, k)]
         operands = self.graph.operands(step)
         vectors = any(not self._is_scalar(n) for n in operands)
@@ -501,10 +501,10 @@ class LaneCode(BlockCode):
         if op in VECTORS:
             text = f"{VECTORS[op]}({', '.join(map(self._vector, operands))})"
         else:
-            text = expression(self.graph, step, self._written)
+            text = expression(self.graph, step, self._write)
         return [f"  const mbs_lanes t{step} = {text};"]
 
-    def _sincos(self, batch: Batch, lane: int) -> list[str]:
+    def _sincos(self, batch: SinCosGroup, lane: int) -> list[str]:
         angle = batch.angles[lane]
         own = [(n, place) for n, place in batch.results if place % LANES == lane]
         names = f"s{angle}", f"c{angle}"
@@ -520,10 +520,10 @@ class LaneCode(BlockCode):
         return shared or node.op == casadi.OP_CONST
 
     def _vector(self, number: int) -> str:
-        text = self._written(self.graph, number)
+        text = self._write(self.graph, number)
         return f"mbs_all({text})" if self._is_scalar(number) else text
 
-    def _written(self, graph: Graph, number: int) -> str:
+    def _write(self, graph: Graph, number: int) -> str:
         node = graph.nodes[number]
         if node.op == casadi.OP_INPUT and not self.shared[node.args[0]]:
             return f"i{node.args[0]}[{node.args[1]} * MBS_ROW]"

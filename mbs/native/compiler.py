@@ -410,7 +410,7 @@ def _library_in(
         ]
         output = build / f"library{suffix}"
         library = compile_library(parts, [build], flags, output, compiler=compiler)
-        return _installed(library, folder / f"{key}-{_sum_of(library)}{suffix}")
+        return _install(library, folder / f"{key}-{_sum_of(library)}{suffix}")
 
 
 def _known(folder: Path, key: str, suffix: str) -> Path | None:
@@ -435,7 +435,7 @@ def _common_object(
         return known
     source, output = build / file, build / f"{Path(file).stem}.o"
     _compile(compiler, [*chosen, f"-I{build}", str(source), "-o", str(output)], [source])
-    return _installed(output, folder / f"{key}-{_sum_of(output)}.o")
+    return _install(output, folder / f"{key}-{_sum_of(output)}.o")
 
 
 def is_whole(library: Path) -> bool:
@@ -467,7 +467,7 @@ def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> 
     return digest.hexdigest()[:40]
 
 
-def _installed(library: Path, target: Path) -> Path:
+def _install(library: Path, target: Path) -> Path:
     """The target; where another user keeps one of its name to himself, a copy for this process."""
     try:
         os.replace(library, target)

@@ -21,10 +21,10 @@ from casadi import Function, Sparsity
 from mbs.errors import ModelError
 from mbs.native.c_code import (
     LANES,
-    Batch,
     BlockCode,
     LaneCode,
     Memory,
+    SinCosGroup,
     Step,
     blocks,
     gives,
@@ -186,14 +186,14 @@ def function_table(function: Function, work: int) -> str:
     lines = [
         f"EXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}",
         f"EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}",
-        _chosen("double ", f"{name}_default_in", _defaults(function)),
-        _chosen("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
-        _chosen("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
+        _choose("double ", f"{name}_default_in", _defaults(function)),
+        _choose("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
+        _choose("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
     ]
     for kind, patterns in tables.items():
         names = [f"{name}_{kind}_{k}" for k in range(len(patterns))]
         lines += [_table(*row) for row in zip(names, patterns, strict=True)]
-        lines.append(_chosen(shape, f"{name}_{kind}", names))
+        lines.append(_choose(shape, f"{name}_{kind}", names))
     return "\n".join([*lines, _work(name, n_in, n_out, work)])
 
 
@@ -202,7 +202,7 @@ def _defaults(function: Function) -> list[str]:
     return [repr(x) if math.isfinite(x) else "NAN" for x in values]
 
 
-def _chosen(kind: str, name: str, answers: Sequence[str]) -> str:
+def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
     """A C function of a number that gives the answer of that number, else 0."""
     cases = "".join(f" case {k}: return {answer};" for k, answer in enumerate(answers))
     return f"EXPORT {kind}{name}(casadi_int i) {{ switch (i) {{{cases} default: return 0; }} }}"
@@ -290,7 +290,7 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     every = [steps for some in pieces for steps in some]
     columns, elsewhere = direct_columns(graph, maps, function.n_out())
     where = slots(graph, every, {port: begins[k] for port, k in late.items()}, elsewhere)
-    batches = sum(isinstance(step, Batch) for steps in every for step in steps)
+    batches = sum(isinstance(step, SinCosGroup) for steps in every for step in steps)
     code = BlockCode(graph, where, "mbs_sincos8" if batches <= _INLINE else "mbs_sincos8_call")
     memory = Memory(function, graph, where.count)
     sources = []

@@ -116,14 +116,14 @@ class _Trace:
     def called(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
         """The outputs."""
         if function.class_name() in _MAPS:
-            return self._mapped(function, arguments)
+            return self._map(function, arguments)
         if function.is_a("MXFunction"):
-            return self._interpreted(function, arguments)
+            return self._interpret(function, arguments)
         if function.is_a("SXFunction"):
             return [SX(y) for y in function.call([_whole(x) for x in arguments])]
         raise ModelError(f"{function.name()} is not made of scalar operations")
 
-    def _interpreted(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+    def _interpret(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
         work: dict[int, _Value] = {}
         results = [[SX(0)] * function.nnz_out(k) for k in range(function.n_out())]
         for k in range(function.n_instructions()):
@@ -164,7 +164,7 @@ class _Trace:
             raise ModelError(f"operation {op} of CasADi between maps is not known here")
         return [SX(_MOVES[op](node, values))]
 
-    def _mapped(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+    def _map(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
         column, columns = function, 1
         while column.class_name() in _MAPS:
             facts = column.info()
@@ -218,7 +218,7 @@ def _in_lanes(value: SX, rows: int, columns: int) -> SX:
     return SX(elements[places]) if places else SX(0, 1)
 
 
-def _selected(node: MX, values: list[SX]) -> SX:
+def _select(node: MX, values: list[SX]) -> SX:
     """Some non-zero elements of a matrix in another pattern."""
     facts, pattern = node.info(), node.sparsity()
     if "nz" in facts:
@@ -246,5 +246,5 @@ _MOVES: Mapping[int, Callable[[MX, list[SX]], SX]] = {
     casadi.OP_HORZCAT: lambda _, values: casadi.horzcat(*values),
     casadi.OP_VERTCAT: lambda _, values: casadi.vertcat(*values),
     casadi.OP_PROJECT: lambda node, values: casadi.project(values[0], node.sparsity()),
-    casadi.OP_GETNONZEROS: _selected,
+    casadi.OP_GETNONZEROS: _select,
 }

@@ -255,7 +255,7 @@ class Builder:
         if rule is not None:
             return rule(*operands)
         if all(self.nodes[a].op == casadi.OP_CONST for a in operands):
-            return self._folded(op, operands)
+            return self._fold(op, operands)
         if op in _ODD and self._is(operands[0], casadi.OP_NEG):
             return self.negative(self.apply(op, self.nodes[operands[0]].args[0]))
         if op in _EVEN and self._is(operands[0], casadi.OP_NEG):
@@ -417,7 +417,7 @@ class Builder:
         product = op == casadi.OP_MUL
         return self.constant(one.value * other.value if product else one.value + other.value)
 
-    def _folded(self, op: int, operands: Sequence[int]) -> int:
+    def _fold(self, op: int, operands: Sequence[int]) -> int:
         """An operation on constants; it stays when the result is no finite number."""
         numbers = [DM(self.nodes[a].value) for a in operands]
         result = DM.unary(op, *numbers) if len(numbers) == 1 else DM.binary(op, *numbers)

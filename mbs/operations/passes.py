@@ -123,10 +123,10 @@ def _opened_last(algebra: Algebra, polynomial: Polynomial) -> int:
 
 
 def _ways(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
-    ways = [partial(_factored, algebra, polynomial)]
+    ways = [partial(_factor, algebra, polynomial)]
     opened = _opened(algebra, polynomial)
     if opened != polynomial:
-        ways.append(partial(_factored, algebra, opened))
+        ways.append(partial(_factor, algebra, opened))
     return ways
 
 
@@ -149,7 +149,7 @@ def _opened(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
     return total
 
 
-def _factored(algebra: Algebra, polynomial: Polynomial) -> int:
+def _factor(algebra: Algebra, polynomial: Polynomial) -> int:
     rest = dict(polynomial)
     for _ in range(_MOST_WORK // max(1, len(polynomial))):
         savings = _savings(algebra, rest)
@@ -183,7 +183,7 @@ def _with_factor(algebra: Algebra, polynomial: Polynomial, number: int) -> Polyn
             del rest[monomial]
             algebra.accumulate(bracket, algebra.opened(quotient).items())
     if bracket:
-        product = builder.product(number, _factored(algebra, bracket))
+        product = builder.product(number, _factor(algebra, bracket))
         algebra.accumulate(rest, algebra.indeterminate(product).items())
     return rest
 
@@ -208,10 +208,10 @@ def fold(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
     A sign that is left goes into a difference that nothing else uses: -(x - y) is y - x.
     """
-    return drop(_turned(drop(rebuilt(graph, Builder(graph, parameters)))))
+    return drop(_rotate(drop(rebuilt(graph, Builder(graph, parameters)))))
 
 
-def _turned(graph: Graph) -> Graph:
+def _rotate(graph: Graph) -> Graph:
     """Differences of which the negatives alone are used, turned round."""
     negated = {n.args[0] for n in graph.nodes if n.op == casadi.OP_NEG}
     plain = {number for result in graph.results for number in result}
@@ -265,7 +265,7 @@ def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
         lambda number: (room[number], number),
         lambda number: (number,),
     ]
-    trials = [_walked(graph, rank) for rank in ranks]
+    trials = [_walk(graph, rank) for rank in ranks]
     return min([*trials, graph], key=waiting)
 
 
@@ -302,7 +302,7 @@ def _depth(graph: Graph) -> list[int]:
     return depth
 
 
-def _walked(graph: Graph, rank: _Rank) -> Graph:
+def _walk(graph: Graph, rank: _Rank) -> Graph:
     """The graph in the order of a walk from the outputs, operands of lower rank first."""
     operands = [graph.operands(number) for number in range(len(graph.nodes))]
     for number, node in enumerate(graph.nodes):
@@ -336,10 +336,10 @@ def parameters(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     c1 (x c2) is (c1 c2) x, c1 x + c2 x is (c1 + c2) x, and c1 (c2 x + c3 y) is
     (c1 c2) x + (c1 c3) y. What is used elsewhere is never computed a second time.
     """
-    return rewritten(graph, parameters, _gathered)
+    return rewritten(graph, parameters, _gather)
 
 
-def _gathered(algebra: Algebra, polynomial: Polynomial) -> int:
+def _gather(algebra: Algebra, polynomial: Polynomial) -> int:
     opened = _opened_parameters(algebra, polynomial)
     ways = [polynomial] if opened == polynomial else [polynomial, opened]
     return algebra.cheapest([partial(algebra.plain, way) for way in ways])
@@ -366,10 +366,10 @@ def pythagoras(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     A vector turned to and fro is itself again. Each angle is tried by itself and stays so if the
     graph got cheaper.
     """
-    return improved(graph, parameters, _reduced, lambda pair: pair[0] == pair[1])
+    return improved(graph, parameters, _reduce, lambda pair: pair[0] == pair[1])
 
 
-def _reduced(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+def _reduce(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
     """The squares of an angle's sine and cosine reduced where that saves a term or product."""
     opened = multiplied_out(algebra, polynomial, pair)
     result = dict(opened)
@@ -420,12 +420,12 @@ def share(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     names = tuple(parameters)
     graph = fold(graph, names)
     for ops in (_PRODUCTS, _SUMS):
-        trials = (fold(_associated(graph, names, ops, n), names) for n in _LONGEST_OPENED)
+        trials = (fold(_associate(graph, names, ops, n), names) for n in _LONGEST_OPENED)
         graph = min([graph, *trials], key=lambda trial: count_graph(trial, names).total)
     return graph
 
 
-def _associated(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest: int) -> Graph:
+def _associate(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest: int) -> Graph:
     """The graph with its sums or products associated anew.
 
     Args:
@@ -441,7 +441,7 @@ def _associated(graph: Graph, parameters: tuple[str, ...], ops: set[int], longes
         _gather_fixed(group, fixed, known, len(graph.nodes))
     taken = len(graph.nodes) + len(known)
     extract_pairs(groups, taken)
-    return _written(graph, {**groups, **known}, Builder(graph, parameters), ops)
+    return _write(graph, {**groups, **known}, Builder(graph, parameters), ops)
 
 
 def _opened_groups(
@@ -492,7 +492,7 @@ def _gather_fixed(group: Group, fixed: list[bool], known: dict[int, Group], firs
     group[name] = 1
 
 
-def _written(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[int]) -> Graph:
+def _write(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[int]) -> Graph:
     """The graph in which groups are computed element by element."""
     numbers: dict[int, int] = {}
 

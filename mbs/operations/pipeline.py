@@ -141,24 +141,24 @@ def simplification(
     The passes are made in turn until none saves anything more. Each result is compared with the
     given Function at random points, and undone if it takes more operations.
     """
-    chosen, names = _chosen(passes), tuple(parameters)
+    chosen, names = _choose(passes), tuple(parameters)
     graph, steps = graph_of(function), list[Step]()
     proof = witness(function)
     simplifying = [p for p in chosen if p.name != "order"]
     idle = 0
     for number in range(_MOST_ROUNDS * len(simplifying)):
-        graph, step = _made(simplifying[number % len(simplifying)], graph, names, proof)
+        graph, step = _make(simplifying[number % len(simplifying)], graph, names, proof)
         steps.append(step)
         idle = 0 if step.kept and step.after.total < step.before.total else idle + 1
         if idle == len(simplifying):
             break
     for last in (p for p in chosen if p.name == "order"):
-        graph, step = _made(last, graph, names, proof)
+        graph, step = _make(last, graph, names, proof)
         steps.append(step)
     return Simplification(_function_like(function, graph), graph, tuple(steps))
 
 
-def _chosen(passes: Iterable[str] | None) -> Sequence[Pass]:
+def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
     if passes is None:
         return PASSES
     wanted, known = set(passes), [p.name for p in PASSES]
@@ -167,7 +167,7 @@ def _chosen(passes: Iterable[str] | None) -> Sequence[Pass]:
     return [p for p in PASSES if p.name in wanted]
 
 
-def _made(
+def _make(
     one: Pass, graph: Graph, parameters: tuple[str, ...], proof: Witness
 ) -> tuple[Graph, Step]:
     started = time.perf_counter()
@@ -270,20 +270,20 @@ def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
 def _setup(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
     """The graph from parameters to the kept nodes."""
     inputs = tuple(port for port in graph.inputs if port.name in names)
-    nodes = _renumbered(graph, [port.name for port in inputs])
+    nodes = _renumber(graph, [port.name for port in inputs])
     return Graph(f"{graph.name}_setup", inputs, (column,), nodes, (tuple(kept),))
 
 
 def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
     """The graph in which the kept nodes are inputs."""
     inputs = tuple(port for port in graph.inputs if port.name not in names)
-    nodes = list(_renumbered(graph, [port.name for port in inputs]))
+    nodes = list(_renumber(graph, [port.name for port in inputs]))
     for position, number in enumerate(kept):
         nodes[number] = Node(casadi.OP_INPUT, (len(inputs), position))
     return drop(Graph(graph.name, (*inputs, column), graph.outputs, tuple(nodes), graph.results))
 
 
-def _renumbered(graph: Graph, names: list[str]) -> tuple[Node, ...]:
+def _renumber(graph: Graph, names: list[str]) -> tuple[Node, ...]:
     """The nodes with inputs counted among these names; others are left as they are."""
     place = {k: names.index(p.name) for k, p in enumerate(graph.inputs) if p.name in names}
 
@@ -320,8 +320,8 @@ def names_found(function: Function, named: Function) -> Function:
     points = witness(named).points
     wanted = np.array([_scalars(named, point, count) for point in points]).T
     computed = _values(graph, points)
-    same = _found(graph, wanted, computed)
-    others = _found(graph, -wanted, computed)
+    same = _find(graph, wanted, computed)
+    others = _find(graph, -wanted, computed)
     known = set(same.values())
     nodes, named_nodes = list(graph.nodes), dict(same)
     for k, number in others.items():
@@ -353,7 +353,7 @@ def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]
     return np.hstack([np.array(Function.call(every, list(point))[0]) for point in points])
 
 
-def _found(
+def _find(
     graph: Graph, wanted: NDArray[np.float64], computed: NDArray[np.float64]
 ) -> dict[int, int]:
     """For named scalars that vary, where there is one, the first node that has their values.

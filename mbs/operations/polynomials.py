@@ -189,7 +189,7 @@ class _Rewriting:
         node, operands = self._old.nodes[number], self._old.operands(number)
         form = None
         if node.op in _POLYNOMIAL_OPS:
-            form = self._combined(node.op, [self._forms[a] for a in operands])
+            form = self._combine(node.op, [self._forms[a] for a in operands])
         if form is None:
             made = self._builder.add(node, [self._number(self._forms[a]) for a in operands])
             return self._algebra.indeterminate(made)
@@ -211,7 +211,7 @@ class _Rewriting:
             self._algebra.written[unsigned] = form
         return number
 
-    def _combined(self, op: int, forms: list[Polynomial]) -> Polynomial | None:
+    def _combine(self, op: int, forms: list[Polynomial]) -> Polynomial | None:
         """An operation on polynomials; None when the result is none."""
         first, *others = forms
         second = others[0] if others else first

@@ -54,10 +54,10 @@ class Infix:
 
     def text(self, number: int, tightness: int = SUM) -> str:
         """A node, in brackets where it binds less than asked for."""
-        text, own = self._written(number)
+        text, own = self._write(number)
         return f"({text})" if own < tightness else text
 
-    def _written(self, number: int) -> tuple[str, int]:
+    def _write(self, number: int) -> tuple[str, int]:
         """The text of a node, and how tightly it binds."""
         return self._expression(self._graph.nodes[number])
 
@@ -67,12 +67,12 @@ class Infix:
         if node.op == casadi.OP_INPUT:
             return self._inputs[self._graph.inputs[node.args[0]].name][node.args[1]], ATOM
         if node.op == casadi.OP_ASSIGN:
-            return self._written(node.args[0])
+            return self._write(node.args[0])
         if node.op in _SIGNS:
             form, own, levels = _SIGNS[node.op]
             operands = zip(node.args, levels, strict=True)
             return form.format(*(self.text(number, level) for number, level in operands)), own
-        return f"{self._called(node.op)}({', '.join(map(self.text, node.args))})", ATOM
+        return f"{self._call_text(node.op)}({', '.join(map(self.text, node.args))})", ATOM
 
-    def _called(self, op: int) -> str:
+    def _call_text(self, op: int) -> str:
         return NAMES[op]

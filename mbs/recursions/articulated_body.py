@@ -18,7 +18,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regroup, slide_frames
+from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     Displacement,
@@ -67,13 +67,13 @@ class ArticulatedInertia:
         """Of two bodies that move together, in one frame."""
         return ArticulatedInertia(self.M + other.M, self.H + other.H, self.J + other.J)
 
-    def turned(self, R: Rotation) -> ArticulatedInertia:
+    def rotate(self, R: Rotation) -> ArticulatedInertia:
         """The same body about the same point in the axes of frame i."""
         return ArticulatedInertia(
             R.apply_to_tensor(self.M), R.apply_to_square(self.H), R.apply_to_tensor(self.J)
         )
 
-    def slid(self, axis: int, t: SX) -> ArticulatedInertia:
+    def shift(self, axis: int, t: SX) -> ArticulatedInertia:
         """The body displaced by t [m] along a coordinate axis; ten products."""
         if t.is_zero():
             return self
@@ -160,14 +160,14 @@ class Pivot:
         rest[3:] -= drive.momentum
         return Pivot(direction, column, rest, D, inverse, gain, ratio)
 
-    def transmitted(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
+    def transmit(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
         """The wrench (6, 1) that passes on to the antecedent, and the effort that accelerates."""
         left = effort - wrench[self.direction]
         wrench = wrench - self.gain * left
         wrench[self.direction] = effort - self.ratio * left
         return wrench, left
 
-    def accelerated(self, twist: SX, left: SX) -> tuple[SX, SX]:
+    def accelerate(self, twist: SX, left: SX) -> tuple[SX, SX]:
         """The acceleration (6, 1) behind the joint, and its part that the joint adds."""
         before = twist[self.direction]
         own = casadi.dot(self.gain, twist) - self.inverse * left + self.ratio * before
@@ -217,7 +217,7 @@ def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
         poses: each with respect to its antecedent.
         right: (nv, m) efforts.
     """
-    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     eliminations = _eliminations(tree, poses, bodies)
     rest = [zeros(6)] * len(tree.links)
     columns = (_solution(tree, eliminations, rest, right[:, k]) for k in range(right.shape[1]))
@@ -247,7 +247,7 @@ def articulated_accelerations(
     """
     inertias = [link.inertia for link in tree.links]
     if not external:
-        poses, inertias = slide_frames(tree, poses, inertias, base_rests=is_zero(base.w))
+        poses, inertias = shift_frames(tree, poses, inertias, base_rests=is_zero(base.w))
     bodies = [PseudoInertia.of(inertia) for inertia in inertias]
     still = SX.zeros(tree.nv)
     motions = link_accelerations(tree, poses, v, still, base)
@@ -268,7 +268,7 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
 
     Where the first is a vanishing part of the second, the inertia matrix is singular.
     """
-    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     rigid = regroup(tree, poses, bodies)
     free, locked = zeros(tree.nv), zeros(tree.nv)
     for link, elimination in zip(tree.links, _eliminations(tree, poses, bodies), strict=True):
@@ -305,7 +305,7 @@ def _eliminations(
             body = ArticulatedInertia.of(pose.motion[0].body(rigid[j]))
         drive, pivots = _drive(tree, poses, j), list[Pivot]()
         if inner:
-            drive = replace(drive, momentum=inner[0].turn.apply(drive.momentum))
+            drive = replace(drive, momentum=inner[0].rotation.apply(drive.momentum))
         for direction in _DIRECTIONS[link.motion]:
             pivots.append(Pivot.of(body, direction, drive))
             body = body.without(pivots[-1])
@@ -336,14 +336,14 @@ def _solution(
         link, joint = tree.links[j], joints[j]
         wrench = _moved_wrench(joint.inner, needed[j])
         for number, pivot in zip(_numbers(link), joint.pivots, strict=True):
-            wrench, left[number] = pivot.transmitted(wrench, efforts[number])
+            wrench, left[number] = pivot.transmit(wrench, efforts[number])
         if link.antecedent >= 0:
             needed[link.antecedent] += _moved_wrench(joint.outer, wrench)
     x, twists = zeros(tree.nv), [zeros(6)] * (len(tree.links) + 1)
     for j, link in enumerate(tree.links):
         twist = _moved_twist(joints[j].outer, twists[link.antecedent])
         for number, pivot in reversed(list(zip(_numbers(link), joints[j].pivots, strict=True))):
-            twist, x[number] = pivot.accelerated(twist, left[number])
+            twist, x[number] = pivot.accelerate(twist, left[number])
         twists[j] = _moved_twist(joints[j].inner, twist)
     return x
 
@@ -357,5 +357,5 @@ def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:
     v, w = twist[:3], twist[3:]
     for step in steps:
         p = step.point(zeros())
-        v, w = step.turn.apply_inverse(v + cross(w, p)), step.turn.apply_inverse(w)
+        v, w = step.rotation.apply_inverse(v + cross(w, p)), step.rotation.apply_inverse(w)
     return casadi.vertcat(v, w)

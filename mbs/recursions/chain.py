@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from mbs.assembly.tree import Frame, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.route import common_link
-from mbs.spatial import Pose, axis_turn, quaternion_rotation, vector
+from mbs.spatial import Pose, axis_rotation, quaternion_rotation, vector
 
 Array = NDArray[np.float64]
 
@@ -35,14 +35,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Spin:
-    """The known turn of a rod about its own line, where a ball of the tree carries it.
+    """The known turn of a rod about its own line, where a spherical joint of the tree carries it.
 
     Attributes:
-        place: number of the angle among the positions.
-        rest: quaternion of the ball in the assembled configuration.
+        index: number of the angle among the positions.
+        rest: quaternion of the spherical joint in the assembled configuration.
     """
 
-    place: int
+    index: int
     rest: tuple[float, ...]
 
 
@@ -53,24 +53,24 @@ class ChainJoint:
     Attributes:
         name: of the coordinate.
         motion: revolute or prismatic along its z axis; spherical turns in any way.
-        place: number of its position; of a ring in q, beyond the end of it for a cut joint; None
-            for a ball whose position nothing asks for. Four numbers follow from there for a
-            quaternion.
+        index: index of its position; of a ring in q, beyond the end of it for a cut joint; None
+            for a spherical joint whose position nothing asks for. Four numbers follow from there
+            for a quaternion.
         sign: -1 where the chain runs through the joint backwards.
         cut: whether it belongs to the joint that closes a loop.
-        spin: of a ball between a rod that may spin and its antecedent.
+        spin: of a spherical joint between a rod that may spin and its antecedent.
     """
 
     name: str
     motion: Motion
-    place: int | None
+    index: int | None
     sign: int
     cut: bool = False
     spin: Spin | None = None
 
     @property
-    def turns(self) -> bool:
-        """Whether the joint turns."""
+    def is_rotational(self) -> bool:
+        """Whether the joint rotates."""
         return self.motion is not Motion.PRISMATIC
 
     def displacement(self, q: SX) -> Pose:
@@ -81,18 +81,18 @@ class ChainJoint:
             case Motion.SPHERICAL:
                 return _spherical_pose(q, self.sign)
             case Motion.PRISMATIC:
-                return Pose.moved(vector([0, 0, self.sign * q]))
-        return Pose.turned(axis_turn("z", self.sign * q).matrix)
+                return Pose.translation(vector([0, 0, self.sign * q]))
+        return Pose.rotation(axis_rotation("z", self.sign * q).matrix)
 
 
 def free_pose(values: SX, sign: int = 1) -> Pose:
     """The pose that three translations and a quaternion tell, or its inverse."""
-    pose = Pose.moved(values[0:3]) @ _spherical_pose(values[3:7], 1)
+    pose = Pose.translation(values[0:3]) @ _spherical_pose(values[3:7], 1)
     return pose if sign > 0 else pose.inverse()
 
 
 def _spherical_pose(quaternion: SX, sign: int) -> Pose:
-    pose = Pose.turned(quaternion_rotation(quaternion / casadi.norm_2(quaternion)))
+    pose = Pose.rotation(quaternion_rotation(quaternion / casadi.norm_2(quaternion)))
     return pose if sign > 0 else pose.inverse()
 
 
@@ -245,7 +245,7 @@ class ChainBuilder:
     """The chain so far: what was passed, and the gap since the last unknown joint.
 
     Attributes:
-        known: numbers in q of the positions that are known.
+        known: indices in q of the positions that are known.
         q: positions, of which the known ones are used.
     """
 
@@ -267,13 +267,13 @@ class ChainBuilder:
 
     def past(self, joint: ChainJoint) -> None:
         """Through a joint; over it, where its position is known."""
-        place = joint.place
-        if place is None or place not in self.known:
+        index = joint.index
+        if index is None or index not in self.known:
             self.through(joint)
             return
         if joint.motion is Motion.REVOLUTE:
             self.gap = replace(self.gap, pivots=(*self.gap.pivots, self.gap.pose))
-        self.over(joint.displacement(self.q[place : place + joint.motion.nq]))
+        self.over(joint.displacement(self.q[index : index + joint.motion.nq]))
 
     def along_tree(self, tree: Tree, a: Frame, b: Frame, spins: Mapping[int, Spin]) -> None:
         """From frame a, back to the common link, and out to frame b.
@@ -282,7 +282,8 @@ class ChainBuilder:
             tree: the links.
             a: where the chain stands.
             b: where it goes.
-            spins: of the balls of rods, by the number in q at which their quaternions begin.
+            spins: of the spherical joints of rods, by the index in q at which their quaternions
+                begin.
         """
         back, out = links_between(tree, a[0], b[0])
         self.over(a[1].inverse())
@@ -318,7 +319,7 @@ def tree_chain(tree: Tree, a: Frame, b: Frame, known: Container[int], q: SX) -> 
         tree: the links.
         a: where it begins.
         b: where it ends.
-        known: numbers in q of the positions that are known.
+        known: indices in q of the positions that are known.
         q: (nq, 1) positions, of which the known ones are used.
     """
     builder = ChainBuilder(known, q)

@@ -14,7 +14,7 @@ from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import momentum_on
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regroup, slide_frames
+from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import effort, unit_motions
 from mbs.spatial import Wrench, body_through, wrench_through, zeros
 
@@ -25,7 +25,7 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
     The composite body of link j is seen from the seat of its joint, where its momentum for a unit
     velocity can be read off, and from there as a part of link i.
     """
-    poses, bodies = slide_frames(tree, poses, [link.inertia for link in tree.links])
+    poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     composite = regroup(tree, poses, bodies)
     A = zeros(tree.nv, tree.nv)
     for j in reversed(range(len(tree.links))):
@@ -54,7 +54,7 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
 
 def _at_seat(pose: LinkPose, motion: Motion, vector: SX) -> SX:
     """A vector of the link in the frame in which the momentum of its joint is written."""
-    return pose.motion[0].turn.apply(vector) if motion.nv == 1 else vector
+    return pose.motion[0].rotation.apply(vector) if motion.nv == 1 else vector
 
 
 def _fill_ancestors(
@@ -81,7 +81,7 @@ def _fill_ancestors(
 
 
 def velocity_antecedents(tree: Tree) -> list[int]:
-    """For each velocity the one before it on the way to the base, or -1."""
+    """For each velocity the one before it on the path to the base, or -1."""
     before = []
     for link in tree.links:
         i = link.antecedent

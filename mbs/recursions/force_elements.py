@@ -19,7 +19,7 @@ from mbs.recursions.velocities import (
     effort,
     link_accelerations,
 )
-from mbs.spatial import PseudoInertia, Wrench, add_wrenches, carried, zeros
+from mbs.spatial import PseudoInertia, Wrench, add_wrenches, transform_wrench, zeros
 
 # Wrenches that the joints of a tree transmit, link by link as the description has them.
 #
@@ -93,7 +93,7 @@ def element_wrenches(
             for port, (link, pose), load in acting.frame_loads(part):
                 point = part.element.frames[port]
                 if link >= 0 if held is None else (point.owner.name, point.port) in held:
-                    f, m = carried(pose, (load.force, load.moment))
+                    f, m = transform_wrench(pose, (load.force, load.moment))
                     exerted.append({link: (-f, -m)})
     return sum_wrenches(*exerted)
 

@@ -1,8 +1,8 @@
 """Jacobian of a frame, where its entries are zero or constant, and Renaud's factors of it.
 
 Every joint gives the velocity z x L along its own axis, L being the vector from the joint to the
-point whose velocity is asked for; the axes in which the result is wanted may be those of any
-frame, and the nearer they are to the middle of the chain, the fewer turns are needed.
+point whose velocity is asked for; the axes in which the result is asked for may be those of any
+frame, and the nearer they are to the middle of the chain, the fewer rotations are needed.
 
 Source: Renaud 1980; Khalil & Creusot 1997, eq. 3 and 5.
 """
@@ -67,7 +67,7 @@ class VelocityTarget:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlook:
-    """The tree seen from the frame in whose axes a Jacobian is wanted.
+    """The tree seen from the frame in whose axes a Jacobian is asked for.
 
     Attributes:
         tree: the links.
@@ -79,8 +79,8 @@ class Outlook:
     branches: tuple[list[PathStep], list[PathStep]]
 
     @property
-    def turns(self) -> int:
-        """Number of turns on the longer branch."""
+    def rotations(self) -> int:
+        """Number of rotations on the longer branch."""
         return max(sum(isinstance(s, OtherRotation) for s in branch) for branch in self.branches)
 
 
@@ -102,19 +102,19 @@ def jacobian(seen: Outlook, reference: int | None = None, matrices: int = 0) -> 
         seen: the frame that moves and the axes.
         reference: V is that of the point that is fixed on the frame and now at the origin of
             this link's frame, -1 for the base's; None for the frame's own origin.
-        matrices: for so many turns, counted from the axes, orientations are formed and applied;
-            beyond, each vector is turned by itself. It changes the operations, not the result.
+        matrices: for so many rotations, counted from the axes, orientations are formed and applied;
+            beyond, each vector is rotated by itself. It changes the operations, not the result.
     """
     J = zeros(6, seen.tree.nv)
     for branch, arms in zip(seen.branches, _arms(seen.branches, reference), strict=True):
         columns = _local_columns(seen.tree, branch, arms)
-        for k, V, w in _carried(branch, columns, matrices):
+        for k, V, w in _columns_at_start(branch, columns, matrices):
             J[:, k] = casadi.vertcat(V, w)
     return J
 
 
 Column = tuple[int, SX, SX]
-"""Number in v, and what a unit of it gives: linear and angular velocity."""
+"""Index in v, and what a unit of it gives: linear and angular velocity."""
 
 
 def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
@@ -139,7 +139,7 @@ def _place(branch: list[PathStep], reference: int | None) -> int | None:
 
 
 def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
-    """Ways to the end of the branch, after each step and before the first."""
+    """Vectors to the end of the branch, after each step and before the first."""
     arm, arms = zeros(), []
     for step in reversed(branch):
         arms.append(arm)
@@ -152,7 +152,7 @@ def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
 
 
 def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
-    """Ways to a reference that lies `arm` from the beginning of the branch."""
+    """Vectors to a reference that lies `arm` from the beginning of the branch."""
     arms = []
     for step in branch:
         match step:
@@ -176,7 +176,7 @@ def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[t
     return result
 
 
-def _carried(
+def _columns_at_start(
     branch: list[PathStep], columns: list[tuple[int, Column]], matrices: int
 ) -> list[Column]:
     """The columns in the axes at the beginning of the branch."""
@@ -186,22 +186,22 @@ def _carried(
     for number, step in enumerate(branch[:split]):
         if isinstance(step, OtherRotation):
             R = casadi.mtimes(R, step.rotation.matrix)
-        near += [_turned(R, column) for at, column in columns if at == number]
+        near += [_rotate(R, column) for at, column in columns if at == number]
     far: list[Column] = []
     for number in reversed(range(split, len(branch))):
         far += [column for at, column in columns if at == number]
         step = branch[number]
         if isinstance(step, OtherRotation):
-            far = [_moved(step.rotation, column) for column in far]
-    return near + [_turned(R, column) for column in far]
+            far = [_rotate_by(step.rotation, column) for column in far]
+    return near + [_rotate(R, column) for column in far]
 
 
-def _turned(R: SX, column: Column) -> Column:
+def _rotate(R: SX, column: Column) -> Column:
     k, V, w = column
     return k, casadi.mtimes(R, V), casadi.mtimes(R, w)
 
 
-def _moved(rotation: Rotation, column: Column) -> Column:
+def _rotate_by(rotation: Rotation, column: Column) -> Column:
     k, V, w = column
     V, w = along(rotation, [V, w])
     return k, V, w
@@ -244,7 +244,7 @@ class Survey:
     J: Array
     units: Array
 
-    def combined(self, G: Array) -> Survey:
+    def combine(self, G: Array) -> Survey:
         """The same of other velocities, of which G (samples, nv, m) makes these."""
         parts = G / self.units[:, None]
         sizes = np.abs(parts).max(axis=(0, 1))
@@ -252,8 +252,8 @@ class Survey:
         return replace(self, J=self.J @ parts * units, units=units)
 
     @property
-    def on_the_way(self) -> range:
-        """Places of the base and of the links."""
+    def on_path(self) -> range:
+        """Indices of the base and of the links."""
         return range(len(self.frames) - 1)
 
     def linear(self, axes: int, reference: int | None) -> Array:
@@ -266,14 +266,14 @@ class Survey:
         """(samples, 3, nv) angular velocity in the axes of a frame."""
         return np.asarray(np.swapaxes(self.R[axes], 1, 2) @ self.J[:, 3:])
 
-    def turned(self, axes: int) -> Array:
+    def orientation(self, axes: int) -> Array:
         """(samples, 3, 3) orientation of a frame in the axes that were asked for."""
         return np.asarray(np.swapaxes(self.R[-1], 1, 2) @ self.R[axes])
 
     def separate_origins(self) -> list[int]:
-        """Places of links whose origins are not always where a later one's or the frame's is."""
+        """Indices of links whose origins are not always where a later one's or the frame's is."""
         seen, kept = [self.target_p], []
-        for number in reversed(self.on_the_way):
+        for number in reversed(self.on_path):
             if all(np.abs(self.p[number] - other).max() > _ZERO for other in seen):
                 kept.append(number)
                 seen.append(self.p[number])
@@ -296,7 +296,7 @@ def survey(target: VelocityTarget) -> Survey:
     frames = [(k, home) for k in (-1, *path)] + [axes, frame]
     placed = [(poses[k] if k >= 0 else home) @ inside for k, inside in frames]
     base = outlook(target.along((-1, home)))
-    J = jacobian(base, matrices=base.turns)
+    J = jacobian(base, matrices=base.rotations)
     outputs = [casadi.horzcat(*(pose.matrix for pose in placed)), casadi.densify(J)]
     f = Function("survey", [q, target.p], outputs)
     values = [f(*sample) for sample in random_samples(tree, target.p.numel())]
@@ -344,7 +344,7 @@ def varying(values: Array) -> NDArray[np.bool_]:
 # Renaud's factors of a Jacobian, and the frame in the middle that makes the last one simple.
 #
 # J = [R 0; 0 R] [I -L^; 0 I] J_i: the velocity of a reference point in the axes of an
-# intermediate frame i, moved to the origin of the frame, turned into the axes that are wanted.
+# intermediate frame i, moved to the origin of the frame, turned into the target axes.
 #
 # Source: Renaud 1980; Khalil & Creusot 1997, eq. 4.
 
@@ -365,7 +365,7 @@ class Renaud:
     Attributes:
         intermediate: link in whose axes J is, -1 for the base.
         reference: link whose origin V belongs to, None for the frame's own origin.
-        R: (3, 3) orientation of the intermediate frame in the axes that are wanted.
+        R: (3, 3) orientation of the intermediate frame in the target axes.
         L: (3, 1) from the reference to the frame's origin, in the intermediate axes [m].
         J: (6, nv) in the intermediate axes.
     """
@@ -399,7 +399,7 @@ def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> S
         reference: link whose origin V belongs to, None for the frame's own origin.
     """
     seen = outlook(target)
-    most = seen.turns
+    most = seen.rotations
     numbers = [most] if most > _MOST_TURNS else sorted({*range(0, most, 2), most})
     candidates = (jacobian(seen, reference, number) for number in numbers)
     return min(candidates, key=lambda J: cost(J, target.q, target.p))
@@ -411,12 +411,12 @@ def renaud(
     """The three factors; what is not asked for is chosen for the fewest operations of J.
 
     Args:
-        target: the frame that moves, and the axes that are wanted.
+        target: the frame that moves, and the target axes.
         intermediate: link on the path to the frame, -1 for the base, or None for the best.
         reference: link on the path whose origin the velocity J v belongs to, or None for the best.
     """
     found = survey(target)
-    ranked = _ranked(found, intermediate, reference)
+    ranked = _rank(found, intermediate, reference)
     counted = _COUNTED if len(found.frames) <= _MOST_PLACES else 1
     candidates = [
         (i, r, cheapest_jacobian(target.along((i, _HOME)), r)) for i, r in ranked[:counted]
@@ -435,12 +435,12 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
     return express(target.tree, target.q, target.axes, place, [p])[0]
 
 
-def _ranked(
+def _rank(
     found: Survey, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
     """Pairs of axes and reference, those with the fewest entries that vary first."""
-    links = [found.frames[k][0] for k in found.on_the_way]
-    places = spread(found.on_the_way)
+    links = [found.frames[k][0] for k in found.on_path]
+    places = spread(found.on_path)
     axes = places if intermediate is None else [links.index(intermediate)]
     own: list[int | None] = [None, *spread(found.separate_origins())]
     references = own if reference is None else [links.index(reference)]

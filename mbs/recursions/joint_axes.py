@@ -1,7 +1,7 @@
 """Axes in which a joint is simple: its unit motions and their rates there.
 
 They stand at the origin of link j and do not turn with joint j: what is computed there for the
-joint needs no turn about its own axis. Joints with parallel axes, one after the other, have the
+joint needs no rotation about its own axis. Joints with parallel axes, one after the other, have the
 same axes, so that what is between them is a translation.
 """
 
@@ -16,7 +16,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, motion_behind, unit_motions
-from mbs.spatial import Displacement, Rotation, Screw, cross, is_zero, vector, zeros
+from mbs.spatial import Displacement, Rotation, ScrewDisplacement, cross, is_zero, vector, zeros
 
 # The unit motions of a joint and their rates, as seen by an observer at the joint.
 #
@@ -192,7 +192,7 @@ def joint_axes(
         if link.motion.nv > 1:
             axes = _of_several(link, poses[j], before, motions[j], v[link.v])
         elif len(poses[j].run) > 1:
-            axes = _continued(poses[j], poses[i].spin, result[i], motions[j])
+            axes = _continue(poses[j], poses[i].spin, result[i], motions[j])
         else:
             axes = _of_one(link, poses[j], before, motions[j], v[link.v])
         result.append(axes)
@@ -222,9 +222,9 @@ def _of_one(
     dot = vector([w[1], -w[0], 0])
     ddot = vector([wd[1] + w[0] * w[2], w[1] * w[2] - wd[0], own.rate.U[2, 2]])
     screw = pose.motion[0]
-    assert isinstance(screw, Screw)
+    assert isinstance(screw, ScrewDisplacement)
     linear, _ = motion_behind(link.motion, v)
-    height = Screw.about("z", SX(0), screw.t)
+    height = ScrewDisplacement.about("z", SX(0), screw.t)
     path: tuple[AxesStep, ...] = (
         *_drift(linear),
         height,
@@ -239,10 +239,10 @@ def _of_one(
     return JointAxes(pose.spin, path, False, (line,), vector([w[0], w[1], own.w[2]]))
 
 
-def _continued(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
+def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
     """The axes of the joint before, at another point; `rotation` leads to them from its frame."""
     p = rotation.apply(pose.p)
-    shift = tuple(Screw.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))
+    shift = tuple(ScrewDisplacement.about(axis, SX(0), p[k]) for k, axis in enumerate("xyz"))
     path: tuple[AxesStep, ...] = (*shift, *_drift(cross(axes.w, p)))
     before = axes.lines[0]
     line = revolute_line(before.spin, before.second.angular, pose.spin.apply(own.vd))

@@ -20,7 +20,7 @@ from mbs.assembly.tree import Link, Tree, position_rate
 from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import momentum_on, spin_momenta
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regroup, slide_frames
+from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import (
     effort,
     link_accelerations,
@@ -31,14 +31,14 @@ from mbs.recursions.velocities import (
 from mbs.spatial import (
     Displacement,
     FreeDisplacement,
-    MatrixTurn,
+    MatrixRotation,
     PseudoInertia,
-    Screw,
+    ScrewDisplacement,
     cross,
     skew,
     zeros,
 )
-from mbs.spatial.rotation import Turn
+from mbs.spatial.rotation import AxisRotation
 
 # The augmented body of a link: everything behind its joint, and how it changes.
 #
@@ -82,7 +82,7 @@ class VelocityField:
         """The column in the frame before a displacement whose translation has this velocity."""
         f, m = step.wrench(self.f, self.m)
         f_rate, m_rate = step.wrench(self.f_rate, self.m_rate)
-        drag = step.turn.apply(self.drag) + cross(velocity, f)
+        drag = step.rotation.apply(self.drag) + cross(velocity, f)
         return VelocityField(f, m, f_rate, m_rate, drag)
 
     def row(self, motion: Motion, w: SX) -> SX:
@@ -248,7 +248,7 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
         v: (nv, 1) joint velocities.
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    poses, bodies = slide_frames(tree, poses, bodies)
+    poses, bodies = shift_frames(tree, poses, bodies)
     bodies = regroup(tree, poses, bodies)
     rest, base = zeros(tree.nv), resting_base(zeros())
     w = [motion.w for motion in link_accelerations(tree, poses, v, rest, base)]
@@ -316,12 +316,12 @@ def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
     """The place of a joint that is parallel to that of the joint before it."""
     inner, _ = before.inner[0]
     p = inner.point(pose.foot)
-    outer = FreeDisplacement(MatrixTurn(SX(DM.eye(3))), p)
+    outer = FreeDisplacement(MatrixRotation(SX(DM.eye(3))), p)
     motion = pose.motion[0]
-    assert isinstance(motion, Screw)
-    assert isinstance(pose.spin, Turn)
+    assert isinstance(motion, ScrewDisplacement)
+    assert isinstance(pose.spin, AxisRotation)
     w = before.w + angular
-    screw = Screw(pose.spin, motion.t)
+    screw = ScrewDisplacement(pose.spin, motion.t)
     return _FormPlace(
         w,
         before.g,
@@ -337,9 +337,9 @@ def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
     for number, step in enumerate(pose.steps, 1):
         velocity = cross(w, step.point(zeros()))
         if number == len(pose.steps):
-            velocity = velocity + step.turn.apply(linear)
+            velocity = velocity + step.rotation.apply(linear)
         steps.append((step, velocity))
-        w = step.turn.apply_inverse(w)
+        w = step.rotation.apply_inverse(w)
     return steps
 
 

@@ -14,7 +14,7 @@ from mbs.assembly.tree import Link, Tree
 from mbs.components.forces import smooth_sign
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regroup, slide_frames
+from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import Acceleration, effort, link_accelerations, moment_of_rotation
 from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero, zeros
 
@@ -130,7 +130,7 @@ def newton_euler(
     # passes: frames where distances vanish, parameters in as few places as possible
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
     if not external:  # those are about the origins of the description
-        poses, bodies = slide_frames(tree, poses, bodies, base_rests=is_zero(base.w))
+        poses, bodies = shift_frames(tree, poses, bodies, base_rests=is_zero(base.w))
     bodies = regroup(tree, poses, bodies)
 
     # forward: accelerations of the links, and the wrenches that move their bodies

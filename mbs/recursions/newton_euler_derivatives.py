@@ -16,15 +16,15 @@ from mbs.assembly.tree import CarriedRotor, Tree
 from mbs.recursions.joint_axes import AxesStep, Drift, JointAxes, Line, Twist, joint_axes
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments, spin_momenta
 from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regroup, slide_frames
+from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     FreeDisplacement,
     Inertia,
-    MatrixTurn,
+    MatrixRotation,
     PseudoInertia,
     Rotation,
-    Screw,
+    ScrewDisplacement,
     Wrench,
     add_wrenches,
     cross,
@@ -96,12 +96,12 @@ class SubtreeMotion:
             self.m + other.m,
         )
 
-    def turned(self, R: Rotation) -> SubtreeMotion:
+    def rotate(self, R: Rotation) -> SubtreeMotion:
         """In the axes of frame i, R being the orientation of the present ones in i."""
         f, m = R.apply(self.f), R.apply(self.m)
-        return SubtreeMotion(self.body.turned(R), R.apply_to_square(self.K), R.apply(self.n), f, m)
+        return SubtreeMotion(self.body.rotate(R), R.apply_to_square(self.K), R.apply(self.n), f, m)
 
-    def slid(self, axis: int, t: SX) -> SubtreeMotion:
+    def shift(self, axis: int, t: SX) -> SubtreeMotion:
         """Displaced by t [m] along a coordinate axis."""
         if t.is_zero():
             return self
@@ -113,7 +113,7 @@ class SubtreeMotion:
             K[row, axis] -= t * self.n[row]
         m[k] -= t * self.f[h]
         m[h] += t * self.f[k]
-        return SubtreeMotion(self.body.slid(axis, t), K, self.n, self.f, m)
+        return SubtreeMotion(self.body.shift(axis, t), K, self.n, self.f, m)
 
     def drifting(self, twice: SX) -> SubtreeMotion:
         """For an observer to whom everything has half of `twice` added to its velocity."""
@@ -162,7 +162,7 @@ def subtree_motions(
     result = list(own)
     for j in reversed(range(len(own))):
         turn, i = axes[j].rotation, tree.links[j].antecedent
-        here = in_frame[j] if turn is None else in_frame[j].turned(turn)
+        here = in_frame[j] if turn is None else in_frame[j].rotate(turn)
         here = result[j] = here + parallel[j]
         if i < 0:
             continue
@@ -192,7 +192,7 @@ class Couple:
     dv: SX
     da: SX
 
-    def turned(self, R: Rotation) -> Couple:
+    def rotate(self, R: Rotation) -> Couple:
         """In the axes of frame i, R being the orientation of the present ones in i."""
         return Couple(R.apply(self.dv), R.apply(self.da))
 
@@ -222,10 +222,10 @@ class EffortColumn:
             step.wrench(*self.dq),
             step.wrench(*self.dv),
             step.wrench(*self.momentum),
-            step.turn.apply(self.spin),
+            step.rotation.apply(self.spin),
         )
 
-    def turned(self, R: Rotation) -> EffortColumn:
+    def rotate(self, R: Rotation) -> EffortColumn:
         """In the axes of frame i, R being the orientation of the present ones in i."""
         dq, dv, momentum = ((R.apply(f), R.apply(m)) for f, m in (self.dq, self.dv, self.momentum))
         return EffortColumn(dq, dv, momentum, R.apply(self.spin))
@@ -287,7 +287,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
     """Links whose columns cost less by way of the base; empty when too few do.
 
     In the base a pair of joints costs the same however far they are apart and however their axes
-    lie; on the way through the joints right angles and vanishing distances are cheaper still.
+    lie; on the path through the joints right angles and vanishing distances are cheaper still.
     """
     saved: dict[int, int] = {}
     for j, link in enumerate(tree.links):
@@ -308,8 +308,8 @@ def _cost(step: AxesStep) -> int:
     match step:
         case Drift():
             return _DRIFT
-        case Screw():
-            quarter = step.turn.c.is_zero() or step.turn.s.is_zero()
+        case ScrewDisplacement():
+            quarter = step.rotation.c.is_zero() or step.rotation.s.is_zero()
             return _TURN * (not quarter) + _SLIDE * (not step.t.is_zero())
     return 3 * (_TURN + _SLIDE)
 
@@ -341,13 +341,13 @@ def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
         i = link.antecedent
         R, p, twice = SX.eye(3), zeros(), zeros()
         if i >= 0:
-            R, p, twice = result[i].place.turn.matrix, result[i].place.p, result[i].twice
+            R, p, twice = result[i].place.rotation.matrix, result[i].place.p, result[i].twice
             turn = axes[i].rotation
             if turn is not None and not own.parallel:
-                R = _turned(R, turn)
+                R = _rotate(R, turn)
         for step in reversed(own.path):
             R, p, twice = _after(step, R, p, twice)
-        place = FreeDisplacement(MatrixTurn(R), p)
+        place = FreeDisplacement(MatrixRotation(R), p)
         lines = (line.displaced(R, p).drifting(twice) for line in own.lines)
         result.append(BaseAxes(place, twice, tuple(lines)))
     return result
@@ -357,10 +357,10 @@ def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
     if isinstance(step, Drift):
         return R, p, twice + casadi.mtimes(R, step.twice)
     p = p + casadi.mtimes(R, step.point(zeros()))
-    return _turned(R, step.turn), p, twice
+    return _rotate(R, step.rotation), p, twice
 
 
-def _turned(R: SX, turn: Rotation) -> SX:
+def _rotate(R: SX, turn: Rotation) -> SX:
     """R times the matrix of a turn."""
     return casadi.horzcat(*(turn.apply_inverse(R[k, :].T) for k in range(3))).T
 
@@ -408,7 +408,7 @@ def newton_euler_derivatives(
         of the velocity].
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
-    poses, bodies = slide_frames(tree, poses, bodies, base_rests=is_zero(base.w))
+    poses, bodies = shift_frames(tree, poses, bodies, base_rests=is_zero(base.w))
     bodies = regroup(tree, poses, bodies)
     motions = link_accelerations(tree, poses, v, a, base)
     axes = joint_axes(tree, poses, v, motions, base)
@@ -483,7 +483,7 @@ def _through_axes(
         joined, j = axes[j].parallel, tree.links[j].antecedent
         turn = axes[j].rotation
         if turn is not None and not joined:
-            column = column.turned(turn)
+            column = column.rotate(turn)
         if couple is not None:
             column, couple = column.with_couple(couple), None
         yield j, axes[j].lines, column
@@ -496,7 +496,7 @@ def _through_base(
     i = tree.links[j].antecedent
     column = column.through(placed[j].place).drifting(placed[j].twice)
     if couple is not None:
-        column = column.with_couple(couple.turned(placed[i].place.turn))
+        column = column.with_couple(couple.rotate(placed[i].place.rotation))
     for before in tree.path(i):
         yield before, placed[before].lines, column
 

@@ -15,12 +15,12 @@ from mbs.components.joints import Motion
 from mbs.spatial import (
     Displacement,
     FreeDisplacement,
-    MatrixTurn,
+    MatrixRotation,
     Pose,
     Rotation,
-    Screw,
+    ScrewDisplacement,
     Wrench,
-    axis_turn,
+    axis_rotation,
     origin,
     quaternion_rotation,
     wrench_through,
@@ -71,25 +71,25 @@ class LinkPose:
         """(3, 3) orientation of j in i."""
         R = Pose.identity().R
         for step in self.steps:
-            R = casadi.mtimes(R, step.turn.matrix)
+            R = casadi.mtimes(R, step.rotation.matrix)
         return R
 
     def at_seat(self, vector: SX) -> SX:
         """A vector of frame i in the seat of the joint."""
         for step in self.seat:
-            vector = step.turn.apply_inverse(vector)
+            vector = step.rotation.apply_inverse(vector)
         return vector
 
     def apply(self, vector: SX) -> SX:
         """A vector of frame j in frame i."""
         for step in reversed(self.steps):
-            vector = step.turn.apply(vector)
+            vector = step.rotation.apply(vector)
         return vector
 
     def apply_inverse(self, vector: SX) -> SX:
         """A vector of frame i in frame j."""
         for step in self.steps:
-            vector = step.turn.apply_inverse(vector)
+            vector = step.rotation.apply_inverse(vector)
         return vector
 
     def wrench(self, f: SX, m: SX) -> Wrench:
@@ -100,7 +100,7 @@ class LinkPose:
         """Frame j seen from the frame in which frame i has this pose."""
         rows = pose.R.T
         for step in self.steps:
-            rows = casadi.horzcat(*(step.turn.apply_inverse(rows[:, k]) for k in range(3)))
+            rows = casadi.horzcat(*(step.rotation.apply_inverse(rows[:, k]) for k in range(3)))
         return Pose(rows.T, pose.p + casadi.mtimes(pose.R, self.p))
 
 
@@ -117,12 +117,12 @@ def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
             run, angle = (*poses[i].run, j), angles[i] + angle
         angles.append(angle)
         seat, motion = _joint(link, seat, q[link.q])
-        spin = axis_turn("z", angle) if len(run) > 1 else motion[0].turn
+        spin = axis_rotation("z", angle) if len(run) > 1 else motion[0].rotation
         poses.append(LinkPose(seat, motion, run, spin))
     return poses
 
 
-def _continues(before: Link, seat: tuple[Screw, ...]) -> bool:
+def _continues(before: Link, seat: tuple[ScrewDisplacement, ...]) -> bool:
     """Whether a revolute joint on this seat has the axis direction of the one before."""
     return before.motion is Motion.REVOLUTE and not any(_turns(step) for step in seat)
 
@@ -137,27 +137,27 @@ def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
 
 
 def _joint(
-    link: Link, seat: tuple[Screw, ...], q: SX
-) -> tuple[tuple[Screw, ...], tuple[Displacement, ...]]:
+    link: Link, seat: tuple[ScrewDisplacement, ...], q: SX
+) -> tuple[tuple[ScrewDisplacement, ...], tuple[Displacement, ...]]:
     """The seat of a joint and the displacement from it to the frame of the link."""
     at = link.placement
     match link.motion:
         case Motion.REVOLUTE:
-            return seat, (Screw.about("z", at.theta + q, at.r),)
+            return seat, (ScrewDisplacement.about("z", at.theta + q, at.r),)
         case Motion.PRISMATIC:
-            return seat, (Screw.about("z", at.theta, at.r + q),)
+            return seat, (ScrewDisplacement.about("z", at.theta, at.r + q),)
     free = FreeDisplacement(
-        MatrixTurn(quaternion_rotation(q[link.motion.nq - 4 :])),
+        MatrixRotation(quaternion_rotation(q[link.motion.nq - 4 :])),
         q[0:3] if link.motion is Motion.FREE else zeros(),
     )
-    return seat + _moving(Screw.about("z", at.theta, at.r)), (free,)
+    return seat + _moving(ScrewDisplacement.about("z", at.theta, at.r)), (free,)
 
 
-def _moving(*steps: Screw) -> tuple[Screw, ...]:
+def _moving(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:
     """The steps that move anything."""
     return tuple(step for step in steps if _turns(step) or not step.t.is_zero())
 
 
-def _turns(step: Screw) -> bool:
+def _turns(step: ScrewDisplacement) -> bool:
     """Whether it turns; the cosine of a small angle is one, its sine is not zero."""
-    return not (step.turn.s.is_zero() and step.turn.c.is_one())
+    return not (step.rotation.s.is_zero() and step.rotation.c.is_one())

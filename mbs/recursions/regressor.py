@@ -22,7 +22,7 @@ from mbs.recursions.poses import LinkPose
 from mbs.recursions.velocities import Acceleration, Velocity, unit_motions
 from mbs.spatial import (
     Inertia,
-    Screw,
+    ScrewDisplacement,
     body_through,
     cross,
     elements,
@@ -128,14 +128,14 @@ def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
         ten[k] = 1
     body, screw = Inertia.from_parameters(ten), pose.motion[0]
     if motion is Motion.PRISMATIC:
-        body = body.turned(screw.turn)
-    elif isinstance(screw, Screw):
-        body = body.slid(2, screw.t)
+        body = body.rotate(screw.rotation)
+    elif isinstance(screw, ScrewDisplacement):
+        body = body.shift(2, screw.t)
     constants = elements(body_through(pose.seat, body).parameters)
-    return ColumnSum(_grouped(constants), _XX if len(part) > 1 else None)
+    return ColumnSum(_group(constants), _XX if len(part) > 1 else None)
 
 
-def _grouped(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]:
+def _group(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]:
     """Columns with the same constant, but for its sign, together; those with zero left out."""
     groups: list[tuple[SX, list[tuple[int, int]]]] = []
     for column, constant in enumerate(constants):
@@ -188,7 +188,7 @@ class PathTwist:
 
 def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
     """For every link unit velocities of the joints from the base to it, in its frame."""
-    return _carried(tree, poses, _unit_twists(tree))
+    return _carry(tree, poses, _unit_twists(tree))
 
 
 def path_twist_rates(
@@ -202,7 +202,7 @@ def path_twist_rates(
         velocities: of the links.
     """
     pairs = zip(_unit_twists(tree), velocities, strict=True)
-    return _carried(tree, poses, [[twist.rate(v) for twist in own] for own, v in pairs])
+    return _carry(tree, poses, [[twist.rate(v) for twist in own] for own, v in pairs])
 
 
 def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
@@ -223,9 +223,7 @@ def _unit_twists(tree: Tree) -> list[list[PathTwist]]:
     ]
 
 
-def _carried(
-    tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]
-) -> list[list[PathTwist]]:
+def _carry(tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]) -> list[list[PathTwist]]:
     """To every link the twists of the links before it, and its own."""
     outer: list[list[PathTwist]] = []
     inner: list[list[PathTwist]] = []
@@ -258,10 +256,15 @@ def inertial_regressor(tree: Tree, poses: list[LinkPose], motions: list[Accelera
         poses: each with respect to its antecedent.
         motions: of the links; see `link_accelerations`.
     """
-    links: list[Elements] = []
-    for motion, twists in zip(motions, path_twists(tree, poses), strict=True):
-        units = unit_wrenches(motion)
-        links.append({twist.row: partial(element, twist, units) for twist in twists})
+    return _work_of_units(tree, poses, [unit_wrenches(motion) for motion in motions])
+
+
+def _work_of_units(tree: Tree, poses: list[LinkPose], units: list[list[Unit]]) -> list[SX]:
+    """For every link the matrix (nv, 10) of the work of its units in unit joint velocities."""
+    links: list[Elements] = [
+        {twist.row: partial(element, twist, own) for twist in twists}
+        for own, twists in zip(units, path_twists(tree, poses), strict=True)
+    ]
     return fill_rows(tree, poses, tree.nv, links)
 
 
@@ -357,11 +360,7 @@ def momentum_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
         poses: each with respect to its antecedent.
         velocities: of the links; see `link_velocities`.
     """
-    links: list[Elements] = []
-    for velocity, twists in zip(velocities, path_twists(tree, poses), strict=True):
-        units = unit_momenta(velocity)
-        links.append({twist.row: partial(element, twist, units) for twist in twists})
-    return fill_rows(tree, poses, tree.nv, links)
+    return _work_of_units(tree, poses, [unit_momenta(velocity) for velocity in velocities])
 
 
 def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
@@ -388,7 +387,7 @@ def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
 
 
 def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:
-    """Velocities that raise nothing: turns about vertical axes and level slides."""
+    """Velocities that raise nothing: rotations about vertical axes and level slides."""
     own = [
         (twist, ups[j])
         for j, link in enumerate(tree.links)

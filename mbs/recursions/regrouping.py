@@ -17,7 +17,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import Body, Inertia, Screw, body_through, elements, exact_sum
+from mbs.spatial import Body, Inertia, ScrewDisplacement, body_through, elements, exact_sum
 
 
 def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]:
@@ -36,7 +36,7 @@ def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]
         bodies[j], moved = _parts(link.motion, bodies[j])
         if link.antecedent >= 0:
             part = _seen_through(moved, link.motion, poses[j])
-            bodies[link.antecedent] = _joined(bodies[link.antecedent], part)
+            bodies[link.antecedent] = _join(bodies[link.antecedent], part)
     return bodies
 
 
@@ -54,15 +54,15 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
     """A moved part about and in frame i; behind a prismatic joint it has no place, only axes."""
     if motion is Motion.PRISMATIC:
         for step in reversed(pose.steps):
-            body = body.turned(step.turn)
+            body = body.rotate(step.rotation)
         return body
     screw = pose.motion[0]
-    if isinstance(screw, Screw):
-        body = body.slid(2, screw.t)
+    if isinstance(screw, ScrewDisplacement):
+        body = body.shift(2, screw.t)
     return body_through(pose.seat, body)
 
 
-def _joined(body: Body, part: Body) -> Body:
+def _join(body: Body, part: Body) -> Body:
     """Two bodies welded together; numbers that cancel are zero, so that they fold."""
     both = zip(_moments(body), _moments(part), strict=True)
     return type(body)(*(_sum(a, b) for a, b in both))
@@ -82,11 +82,11 @@ def _moments(body: Body) -> tuple[SX, SX, SX]:
 # The origin of the frame of a revolute link may stand anywhere on its axis. Three places save
 # operations: the foot of the axis when it is at rest, because no force on it does any work and
 # gravity alone accelerates it; the foot of the axis of a last link; the height of the link behind
-# it when that one turns about a parallel axis and the frame stands beside its foot already: a
+# it when that one rotates about a parallel axis and the frame stands beside its foot already: a
 # distance that is passed on to a joint without one saves nothing.
 
 
-def slide_frames(
+def shift_frames(
     tree: Tree, poses: list[LinkPose], bodies: list[Body], *, base_rests: bool = True
 ) -> tuple[list[LinkPose], list[Body]]:
     """The same tree with other frames of revolute links.
@@ -101,7 +101,7 @@ def slide_frames(
     if all(up.is_zero() for up in rise):
         return poses, bodies
     moved = [_between(tree, poses, rise, j) for j in range(len(poses))]
-    return moved, [body.slid(2, -rise[j]) for j, body in enumerate(bodies)]
+    return moved, [body.shift(2, -rise[j]) for j, body in enumerate(bodies)]
 
 
 def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
@@ -140,11 +140,11 @@ def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkP
     pose, i = poses[j], tree.links[j].antecedent
     b = -rise[i] if i >= 0 else SX(0)
     screw = pose.motion[0]
-    if isinstance(screw, Screw):
+    if isinstance(screw, ScrewDisplacement):
         r = screw.t + rise[j]
         if len(pose.run) > 1 and not b.is_zero():  # the seat has a height in any case
             b, r = b + r, SX(0)
         pose = replace(pose, motion=(replace(screw, t=r),))
     if b.is_zero():
         return pose
-    return replace(pose, seat=(Screw.about("z", SX(0), b), *pose.seat))
+    return replace(pose, seat=(ScrewDisplacement.about("z", SX(0), b), *pose.seat))

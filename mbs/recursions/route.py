@@ -21,12 +21,12 @@ from mbs.components.joints import Motion
 from mbs.operations import count
 from mbs.recursions.velocities import Acceleration, Velocity
 from mbs.spatial import (
+    AxisRotation,
     Khalil,
-    MatrixTurn,
+    MatrixRotation,
     Pose,
     Rotation,
-    Turn,
-    axis_turn,
+    axis_rotation,
     cross,
     is_zero,
     quaternion_rotation,
@@ -105,7 +105,7 @@ def path_to(tree: Tree, q: SX, frame: tuple[int, Pose]) -> list[PathStep]:
     if not is_zero(inside.p):
         steps.append(PathTranslation(inside.p))
     if not inside.is_identity():
-        steps.append(OtherRotation(MatrixTurn(inside.R)))
+        steps.append(OtherRotation(MatrixRotation(inside.R)))
     return steps
 
 
@@ -121,7 +121,10 @@ def _link_steps(k: int, link: Link, q: SX) -> list[PathStep]:
     if motion is Motion.FREE:
         steps.append(PathTranslation(q[0:3]))
     if motion in (Motion.SPHERICAL, Motion.FREE):
-        steps += [OtherRotation(MatrixTurn(quaternion_rotation(q[motion.nq - 4 :]))), JointAt(k)]
+        steps += [
+            OtherRotation(MatrixRotation(quaternion_rotation(q[motion.nq - 4 :]))),
+            JointAt(k),
+        ]
     return [*(step for step in steps if not _is_idle(step)), OriginOf(k)]
 
 
@@ -130,7 +133,7 @@ def _seat_steps(frame: Khalil) -> list[PathStep]:
     return [
         RotationAboutZ(frame.gamma),
         PathTranslation(vector([0, 0, frame.b])),
-        OtherRotation(axis_turn("x", frame.alpha)),
+        OtherRotation(axis_rotation("x", frame.alpha)),
         PathTranslation(vector([frame.d, 0, 0])),
     ]
 
@@ -148,7 +151,7 @@ def _is_idle(step: PathStep) -> bool:
     match step:
         case RotationAboutZ(angle=angle):
             return bool(angle.is_zero())
-        case OtherRotation(rotation=Turn(s=s, c=c)):
+        case OtherRotation(rotation=AxisRotation(s=s, c=c)):
             return bool(s.is_zero() and c.is_one())
         case PathTranslation(p=p):
             return is_zero(p)
@@ -173,9 +176,9 @@ def _inverse(step: PathStep) -> PathStep:
 
 def inverse_rotation(rotation: Rotation) -> Rotation:
     """The inverse rotation."""
-    if isinstance(rotation, Turn):
-        return Turn(rotation.axis, -rotation.s, rotation.c)
-    return MatrixTurn(rotation.matrix.T)
+    if isinstance(rotation, AxisRotation):
+        return AxisRotation(rotation.axis, -rotation.s, rotation.c)
+    return MatrixRotation(rotation.matrix.T)
 
 
 def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
@@ -214,7 +217,7 @@ def _one_rotation(rotations: list[RotationAboutZ]) -> list[PathStep]:
     return [OtherRotation(_total(rotations))] if rotations else []
 
 
-def _total(rotations: list[RotationAboutZ]) -> Turn:
+def _total(rotations: list[RotationAboutZ]) -> AxisRotation:
     """One rotation of several, their angles added in the order of the tree in either direction."""
     forward, backward = (
         [rotation.angle for rotation in rotations if rotation.backwards is backwards]
@@ -222,9 +225,9 @@ def _total(rotations: list[RotationAboutZ]) -> Turn:
     )
     angle = _sum(forward)
     if not backward:
-        return axis_turn("z", angle)
-    turn = axis_turn("z", _sum(backward[::-1]) - angle)
-    return Turn("z", -turn.s, turn.c)
+        return axis_rotation("z", angle)
+    turn = axis_rotation("z", _sum(backward[::-1]) - angle)
+    return AxisRotation("z", -turn.s, turn.c)
 
 
 def _sum(angles: list[SX]) -> SX:

@@ -117,8 +117,8 @@ def square_jacobian(
     if G is None:
         places = _places(tree, found, columns)
     else:
-        found = found.combined(_values(target, G))
-        places = [*spread(found.on_the_way), len(found.frames) - 1]
+        found = found.combine(_values(target, G))
+        places = [*spread(found.on_path), len(found.frames) - 1]
     size = len(found.frames)
     views = _views(found, places, rows, columns)
     view = min(views, key=lambda v: v.rank(size))
@@ -137,7 +137,7 @@ def square_jacobian(
     asked = np.concatenate([found.linear(-1, None), found.angular(-1)], axis=1)
     whole = asked[:, rows][:, :, columns]
     B = _with_zeros(J[:, list(columns)], nonzero(view.B))
-    return _signed(B, view.B, view.blocks, X_inverse, whole)
+    return _sign(B, view.B, view.blocks, X_inverse, whole)
 
 
 def _values(target: VelocityTarget, A: SX) -> Array:
@@ -150,7 +150,7 @@ def _values(target: VelocityTarget, A: SX) -> Array:
 def _places(tree: Tree, found: Survey, columns: Sequence[int]) -> list[int]:
     """The base, the links of these columns, and the axes that were asked for."""
     kept = []
-    for place in found.on_the_way:
+    for place in found.on_path:
         link, _ = found.frames[place]
         v = tree.links[link].v if link >= 0 else slice(0, 0)
         if link < 0 or any(v.start <= column < v.stop for column in columns):
@@ -163,9 +163,9 @@ def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
 
     Args:
         rows: that were asked for.
-        R_V: rows of the orientation of the wanted axes in the linear axes.
+        R_V: rows of the orientation of the target axes in the linear axes.
         R_w: likewise in the angular axes.
-        arm: (3, 1) from the reference to the frame's origin, in the wanted axes.
+        arm: (3, 1) from the reference to the frame's origin, in the target axes.
     """
     V_rows, w_rows = [k for k in rows if k < 3], [k - 3 for k in rows if k >= 3]
     Q_V, Q_w = R_V[:, V_rows], R_w[:, w_rows]
@@ -176,7 +176,7 @@ def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
     return casadi.densify(back)[:, [grouped.index(k) for k in rows]]
 
 
-def _signed(
+def _sign(
     B: SX, values: Array, blocks: tuple[Block, ...] | None, X_inverse: SX, whole: Array
 ) -> SquareJacobian:
     if blocks is None or _always_singular(values):
@@ -199,7 +199,7 @@ def _views(
     memo: dict[bytes, tuple[Block, ...] | None] = {}
     references = [None, *(k for k in found.separate_origins() if k in places)]
     for j in places:
-        R, w = found.turned(j), found.angular(j)[:, :, columns]
+        R, w = found.orientation(j), found.angular(j)[:, :, columns]
         w_kept = _rows_reached(R, w_rows)
         if w_kept is None:
             continue
@@ -207,7 +207,7 @@ def _views(
             if _leaks(found.arm(r), R, w, V_rows, w_kept):
                 continue
             for i in places:
-                V_kept = _rows_reached(found.turned(i), V_rows)
+                V_kept = _rows_reached(found.orientation(i), V_rows)
                 if V_kept is None:
                     continue
                 V = found.linear(i, r)[:, :, columns]

@@ -217,7 +217,7 @@ def _rotation(
     first = poses[run[0]]
     root = motions[tree.links[run[0]].antecedent]
     w_seat, wd_seat = first.at_seat(root.w), first.at_seat(root.wd)
-    turn = pose.spin if len(run) > 1 else pose.motion[0].turn
+    turn = pose.spin if len(run) > 1 else pose.motion[0].rotation
     speed, acceleration = SX(0), SX(0)
     if link.motion is Motion.REVOLUTE:
         for k in run:
@@ -246,7 +246,7 @@ def _square_across(before: Acceleration, pose: LinkPose) -> SX | None:
     """
     axis = vector([0, 0, 1])
     for step in reversed(pose.seat):
-        axis = step.turn.apply(axis)
+        axis = step.rotation.apply(axis)
     for k in range(3):
         if axis[(k + 1) % 3].is_zero() and axis[(k + 2) % 3].is_zero():
             return SX(-before.rate.U[k, k])

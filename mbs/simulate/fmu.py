@@ -138,7 +138,7 @@ def _older(instance: Any, plan: Plan, points: dict[float, bool], recording: Reco
             apply(reached.time, False)
         if points[end] or reached.terminated:
             recording.row(reached.time)
-        recording.happened(reached.time)
+        recording.record_event(reached.time)
         if reached.terminated:
             return recording.ended(reached.time)
     return None
@@ -191,7 +191,7 @@ def _newer(
                 unsaid = reached.event or time >= following
                 following = run.event(time, jumped=time == end, otherwise=["event"] * unsaid)
             else:
-                recording.happened(time)
+                recording.record_event(time)
     return None
 
 
@@ -222,7 +222,7 @@ class _Newer:
             self.plan.tracks.setter(self.instance)(time, True)
         following = self.update()
         self.recording.row(time)
-        self.recording.happened(time, [(self.recording.name, words) for words in otherwise])
+        self.recording.record_event(time, [(self.recording.name, words) for words in otherwise])
         return following
 
     def update(self) -> float:
@@ -331,7 +331,7 @@ class _Exchange:
         self.clock.jump(time)
         following, ended = self.update()
         self.recording.row(time)
-        self.recording.happened(time, self._told(time, fired))
+        self.recording.record_event(time, self._told(time, fired))
         return following, ended
 
     def update(self) -> tuple[float, bool]:
@@ -412,10 +412,10 @@ def _cvode(run: _Exchange, common: dict[str, Any], lost: list[Exception]) -> _St
         """Keeps errors of the FMU, which would be lost in C; what it discards is tried again."""
 
         def f(self, *arguments: Any) -> int:
-            return _kept(super().f, arguments, lost)
+            return _keep(super().f, arguments, lost)
 
         def g(self, *arguments: Any) -> int:
-            return _kept(super().g, arguments, lost)
+            return _keep(super().g, arguments, lost)
 
     plan = run.plan
     solver = Solver(
@@ -431,7 +431,7 @@ def _cvode(run: _Exchange, common: dict[str, Any], lost: list[Exception]) -> _St
     return _Steps(solver, lambda until: _stop_at(solver, until), lost)
 
 
-def _kept(call: Callable[..., int], arguments: tuple[Any, ...], lost: list[Exception]) -> int:
+def _keep(call: Callable[..., int], arguments: tuple[Any, ...], lost: list[Exception]) -> int:
     """What CVODE is answered: 1 asks for a shorter step, -1 for the end."""
     try:
         return call(*arguments)
@@ -477,7 +477,7 @@ _LOCK, _LOADING = threading.Lock(), threading.Lock()
 
 
 @contextmanager
-def heard(listener: Listener) -> Iterator[None]:
+def listening(listener: Listener) -> Iterator[None]:
     """While it lasts, messages of FMUs that this thread runs go to `listener`."""
     thread = threading.get_ident()
     with _LOCK:
@@ -524,7 +524,7 @@ def instance(description: Any, folder: str, kind: str, watch: Callable[..., None
         "mbs"
     )  # others, asked to log, say everything
     if newer:
-        offers = _offered(interface, watch) if stepped else {}
+        offers = _offer(interface, watch) if stepped else {}
         fmu.instantiate(loggingOn=says_why, logMessage=_log_newer, **offers)
     else:
         fmu.instantiate(callbacks=_callbacks(), loggingOn=says_why)
@@ -545,7 +545,7 @@ def _kept_directory() -> Iterator[None]:
             os.chdir(before)
 
 
-def _offered(interface: Any, watch: Callable[..., None]) -> dict[str, Any]:
+def _offer(interface: Any, watch: Callable[..., None]) -> dict[str, Any]:
     """What an instance for co-simulation of FMI 3.0 is told that its host can do."""
     events = bool(interface.hasEventMode)
     found: dict[str, Any] = {"eventModeUsed": events, "earlyReturnAllowed": events}
@@ -672,7 +672,7 @@ def fmu(
         raise ModelError(f"inputs is {quoted(inputs)}; give a dict of names to values, or a Result")
     with tempfile.TemporaryDirectory(prefix="mbs-fmu-", ignore_cleanup_errors=True) as folder:
         _extract(file, folder)
-        description = _described(folder, file)
+        description = _describe(folder, file)
         where = f"FMU {description.modelName}"
         _check_kind(description, kind)
         begin, span = _span(description, duration, where)
@@ -687,7 +687,7 @@ def fmu(
             solver=_one_of(solver, _SOLVERS, "solver", where),
             rows=_one_of(rows, _ROWS, "rows", where),
         )
-        return _simulated(folder, plan, _recorded(folder, plan, record), quiet=quiet)
+        return _simulate(folder, plan, _record(folder, plan, record), quiet=quiet)
 
 
 def _path(path: object) -> Path:
@@ -717,7 +717,7 @@ def _extract(path: Path, folder: str) -> None:
         raise ModelError(f"{path} is not an FMU: {error}") from error
 
 
-def _described(folder: str, path: Path) -> Any:
+def _describe(folder: str, path: Path) -> Any:
     import fmpy
 
     try:
@@ -776,7 +776,7 @@ def _between_steps(folder: str, plan: Plan) -> set[str]:
     return found
 
 
-def _recorded(folder: str, plan: Plan, record: Sequence[str] | None) -> list[Any]:
+def _record(folder: str, plan: Plan, record: Sequence[str] | None) -> list[Any]:
     """The variables to keep."""
     described = plan.description
     known = {
@@ -796,7 +796,7 @@ def _recorded(folder: str, plan: Plan, record: Sequence[str] | None) -> list[Any
     return [v for v in known.values() if v.causality in ("input", "output") or v.name in states]
 
 
-def _simulated(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) -> Result:
+def _simulate(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) -> Result:
     messages: deque[str] = deque(maxlen=2)
 
     def listen(status: int, message: str) -> None:
@@ -809,7 +809,7 @@ def _simulated(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) ->
     stop: SolverError | Interrupted | None = None
     with progress(name, plan.begin, plan.end, quiet=quiet) as reached:
         try:
-            with heard(listen), instance(plan.description, folder, plan.kind, watch) as unit:
+            with listening(listen), instance(plan.description, folder, plan.kind, watch) as unit:
                 recording = recording_of(unit, plan.description, variables, reached)
                 if plan.kind == "CoSimulation":
                     co_simulate(unit, plan, recording, watch)

@@ -442,7 +442,7 @@ class Recording:
             self.rows.append(values)
         self.reached(time)
 
-    def happened(self, time: float, otherwise: Iterable[tuple[str, str]] = ()) -> None:
+    def record_event(self, time: float, otherwise: Iterable[tuple[str, str]] = ()) -> None:
         """Keep every discrete variable that has changed, or where none has, these names and words.
 
         Args:

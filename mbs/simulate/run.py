@@ -381,7 +381,7 @@ def integrated(
         they do not: the message says when and in which configuration, and at a singular one the
         joint that the loops do not hold.
     """
-    legs, stop = _integrated(system, equations, x0, times, p, **options)
+    legs, stop = _integrate(system, equations, x0, times, p, **options)
     if isinstance(stop, SolverError) and stop.state:
         q = np.array(stop.state[: system.nq])
         where = ", ".join(f"{c.name} = {x:.6g}" for c, x in zip(system.coordinates, q, strict=True))
@@ -410,7 +410,7 @@ def _lost(system: System, q: Array, p: Sequence[float]) -> str:
     return f", and the loops hardly hold {name} there"
 
 
-def _integrated(
+def _integrate(
     system: System,
     equations: Callable[[System], FullState],
     x0: Array,
@@ -601,7 +601,7 @@ def prescribed_motions(system: System, motion: Motion) -> list[Prescribed]:
             f"{system.name}: motion is {quoted(motion)}; give a dict such as"
             ' {"j1.q": lambda t: 0.3 * casadi.sin(t)}'
         )
-    found = [_prescribed(system, name, law) for name, law in (motion or {}).items()]
+    found = [_prescribe(system, name, law) for name, law in (motion or {}).items()]
     names = [one.name for one in found]
     for name in names:
         if names.count(name) > 1:
@@ -649,7 +649,7 @@ def _put(system: System, values: dict[str, float], name: str, value: float, what
     values[name] = value
 
 
-def _prescribed(system: System, name: str, law: Any) -> Prescribed:
+def _prescribe(system: System, name: str, law: Any) -> Prescribed:
     base, _, kind = str(name).rpartition(".")
     speeds = [speed.name for speed in system.speeds]
     positions = [coordinate.name for coordinate in system.coordinates]

@@ -96,7 +96,7 @@ class Folder:
             ModelError: it holds another study, or results of an unknown one.
             ExportError: it cannot be written.
         """
-        folder = Folder(_made(path_of(path).absolute()))
+        folder = Folder(_make(path_of(path).absolute()))
         index = folder.path / _INDEX
         text = json.dumps(study, indent=1, sort_keys=True) + "\n"
         known = index.read_bytes() if index.exists() else None
@@ -165,7 +165,7 @@ class Folder:
         return [number for number in range(count) if not zipfile.is_zipfile(self.file(number))]
 
 
-def _made(folder: Path) -> Path:
+def _make(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -372,7 +372,7 @@ class Sweep:
         for k in range(len(self)):
             if k in self.failures:
                 continue
-            for name, value in _measured(self[k], measures, k):
+            for name, value in _measure(self[k], measures, k):
                 column = columns.setdefault(name, np.full(len(self), np.nan))
                 column[k] = value
         return columns
@@ -424,7 +424,7 @@ def _index(number: object, count: int) -> int:
     )
 
 
-def _measured(result: Result, measures: Measures | None, case: int) -> Iterator[tuple[str, float]]:
+def _measure(result: Result, measures: Measures | None, case: int) -> Iterator[tuple[str, float]]:
     if measures is None:
         ends = result.values[-1].tolist()
         yield from ((f"{name}.end", x) for name, x in zip(result.names, ends, strict=True))
@@ -559,10 +559,10 @@ class _Task:
         except MbsError as error:
             return Answer(None, str(error))
         except Exception as error:
-            return Answer(None, _said(error))
+            return Answer(None, _say(error))
 
 
-def _said(error: BaseException) -> str:
+def _say(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
@@ -574,7 +574,7 @@ class _Run:
 
     def __call__(self, case: Case, options: Mapping[str, Any]) -> Result:
         given = _arguments(self.system, case)
-        return run(self.system, quiet=True, **_merged(options, given))
+        return run(self.system, quiet=True, **_merge(options, given))
 
 
 @dataclass(frozen=True, slots=True)
@@ -589,7 +589,7 @@ class _Fmu:
         for name, value in case.items():
             kind = "parameters" if name in self.parameters else "start"
             given.setdefault(kind, {})[name] = value
-        return fmu(self.path, quiet=True, **_merged(options, given))
+        return fmu(self.path, quiet=True, **_merge(options, given))
 
 
 def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
@@ -682,7 +682,7 @@ def _arguments(system: System, case: Case) -> dict[str, dict[str, float]]:
     return given
 
 
-def _merged(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Options of all cases, with the values of one."""
     merged = dict(options)
     for argument, values in given.items():
@@ -712,7 +712,7 @@ def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[in
         for number, task in tasks.items():
             futures[executor.submit(task)] = number
         for future in as_completed(futures):
-            yield futures[future], _answered(future)
+            yield futures[future], _answer(future)
     except BrokenExecutor as error:
         raise SolverError(
             f"sweep: a process of the executor ended ({error}); start the study again with the same"
@@ -723,10 +723,10 @@ def _spread(tasks: Mapping[int, _Task], executor: Executor) -> Iterator[tuple[in
             future.cancel()
 
 
-def _answered(future: Future[Answer]) -> Answer:
+def _answer(future: Future[Answer]) -> Answer:
     try:
         return future.result()
     except BrokenExecutor:
         raise
     except Exception as error:  # lost on the way, such as a worker of a cluster
-        return Answer(None, _said(error))
+        return Answer(None, _say(error))

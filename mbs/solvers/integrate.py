@@ -24,8 +24,8 @@ from mbs.solvers.problem import (
     Event,
     EventMotion,
     Events,
+    IntegrationProblem,
     Passage,
-    Problem,
     equations,
     failed,
     fired_of,
@@ -103,7 +103,9 @@ def library_of(equations: Equations) -> ctypes.CDLL | None:
     return _load(library, equations.indicators is not None, equations.passage is not None)
 
 
-def run_compiled(library: ctypes.CDLL, problem: Problem, progress: Progress | None) -> EventMotion:
+def run_compiled(
+    library: ctypes.CDLL, problem: IntegrationProblem, progress: Progress | None
+) -> EventMotion:
     """The motion at the times of a problem, as far as it comes.
 
     Control-C is heard between two chunks of steps: the compiled code runs to the end of its own.
@@ -156,7 +158,7 @@ def run_compiled(library: ctypes.CDLL, problem: Problem, progress: Progress | No
     return replace(problem.motion(table[: done.value], log, stop), first_slope=first)
 
 
-def _event(library: ctypes.CDLL, driver: ctypes.c_void_p, problem: Problem) -> Event:
+def _event(library: ctypes.CDLL, driver: ctypes.c_void_p, problem: IntegrationProblem) -> Event:
     assert problem.equations.indicators is not None
     fired = np.empty(problem.equations.indicators.numel_out(0))
     modes = np.empty(problem.modes)
@@ -199,7 +201,7 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
 
 
 @contextmanager
-def _opened(library: ctypes.CDLL, problem: Problem) -> Iterator[ctypes.c_void_p]:
+def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctypes.c_void_p]:
     n, p, start = len(problem.x0), problem.p, float(problem.times[0])
     indicators = problem.equations.indicators
     control = np.array([problem.rtol, problem.atol, problem.max_step])
@@ -351,7 +353,7 @@ def integrate_events(
     return motion
 
 
-def _run(given: Problem, progress: Progress | None, compiled: bool) -> EventMotion:
+def _run(given: IntegrationProblem, progress: Progress | None, compiled: bool) -> EventMotion:
     library = library_of(given.equations) if compiled and compiler_found() else None
     if library is None:
         return run_interpreted(given, progress)

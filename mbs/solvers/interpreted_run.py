@@ -9,7 +9,15 @@ import numpy.typing as npt
 
 from mbs.errors import Interrupted, SolverError
 from mbs.solvers.dopri5 import Dopri5
-from mbs.solvers.problem import Event, EventMotion, Failure, Problem, failed, fired_of, interrupted
+from mbs.solvers.problem import (
+    Event,
+    EventMotion,
+    Failure,
+    IntegrationProblem,
+    failed,
+    fired_of,
+    interrupted,
+)
 from mbs.solvers.rodas import Rodas
 from mbs.solvers.stepper import EPSILON, Array, Projection, Stepper, Table
 
@@ -110,11 +118,11 @@ class EventStepper:
                         budget -= self._step(limit)
         except Failure as failure:
             raise failed(
-                solver.t, solver.h, str(failure), self._blamed(failure), solver.x.tolist()
+                solver.t, solver.h, str(failure), self._blame(failure), solver.x.tolist()
             ) from failure
         return False
 
-    def _blamed(self, failure: Failure) -> tuple[int, ...]:
+    def _blame(self, failure: Failure) -> tuple[int, ...]:
         return fired_of(self.fired) if str(failure) in ("settle", "standstill") else ()
 
     def _values(self, t: float, x: Array) -> Array:
@@ -218,11 +226,11 @@ class EventStepper:
         return b, right
 
     def _stop_at_event(self, a: float, b: float, right: Array) -> None:
-        b, right = self._located(a, b, right)
+        b, right = self._locate(a, b, right)
         self.due = self.armed & (right <= 0)
         self.solver.rewind(b)
 
-    def _located(self, a: float, b: float, right: Array) -> tuple[float, Array]:
+    def _locate(self, a: float, b: float, right: Array) -> tuple[float, Array]:
         """The first time after a at which an indicator is not positive, and all of them there.
 
         Secants with a safeguard, and the half of each value that stays (the Illinois rule).
@@ -287,7 +295,7 @@ shortened."""
 _CHUNK = 50  # steps between two calls of progress
 
 
-def run_interpreted(problem: Problem, progress: Progress | None) -> EventMotion:
+def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> EventMotion:
     """The motion at the times of a problem, as far as it comes.
 
     Args:
@@ -301,8 +309,8 @@ def run_interpreted(problem: Problem, progress: Progress | None) -> EventMotion:
     stop: SolverError | Interrupted | None = None
     try:
         if solver.project is not None:
-            solver.x = _begun(solver)
-        watched = _watched(problem, p, solver)
+            solver.x = _begin(solver)
+        watched = _watch(problem, p, solver)
         while not table.full:
             if watched is None:
                 solver.fill(table, _CHUNK)
@@ -322,7 +330,7 @@ def _vector(value: casadi.DM) -> Array:
     return np.asarray(value.full()[:, 0])
 
 
-def _stepper(problem: Problem, p: Array) -> Stepper:
+def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     functions, start, state = problem.equations, float(problem.times[0]), problem.x0
     project = _projection(problem, p)
     control = problem.rtol, problem.atol, problem.max_step
@@ -340,7 +348,7 @@ def _stepper(problem: Problem, p: Array) -> Stepper:
     return Rodas(slope, project, start, state, *control, jacobian=jacobian)
 
 
-def _begun(solver: Stepper) -> Array:
+def _begin(solver: Stepper) -> Array:
     """The first state, on the constraints."""
     assert solver.project is not None
     try:
@@ -349,7 +357,7 @@ def _begun(solver: Stepper) -> Array:
         raise failed(solver.t, 0.0, str(failure), state=solver.x.tolist()) from failure
 
 
-def _projection(problem: Problem, p: Array) -> Projection | None:
+def _projection(problem: IntegrationProblem, p: Array) -> Projection | None:
     """Newton steps until the constraints hold to rounding."""
     step = problem.equations.project
     if step is None:
@@ -371,7 +379,7 @@ def _projection(problem: Problem, p: Array) -> Projection | None:
     return onto
 
 
-def _watched(problem: Problem, p: Array, solver: Stepper) -> EventStepper | None:
+def _watch(problem: IntegrationProblem, p: Array, solver: Stepper) -> EventStepper | None:
     """The integration with its events, which has looked at the first state."""
     functions, project = problem.equations, solver.project
     indicators, rates, jump = functions.indicators, functions.rates, functions.jump

@@ -101,7 +101,7 @@ _LAST_DIGITS = 1e-2
 
 
 @dataclass(frozen=True, slots=True)
-class Root:
+class LeastSquaresResult:
     """Where the iteration ended.
 
     Attributes:
@@ -122,7 +122,7 @@ def gauss_newton(
     tolerance: float | Vector = 1e-12,
     iterations: int = 100,
     rank_tolerance: float = 1e-9,
-) -> Root:
+) -> LeastSquaresResult:
     """Damped Gauss-Newton with the smallest step that solves the linearised equations.
 
     The step is the minimum-norm least-squares solution, so that dependent equations and free
@@ -142,7 +142,7 @@ def gauss_newton(
     x = np.array(start, dtype=float)
     r, J = function(x)
     if not _finite(r, J):
-        return Root(x, np.inf, False)
+        return LeastSquaresResult(x, np.inf, False)
     for _ in range(iterations):
         reached = bool(np.all(np.abs(r) <= tolerance))
         if reached and np.all(np.abs(r) <= _LAST_DIGITS * np.asarray(tolerance)):
@@ -162,7 +162,7 @@ def gauss_newton(
         x, r, J = trial, r_trial, J_trial
         if stalled or reached:
             break
-    return Root(x, _norm(r), bool(np.all(np.abs(r) <= tolerance)))
+    return LeastSquaresResult(x, _norm(r), bool(np.all(np.abs(r) <= tolerance)))
 
 
 def _norm(x: Vector) -> float:
@@ -185,7 +185,9 @@ _SETTLED = 1e-16
 """Part of r' r below which a gain is the rounding of it."""
 
 
-def levenberg_marquardt(function: Residual, start: Vector, *, iterations: int = 300) -> Root:
+def levenberg_marquardt(
+    function: Residual, start: Vector, *, iterations: int = 300
+) -> LeastSquaresResult:
     """A local minimum of r' r; it is reached too where the Jacobian loses rank at it.
 
     The step solves (J' J + mu 1) s = -J' r; mu falls where a step leads down and rises where not.
@@ -212,5 +214,5 @@ def levenberg_marquardt(function: Residual, start: Vector, *, iterations: int = 
         else:
             settled, damping = damping > _STIFFEST, damping * _STIFFENED
         if settled:
-            return Root(x, float(np.linalg.norm(r)), True)
-    return Root(x, float(np.linalg.norm(r)), False)
+            return LeastSquaresResult(x, float(np.linalg.norm(r)), True)
+    return LeastSquaresResult(x, float(np.linalg.norm(r)), False)

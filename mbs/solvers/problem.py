@@ -163,7 +163,7 @@ class Equations:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
+class IntegrationProblem:
     """An integration, its arguments checked.
 
     Attributes:
@@ -315,7 +315,7 @@ def problem(
     modes: npt.ArrayLike,
     tolerances: tuple[float, float],
     max_step: float,
-) -> Problem:
+) -> IntegrationProblem:
     """The integration of given functions.
 
     Args:
@@ -349,7 +349,9 @@ def problem(
         raise ModelError(f"integrate: tolerances {rtol!r} and {atol!r} must be positive numbers")
     if not (isinstance(max_step, (int, float)) and max_step > 0):
         raise ModelError(f"integrate: the longest step {max_step!r} must be a positive number, s")
-    return Problem(functions, x, t, np.concatenate([own, m]), len(m), rtol, atol, max_step)
+    return IntegrationProblem(
+        functions, x, t, np.concatenate([own, m]), len(m), rtol, atol, max_step
+    )
 
 
 def numbers(values: npt.ArrayLike) -> Array:

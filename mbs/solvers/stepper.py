@@ -109,7 +109,7 @@ class Stepper(ABC):
 
     @abstractmethod
     def _keep(self, h: float, y: Array) -> tuple[Array, ...]:
-        """Dense output of the attempt that led to y."""
+        """Dense output of the attempt that gave y."""
 
     @abstractmethod
     def _close(self, t: float, y: Array) -> Array | None:

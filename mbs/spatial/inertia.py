@@ -83,16 +83,16 @@ class Inertia:
             R: rotation of the present frame j seen from i.
             p: (3, 1) origin of j in i [m].
         """
-        moved = self.turned(R)
+        moved = self.rotate(R)
         for axis in range(3):
-            moved = moved.slid(axis, p[axis])
+            moved = moved.shift(axis, p[axis])
         return moved
 
-    def turned(self, R: Rotation) -> Inertia:
+    def rotate(self, R: Rotation) -> Inertia:
         """The same body about the same point in the axes of frame i."""
         return Inertia(R.apply_to_tensor(self.J), R.apply(self.ms), self.m)
 
-    def slid(self, axis: int, t: SX) -> Inertia:
+    def shift(self, axis: int, t: SX) -> Inertia:
         """The body displaced by t [m] along a coordinate axis.
 
         Three products: with h = ms + m t, J changes by t (ms + h) across the axis.
@@ -110,7 +110,7 @@ class Inertia:
     def along_axis(self) -> tuple[Inertia, Inertia]:
         """Two bodies that make this one: YY, MZ and M are zero in the first.
 
-        The second is mass on the z axis: no turn about it can be felt.
+        The second is mass on the z axis: no rotation about it can be felt.
         """
         J, on_axis = SX(self.J), zeros(3, 3)
         on_axis[0, 0] = on_axis[1, 1] = self.J[1, 1]
@@ -173,11 +173,11 @@ class PseudoInertia:
         """Two bodies welded together, in one frame."""
         return PseudoInertia(self.S + other.S, self.ms + other.ms, self.m + other.m)
 
-    def turned(self, R: Rotation) -> PseudoInertia:
+    def rotate(self, R: Rotation) -> PseudoInertia:
         """The same body about the same point in the axes of frame i."""
         return PseudoInertia(R.apply_to_tensor(self.S), R.apply(self.ms), self.m)
 
-    def slid(self, axis: int, t: SX) -> PseudoInertia:
+    def shift(self, axis: int, t: SX) -> PseudoInertia:
         """The body displaced by t [m] along a coordinate axis."""
         if t.is_zero():
             return self
@@ -191,7 +191,7 @@ class PseudoInertia:
     def along_axis(self) -> tuple[PseudoInertia, PseudoInertia]:
         """Two bodies that make this one: the first has no S33, MZ, M.
 
-        The second is mass on the z axis: no turn about it can be felt.
+        The second is mass on the z axis: no rotation about it can be felt.
         """
         S, on_axis, ms, height = SX(self.S), zeros(3, 3), SX(self.ms), zeros()
         on_axis[2, 2], S[2, 2] = S[2, 2], 0

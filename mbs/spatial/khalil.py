@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 import casadi
 from casadi import DM, SX, Function
 
-from mbs.spatial.pose import Pose, Screw
-from mbs.spatial.rotation import axis_turn
+from mbs.spatial.pose import Pose, ScrewDisplacement
+from mbs.spatial.rotation import axis_rotation
 from mbs.spatial.vectors import exact_sum, vector
 
 _QUARTER = math.pi / 2
@@ -74,24 +74,30 @@ class Khalil:
         R = Pose.about("z", self.gamma) @ Pose.about("x", self.alpha) @ Pose.about("z", self.theta)
         if not R.chain:
             return Pose(R.R, self.position())
-        first = Pose.about("z", self.gamma) @ Pose.moved(vector([self.d, 0, self.b]))
-        last = Pose.about("z", self.theta) @ Pose.moved(vector([0, 0, self.r]))
+        first = Pose.about("z", self.gamma) @ Pose.translation(vector([self.d, 0, self.b]))
+        last = Pose.about("z", self.theta) @ Pose.translation(vector([0, 0, self.r]))
         return Pose(R.R, self.position(), (first @ Pose.about("x", self.alpha) @ last).chain)
 
     @property
-    def seat(self) -> tuple[Screw, ...]:
+    def seat(self) -> tuple[ScrewDisplacement, ...]:
         """From frame i to the axis of joint j: gamma and b, then alpha and d."""
-        return Screw.about("z", self.gamma, self.b), Screw.about("x", self.alpha, self.d)
+        return ScrewDisplacement.about("z", self.gamma, self.b), ScrewDisplacement.about(
+            "x", self.alpha, self.d
+        )
 
     @property
-    def fixed(self) -> tuple[Screw, ...]:
+    def fixed(self) -> tuple[ScrewDisplacement, ...]:
         """From frame i to frame j when nothing moves between them."""
         if not self._shifts_across:
-            return *self.seat, Screw.about("z", self.theta, self.r)
-        turn = Screw.about("z", exact_sum(self.gamma, SX(-_QUARTER)), self.b)
-        return turn, Screw.about("y", SX(0), self.d), Screw.about("z", SX(0), self.r)
+            return *self.seat, ScrewDisplacement.about("z", self.theta, self.r)
+        turn = ScrewDisplacement.about("z", exact_sum(self.gamma, SX(-_QUARTER)), self.b)
+        return (
+            turn,
+            ScrewDisplacement.about("y", SX(0), self.d),
+            ScrewDisplacement.about("z", SX(0), self.r),
+        )
 
-    def divided(self) -> tuple[Khalil, Khalil]:
+    def split(self) -> tuple[Khalil, Khalil]:
         """Its gamma and b, which commute with a motion about and along z_i, and what is left."""
         zero, gamma = SX(0), self.gamma
         left = zero
@@ -107,36 +113,36 @@ class Khalil:
 
     def position(self) -> SX:
         """(3, 1) origin of frame j in frame i [m]; theta has no part in it."""
-        gamma, alpha = axis_turn("z", self.gamma), axis_turn("x", self.alpha)
+        gamma, alpha = axis_rotation("z", self.gamma), axis_rotation("x", self.alpha)
         return gamma.apply(vector([self.d, -self.r * alpha.s, self.b + self.r * alpha.c]))
 
-    def turned(self, angle: SX) -> Khalil:
-        """The frame turned further about its own z axis."""
+    def rotate(self, angle: SX) -> Khalil:
+        """The frame rotated further about its own z axis."""
         return replace(self, theta=self.theta + angle)
 
-    def slid(self, distance: SX) -> Khalil:
-        """The frame slid further along its own z axis."""
+    def shift(self, distance: SX) -> Khalil:
+        """The frame shifted further along its own z axis."""
         return replace(self, r=self.r + distance)
 
 
-def placed(pose: Pose, size: float) -> tuple[Khalil, ...]:
+def frames_to(pose: Pose, size: float) -> tuple[Khalil, ...]:
     """The frames that lead to a pose, one after the other; the last one stands at it.
 
     It is one frame where the common perpendicular of the two axes is near. Otherwise fixed frames
-    come before it: one for a shift across both axes, one for every further turn by a symbol. What
-    holds of numbers is never said of a symbol: its sign, or that its sine is not zero.
+    come before it: one for a shift across both axes, one for every further rotation by a
+    symbol. What holds of numbers is never said of a symbol: its sign, or that its sine is not zero.
 
     Parallel axes leave one distance free: b is then zero and r takes the offset.
 
     Args:
-        pose: of numbers, or made of turns by symbols about coordinate axes.
+        pose: of numbers, or made of rotations by symbols about coordinate axes.
         size: of the mechanism, such as the length of its largest link [m].
 
     Raises:
         ValueError: symbols turn the pose in a way that its chain does not tell.
     """
     if not pose.chain and not pose.R.is_constant():
-        raise ValueError("a pose that symbols turn has no chain of turns")
+        raise ValueError("a pose that symbols rotate has no chain of rotations")
     segments, theta, r = _segments(pose, size)
     frames: list[Khalil] = []
     slide = SX(0)  # along z, left over by the segment before
@@ -146,7 +152,7 @@ def placed(pose: Pose, size: float) -> tuple[Khalil, ...]:
         turn, height = (theta, r) if last else (SX(0), SX(0))
         found, slide = _frames(segment, turn, size)
         if last:
-            found[-1] = found[-1].slid(exact_sum(height, slide))
+            found[-1] = found[-1].shift(exact_sum(height, slide))
         frames += found
     return tuple(frames)
 
@@ -167,17 +173,17 @@ class _Segment:
 
     def shift_behind(self, x: SX, y: SX, z: SX) -> None:
         """A further shift in the axes behind alpha."""
-        self.shift(*_turned("x", self.alpha, x, y, z))
+        self.shift(*_rotate("x", self.alpha, x, y, z))
 
 
 def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
     """A pose as segments, then theta and r of the last frame."""
     segments: list[_Segment] = []
-    # what follows the last turn about x: a turn about z, then a shift in the axes that it makes
+    # what follows the last turn about x: a rotation about z, then a shift in the axes that it makes
     theta, x, y, z = SX(0), SX(0), SX(0), SX(0)
     for axis, angle, p in _elementary(pose):
         if axis == "z":
-            x, y, _ = _turned("z", -angle, x, y, SX(0))
+            x, y, _ = _rotate("z", -angle, x, y, SX(0))
             theta = exact_sum(theta, angle)
         elif axis == "x" and theta.is_zero() and segments:
             before = segments[-1]
@@ -196,7 +202,7 @@ def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
         else:
             x, y, z = exact_sum(x, p[0]), exact_sum(y, p[1]), exact_sum(z, p[2])
     if segments:
-        segments[-1].shift_behind(*_turned("z", theta, x, y, SX(0)))
+        segments[-1].shift_behind(*_rotate("z", theta, x, y, SX(0)))
         r = z
     elif theta.is_constant() or _direction(pose.p[0], pose.p[1]) is not None:
         # parallel axes, the shift seen from before the turn
@@ -257,13 +263,13 @@ def _atan2(y: float, x: float) -> float:
 def _frames(segment: _Segment, theta: SX, size: float) -> tuple[list[Khalil], SX]:
     """The frames of a segment and of the turn about z behind it, and a slide along the last z."""
     gamma, alpha, x, y, z = segment.gamma, segment.alpha, segment.x, segment.y, segment.z
-    sine, cosine = axis_turn("x", alpha).s, axis_turn("x", alpha).c
+    sine, cosine = axis_rotation("x", alpha).s, axis_rotation("x", alpha).c
     if sine.is_zero():
         alpha = SX(0.0 if float(cosine) > 0 else math.pi)
         towards = 0.0 if y.is_zero() else _direction(x, y)
         if towards is not None:
             # parallel axes: x along the shift between them
-            length = x if y.is_zero() else _turned("z", SX(-towards), x, y, SX(0))[0]
+            length = x if y.is_zero() else _rotate("z", SX(-towards), x, y, SX(0))[0]
             gamma = exact_sum(gamma, SX(towards))
             theta = exact_sum(theta, -cosine * towards)
             return [Khalil(gamma, SX(0), alpha, length, theta, SX(0))], cosine * z
@@ -286,9 +292,9 @@ def _is_near(b: SX, r: SX, sine: float, size: float) -> bool:
     return sine >= _LEAST_SINE
 
 
-def _turned(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
-    """The shift behind a turn about "x" or "z", seen from before it; zeros stay zeros."""
-    turn = axis_turn(axis, angle)
+def _rotate(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
+    """The shift behind a rotation about "x" or "z", seen from before it; zeros stay zeros."""
+    turn = axis_rotation(axis, angle)
     if axis == "x":
         y, z = exact_sum(turn.c * y, -turn.s * z), exact_sum(turn.s * y, turn.c * z)
     elif not (x.is_zero() and y.is_zero()):

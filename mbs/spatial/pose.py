@@ -9,13 +9,13 @@ from typing import Protocol, Self, TypeVar
 import casadi
 from casadi import DM, SX
 
-from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, axis_turn
+from mbs.spatial.rotation import AxisRotation, MatrixRotation, Rotation, axis_rotation
 from mbs.spatial.vectors import cross, elements, exact_product, is_zero, zeros
 
 
 @dataclass(frozen=True, slots=True)
-class AxisTurn:
-    """A turn about the axis "x", "y" or "z" by an angle [rad] that has a symbol in it."""
+class SymbolicRotation:
+    """A rotation about the axis "x", "y" or "z" by an angle [rad] that has a symbol in it."""
 
     axis: str
     angle: SX
@@ -28,15 +28,15 @@ class Pose:
     Attributes:
         R: (3, 3) orientation; its columns are the axes of j in frame i.
         p: (3, 1) origin of j in frame i [m].
-        chain: the displacements one after the other that make it, where symbols turn it: turns by
-            an angle with a symbol, and poses whose orientation is of numbers. From them the angles
-            are read off as they were written; the matrix would leave the sign of a sine open.
-            Empty where R is of numbers, and where symbols in R came from elsewhere.
+        chain: the displacements one after the other that make it, where symbols turn it: rotations
+            by an angle with a symbol, and poses whose orientation is of numbers. From them the
+            angles are read off as they were written; the matrix would leave the sign of a sine
+            open. Empty where R is of numbers, and where symbols in R came from elsewhere.
     """
 
     R: SX
     p: SX
-    chain: tuple[AxisTurn | Pose, ...] = ()
+    chain: tuple[SymbolicRotation | Pose, ...] = ()
 
     @staticmethod
     def identity() -> Pose:
@@ -44,29 +44,29 @@ class Pose:
         return Pose(casadi.densify(SX(DM.eye(3))), zeros())
 
     @staticmethod
-    def turned(R: SX) -> Pose:
+    def rotation(R: SX) -> Pose:
         """A frame with the same origin and the orientation R."""
         return Pose(casadi.densify(R), zeros())
 
     @staticmethod
     def about(axis: str, angle: SX) -> Pose:
-        """A frame with the same origin, turned by an angle [rad] about "x", "y" or "z"."""
-        R = axis_turn(axis, angle).matrix
-        return Pose(R, zeros(), () if R.is_constant() else (AxisTurn(axis, angle),))
+        """A frame with the same origin, rotated by an angle [rad] about "x", "y" or "z"."""
+        R = axis_rotation(axis, angle).matrix
+        return Pose(R, zeros(), () if R.is_constant() else (SymbolicRotation(axis, angle),))
 
     @staticmethod
-    def moved(p: SX) -> Pose:
+    def translation(p: SX) -> Pose:
         """A frame with the same orientation and the origin p."""
         return Pose(Pose.identity().R, casadi.densify(p))
 
     @property
-    def steps(self) -> tuple[AxisTurn | Pose, ...]:
+    def steps(self) -> tuple[SymbolicRotation | Pose, ...]:
         """The displacements that make it: those of its chain, or itself."""
         return self.chain or (self,)
 
     def __matmul__(self, other: Pose) -> Pose:
         """T_ik from T_ij and T_jk."""
-        chain = _joined(self, other) if self.chain or other.chain else ()
+        chain = _join(self, other) if self.chain or other.chain else ()
         return Pose(
             _with_lone_ones(exact_product(self.R, other.R)),
             exact_product(self.R, other.p, self.p),
@@ -90,17 +90,20 @@ class Pose:
 
     def at(self, p: SX) -> Pose:
         """A frame with the same orientation and its origin at p, (3, 1)."""
-        turns = (step if isinstance(step, AxisTurn) else Pose.turned(step.R) for step in self.chain)
-        return Pose(self.R, p, (Pose.moved(p), *turns) if self.chain else ())
+        turns = (
+            step if isinstance(step, SymbolicRotation) else Pose.rotation(step.R)
+            for step in self.chain
+        )
+        return Pose(self.R, p, (Pose.translation(p), *turns) if self.chain else ())
 
     def is_identity(self) -> bool:
         """Whether it is the constant identity."""
         return bool(casadi.is_equal(self.matrix, casadi.densify(SX(DM.eye(4))), 1))
 
 
-def _joined(first: Pose, second: Pose) -> tuple[AxisTurn | Pose, ...]:
-    """The displacements of both, those without a turn by a symbol made one; empty if unknown."""
-    joined: list[AxisTurn | Pose] = []
+def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
+    """The displacements of both, constant rotations made one; empty if unknown."""
+    joined: list[SymbolicRotation | Pose] = []
     for step in (*first.steps, *second.steps):
         if isinstance(step, Pose):
             if not step.R.is_constant():
@@ -112,8 +115,12 @@ def _joined(first: Pose, second: Pose) -> tuple[AxisTurn | Pose, ...]:
     return tuple(joined)
 
 
-def _inverse(step: AxisTurn | Pose) -> AxisTurn | Pose:
-    return AxisTurn(step.axis, -step.angle) if isinstance(step, AxisTurn) else step.inverse()
+def _inverse(step: SymbolicRotation | Pose) -> SymbolicRotation | Pose:
+    return (
+        SymbolicRotation(step.axis, -step.angle)
+        if isinstance(step, SymbolicRotation)
+        else step.inverse()
+    )
 
 
 def _with_lone_ones(R: SX) -> SX:
@@ -150,13 +157,13 @@ def add_wrenches(a: Wrench, b: Wrench) -> Wrench:
     return a[0] + b[0], a[1] + b[1]
 
 
-def carried(pose: Pose, wrench: Wrench) -> Wrench:
+def transform_wrench(pose: Pose, wrench: Wrench) -> Wrench:
     """A wrench about and in frame j, about and in the frame i in which frame j has this pose."""
     force, moment = (casadi.mtimes(pose.R, part) for part in wrench)
     return force, moment + cross(pose.p, force)
 
 
-# Elementary displacements: a turn about a coordinate axis with a translation along it.
+# Elementary displacements: a rotation about a coordinate axis with a translation along it.
 #
 # A link frame of Khalil and Kleinfinger is two or three of them from its antecedent. A wrench or
 # an inertia is moved through one for a handful of multiplications, where a pose would cost
@@ -166,10 +173,10 @@ def carried(pose: Pose, wrench: Wrench) -> Wrench:
 class Movable(Protocol):
     """What is given about and in a frame: an inertia, or what is moved like one."""
 
-    def turned(self, R: Rotation) -> Self:
+    def rotate(self, R: Rotation) -> Self:
         """The same about the same point in the axes of frame i."""
 
-    def slid(self, axis: int, t: SX) -> Self:
+    def shift(self, axis: int, t: SX) -> Self:
         """The same displaced by t [m] along a coordinate axis."""
 
 
@@ -180,7 +187,7 @@ class Displacement(Protocol):
     """Where a frame j stands in a frame i."""
 
     @property
-    def turn(self) -> Rotation:
+    def rotation(self) -> Rotation:
         """The orientation of frame j seen from frame i."""
 
     def point(self, r: SX) -> SX:
@@ -194,73 +201,73 @@ class Displacement(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Screw:
-    """A turn about a coordinate axis and a translation along the same axis.
+class ScrewDisplacement:
+    """A rotation about a coordinate axis and a translation along the same axis.
 
     Attributes:
-        turn: about the axis.
+        rotation: about the axis.
         t: distance along the axis [m].
     """
 
-    turn: Turn
+    rotation: AxisRotation
     t: SX
 
     @staticmethod
-    def about(axis: str, angle: SX, t: SX) -> Screw:
+    def about(axis: str, angle: SX, t: SX) -> ScrewDisplacement:
         """The screw by an angle [rad] and a distance [m] along the axis "x", "y" or "z"."""
-        return Screw(axis_turn(axis, angle), SX(t))
+        return ScrewDisplacement(axis_rotation(axis, angle), SX(t))
 
     @property
     def axis(self) -> int:
         """0, 1 or 2 for x, y or z."""
-        return self.turn.along
+        return self.rotation.along
 
     def point(self, r: SX) -> SX:
         """A point of frame j, (3, 1), in frame i [m]."""
-        moved = SX(self.turn.apply(r))
+        moved = SX(self.rotation.apply(r))
         moved[self.axis] += self.t
         return moved
 
     def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
-        f, m = self.turn.apply(f), SX(self.turn.apply(m))
+        f, m = self.rotation.apply(f), SX(self.rotation.apply(m))
         if not self.t.is_zero():
-            k, h = self.turn.across
+            k, h = self.rotation.across
             m[k] -= self.t * f[h]
             m[h] += self.t * f[k]
         return f, m
 
     def body(self, thing: Thing) -> Thing:
         """What is given about and in frame j, such as an inertia, about and in frame i."""
-        return thing.turned(self.turn).slid(self.axis, self.t)
+        return thing.rotate(self.rotation).shift(self.axis, self.t)
 
 
 @dataclass(frozen=True, slots=True)
 class FreeDisplacement:
-    """Any translation, then any turn.
+    """Any translation, then any rotation.
 
     Attributes:
-        turn: orientation of frame j in frame i.
+        rotation: of frame j seen from frame i.
         p: (3, 1) origin of frame j in frame i [m].
     """
 
-    turn: MatrixTurn
+    rotation: MatrixRotation
     p: SX
 
     def point(self, r: SX) -> SX:
         """A point of frame j, (3, 1), in frame i [m]."""
-        return self.p + self.turn.apply(r)
+        return self.p + self.rotation.apply(r)
 
     def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
-        f, m = self.turn.apply(f), self.turn.apply(m)
+        f, m = self.rotation.apply(f), self.rotation.apply(m)
         return f, m if is_zero(self.p) else m + cross(self.p, f)
 
     def body(self, thing: Thing) -> Thing:
         """What is given about and in frame j, such as an inertia, about and in frame i."""
-        moved = thing.turned(self.turn)
+        moved = thing.rotate(self.rotation)
         for axis in range(3):
-            moved = moved.slid(axis, self.p[axis])
+            moved = moved.shift(axis, self.p[axis])
         return moved
 
 

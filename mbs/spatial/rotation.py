@@ -1,7 +1,7 @@
-"""Rotations as sequences of turns about coordinate axes.
+"""Rotations as sequences of elementary ones about coordinate axes.
 
-A turn about an axis costs four multiplications and two additions a vector, and nothing when its
-angle is a multiple of a quarter turn: two turns are cheaper than the matrix they make.
+A rotation about an axis costs four multiplications and two additions a vector, and nothing when its
+angle is a multiple of a quarter turn: two rotations are cheaper than the matrix they make.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _TIE = 1e-6
 
 
 class Rotation(Protocol):
-    """Something that turns vectors of a frame j into vectors of a frame i."""
+    """Something that rotates vectors of a frame j into vectors of a frame i."""
 
     @property
     def matrix(self) -> SX:
@@ -56,7 +56,7 @@ class Rotation(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class AxisRotation:
     """A rotation about a coordinate axis, by its sine and cosine."""
 
     axis: str
@@ -70,26 +70,26 @@ class Turn:
 
     @property
     def across(self) -> tuple[int, int]:
-        """Numbers of the axes that turn, the first towards the second."""
+        """Numbers of the axes that rotate, the first towards the second."""
         return (self.along + 1) % 3, (self.along + 2) % 3
 
     @property
     def matrix(self) -> SX:
-        """(3, 3) orientation of the turned frame."""
+        """(3, 3) orientation of the rotated frame."""
         k, h = self.across
         R = SX(DM.eye(3))
         R[k, k], R[k, h], R[h, k], R[h, h] = self.c, -self.s, self.s, self.c
         return casadi.densify(R)
 
     def apply(self, vector: SX) -> SX:
-        """The vector of the turned frame in the fixed one."""
-        return self._turned(vector, self.s)
+        """The vector of the rotated frame in the fixed one."""
+        return self._rotate(vector, self.s)
 
     def apply_inverse(self, vector: SX) -> SX:
         """The vector of the fixed frame in the turned one."""
-        return self._turned(vector, -self.s)
+        return self._rotate(vector, -self.s)
 
-    def _turned(self, vector: SX, s: SX) -> SX:
+    def _rotate(self, vector: SX, s: SX) -> SX:
         k, h = self.across
         turned = +vector
         turned[k] = self.c * vector[k] - s * vector[h]
@@ -97,16 +97,16 @@ class Turn:
         return turned
 
     def apply_to_tensor(self, tensor: SX) -> SX:
-        """The symmetric tensor of the turned frame in the fixed one; eight multiplications."""
+        """The symmetric tensor of the rotated frame in the fixed one; eight multiplications."""
         k, h = self.across
         m, turned = self.along, self.apply_to_square(tensor)
         turned[h, k], turned[m, k], turned[m, h] = turned[k, h], turned[k, m], turned[h, m]
         return turned
 
     def apply_to_square(self, square: SX) -> SX:
-        """Any tensor of the turned frame in the fixed one; twelve multiplications.
+        """Any tensor of the rotated frame in the fixed one; twelve multiplications.
 
-        With w = c (a - e) - s (b + d) the turned block is [[e + c w, b + s w], [d + s w, a - c w]]
+        With w = c (a - e) - s (b + d) the rotated block is [[e + c w, b + s w], [d + s w, a - c w]]
         for the block [[a, b], [d, e]].
         """
         (k, h), m = self.across, self.along
@@ -127,13 +127,13 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class MatrixTurn:
+class MatrixRotation:
     """A rotation by its matrix, where no axis is special (quaternions)."""
 
     matrix: SX
 
     def apply(self, vector: SX) -> SX:
-        """The vector of the turned frame in the fixed one."""
+        """The vector of the rotated frame in the fixed one."""
         return casadi.mtimes(self.matrix, vector)
 
     def apply_inverse(self, vector: SX) -> SX:
@@ -141,18 +141,18 @@ class MatrixTurn:
         return casadi.mtimes(self.matrix.T, vector)
 
     def apply_to_tensor(self, tensor: SX) -> SX:
-        """The symmetric tensor of the turned frame in the fixed one."""
+        """The symmetric tensor of the rotated frame in the fixed one."""
         return self.apply_to_square(tensor)
 
     def apply_to_square(self, square: SX) -> SX:
-        """Any tensor of the turned frame in the fixed one."""
+        """Any tensor of the rotated frame in the fixed one."""
         return casadi.mtimes(casadi.mtimes(self.matrix, square), self.matrix.T)
 
 
-def axis_turn(axis: str, angle: SX) -> Turn:
+def axis_rotation(axis: str, angle: SX) -> AxisRotation:
     """The turn by an angle [rad] about the axis "x", "y" or "z"."""
     s, c = sin_cos(angle)
-    return Turn(axis, s, c)
+    return AxisRotation(axis, s, c)
 
 
 def align_z(direction: Sequence[float]) -> SX:
@@ -204,11 +204,11 @@ def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -
     return first, second, third
 
 
-# Unit quaternions w, x, y, z for joints that turn freely.
+# Unit quaternions w, x, y, z for joints that rotate freely.
 
 
 def quaternion_rotation(quaternion: SX) -> SX:
-    """(3, 3) orientation of the turned frame, of a unit quaternion (w, x, y, z).
+    """(3, 3) orientation of the rotated frame, of a unit quaternion (w, x, y, z).
 
     The diagonal is w2 + x2 - y2 - z2 and so on, which keeps R' R = |quaternion|^4 I when the norm
     is not one.
@@ -225,11 +225,11 @@ def quaternion_rotation(quaternion: SX) -> SX:
 
 
 def quaternion_rate(quaternion: SX, angular_velocity: SX) -> SX:
-    """(4, 1) time derivative of the quaternion of a frame that turns with the velocity [rad/s].
+    """(4, 1) time derivative of the quaternion of a frame that rotates with the velocity [rad/s].
 
     Args:
         quaternion: (4, 1) w, x, y, z.
-        angular_velocity: (3, 1) in the turned frame.
+        angular_velocity: (3, 1) in the rotated frame.
     """
     w, e = quaternion[0], quaternion[1:4]
     return 0.5 * casadi.vertcat(

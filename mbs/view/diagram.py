@@ -168,7 +168,7 @@ class Layout:
 
 def layout(graph: Connections) -> Layout:
     """Places for a graph."""
-    hung = _hung(graph)
+    hung = _hang(graph)
     draft = _DiagramSoFar(graph, hung, {}, [], [], {})
     chain = _chain(graph) if not graph.cuts else []
     if len(chain) > _LONGEST + 1:
@@ -194,7 +194,7 @@ def _chain(graph: Connections) -> list[int]:
     return found
 
 
-def _hung(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
+def _hang(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
     """For each link the cut joints that hang below it: the link that fewer of them join."""
     count = Counter(end for edge in graph.cuts for end in edge.ends)
     depth = _depths(graph)

@@ -15,7 +15,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.view.mesh import BOX_CORNERS, BOX_FACES, turned_to
-from mbs.view.posed import Array, PosedLinks, plane_normal, posed
+from mbs.view.posed import Array, PosedLinks, plane_normal, pose_links
 from mbs.view.primitives import (
     AxisShape,
     BallShape,
@@ -147,7 +147,7 @@ def drawing(
         ModelError: as for `scene`.
     """
     made = scene(system, q, parameters=parameters)
-    at = posed(system, made.q, made.parameters)
+    at = pose_links(system, made.q, made.parameters)
     eye = _eye(at, np.array(made.views["iso"]))
     # links as bars, also where the description says what they look like
     out = made.hidden(("visual",))

@@ -70,17 +70,17 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
         R = turned_to(np.array(item.axis))
         yield Faces(revolved(profile, 48) @ R.T + np.array(item.at), item.colour)
     elif isinstance(item, BoxShape):
-        yield Faces(_posed(_cuboid(np.array(item.size)), item.pose), item.colour)
+        yield Faces(_pose(_cuboid(np.array(item.size)), item.pose), item.colour)
     elif isinstance(item, MeshShape):
         corners = np.reshape(item.points, (-1, 3))[np.reshape(item.triangles, (-1, 3))]
         # files do not agree on which side is outside
-        yield Faces(_posed(corners[:, [0, 1, 2, 2]], item.pose), item.colour, "open")
+        yield Faces(_pose(corners[:, [0, 1, 2, 2]], item.pose), item.colour, "open")
     elif isinstance(item, PlateShape):
         yield Faces(_fan(np.array(item.points)), item.colour, "open", item.opacity)
     elif isinstance(item, FrameShape):
         for k in range(3):
             arrow = _arrow(item.length) @ turned_to(np.eye(3)[k]).T
-            yield Faces(_posed(arrow, item.pose), f"axes.{k}")
+            yield Faces(_pose(arrow, item.pose), f"axes.{k}")
     elif isinstance(item, AxisShape):
         yield Faces(_dashes(np.array(item.a), np.array(item.b), size), item.colour, "line")
 
@@ -163,7 +163,7 @@ def _arrow(length: float) -> Array:
     return revolved(length * np.array(profile), 8)
 
 
-def _posed(faces: Array, rows: tuple[float, ...]) -> Array:
+def _pose(faces: Array, rows: tuple[float, ...]) -> Array:
     pose = np.array(rows).reshape(3, 4)
     return np.array(faces @ pose[:, :3].T + pose[:, 3])
 

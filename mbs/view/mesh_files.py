@@ -79,7 +79,7 @@ def _read(path: str, stamp: int) -> Mesh:
         scene = trimesh.load_scene(
             io.BytesIO(plain), file_type=kind, process=False, skip_materials=True
         )
-        points, triangles = _joined(scene)
+        points, triangles = _join(scene)
         if kind == "dae":
             points = points * _unit(content)
     except Exception as error:  # the libraries raise whatever malformed files make of them
@@ -103,7 +103,7 @@ def _module(name: str, path: str) -> Any:
         ) from None
 
 
-def _joined(scene: Any) -> tuple[Array, NDArray[np.int64]]:
+def _join(scene: Any) -> tuple[Array, NDArray[np.int64]]:
     """All meshes of a file in its frame."""
     points, triangles, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
     for node in scene.graph.nodes_geometry:

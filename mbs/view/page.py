@@ -107,7 +107,7 @@ def page(
     styles = [*(asset(name) for name in STYLES), asset("bar.css")]
     motion = None
     if times is not None and poses is not None:
-        motion = {**_packed(times, poses), "speed": speed}
+        motion = {**_pack(times, poses), "speed": speed}
     drawn = scene.as_dict()
     drawn["hidden"] = [role for role in scene.hidden(look.hidden) if role not in look.shown]
     options = {"view": look.view, "theme": look.theme, "motion": motion}
@@ -137,7 +137,7 @@ def framed(text: str) -> str:
     return f'<iframe sandbox="{allowed}" style="{look}" srcdoc="{source}"></iframe>'
 
 
-def _packed(times: Array, poses: Array) -> dict[str, object]:
+def _pack(times: Array, poses: Array) -> dict[str, object]:
     """A motion as the script reads it: poses are 32-bit numbers in base 64."""
     data = base64.b64encode(np.ascontiguousarray(poses, dtype="<f4").tobytes())
     return {"times": [round(float(t), 6) for t in times], "packed": data.decode("ascii")}

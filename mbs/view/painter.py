@@ -120,7 +120,7 @@ class Painter:
             matplotlib.LineCollection(segments, colors=tints, linewidths=0.6, zorder=0)
         )
         corners, colours, widths, shadow = self._faces(places)
-        dark = self._mixed(self._colour("background"), np.zeros(3), self._number("shadow"))
+        dark = self._mix(self._colour("background"), np.zeros(3), self._number("shadow"))
         axes.add_collection(
             matplotlib.PolyCollection(
                 shadow, facecolors=[dark], edgecolors=[dark], linewidths=0.2, zorder=1
@@ -145,7 +145,7 @@ class Painter:
                 )
                 faces = stretched(item, a, b)
                 every.append((faces.corners, faces))
-        parts = [self._lit(corners, faces) for corners, faces in every if len(corners)]
+        parts = [self._light(corners, faces) for corners, faces in every if len(corners)]
         corners, colours, widths = (np.concatenate(rows) for rows in zip(*parts, strict=True))
         flat, depth = self.eye.seen(corners)
         order = np.argsort(depth.mean(axis=1), kind="stable")
@@ -154,7 +154,7 @@ class Painter:
     def _moved(self, faces: Faces, pose: Array) -> Array:
         return np.array(faces.corners @ pose[:, :3].T + pose[:, 3])
 
-    def _lit(self, corners: Array, faces: Faces) -> tuple[Array, Array, Array]:
+    def _light(self, corners: Array, faces: Faces) -> tuple[Array, Array, Array]:
         """The faces that are seen, their colours under the light and the widths of their edges."""
         colour = self._colour(faces.colour)
         if faces.kind == "line":
@@ -227,7 +227,7 @@ class Painter:
         value = PALETTE[self.theme][name]
         return float(value) if isinstance(value, (int, float)) else 0.0
 
-    def _mixed(self, first: Array, second: Array, part: float) -> Array:
+    def _mix(self, first: Array, second: Array, part: float) -> Array:
         # the theme says how dark shadows are on the page; here they are somewhat lighter
         return np.array(first + 0.6 * part * (second - first))
 

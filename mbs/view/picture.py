@@ -74,7 +74,7 @@ class Picture:
         """
         ending = path_of(path).suffix.lower()
         if ending not in _ENDINGS:
-            raise ExportError(f"{path_of(path)}: the ending is {ending!r}; use {_listed()}")
+            raise ExportError(f"{path_of(path)}: the ending is {ending!r}; use {_list()}")
         if ending == ".html":
             write_text(self.html, path)
         elif ending in (".png", ".svg"):
@@ -98,7 +98,7 @@ class Picture:
         return painter(self.scene, self.look.view, theme, self.look.shown, self.look.hidden)
 
 
-def _listed() -> str:
+def _list() -> str:
     return f"{', '.join(_ENDINGS[:-1])} or {_ENDINGS[-1]}"
 
 

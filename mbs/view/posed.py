@@ -70,7 +70,9 @@ def rows(pose: Array) -> Rows:
     return tuple(float(value) for value in np.ravel(pose))
 
 
-def posed(system: System, q: Sequence[float], parameters: Mapping[str, float] | None) -> PosedLinks:
+def pose_links(
+    system: System, q: Sequence[float], parameters: Mapping[str, float] | None
+) -> PosedLinks:
     """The links and the skeleton at positions q.
 
     Args:

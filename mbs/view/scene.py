@@ -19,8 +19,8 @@ from mbs.view.posed import (
     bounds_of,
     floor_of,
     measures,
+    pose_links,
     pose_rows,
-    posed,
     position_of,
     views,
 )
@@ -168,7 +168,7 @@ def scene(
     """
     require_system(system)
     place = position_of(system, q)
-    at = posed(system, place, parameters)
+    at = pose_links(system, place, parameters)
     solids = list(solid_shapes(at))
     notes: list[str] = []
     visuals = list(visual_shapes(at, notes))

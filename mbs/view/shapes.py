@@ -47,7 +47,7 @@ def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
         if joint.kind == "rollingdisc":
             yield from _wheel(scene, joint, sizes)
             continue
-        yield from _joined(scene, joint, sizes)
+        yield from _join(scene, joint, sizes)
         yield from _axes(scene, joint, sizes)
     yield from _labels(scene, sizes)
 
@@ -79,7 +79,7 @@ def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
     return "joint", "active" if driven else "joint"
 
 
-def _joined(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+def _join(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
     """A bar between frames that are not one place, balls where a joint has no axes."""
     role, colour = _look(scene, joint)
     a, b = (scene.points[k] for k in joint.points)

@@ -168,7 +168,7 @@ def wrong_frames(*given):
 
     framed = khalil_frames(*given)
     *links, last = framed.tree.links
-    moved = replace(last, placement=last.placement.slid(casadi.SX(1e-9)))
+    moved = replace(last, placement=last.placement.shift(casadi.SX(1e-9)))
     return replace(framed, tree=replace(framed.tree, links=(*links, moved)))
 
 

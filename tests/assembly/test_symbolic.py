@@ -137,7 +137,9 @@ def test_a_link_all_of_whose_bodies_are_held_has_no_symbol() -> None:
     m.connect(m.world, Revolute("j1", axis="z"), a)
     m.connect(a.at(0.5), Fixed("one"), b)
     m.connect(c, Fixed("two"), b.at(0.5))
-    with pytest.raises(ModelError, match=r"held: the mass of link 1 .* held by one or two; give"):
+    with pytest.raises(
+        ModelError, match=r"held: the mass of link 1 .* carried by one or two; give"
+    ):
         symbolic(m.assemble(), ["masses"])
 
 

@@ -105,7 +105,7 @@ def test_a_cut_ball_has_no_coordinates_to_read():
     mechanism.add(JointSensor("s", "closing.qw"))
     refused(
         AssemblyError,
-        "s: the joint of 'closing.qw' is cut to open a loop and turns in all directions",
+        "s: the joint of 'closing.qw' is cut to open a loop and rotates in all directions",
         "put a RelativeSensor",
         by=lambda: mechanism.assemble(guess=guess),
     )

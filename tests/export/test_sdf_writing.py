@@ -3,6 +3,13 @@
 import numpy as np
 import pytest
 from support.random_trees import random_tree
+from support.written_files import (
+    CLOSE,
+    assert_coupling_is_kept,
+    assert_same_tree,
+    names_of,
+    written_arm,
+)
 
 import mbs
 from mbs.components import (
@@ -11,16 +18,12 @@ from mbs.components import (
     Free,
     JointStop,
     Mechanism,
-    Prismatic,
     Revolute,
     Spherical,
     Universal,
 )
 from mbs.errors import ModelError
 from mbs.expressions import to_float
-
-CLOSE = 1e-12
-"""Of the largest value: angles and tensors are computed anew from rotations, some 1e-16 each."""
 
 
 def again(system, tmp_path):
@@ -29,77 +32,26 @@ def again(system, tmp_path):
     return mbs.load(path)
 
 
-def names_of(rows):
-    return [row.name.replace(".", "_").replace("::", "_") for row in rows]
-
-
-def same(one, other, rng, zero=None):
-    """Inertia matrix, inverse dynamics and poses at random positions of a tree.
-
-    Args:
-        one: the system that was written.
-        other: what was read; coordinates may stand in another order.
-        rng: of the state.
-        zero: positions from which those of the other one count.
-    """
-    q, (v, a) = rng.uniform(-1, 1, one.nq), rng.uniform(-1, 1, (2, one.nv))
-    for k, coordinate in enumerate(one.coordinates):
-        if coordinate.name.endswith("qw"):
-            q[k : k + 4] /= np.linalg.norm(q[k : k + 4])
-    at_q = [names_of(one.coordinates).index(name) for name in names_of(other.coordinates)]
-    at_v = [names_of(one.speeds).index(name) for name in names_of(other.speeds)]
-    M, N = (np.array(mbs.models.inertia_matrix(s)(x)) for s, x in ((one, q), (other, q[at_q])))
-    assert pytest.approx(M[np.ix_(at_v, at_v)], abs=CLOSE * abs(M).max()) == N
-    tau = np.array(mbs.models.inverse_dynamics(one)(q, v, a)).ravel()[at_v]
-    found = np.array(mbs.models.inverse_dynamics(other)(q[at_q], v[at_v], a[at_v])).ravel()
-    assert found == pytest.approx(tau, abs=CLOSE * abs(tau).max())
-    for name in set(one.frames) & set(other.frames):
-        T = np.array(mbs.models.transform(one, name)(q))
-        found = np.array(mbs.models.transform(other, name)(q[at_q]))
-        assert found == pytest.approx(T, abs=CLOSE * max(1, abs(T).max()))
-
-
 @pytest.mark.parametrize("name", ["puma560", "stanford", "scara", "rx90", "two_branch_tree"])
 def test_robots_of_the_catalogue(tmp_path, name):
     system = mbs.load(name).assemble()
     found = again(system, tmp_path).assemble()
     assert set(names_of(row for row in system.bodies)) <= set(found.frames)
-    same(system, found, np.random.default_rng(1))
+    assert_same_tree(system, found, np.random.default_rng(1))
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_random_trees(tmp_path, seed):
     kinds = ("revolute", "prismatic", "universal", "cylindrical", "planar")
     system = random_tree(seed, 5, kinds=kinds, aligned=bool(seed % 2)).mechanism.assemble()
-    same(system, again(system, tmp_path).assemble(), np.random.default_rng(seed))
+    assert_same_tree(system, again(system, tmp_path).assemble(), np.random.default_rng(seed))
 
 
 def arm():
-    mechanism = Mechanism("arm", gravity=(0.1, 0, -9))
-    base = mechanism.add(Body("pedestal", mass=3, inertia=(0.1, 0.1, 0.1)))
-    mechanism.connect(mechanism.world.at(0, 0, 1), base)
-    link = mechanism.add(Body("link", mass=2, com=(0.1, 0, 0), inertia=(0.1, 0.2, 0.2)))
-    joint = Revolute(
-        "j",
-        axis="y",
-        limits=(-1, 2),
-        velocity=3.0,
-        effort=40.0,
-        Fv=0.5,
-        Fs=0.2,
-        Ia=0.3,
-        stiffness=7.0,
-        rest=0.4,
-    )
-    # The link's frame is not on the axis, and the pitch of a quarter turn is a singular one.
-    mechanism.connect(
-        base.at(0.1, 0.2, 0.3, rotation=[("y", "pi/2"), ("x", 0.3)]), joint, link.at(0.2, 0, 0.1)
-    )
-    slide = mechanism.add(Body("slide", mass=1, com=(0, 0.1, 0), inertia=(0.1, 0.1, 0.1)))
-    mechanism.connect(link.at(0.5, 0, 0), Prismatic("s", axis=(0.6, 0, 0.8), actuated=False), slide)
+    mechanism = written_arm((0.1, 0, -9), stiffness=7.0, rest=0.4)
+    link = mechanism.components["link"]
     plate = mechanism.add(Body("plate", mass=1, com=(0, 0.1, 0), inertia=(0.1, 0.1, 0.1)))
     mechanism.connect(link.at(0.3, 0, 0), plate)
-    mechanism.add_frame("tool", slide.at(0, 0, 0.1, rotation=("z", 0.3)))
     return mechanism
 
 
@@ -107,7 +59,7 @@ def test_what_a_file_says_is_kept(tmp_path):
     mechanism = again(arm(), tmp_path)
     assert mechanism.notes == []
     found = mechanism.assemble()
-    same(arm().assemble(), found, np.random.default_rng(2))
+    assert_same_tree(arm().assemble(), found, np.random.default_rng(2))
     assert {"pedestal", "link", "slide", "plate", "tool"} <= set(found.frames)
     j, s = mechanism.joints()
     assert j.limits == (("", (-1.0, 2.0)),)
@@ -127,17 +79,11 @@ def test_a_free_root_starts_where_it_was(tmp_path):
     mechanism.guess = {"root_joint.x": 0.3, "root_joint.z": 2.0, **turn}
     one, other = mechanism.assemble(), again(mechanism, tmp_path).assemble()
     assert other.configuration == pytest.approx(one.configuration, abs=CLOSE)
-    same(one, other, np.random.default_rng(3))
+    assert_same_tree(one, other, np.random.default_rng(3))
 
 
 def test_a_coupling_of_degree_one_is_a_mimic(tmp_path):
-    mechanism = arm()
-    mechanism.add(Coupling("c", driven="s", driver="j", coefficients=(0.1, 0.5)))
-    one, other = mechanism.assemble(), again(mechanism, tmp_path).assemble()
-    assert [len(s.active) for s in (one, other)] == [1, 1]
-    q = [0.4, 0.1 + 0.5 * 0.4]
-    tau = [float(mbs.models.inverse_dynamics(s)(q, [0.3], [0.7])) for s in (one, other)]
-    assert tau[1] == pytest.approx(tau[0], rel=1e-12)
+    assert_coupling_is_kept(arm(), lambda mechanism: again(mechanism, tmp_path))
 
 
 def closed_values(system):
@@ -246,7 +192,7 @@ def test_a_ball_joint(tmp_path):
     m = arm()
     ball = m.add(Body("bob", mass=1, com=(0.1, 0, 0.3), inertia=(0.1, 0.2, 0.15)))
     m.connect(m.components["link"].at(0, 0.3, 0, rotation=("x", 1)), Spherical("sph"), ball.at(0.1))
-    same(m.assemble(), again(m, tmp_path).assemble(), np.random.default_rng(5))
+    assert_same_tree(m.assemble(), again(m, tmp_path).assemble(), np.random.default_rng(5))
 
 
 def test_what_sdf_cannot_say_is_refused(tmp_path):

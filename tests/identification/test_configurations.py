@@ -5,19 +5,19 @@ from support.measured_arm import arm
 import mbs
 from mbs.components import Body, Spherical
 from mbs.errors import ModelError
-from mbs.identification.leading import active_places, is_explicit, positions
+from mbs.identification.leading import active_indices, is_explicit, positions
 
 
 def test_open_systems_are_their_own_configuration():
     q = np.random.default_rng(1).normal(size=(4, 3))
     assert positions(arm(), q) is q
-    assert active_places(arm()) == [0, 1, 2]
+    assert active_indices(arm()) == [0, 1, 2]
     assert is_explicit(arm())
 
 
 def test_angles_that_follow_do_not_jump():
     system = mbs.load("sr400").assemble()
-    places = active_places(system)
+    places = active_indices(system)
     swing = np.linspace(-0.6, 0.6, 121)
     rates = np.array([1, 1, 1, 1, 1, -0.5])
     q_a = np.array([system.configuration[k] for k in places]) + np.outer(swing, rates)
@@ -41,4 +41,4 @@ def test_a_ball_is_no_independent_position():
     m = mbs.Mechanism("ball")
     m.connect(m.world, Spherical("j"), m.add(Body("b", mass=1, inertia=(1, 1, 1))))
     with pytest.raises(ModelError, match="j is a quaternion, whose position is not the integral"):
-        active_places(m.assemble())
+        active_indices(m.assemble())

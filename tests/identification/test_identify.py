@@ -9,7 +9,7 @@ from mbs.errors import ModelError, SolverError
 from mbs.identification.base_parameters import base_parameters
 from mbs.identification.exciting import Series, excitation
 from mbs.identification.identify import identify
-from mbs.identification.leading import active_places
+from mbs.identification.leading import active_indices
 from mbs.identification.least_squares import least_squares
 from mbs.identification.methods import METHODS
 from mbs.identification.observations import observe
@@ -156,7 +156,7 @@ def test_efforts_of_the_wrong_sign_are_told():
 @pytest.mark.parametrize("method", ["weighted", "instrumental"])
 def test_a_closed_robot_is_identified_from_its_independent_joints(method):
     system = mbs.load("five_bar").assemble()
-    places = active_places(system)
+    places = active_indices(system)
     motion = excitation(
         system,
         series=Series(period=4.0, harmonics=3, samples=24),

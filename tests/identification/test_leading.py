@@ -9,7 +9,14 @@ import mbs
 from mbs.errors import ModelError
 from mbs.identification.exciting import Series, excitation
 from mbs.identification.identify import identify
-from mbs.identification.leading import LED, active_places, leads_of, led, positions, signed_leads
+from mbs.identification.leading import (
+    REGULAR,
+    active_indices,
+    leads_of,
+    positions,
+    regular,
+    signed_leads,
+)
 from mbs.identification.record import Record
 
 
@@ -27,7 +34,7 @@ def swinging(middle, size, seed=3):
     rng = np.random.default_rng(seed)
     sine, cosine = size * rng.uniform(-0.4, 0.4, (2, 4, 6))
     S, C = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-    start = np.array([system.configuration[k] for k in active_places(system)])
+    start = np.array([system.configuration[k] for k in active_indices(system)])
     start[1] += middle
     q_a = start + S @ sine + C @ cosine
     v = (C * w) @ sine - (S * w) @ cosine
@@ -39,7 +46,7 @@ def swinging(middle, size, seed=3):
 
 def test_leads_change_sign_where_the_parallelogram_is_flat():
     system = sr400()
-    start = np.array([system.configuration[k] for k in active_places(system)])
+    start = np.array([system.configuration[k] for k in active_indices(system)])
     turned = np.linspace(0, 2.5, 26)
     q = positions(system, start + np.outer(turned, np.eye(6)[1]))
     leads = leads_of(system, q)
@@ -51,14 +58,14 @@ def test_leads_change_sign_where_the_parallelogram_is_flat():
         )
     assert (leads[turned < 1.5] > 0).all()
     assert (leads[turned > 1.7] < 0).all()
-    good = led(system, q)
+    good = regular(system, q)
     assert not good[(turned > 1.52) & (turned < 1.62)].any()
     assert good[turned < 1.4].all()
 
 
 def test_rows_next_to_a_singular_configuration_are_left_out_and_told():
     t, q, tau = swinging(0.9, 1.0)
-    assert 0.005 < np.mean(np.abs(leads_of(sr400(), q)) < LED) < 0.2
+    assert 0.005 < np.mean(np.abs(leads_of(sr400(), q)) < REGULAR) < 0.2
     noisy = q + 1e-5 * np.random.default_rng(1).normal(size=q.shape)
     found = identify(sr400(), Record.of(sr400(), t, noisy, tau), 6.0, quiet=True)
     assert found.estimate.residuals.total_percent < 0.6

@@ -10,7 +10,7 @@ import mbs
 from mbs.components import Body, Revolute
 from mbs.errors import AssemblyError, DescriptionError, ModelError, SingularPosture, Unclosable
 from mbs.loops import examine
-from mbs.loops.examine import require_led
+from mbs.loops.examine import require_determined
 
 GUESS = {"j1": 1.0, "j2": -0.5, "j4": 1.5}
 
@@ -44,7 +44,9 @@ def test_an_open_configuration_says_by_how_much():
     assert not state.is_closed
     assert 1e-3 < state.residual < 0.1
     refused(
-        Unclosable, "q leaves the loops open by", by=lambda: require_led(system, q, np.empty(0))
+        Unclosable,
+        "q leaves the loops open by",
+        by=lambda: require_determined(system, q, np.empty(0)),
     )
 
 
@@ -64,7 +66,7 @@ def test_a_dead_point_is_not_led_and_not_singular():
         SingularPosture,
         "the configuration is singular, j4 cannot lead the other joints there",
         'coordinates="tree"',
-        by=lambda: require_led(system, q, np.empty(0)),
+        by=lambda: require_determined(system, q, np.empty(0)),
     )
     assert examine(four_bar().assemble(GUESS, active=["j1"]), q).is_led
 

@@ -20,7 +20,7 @@ from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.recursions.chain import ChainJoint, Gap, Ring
 from mbs.robots.rows import frame, robot
-from mbs.spatial import Pose, axis_turn, vector
+from mbs.spatial import Pose, axis_rotation, vector
 
 HALF = np.pi / 2
 
@@ -202,12 +202,12 @@ def test_refusals_name_the_joints_left():
 def four_bar():
     """Crank 0.3 m, rocker 0.7 m, ground 1 m."""
     a, coupler = SX.sym("a"), SX.sym("c")
-    crank = Pose.turned(axis_turn("z", a).matrix) @ Pose.moved(vector([0.3, 0, 0]))
-    ground = Pose.moved(vector([-1, 0, 0]))
+    crank = Pose.rotation(axis_rotation("z", a).matrix) @ Pose.translation(vector([0.3, 0, 0]))
+    ground = Pose.translation(vector([-1, 0, 0]))
     gaps = (
         Gap(ground @ crank),
-        Gap(Pose.moved(vector([coupler, 0, 0]))),
-        Gap(Pose.moved(vector([0.7, 0, 0]))),
+        Gap(Pose.translation(vector([coupler, 0, 0]))),
+        Gap(Pose.translation(vector([0.7, 0, 0]))),
     )
     joints = tuple(ChainJoint(f"q{k + 2}", Motion.REVOLUTE, k, 1) for k in range(3))
     samples = []

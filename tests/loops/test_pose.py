@@ -172,7 +172,7 @@ def test_platform_that_cannot_turn_says_how_far_it_is_turned(systems):
     T[:3, :3] = rotation([0, 0, 0.3])
     near = mbs.loops.solve_pose(systems["delta"], "tool", T, rows=["x", "y", "z"])
     assert is_closed(systems["delta"], near)
-    with pytest.raises(Unclosable, match=r"m away and turned by \d.*; name the rows"):
+    with pytest.raises(Unclosable, match=r"m away and rotated by \d.*; name the rows"):
         mbs.loops.solve_pose(systems["five_bar"], "tool", point(0.1, 0.4))
 
 

@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from support.configurations import near_assembled
 
 import mbs
 from mbs.components import Body, Box, Free, PointMass, Revolute, Spring
@@ -23,20 +24,10 @@ def placed(system, q):
     return np.array(points).T, np.array(directions).T
 
 
-def moved(system):
-    """A configuration of the open tree that is not the assembled one."""
-    rng = np.random.default_rng(SEED)
-    q = np.array(system.configuration) + rng.uniform(-0.5, 0.5, system.nq)
-    turned = [k for k, c in enumerate(system.coordinates) if c.kind == "quaternion"]
-    for four in np.array(turned, int).reshape(-1, 4):
-        q[four] /= np.linalg.norm(q[four])
-    return q
-
-
 def test_joints_hold_links_together(robot):
     parts = skeleton(robot)
     assembled, _ = placed(robot, robot.configuration)
-    opened, _ = placed(robot, moved(robot))
+    opened, _ = placed(robot, near_assembled(robot, 0.5, SEED))
     for joint in parts.joints:
         a, b = joint.points
         if joint.kind in ("revolute", "universal", "spherical"):
@@ -52,7 +43,7 @@ def test_joints_hold_links_together(robot):
 
 def test_lines_keep_their_length(robot):
     first, _ = placed(robot, robot.configuration)
-    second, _ = placed(robot, moved(robot))
+    second, _ = placed(robot, near_assembled(robot, 0.5, SEED))
     lines = [line for link in skeleton(robot).links for line in link.segments]
     assert lines
     for a, b in lines:
@@ -62,7 +53,7 @@ def test_lines_keep_their_length(robot):
 
 
 def test_points_of_a_link_move_with_it(robot):
-    q = moved(robot)
+    q = near_assembled(robot, 0.5, SEED)
     points, _ = placed(robot, q)
     for joint in skeleton(robot).joints:
         row = next(row for row in robot.joints if row.name == joint.name)
@@ -77,7 +68,7 @@ def test_points_of_a_link_move_with_it(robot):
 def test_axes_turn_and_slide_what_comes_after(robot):
     """Moving one coordinate turns the link about the axis, or shifts it along the axis."""
     parts, h = skeleton(robot), 1e-6
-    q = moved(robot)
+    q = near_assembled(robot, 0.5, SEED)
     points, directions = placed(robot, q)
     for joint in parts.joints:
         if joint.cut or len(joint.axes) != 1:

@@ -10,7 +10,7 @@ from support.random_trees import random_state, random_tree
 import mbs
 import mbs.models
 from mbs.native import compiled, find_compiler
-from mbs.native.c_code import LANES, Batch, blocks, gives, needs, schedule, slots
+from mbs.native.c_code import LANES, SinCosGroup, blocks, gives, needs, schedule, slots
 from mbs.native.compiler import compile_library
 from mbs.native.kernel import FAST_FLAGS, kernel_library, kernel_source, processor
 from mbs.operations.graph import graph_of
@@ -128,7 +128,7 @@ def nested():
 def test_angles_are_computed_together_and_in_order():
     graph = graph_of(nested())
     steps = schedule(graph)
-    batches = [step for step in steps if isinstance(step, Batch)]
+    batches = [step for step in steps if isinstance(step, SinCosGroup)]
     assert [len(batch.angles) for batch in batches] == [2, 1]
     assert [len(batch.results) for batch in batches] == [2, 2]
     assert worst(nested(), [np.array([0.3, 2.0, -1.0])]) < 1e-15
@@ -139,7 +139,7 @@ def test_steps_come_after_what_they_need():
     graph = graph_of(model)
     computed = {n for n, node in enumerate(graph.nodes) if node.op in (ca.OP_INPUT, ca.OP_CONST)}
     steps = schedule(graph)
-    assert sum(isinstance(step, Batch) for step in steps) == 1
+    assert sum(isinstance(step, SinCosGroup) for step in steps) == 1
     for step in steps:
         assert computed.issuperset(needs(graph, step))
         assert computed.isdisjoint(gives(step))

@@ -42,7 +42,7 @@ def test_unknown_joints_in_symbols_and_in_numbers(seed):
     p = np.array(system.p_default)
     end = system.frame(len(system.links))
     chain = tree_chain(system.tree, system.frame("base"), end, [1], SX([0.0, 0.7, 0, 0, 0]))
-    assert [joint.place for joint in chain.joints] == [0, 2, 3, 4]
+    assert [joint.index for joint in chain.joints] == [0, 2, 3, 4]
     x = SX.sym("x", 4)
     numbers = rng.uniform(-1, 1, (3, 4))
     arm = arm_of(chain, system.p, p)
@@ -71,13 +71,13 @@ def test_the_ends_of_a_ring_coincide():
     q = SX.sym("q", extent(system))
     ring = ring_of(system, 0, (), q)
     found = mbs.loops.solve(system, {system.coordinates[system.active[0]].name: 0.4})
-    angle = {joint.name: joint.place for joint in ring.joints}
+    angle = {joint.name: joint.index for joint in ring.joints}
     x = [float(found[angle[joint.name]]) for joint in ring.joints if not joint.cut]
     assert len(ring.gaps) == len(ring.joints) == len(x) + 1
     opened = SX.sym("x")
-    places = [k for k, joint in enumerate(ring.joints) if not joint.cut]
+    indices = [k for k, joint in enumerate(ring.joints) if not joint.cut]
     whole = SX(4, 1)
-    whole[places] = x
+    whole[indices] = x
     whole[next(k for k, joint in enumerate(ring.joints) if joint.cut)] = opened
     end = Function("end", [opened], [transforms(ring, whole)[-1].matrix])
     # the one joint that is cut has no position in q: some angle of it closes the ring

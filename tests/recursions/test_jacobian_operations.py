@@ -44,7 +44,7 @@ def test_choice_is_the_least_of_all_ways():
     q = SX.sym("q", 6)
     target = VelocityTarget(system.tree, q, system.p, system.frame(6), system.frame("base"))
     seen = outlook(target)
-    ways = [frame_jacobian(seen, matrices=m) for m in range(seen.turns + 1)]
+    ways = [frame_jacobian(seen, matrices=m) for m in range(seen.rotations + 1)]
     every = [cost(J, q, system.p) for J in ways]
     best = cost(cheapest_jacobian(target), q, system.p)
     assert best <= min(every) + 2
@@ -59,7 +59,7 @@ def test_no_choice_changes_the_result(axes, reference):
     q = SX.sym("q", 6)
     target = VelocityTarget(system.tree, q, system.p, system.frame(6), system.frame(axes))
     seen = outlook(target)
-    ways = [frame_jacobian(seen, reference, m) for m in (0, 3, seen.turns)]
+    ways = [frame_jacobian(seen, reference, m) for m in (0, 3, seen.rotations)]
     f = casadi.Function("f", [q, system.p], ways)
     sample = np.linspace(-1, 2, 6), system.p_default
     first, *others = (np.array(J) for J in f(*sample))

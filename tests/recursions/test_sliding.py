@@ -41,7 +41,7 @@ def both(assemble, monkeypatch):
     slid = prices(assemble)
     for module in RECURSIONS:
         monkeypatch.setattr(
-            module, "slide_frames", lambda tree, poses, bodies, **_: (poses, bodies)
+            module, "shift_frames", lambda tree, poses, bodies, **_: (poses, bodies)
         )
     return slid, prices(assemble)
 

@@ -47,7 +47,7 @@ def test_singularities_of_an_arm_of_any_size(size):
 def test_velocities_that_are_made_of_others():
     usual = surveyed(1.0)
     G = np.random.default_rng(0).standard_normal((3, 4, 2))
-    small = usual.combined(1e-13 * G)
+    small = usual.combine(1e-13 * G)
     np.testing.assert_array_equal(nonzero(small.J), nonzero(usual.J @ G))
     idle = np.zeros((3, 4, 1))
-    assert not nonzero(usual.combined(idle).J).any()
+    assert not nonzero(usual.combine(idle).J).any()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.contact_mechanisms import block
 
 import mbs
 from mbs.components import CoulombFriction, PointMass, Prismatic, RigidStop, Spring
@@ -15,15 +16,6 @@ def run(system, duration, **options):
 
 def words(result):
     return [(name, what) for _, name, what in result.events]
-
-
-def block(slope, *elements, mass=2.0):
-    """A block on a slope that falls along x."""
-    m = mbs.Mechanism("block", gravity=(G * np.sin(slope), 0, -G * np.cos(slope)))
-    m.connect(m.world, Prismatic("x", axis="x", actuated=True), m.add(PointMass("mass", mass)))
-    for element in elements:
-        m.add(element)
-    return m.assemble()
 
 
 def dry(slope, mu=0.5, mass=2.0):

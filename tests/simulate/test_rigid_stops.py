@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from support.contact_mechanisms import pendulum
 
 import mbs
-from mbs.components import Body, PointMass, Prismatic, Revolute, RigidStop
+from mbs.components import Body, PointMass, Prismatic, RigidStop
 from mbs.models.state.tree import full_state
 from mbs.solvers import Events, integrate_events
 
@@ -25,16 +26,6 @@ def ball(**stop):
     body = m.add(Body("body", mass=2.0, inertia=(0.1, 0.1, 0.1)))
     m.connect(m.world, Prismatic("z", axis="z", actuated=True), body)
     m.add(RigidStop("ground", joint="z", lower=0, **stop))
-    return m.assemble()
-
-
-def pendulum(*elements, mass=1.5, length=0.7):
-    """A point mass on a horizontal rod at q = 0, which hangs at q = -pi/2."""
-    m = mbs.Mechanism("pendulum")
-    rod = m.add(PointMass("mass", mass))
-    m.connect(m.world, Revolute("q", axis="-y", actuated=True), rod.at(-length, 0, 0))
-    for element in elements:
-        m.add(element)
     return m.assemble()
 
 

@@ -3,10 +3,11 @@
 import casadi
 import numpy as np
 import pytest
+from support.dae_mechanisms import rssr
 
 import mbs
 import mbs.simulate.run
-from mbs.components import Body, Box, Free, Mechanism, PointMass, Prismatic, Revolute, Spherical
+from mbs.components import Body, Box, Free, Mechanism, PointMass, Prismatic, Revolute
 from mbs.errors import LoopError, ModelError, Unclosable
 
 LOOSE = casadi.SX.sym("loose")
@@ -114,16 +115,7 @@ def test_loop_runs_through_a_configuration_where_its_crank_turns_back():
 
 
 def test_spatial_loop_with_quaternion_joints():
-    m = Mechanism("rssr", gravity=(0, 0, -9.81))
-    crank, rod, rocker = (
-        m.add(Box(n, length=x, width=0.02, mass=1)) for n, x in (("a", 0.2), ("b", 0.6), ("c", 0.4))
-    )
-    m.connect(m.world, Revolute("j1", actuated=True), crank.left)
-    m.connect(crank.right, Spherical("s1"), rod.left)
-    m.connect(rod.right, Spherical("s2"), rocker.right)
-    m.connect(m.world.at(0.3, 0.3, rotation=("x", "pi/2")), Revolute("j2"), rocker.left)
-    system = m.assemble(guess={"j2": 1.0})
-    result = mbs.simulate.run(system, 3.0, v0={"j1": 1.0}, tolerance=1e-10)
+    result = mbs.simulate.run(rssr(), 3.0, v0={"j1": 1.0}, tolerance=1e-10)
     total = result["kinetic_energy"] + result["potential_energy"]
     assert np.ptp(total) < 1e-7
     assert result["closure_residual"].max() < 1e-12

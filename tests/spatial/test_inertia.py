@@ -8,8 +8,8 @@ from support.random_trees import random_rotation
 
 from mbs.spatial import (
     Inertia,
-    MatrixTurn,
-    axis_turn,
+    MatrixRotation,
+    axis_rotation,
     is_zero,
     quaternion_rate,
     quaternion_rotation,
@@ -43,9 +43,9 @@ def test_displaced_and_turned(seed):
     rng = np.random.default_rng(seed)
     masses, points = cloud(rng)
     R, p = random_rotation(rng), rng.uniform(-1, 1, 3)
-    seen = inertia_of(masses, points).seen_from(MatrixTurn(SX(DM(R))), SX(DM(p)))
+    seen = inertia_of(masses, points).seen_from(MatrixRotation(SX(DM(R))), SX(DM(p)))
     assert_is(seen, masses, points @ R.T + p)
-    turned = inertia_of(masses, points).seen_from(MatrixTurn(SX(DM(R))), SX.zeros(3))
+    turned = inertia_of(masses, points).seen_from(MatrixRotation(SX(DM(R))), SX.zeros(3))
     assert_is(turned, masses, points @ R.T)
 
 
@@ -53,7 +53,7 @@ def test_displaced_and_turned(seed):
 def test_turned_about_an_axis(axis):
     rng = np.random.default_rng(8)
     masses, points = cloud(rng)
-    turn = axis_turn(axis, SX(0.9))
+    turn = axis_rotation(axis, SX(0.9))
     R, p = DM(turn.matrix).full(), rng.uniform(-1, 1, 3)
     assert_is(inertia_of(masses, points).seen_from(turn, SX(DM(p))), masses, points @ R.T + p)
 
@@ -108,7 +108,7 @@ def test_sum_and_massless():
     assert is_zero(Inertia.zero().parameters)
     assert not is_zero(whole.parameters)
     assert not is_zero(Inertia(SX.zeros(3, 3), SX.zeros(3), SX.sym("m")).parameters)
-    moved = Inertia.zero().seen_from(axis_turn("x", SX.sym("q")), SX.sym("p", 3))
+    moved = Inertia.zero().seen_from(axis_rotation("x", SX.sym("q")), SX.sym("p", 3))
     assert is_zero(moved.parameters)
 
 

@@ -6,7 +6,7 @@ import pytest
 from casadi import DM, SX
 from support.random_trees import random_rotation
 
-from mbs.spatial import Inertia, MatrixTurn, PseudoInertia, axis_turn, is_zero
+from mbs.spatial import Inertia, MatrixRotation, PseudoInertia, axis_rotation, is_zero
 
 
 def numeric(value):
@@ -67,7 +67,7 @@ def test_slid(axis, t):
     masses, points = cloud(4)
     moved = points + t * np.eye(3)[axis]
     np.testing.assert_allclose(
-        written(body_of(masses, points).slid(axis, SX(t))), moments(masses, moved), atol=1e-14
+        written(body_of(masses, points).shift(axis, SX(t))), moments(masses, moved), atol=1e-14
     )
 
 
@@ -75,7 +75,7 @@ def test_slid(axis, t):
 def test_slid_by_a_symbol(axis):
     masses, points = cloud(5)
     t = SX.sym("t")
-    body = body_of(masses, points).slid(axis, t)
+    body = body_of(masses, points).shift(axis, t)
     f = casadi.Function("f", [t], [body.S, body.ms, body.m])
     S, ms, m = (DM(x).full().squeeze() for x in f(0.35))
     P = moments(masses, points + 0.35 * np.eye(3)[axis])
@@ -87,15 +87,15 @@ def test_slid_by_a_symbol(axis):
 @pytest.mark.parametrize("angle", [0.8, np.pi / 2, np.pi, -np.pi / 2])
 def test_turned_about_an_axis(axis, angle):
     masses, points = cloud(6)
-    turn = axis_turn(axis, SX(angle))
-    got = written(body_of(masses, points).turned(turn))
+    turn = axis_rotation(axis, SX(angle))
+    got = written(body_of(masses, points).rotate(turn))
     np.testing.assert_allclose(got, moments(masses, points @ numeric(turn.matrix).T), atol=1e-14)
 
 
 def test_turned_by_a_matrix():
     masses, points = cloud(7)
     R = random_rotation(np.random.default_rng(1))
-    got = written(body_of(masses, points).turned(MatrixTurn(SX(DM(R)))))
+    got = written(body_of(masses, points).rotate(MatrixRotation(SX(DM(R)))))
     np.testing.assert_allclose(got, moments(masses, points @ R.T), atol=1e-14)
 
 
@@ -135,9 +135,9 @@ def test_what_each_part_holds(form):
     assert of(felt)[k, k].is_zero()
     assert felt.ms[2].is_zero()
     assert felt.m.is_zero()
-    quarter = axis_turn("z", SX(0.9))
+    quarter = axis_rotation("z", SX(0.9))
     np.testing.assert_allclose(
-        numeric(of(on_axis.turned(quarter))), numeric(of(on_axis)), atol=1e-15
+        numeric(of(on_axis.rotate(quarter))), numeric(of(on_axis)), atol=1e-15
     )
     assert is_zero(on_axis.ms[:2])
     rest, turning = body.rotational()

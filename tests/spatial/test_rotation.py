@@ -7,10 +7,10 @@ from casadi import DM, SX
 from support.random_trees import random_rotation
 
 from mbs.spatial import (
-    MatrixTurn,
-    Turn,
+    AxisRotation,
+    MatrixRotation,
     align_z,
-    axis_turn,
+    axis_rotation,
     is_zero,
     nearest_rotation,
     sin_cos,
@@ -83,7 +83,7 @@ def test_quarter_turns_leave_the_constant_out_of_the_graph(k, written):
 def test_turns_against_matrices(axis):
     rng = np.random.default_rng(1)
     q = SX.sym("q")
-    turn = axis_turn(axis, q)
+    turn = axis_rotation(axis, q)
     unit = np.eye(3)["xyz".index(axis)]
     R = rodrigues(unit, 0.7)
     np.testing.assert_allclose(number(turn.matrix, (q, 0.7)), R, atol=1e-15)
@@ -102,7 +102,7 @@ def test_turns_against_matrices(axis):
 def test_matrix_turn_is_the_same_as_its_matrix():
     rng = np.random.default_rng(2)
     R, v, J = random_rotation(rng), rng.standard_normal(3), np.diag([1.0, 2.0, 3.0])
-    turn = MatrixTurn(SX(DM(R)))
+    turn = MatrixRotation(SX(DM(R)))
     np.testing.assert_allclose(DM(turn.apply(SX(DM(v)))).full().ravel(), R @ v, atol=1e-15)
     np.testing.assert_allclose(
         DM(turn.apply_inverse(SX(DM(v)))).full().ravel(), R.T @ v, atol=1e-15
@@ -118,7 +118,7 @@ def test_turning_a_tensor_costs_nine_multiplications():
         casadi.horzcat(a[1], a[3], a[4]),
         casadi.horzcat(a[2], a[4], a[5]),
     )
-    f = casadi.Function("f", [s, c, *a], [Turn("z", s, c).apply_to_tensor(J)])
+    f = casadi.Function("f", [s, c, *a], [AxisRotation("z", s, c).apply_to_tensor(J)])
     kinds = [f.instruction_id(n) for n in range(f.n_instructions())]
     # the double of s b is an addition or a product by two
     assert kinds.count(casadi.OP_MUL) + kinds.count(casadi.OP_TWICE) <= 10
@@ -185,9 +185,9 @@ def test_is_zero_and_skew():
 @pytest.mark.parametrize("angle", [0.7, 0.0, np.pi / 2, -np.pi / 2, np.pi])
 @pytest.mark.parametrize("axis", "xyz")
 def test_any_tensor_is_turned(axis, angle):
-    turn, square = axis_turn(axis, SX(angle)), np.random.default_rng(5).standard_normal((3, 3))
+    turn, square = axis_rotation(axis, SX(angle)), np.random.default_rng(5).standard_normal((3, 3))
     R = rodrigues(np.eye(3)["xyz".index(axis)], angle)
-    for one in (turn, MatrixTurn(turn.matrix)):
+    for one in (turn, MatrixRotation(turn.matrix)):
         turned = DM(one.apply_to_square(SX(DM(square)))).full()
         np.testing.assert_allclose(turned, R @ square @ R.T, atol=2e-15)
 
@@ -195,7 +195,7 @@ def test_any_tensor_is_turned(axis, angle):
 def test_turning_any_tensor_costs_twelve_multiplications_and_a_quarter_turn_none():
     s, c = SX.sym("s"), SX.sym("c")
     square = SX.sym("a", 3, 3)
-    for turn, most in ((Turn("y", s, c), 12), (Turn("y", SX(-1), SX(0)), 0)):
+    for turn, most in ((AxisRotation("y", s, c), 12), (AxisRotation("y", SX(-1), SX(0)), 0)):
         f = casadi.Function("f", [s, c, square], [turn.apply_to_square(square)])
         kinds = [f.instruction_id(n) for n in range(f.n_instructions())]
         assert kinds.count(casadi.OP_MUL) == most

@@ -8,9 +8,9 @@ from support.random_trees import random_rotation
 from mbs.spatial import (
     FreeDisplacement,
     Inertia,
-    MatrixTurn,
+    MatrixRotation,
     PseudoInertia,
-    Screw,
+    ScrewDisplacement,
     body_through,
     origin,
     wrench_through,
@@ -51,11 +51,11 @@ def displacements():
         for angle in ANGLES:
             for t in (0.0, 0.4):
                 p = t * np.eye(3)["xyz".index(axis)]
-                yield Screw.about(axis, SX(angle), SX(t)), turned_about(axis, angle), p
+                yield ScrewDisplacement.about(axis, SX(angle), SX(t)), turned_about(axis, angle), p
     rng = np.random.default_rng(2)
     for p in (np.zeros(3), rng.uniform(-1, 1, 3), np.array([0.0, 0.3, 0.0])):
         R = random_rotation(rng)
-        yield FreeDisplacement(MatrixTurn(sx(R)), sx(p)), R, p
+        yield FreeDisplacement(MatrixRotation(sx(R)), sx(p)), R, p
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def rng():
 
 
 def test_number_of_the_axis():
-    assert [Screw.about(axis, SX(0.3), SX(0)).axis for axis in "xyz"] == [0, 1, 2]
+    assert [ScrewDisplacement.about(axis, SX(0.3), SX(0)).axis for axis in "xyz"] == [0, 1, 2]
 
 
 def test_points(rng):
@@ -84,7 +84,7 @@ def test_wrenches(rng):
 def test_wrench_leaves_its_arguments_as_they_were(rng):
     f, m = (sx(x) for x in rng.standard_normal((2, 3)))
     before = numeric(f), numeric(m)
-    Screw.about("x", SX(0.3), SX(0.5)).wrench(f, m)
+    ScrewDisplacement.about("x", SX(0.3), SX(0.5)).wrench(f, m)
     np.testing.assert_array_equal((numeric(f), numeric(m)), before)
 
 

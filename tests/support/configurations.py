@@ -1,23 +1,32 @@
-"""Configurations found by search alone: Gauss-Newton from many random starts."""
+"""Configurations: random ones, and those that Gauss-Newton finds from many random starts."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from mbs.assembly.tree import quaternion_slices
-from mbs.closed_forms.ring import independent_places
+from mbs.closed_forms.ring import independent_indices
 from mbs.loops.closing import Closing, closure_parameters
+
+
+def near_assembled(system, reach, seed):
+    """A random configuration of the opened tree around the assembled one, quaternions unit."""
+    rng = np.random.default_rng(seed)
+    q = np.array(system.configuration) + rng.uniform(-reach, reach, system.nq)
+    for part in quaternion_slices(system.tree):
+        q[part] /= np.linalg.norm(q[part])
+    return q
 
 
 def searched(system, q_a, starts=150, seed=0, reach=3.5):
     """All configurations with these independent positions that random starts lead to."""
     rng = np.random.default_rng(seed)
-    places = independent_places(system)
-    closing = Closing(system, closure_parameters(system), tuple(places))
+    indices = independent_indices(system)
+    closing = Closing(system, closure_parameters(system), tuple(indices))
     found = []
     for _ in range(starts):
         q = rng.uniform(-reach, reach, system.nq)
-        q[places] = q_a
+        q[indices] = q_a
         closed = closing.nearest(q)
         if closed.is_closed and not any(same(system, closed.q, other) for other in found):
             found.append(closed.q)
@@ -42,4 +51,4 @@ def active(system, q=None):
     Rods that spin are as in the assembled configuration.
     """
     whole = np.array(system.configuration if q is None else q)
-    return np.array([whole[k] if k < system.nq else 0.0 for k in independent_places(system)])
+    return np.array([whole[k] if k < system.nq else 0.0 for k in independent_indices(system)])

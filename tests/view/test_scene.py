@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from support.configurations import near_assembled
 
 import mbs
 from mbs.components import Body, Box, Cylinder, Free, PointMass, Prismatic, Revolute, Spring
@@ -16,16 +17,6 @@ from mbs.view.primitives import SpringShape as SpringShape
 
 SEED = 20261122
 CATALOGUE = mbs.robots.catalogue()
-
-
-def configuration(system):
-    """Random positions, quaternions of unit length."""
-    rng = np.random.default_rng(SEED)
-    q = np.array(system.configuration) + rng.uniform(-0.7, 0.7, system.nq)
-    turned = [k for k, c in enumerate(system.coordinates) if c.kind == "quaternion"]
-    for four in np.array(turned, int).reshape(-1, 4):
-        q[four] /= np.linalg.norm(q[four])
-    return q
 
 
 def numbers(value):
@@ -61,7 +52,7 @@ def test_every_mechanism_has_a_scene(name, assembled):
 def test_links_stand_where_the_models_say(name, assembled):
     system = assembled(name)
     scene = mbs.view.scene(system)
-    q = configuration(system)
+    q = near_assembled(system, 0.7, SEED)
     poses = np.array(scene.poses(q.tolist())).reshape(-1, 3, 4)
     assert np.array_equal(poses[0], np.eye(3, 4))
     for number in range(1, len(poses)):
@@ -76,7 +67,7 @@ def test_links_stand_where_the_models_say(name, assembled):
 def test_shapes_stay_on_the_skeleton(name, assembled):
     system = assembled(name)
     scene = mbs.view.scene(system)
-    q = configuration(system)
+    q = near_assembled(system, 0.7, SEED)
     poses = np.array(scene.poses(q.tolist())).reshape(-1, 3, 4)
     parts = skeleton(system)
     points = np.array(parts.function(q)[0]).T

@@ -6,25 +6,13 @@ import shutil
 
 import numpy as np
 import pytest
+from support.browser_app import ARGUMENTS, NAMES
 
 import mbs
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 images = pytest.importorskip("PIL.Image", reason="pictures need matplotlib")
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+BROWSER = next(filter(None, map(shutil.which, NAMES)), None)
 pytestmark = [
     pytest.mark.skipif(BROWSER is None, reason="no chromium is installed"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
@@ -34,7 +22,7 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def browser():
     with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=BROWSER, args=FLAGS)
+        chromium = driver.chromium.launch(executable_path=BROWSER, args=ARGUMENTS)
         yield chromium
         chromium.close()
 

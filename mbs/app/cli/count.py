@@ -67,7 +67,7 @@ def count(
 
     assembled = system(robot, parameter)
     options = assignments(option or (), "--option")
-    keys = key or _offered(assembled, every)
+    keys = key or _offer(assembled, every)
     counted = counts(assembled, keys, EVERY_PASS if optimise else (), options)
     rows = _with_numbers(counted)
     if json:
@@ -76,7 +76,7 @@ def count(
     print_tables(_tables(assembled.name, rows, optimise))
 
 
-def _offered(system: System, every: bool) -> list[str]:
+def _offer(system: System, every: bool) -> list[str]:
     """Keys of all models that the robot has a function of, or of the usual ones among them."""
     from mbs.app.tasks.equations import entries
 

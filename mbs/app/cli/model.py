@@ -88,7 +88,7 @@ def model(
         return
     if output is None:
         typer.echo(written.text, nl=not written.text.endswith("\n"))
-    note(_counted(written))
+    note(_count_text(written))
 
 
 def equations_of(
@@ -119,16 +119,16 @@ def equations_of(
     return task.equations(assembled, key, values, language, passes)
 
 
-def _counted(written: WrittenEquations) -> str:
+def _count_text(written: WrittenEquations) -> str:
     if written.before is None or written.after is None:
         return f"{written.system} {written.key}: {written.title}"
-    told = f"{written.system} {written.key}: {_said(written.after)}"
+    told = f"{written.system} {written.key}: {_say(written.after)}"
     if written.steps:
-        told += f"; before the optimizer {_said(written.before)}"
+        told += f"; before the optimizer {_say(written.before)}"
     return told
 
 
-def _said(count: Count) -> str:
+def _say(count: Count) -> str:
     amounts = {
         "multiplication": count.mul,
         "addition": count.add,

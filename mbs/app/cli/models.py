@@ -95,10 +95,10 @@ def _tables(rows: Sequence[dict[str, Any]]) -> list[PrintedTable]:
 
 
 def _options(row: dict[str, Any]) -> str:
-    return ", ".join(_said(option) for option in row["options"])
+    return ", ".join(_say(option) for option in row["options"])
 
 
-def _said(option: Any) -> str:
+def _say(option: Any) -> str:
     if isinstance(option, str):
         return option
     default = option["default"]

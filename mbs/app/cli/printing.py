@@ -51,7 +51,7 @@ def print_tables(tables: Iterable[PrintedTable]) -> None:
             console.print()
         if table.title:
             console.print(Text(table.title, style="bold"))
-        console.print(_drawn(table, _widths(table)))
+        console.print(_draw(table, _widths(table)))
 
 
 def _widths(table: PrintedTable) -> list[int]:
@@ -63,7 +63,7 @@ def _widths(table: PrintedTable) -> list[int]:
     return widths
 
 
-def _drawn(table: PrintedTable, widths: Sequence[int]) -> Any:
+def _draw(table: PrintedTable, widths: Sequence[int]) -> Any:
     from rich import box
     from rich.table import Table as Rich
     from rich.text import Text

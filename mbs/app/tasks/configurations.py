@@ -73,7 +73,7 @@ def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
     """
     if len(xyz) != 3 or len(rpy) != 3:
         raise ModelError(
-            f"a pose has three places and three angles, {len(xyz)} and {len(rpy)} were given;"
+            f"a pose has three coordinates and three angles, {len(xyz)} and {len(rpy)} were given;"
             " write x y z roll pitch yaw"
         )
     T = np.eye(4)
@@ -196,7 +196,7 @@ class ConfigurationList:
     Attributes:
         system: name of the mechanism.
         frame: that was taken there.
-        T: the wanted pose, rows of (4, 4).
+        T: the target pose, rows of (4, 4).
         names: of the coordinates.
         units: of the coordinates.
         locked: joints that stayed, with their positions.
@@ -306,7 +306,7 @@ def _near(
         return None
     frame, T = wanted
     aim = goal(system, frame, T, None, parameters)
-    best = aim.approached(np.array(system.position(seed)))
+    best = aim.approach(np.array(system.position(seed)))
     if not best.is_closed:
         return None
     distance, angle = aim.gap(best.q)

@@ -231,9 +231,9 @@ def equations(
     started = time.perf_counter()
     if spoken == WORDS:
         assert one.text is not None
-        return _written(system, one, chosen, one.text(system, **chosen), started)
+        return _write(system, one, chosen, one.text(system, **chosen), started)
     model = one.build(system, **chosen)
-    final, steps = _optimised(model, passes)
+    final, steps = _optimise(model, passes)
     return WrittenEquations(
         **_about(system, one, chosen),
         language=spoken,
@@ -247,7 +247,7 @@ def equations(
     )
 
 
-def _optimised(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[Step, ...]]:
+def _optimise(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[Step, ...]]:
     """The model after the passes, and what each did; itself where there are none."""
     if not passes:
         return model, ()
@@ -255,7 +255,7 @@ def _optimised(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[
     return made.function, made.steps
 
 
-def _written(
+def _write(
     system: System, one: Entry, chosen: Mapping[str, Any], text: str, started: float
 ) -> WrittenEquations:
     return WrittenEquations(

@@ -87,7 +87,7 @@ def c_library(
     with tempfile.TemporaryDirectory(prefix="mbs-c-") as place:
         folder = export.c_library(functions, Path(place) / name)
         files = {f"{name}/{path.name}": path.read_bytes() for path in sorted(folder.iterdir())}
-    return _zipped(files)
+    return _zip(files)
 
 
 def c_functions(
@@ -129,7 +129,7 @@ def fmu(system: System, settings: FmuSettings | None = None) -> bytes:
     for what in ("stop_time", "step_size", "tolerance", "internal_step"):
         given[what] = number(given[what], f"{system.name}: {what}")
     given["platforms"] = list(settings.platforms) or None
-    return _written(lambda path: export.fmu(system, path, **given), f"{file_stem(system)}.fmu")
+    return _write(lambda path: export.fmu(system, path, **given), f"{file_stem(system)}.fmu")
 
 
 def par(system: System) -> bytes:
@@ -138,7 +138,7 @@ def par(system: System) -> bytes:
     Raises:
         ModelError: the format cannot say it.
     """
-    return _written(lambda path: export.par(system, path), "robot.par")
+    return _write(lambda path: export.par(system, path), "robot.par")
 
 
 def urdf(system: System) -> bytes:
@@ -147,7 +147,7 @@ def urdf(system: System) -> bytes:
     Raises:
         ModelError: the format cannot say it.
     """
-    return _written(lambda path: export.urdf(system, path), "robot.urdf")
+    return _write(lambda path: export.urdf(system, path), "robot.urdf")
 
 
 def sdf(system: System) -> bytes:
@@ -156,7 +156,7 @@ def sdf(system: System) -> bytes:
     Raises:
         ModelError: the format cannot say it.
     """
-    return _written(lambda path: export.sdf(system, path), "robot.sdf")
+    return _write(lambda path: export.sdf(system, path), "robot.sdf")
 
 
 def toml(system: System) -> bytes:
@@ -168,7 +168,7 @@ def toml(system: System) -> bytes:
         ModelError: a table of frames cannot say it.
     """
     table = _named(robot_table(system, ".toml"), system)
-    return _written(lambda path: write_toml(table, path), "robot.toml")
+    return _write(lambda path: write_toml(table, path), "robot.toml")
 
 
 def _named(table: RobotTable, system: System) -> RobotTable:
@@ -210,7 +210,7 @@ def file_stem(system: System) -> str:
     return _NOT_IN_NAMES.sub("_", system.name).strip("_")[:60] or "robot"
 
 
-def _written(write: Callable[[Path], object], name: str) -> bytes:
+def _write(write: Callable[[Path], object], name: str) -> bytes:
     """What a function writes into a file of this name."""
     with tempfile.TemporaryDirectory(prefix="mbs-export-") as folder:
         path = Path(folder) / name
@@ -218,7 +218,7 @@ def _written(write: Callable[[Path], object], name: str) -> bytes:
         return path.read_bytes()
 
 
-def _zipped(files: Mapping[str, bytes]) -> bytes:
+def _zip(files: Mapping[str, bytes]) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():

@@ -193,14 +193,14 @@ class AppPicture(AppBase):
         await self._pose(self.session.q)
         self._tell(self._on_configuration)
 
-    async def move(self, place: int, value: float) -> None:
+    async def move(self, index: int, value: float) -> None:
         """Move one coordinate by hand; of many moves of it in a row the last one counts.
 
         Args:
-            place: of the coordinate in q.
+            index: of the coordinate in q.
             value: where it is to be [rad or m].
         """
-        self._wanted[place] = value
+        self._wanted[index] = value
         if self._is_moving:
             return
         self._is_moving = True
@@ -211,13 +211,13 @@ class AppPicture(AppBase):
             self._is_moving = False
 
     async def _move_once(self) -> None:
-        place = next(iter(self._wanted))
-        value = self._wanted.pop(place)
+        index = next(iter(self._wanted))
+        value = self._wanted.pop(index)
         system, q = self.session.system, self.session.q
-        if system is None or not 0 <= place < len(q):
+        if system is None or not 0 <= index < len(q):
             return
         try:
-            q = await self.aside(moved, system, q, place, value)
+            q = await self.aside(moved, system, q, index, value)
         except Exception as error:
             self.session.refusal = self._sentence(error)
             self._tell(self._on_configuration)
@@ -420,7 +420,7 @@ async def warm_up() -> None:
         _drawn(system, system.configuration)
         loop = Document.of_name("four_bar").system()
         # any small step along the branch [rad]
-        moved(loop, loop.configuration, handles(loop)[0].place, loop.configuration[0] + 0.01)
+        moved(loop, loop.configuration, handles(loop)[0].index, loop.configuration[0] + 0.01)
 
     await aside(once)
 

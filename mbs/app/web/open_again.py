@@ -45,12 +45,12 @@ async def open_again(app: App) -> None:
     known = {one.key for one in entries()}
     for name in before:
         if name in _OPENERS:
-            await _finished(_OPENERS[name](app))
+            await _finish(_OPENERS[name](app))
         elif name.removeprefix(_EQUATIONS) in known:
             await open_equations(app, name.removeprefix(_EQUATIONS))
 
 
-async def _finished(opening: Any) -> None:
+async def _finish(opening: Any) -> None:
     if opening is not None:
         await opening
 

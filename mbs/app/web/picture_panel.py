@@ -81,12 +81,12 @@ class JointSliders:
         with self._grid:
             for handle in found:
                 self._sliders.append(self._slider(handle))
-        held = {handle.place for handle in found}
+        held = {handle.index for handle in found}
         with self._others:
-            for place, coordinate in enumerate(system.coordinates):
-                if place not in held:
+            for index, coordinate in enumerate(system.coordinates):
+                if index not in held:
                     label = ui.label().tooltip(f"{coordinate.name} follows from the loops")
-                    self._follow[place] = label
+                    self._follow[index] = label
         self._kind.set_text(
             "the active ones; the others follow from the loops" if system.is_closed else ""
         )
@@ -97,13 +97,13 @@ class JointSliders:
         if system is None or len(q) != system.nq:
             return
         for item in self._sliders:
-            value = q[item.handle.place]
+            value = q[item.handle.index]
             if not (self._app.is_moving and item.handle == self._held):
                 item.slider.set_value(value)
             if item.handle != self._typed:
                 item.field.set_value(f"{value:.4f}")
-        for place, label in self._follow.items():
-            label.set_text(f"{system.coordinates[place].name} = {q[place]:.4f}")
+        for index, label in self._follow.items():
+            label.set_text(f"{system.coordinates[index].name} = {q[index]:.4f}")
         self._turn += 1
         turn = self._turn
         await asyncio.sleep(_PAUSE)
@@ -148,7 +148,7 @@ class JointSliders:
         )
         field.on("update:model-value", lambda: self._type(handle), args=[])
         field.on("blur", lambda: self._type(None), args=[])
-        field.on("change", lambda: self._written(made))
+        field.on("change", lambda: self._write(made))
         return made
 
     def _type(self, handle: Handle | None) -> None:
@@ -157,16 +157,16 @@ class JointSliders:
 
     async def _slid(self, handle: Handle, event: events.GenericEventArguments) -> None:
         self._held = handle
-        await self._app.move(handle.place, float(event.args))
+        await self._app.move(handle.index, float(event.args))
 
-    async def _written(self, item: _Slider) -> None:
+    async def _write(self, item: _Slider) -> None:
         self._typed = None
         try:
             value = number(str(item.field.value or ""), item.handle.name)
         except MbsError as error:
             self._app.complain(error)
             return
-        await self._app.move(item.handle.place, value)
+        await self._app.move(item.handle.index, value)
 
     async def _choose_mode(self, event: events.ValueChangeEventArguments[Any]) -> None:
         k = event.value

@@ -17,7 +17,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
 from mbs.errors import DescriptionError, LoopError, MbsError, NoClosedForm, Unclosable
 from mbs.loops import Mode, modes
-from mbs.loops.closing import Closing, closure_parameters, followed_configuration
+from mbs.loops.closing import Closing, closure_parameters, follow_configuration
 from mbs.loops.function import independent_names
 
 # Configurations of the picture: joints that can be moved by hand, the others following.
@@ -38,14 +38,14 @@ class Handle:
 
     Attributes:
         name: of the coordinate.
-        place: in q.
+        index: in q.
         unit: rad, m, or 1 for the parts of a quaternion.
         low, high: ends of its slider.
         limited: whether they are limits of the joint.
     """
 
     name: str
-    place: int
+    index: int
     unit: str
     low: float
     high: float
@@ -57,19 +57,19 @@ def handles(system: System) -> tuple[Handle, ...]:
     chosen = set(independent_names(system)) if system.is_closed else None
     reach = _reach(system)
     return tuple(
-        _handle(system, place, reach)
-        for place, coordinate in enumerate(system.coordinates)
+        _handle(system, index, reach)
+        for index, coordinate in enumerate(system.coordinates)
         if chosen is None or coordinate.name in chosen
     )
 
 
-def _handle(system: System, place: int, reach: float) -> Handle:
-    c = system.coordinates[place]
+def _handle(system: System, index: int, reach: float) -> Handle:
+    c = system.coordinates[index]
     if c.limits is not None:
-        return Handle(c.name, place, c.unit, c.limits[0], c.limits[1], True)
+        return Handle(c.name, index, c.unit, c.limits[0], c.limits[1], True)
     half = {"rad": _FULL_TURN, "m": reach}.get(c.unit, 1.0)
-    middle = system.configuration[place] if c.unit == "m" else 0.0
-    return Handle(c.name, place, c.unit, middle - half, middle + half, False)
+    middle = system.configuration[index] if c.unit == "m" else 0.0
+    return Handle(c.name, index, c.unit, middle - half, middle + half, False)
 
 
 def _reach(system: System) -> float:
@@ -86,29 +86,29 @@ def _number(value: object) -> float:
     return float(value) if isinstance(value, (int, float)) else 0.0
 
 
-def moved(system: System, q: Sequence[float], place: int, value: float) -> Vector:
+def moved(system: System, q: Sequence[float], index: int, value: float) -> Vector:
     """The configuration with one coordinate elsewhere and the loops closed near the old one.
 
     Args:
         system: the mechanism.
         q: (nq,) present configuration [rad or m].
-        place: of the coordinate in q.
+        index: of the coordinate in q.
         value: where it is to be.
 
     Raises:
         LoopError: the loops cannot be closed there.
     """
     target = list(q)
-    target[place] = value
+    target[index] = value
     if not system.is_closed:
-        return _unit(system, target, place)
+        return _unit(system, target, index)
     p = closure_parameters(system)
     try:
-        found = followed_configuration(
+        found = follow_configuration(
             replace(system, configuration=tuple(q)), np.array(target), _held(system), p
         )
     except Unclosable as error:
-        name = system.coordinates[place].name
+        name = system.coordinates[index].name
         end = re.search(rf"ends near .*?\b{re.escape(name)} = (\S+?)[,;]", str(error))
         until = f"; on this branch it ends near {end[1]}" if end else ""
         raise Unclosable(
@@ -118,15 +118,15 @@ def moved(system: System, q: Sequence[float], place: int, value: float) -> Vecto
 
 
 def _held(system: System) -> tuple[int, ...]:
-    return tuple(handle.place for handle in handles(system))
+    return tuple(handle.index for handle in handles(system))
 
 
-def _unit(system: System, q: list[float], place: int) -> Vector:
+def _unit(system: System, q: list[float], index: int) -> Vector:
     """The configuration with quaternions of unit length, the moved part kept if it can be."""
     for part in quaternion_slices(system.tree):
         values = np.array(q[part])
-        if part.start <= place < part.stop:
-            values = _with_part(values, place - part.start)
+        if part.start <= index < part.stop:
+            values = _with_part(values, index - part.start)
         norm = float(np.linalg.norm(values))
         q[part] = [float(x) for x in (values / norm if norm > _SAME else [1.0, 0.0, 0.0, 0.0])]
     return tuple(q)
@@ -166,7 +166,7 @@ def assembly_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str
     """
     if not system.is_closed:
         return ()
-    known = {handle.name: q[handle.place] for handle in handles(system)}
+    known = {handle.name: q[handle.index] for handle in handles(system)}
     try:
         found = modes(system, known)
     except NoClosedForm:

@@ -297,7 +297,7 @@ class TablePanel:
         ).classes("app-grid")
         grid.on(
             "cellValueChanged",
-            lambda event: self._typed(sheet, event),
+            lambda event: self._type(sheet, event),
             args=["colId", "newValue", "rowIndex"],
         )
         grid.on("cellClicked", lambda e: self._clicked(sheet, e), args=["colId", "rowIndex"])
@@ -316,7 +316,7 @@ class TablePanel:
                 else "frames k and k+B coincide when the loop is closed"
             ).classes("app-note")
 
-    async def _typed(self, sheet: str, event: events.GenericEventArguments) -> None:
+    async def _type(self, sheet: str, event: events.GenericEventArguments) -> None:
         text = event.args.get("newValue")
         cell = Cell(sheet, int(event.args["rowIndex"]), str(event.args["colId"]))
         await self._app.edit(cell, "" if text is None else str(text))

@@ -21,15 +21,15 @@ from mbs.closed_forms.paul.linear import (
     row_factors,
     row_values,
 )
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, angle_step, unsteady
+from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, angle_step, unsteady
 from mbs.closed_forms.paul.splits import Variable
-from mbs.closed_forms.sequence import Step
+from mbs.closed_forms.sequence import SequenceStep
 
 _MOST = 2
 _ROWS = 8
 
 
-def eliminated(stage: Stage) -> Iterator[Candidate]:
+def eliminated(stage: PaulStage) -> Iterator[Candidate]:
     """Steps of type 2 from several linear equations."""
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(e.variables for e in rows if len(e.variables) > 1):
@@ -38,30 +38,30 @@ def eliminated(stage: Stage) -> Iterator[Candidate]:
         )[:_ROWS]
         for variable in variables:
             others = tuple(v for v in variables if v is not variable)
-            if variable.slides or len(columns(others)) > _MOST:
+            if variable.prismatic or len(columns(others)) > _MOST:
                 continue
             yield from _of(stage, inside, variable, others)
 
 
 def _of(
-    stage: Stage, rows: list[Equation], variable: Variable, others: Variables
+    stage: PaulStage, rows: list[Equation], variable: Variable, others: Variables
 ) -> Iterator[Candidate]:
     width = len(columns(others))
     for chosen in combinations(rows, width + 1):
-        K = _stacked(chosen, others)
+        K = _stack(chosen, others)
         minors = _minors(K)
         if np.min(np.max(np.abs(minors), axis=-1)) < DEPENDENT or np.any(
             np.max(np.abs(minors), axis=0) < DEPENDENT
         ):
             continue
-        own = _stacked(chosen, (variable,))
+        own = _stack(chosen, (variable,))
         XY = np.einsum("...k,...kc->...c", minors, own)
         size = np.linalg.norm(XY, axis=-1)
         if np.min(size) < DEPENDENT:
             continue
         cost = float(sum(row.cost for row in chosen))
 
-        def build(chosen: tuple[Equation, ...] = chosen) -> Step:
+        def build(chosen: tuple[Equation, ...] = chosen) -> SequenceStep:
             return _built(stage, chosen, variable, others)
 
         # after the equations in one unknown, 4 and 5, and before the pairs of equations, 6
@@ -69,7 +69,7 @@ def _of(
         yield Candidate((order, unsteady(size), cost), (variable,), build)
 
 
-def _stacked(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
+def _stack(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
     return np.stack(np.broadcast_arrays(*(row_values(row, variables) for row in rows)), axis=-2)
 
 
@@ -80,13 +80,15 @@ def _minors(K: Matrix) -> Matrix:
     return np.stack(values, axis=-1)
 
 
-def _built(stage: Stage, rows: tuple[Equation, ...], variable: Variable, others: Variables) -> Step:
+def _built(
+    stage: PaulStage, rows: tuple[Equation, ...], variable: Variable, others: Variables
+) -> SequenceStep:
     K = [row_factors(stage, row, others)[:-1] for row in rows]
     own = [row_factors(stage, row, (variable,)) for row in rows]
     X, Y, Z = (
         casadi.det(casadi.vertcat(*(casadi.horzcat(*k, o[c]) for k, o in zip(K, own, strict=True))))
         for c in range(3)
     )
-    slides = sum(v.slides for v in others)
-    power = sum(row.row.power for row in rows) - slides
+    prismatic = sum(v.prismatic for v in others)
+    power = sum(row.row.power for row in rows) - prismatic
     return angle_step(stage, variable, (SX(X), SX(Y), SX(-Z)), power)

@@ -60,7 +60,8 @@ class Part:
     """What stands with one product of variables.
 
     Attributes:
-        values: (samples) G of Re(G e^i(angle)) times the slides; real where there is no angle.
+        values: (samples) G of Re(G e^i(angle)) times the prismatic joints; real where there is no
+            angle.
         sources: what it is the sum of.
     """
 
@@ -105,12 +106,14 @@ def equations(knowledge: Knowledge, most: int = PRODUCTS) -> tuple[Equation, ...
         knowledge: what is known.
         most: variables of an equation with products of them, before known sums are taken out.
     """
-    slides = frozenset(k for k, joint in enumerate(knowledge.ring.joints) if not joint.turns)
+    prismatic = frozenset(
+        k for k, joint in enumerate(knowledge.ring.joints) if not joint.is_rotational
+    )
     sums = [(known.members, at) for known, _, at in knowledge.open_sums()]
     found = dict[object, list[Equation]]()
     for split in splits(knowledge):
-        for row, terms in simple_rows(split, slides, most):
-            new = _equation(row, terms, slides, sums)
+        for row, terms in simple_rows(split, prismatic, most):
+            new = _equation(row, terms, prismatic, sums)
             if new is not None:
                 found.setdefault(_mark(new), []).append(new)
     return tuple(
@@ -143,14 +146,14 @@ def _leading(table: Values) -> NDArray[np.float64]:
 def _equation(
     row: Row,
     terms: Mapping[Members, Values],
-    slides: frozenset[int],
+    prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> Equation | None:
     """The equation with its variables, if they are few."""
     reduced = dict[Members, tuple[Values, list[Source]]]()
     for term, given in terms.items():
-        turns = any(k not in slides for k, _ in term)
-        rest, source, values = _folded(term, given * (2 if turns else 1), slides, sums)
+        turns = any(k not in prismatic for k, _ in term)
+        rest, source, values = _fold(term, given * (2 if turns else 1), prismatic, sums)
         before = reduced.get(rest)
         if before is None:
             reduced[rest] = values, [source]
@@ -158,7 +161,7 @@ def _equation(
             reduced[rest] = before[0] + values, [*before[1], source]
     if sums:
         reduced = {term: own for term, own in reduced.items() if np.max(np.abs(own[0])) > ZERO}
-    variables = _variables([*reduced], slides)
+    variables = _variables([*reduced], prismatic)
     if not variables or len(variables) > MOST_VARIABLES:
         return None
     parts = {
@@ -172,10 +175,10 @@ def _equation(
     return equation if len(variables) <= PRODUCTS or equation.linear else None
 
 
-def _folded(
+def _fold(
     term: Members,
     values: Values,
-    slides: frozenset[int],
+    prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> tuple[Members, Source, Values]:
     """What is left of a term when the known sums of angles are taken out of it."""
@@ -189,16 +192,16 @@ def _folded(
             known.append((number, multiple))
     if not known:
         return term, Source(term), values
-    leading = next((e for k, e in rest if k not in slides), 0)
+    leading = next((e for k, e in rest if k not in prismatic), 0)
     if leading < 0:
-        rest = tuple((k, e if k in slides else -e) for k, e in rest)
+        rest = tuple((k, e if k in prismatic else -e) for k, e in rest)
         values = values.conj()
     elif leading == 0:
         values = values.real.astype(complex)
     return rest, Source(term, tuple(known), leading < 0), values
 
 
-def _variables(terms: list[Members], slides: frozenset[int]) -> tuple[Variable, ...]:
+def _variables(terms: list[Members], prismatic: frozenset[int]) -> tuple[Variable, ...]:
     """The joints, those put together whose angles always come with the same ratio."""
     columns = dict[int, list[int]]()
     for number, term in enumerate(terms):
@@ -209,11 +212,11 @@ def _variables(terms: list[Members], slides: frozenset[int]) -> tuple[Variable, 
         column = columns[k]
         for at, (leader, variable) in enumerate(groups):
             ratio = 1 if leader == column else -1 if leader == [-e for e in column] else 0
-            if ratio and k not in slides and not variable.slides:
+            if ratio and k not in prismatic and not variable.prismatic:
                 groups[at] = (leader, Variable(False, (*variable.members, (k, ratio))))
                 break
         else:
-            groups.append((column, Variable(k in slides, ((k, 1),))))
+            groups.append((column, Variable(k in prismatic, ((k, 1),))))
     return tuple(variable for _, variable in groups)
 
 
@@ -271,13 +274,13 @@ def factor(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, key
         own = _own(knowledge, matrices, equation, source.term)
         if source.known:
             angle = sum((multiple * sums[number] for number, multiple in source.known), SX(0))
-            own = _turned(own, angle, source.conjugate)
+            own = _rotate(own, angle, source.conjugate)
         total = Factor(total.X + own.X, total.Y + own.Y)
     x, y = np.max(np.abs(part.values.real)), np.max(np.abs(part.values.imag))
     return Factor(total.X if x > ZERO else SX(0), total.Y if y > ZERO else SX(0))
 
 
-def _turned(own: Factor, angle: SX, conjugate: bool) -> Factor:
+def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
     """X and Y of G = X - i Y times e^i(angle), or of its conjugate."""
     c, s = casadi.cos(angle), casadi.sin(angle)
     X, Y = own.X * c + own.Y * s, own.Y * c - own.X * s
@@ -287,51 +290,51 @@ def _turned(own: Factor, angle: SX, conjugate: bool) -> Factor:
 def _own(knowledge: Knowledge, matrices: RingMatrices, equation: Equation, term: Members) -> Factor:
     """X and Y of one product of powers of the joints."""
     joints = knowledge.ring.joints
-    slides = {k: power for k, power in term if not joints[k].turns}
-    angles = [(k, sign) for k, sign in term if joints[k].turns]
+    prismatic = {k: power for k, power in term if not joints[k].is_rotational}
+    angles = [(k, sign) for k, sign in term if joints[k].is_rotational]
     if not angles:
-        return Factor(_coefficient(knowledge, matrices, equation.row, slides), SX(0))
-    if not _has_partner(equation, slides, angles, term):
+        return Factor(_coefficient(knowledge, matrices, equation.row, prismatic), SX(0))
+    if not _has_partner(equation, prismatic, angles, term):
         cosines = {k: 1 for k, _ in angles}
         with_sine = cosines | {angles[0][0]: 2}
         return Factor(
-            _coefficient(knowledge, matrices, equation.row, slides | cosines),
-            _coefficient(knowledge, matrices, equation.row, slides | with_sine),
+            _coefficient(knowledge, matrices, equation.row, prismatic | cosines),
+            _coefficient(knowledge, matrices, equation.row, prismatic | with_sine),
         )
-    return _mixed(knowledge, matrices, equation.row, (slides, angles))
+    return _mix(knowledge, matrices, equation.row, (prismatic, angles))
 
 
 def _has_partner(
     equation: Equation,
-    slides: Mapping[int, int],
+    prismatic: Mapping[int, int],
     angles: list[tuple[int, int]],
     term: Members,
 ) -> bool:
     """Whether the same joints come together with other signs too."""
-    pattern = {k for k, _ in angles} | set(slides)
+    pattern = {k for k, _ in angles} | set(prismatic)
     return any(
         other != term
         and {k for k, _ in other} == pattern
-        and all(slides.get(k, power) == power for k, power in other)
+        and all(prismatic.get(k, power) == power for k, power in other)
         for other in equation.patterns
     )
 
 
-def _mixed(
+def _mix(
     knowledge: Knowledge,
     matrices: RingMatrices,
     row: Row,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
 ) -> Factor:
     """G = X - i Y from all products of cosines and sines of the joints."""
-    slides, angles = term
+    prismatic, angles = term
     X, Y = SX(0), SX(0)
     for choice in product((1, 2), repeat=len(angles)):
         weight = 2 * np.prod(
             [0.5 if c == 1 else -0.5j * e for c, (_, e) in zip(choice, angles, strict=True)]
         )
         chosen = {k: c for c, (k, _) in zip(choice, angles, strict=True)}
-        value = _coefficient(knowledge, matrices, row, dict(slides) | chosen)
+        value = _coefficient(knowledge, matrices, row, dict(prismatic) | chosen)
         X, Y = X + weight.real * value, Y - weight.imag * value
     return Factor(SX(X), SX(Y))
 
@@ -390,9 +393,9 @@ def _joint(knowledge: Knowledge, k: int, number: int, direction: int) -> SX:
     joint = knowledge.ring.joints[k]
     sign = direction * joint.sign
     if k not in knowledge.known:
-        return _sparse_basis(joint.turns, sign)[number]
-    basis, q = _sparse_basis(joint.turns, 1), knowledge.position(k)
-    if joint.turns:
+        return _sparse_basis(joint.is_rotational, sign)[number]
+    basis, q = _sparse_basis(joint.is_rotational, 1), knowledge.position(k)
+    if joint.is_rotational:
         return SX(basis[0] + casadi.cos(q) * basis[1] + (sign * casadi.sin(q)) * basis[2])
     return SX(basis[0] + (sign * q) * basis[1] + (q * q) * basis[2])
 

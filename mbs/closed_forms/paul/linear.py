@@ -16,9 +16,9 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.closed_forms.paul.equation import Equation, Key
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, divided, unsteady
+from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, divided, unsteady
 from mbs.closed_forms.paul.splits import Variable
-from mbs.closed_forms.sequence import Found, Step, angle_of, step
+from mbs.closed_forms.sequence import Found, SequenceStep, angle_of, step
 from mbs.numbers import NONZERO
 from mbs.solvers.rank import graded
 
@@ -32,7 +32,7 @@ _CHOICES = 8
 _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
 
-def linear(stage: Stage) -> Iterator[Candidate]:
+def linear(stage: PaulStage) -> Iterator[Candidate]:
     """Steps that solve as many linear equations as there are columns."""
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(equation.variables for equation in rows):
@@ -41,7 +41,9 @@ def linear(stage: Stage) -> Iterator[Candidate]:
         order = 3.0 if sums else float(min(len(variables), 2))
         for chosen, rank in _best(inside, variables):
 
-            def build(chosen: tuple[Equation, ...] = chosen, v: Variables = variables) -> Step:
+            def build(
+                chosen: tuple[Equation, ...] = chosen, v: Variables = variables
+            ) -> SequenceStep:
                 return _built(stage, chosen, v)
 
             yield Candidate((order, *rank), variables, build)
@@ -50,7 +52,7 @@ def linear(stage: Stage) -> Iterator[Candidate]:
 def columns(variables: Variables) -> list[tuple[Variable, str]]:
     """What the equations are linear in."""
     return [
-        (variable, kind) for variable in variables for kind in ("r" if variable.slides else "cs")
+        (variable, kind) for variable in variables for kind in ("r" if variable.prismatic else "cs")
     ]
 
 
@@ -72,16 +74,16 @@ def row_values(equation: Equation, variables: Variables) -> Matrix:
     return np.stack(np.broadcast_arrays(*values), axis=-1)
 
 
-def row_factors(stage: Stage, equation: Equation, variables: Variables) -> list[SX]:
+def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> list[SX]:
     """The coefficients, then the constant."""
     factors = list[SX]()
     for variable in variables:
         key = key_of(variable, equation)
         if key is None:
-            factors += [SX(0)] * (1 if variable.slides else 2)
+            factors += [SX(0)] * (1 if variable.prismatic else 2)
             continue
         own = stage.factor(equation, key)
-        factors += [own.X] if variable.slides else [own.X, own.Y]
+        factors += [own.X] if variable.prismatic else [own.X, own.Y]
     return [*factors, stage.factor(equation, (0,) * len(equation.variables)).X]
 
 
@@ -109,7 +111,7 @@ def _best(
     return sorted(choices, key=lambda choice: choice[1])[:_CHOICES]
 
 
-def _built(stage: Stage, rows: tuple[Equation, ...], variables: Variables) -> Step:
+def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -> SequenceStep:
     """The step by Cramer's rule."""
     table = [row_factors(stage, row, variables) for row in rows]
     A = casadi.vertcat(*(casadi.horzcat(*row[:-1]) for row in table))
@@ -117,14 +119,14 @@ def _built(stage: Stage, rows: tuple[Equation, ...], variables: Variables) -> St
     named, equation = _text(stage, table, variables)
     D, solved = _cramer(A, b)
     values, regular, at = dict[int, SX](), list[SX](), 0
-    power = sum(row.row.power for row in rows) - sum(variable.slides for variable in variables)
+    power = sum(row.row.power for row in rows) - sum(variable.prismatic for variable in variables)
     for variable in variables:
-        place = stage.knowledge.place(variable)
-        if variable.slides:
-            values[place] = divided(solved[at], D)
+        index = stage.knowledge.index(variable)
+        if variable.prismatic:
+            values[index] = divided(solved[at], D)
         else:
-            values[place] = angle_of(solved[at + 1] * D, solved[at] * D).value
-        at += 1 if variable.slides else 2
+            values[index] = angle_of(solved[at + 1] * D, solved[at] * D).value
+        at += 1 if variable.prismatic else 2
     if not D.is_constant():
         regular.append(SX((D / stage.matrices.length**power) ** 2))
     kind = _kind(variables)
@@ -135,7 +137,7 @@ def _built(stage: Stage, rows: tuple[Equation, ...], variables: Variables) -> St
 def _kind(variables: Variables) -> str:
     if len(variables) > 1:
         return "linear"
-    return "type 1" if variables[0].slides else "type 3"
+    return "type 1" if variables[0].prismatic else "type 3"
 
 
 def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
@@ -149,7 +151,9 @@ def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
     return SX(casadi.det(A)), numerators
 
 
-def _text(stage: Stage, table: list[list[SX]], variables: Variables) -> tuple[dict[str, SX], str]:
+def _text(
+    stage: PaulStage, table: list[list[SX]], variables: Variables
+) -> tuple[dict[str, SX], str]:
     named, lines = dict[str, SX](), list[str]()
     for letter, row in zip(_letters(len(table)), table, strict=True):
         pieces, right = list[str](), "0"

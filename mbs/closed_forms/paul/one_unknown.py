@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.paul.equation import Equation, Factor, Key, RingMatrices, factor
 from mbs.closed_forms.paul.splits import Knowledge, Variable
-from mbs.closed_forms.sequence import ZERO, Found, Step, angle_of, cosine_root, square_root, step
+from mbs.closed_forms.sequence import (
+    ZERO,
+    Found,
+    SequenceStep,
+    angle_of,
+    cosine_root,
+    square_root,
+    step,
+)
 from mbs.numbers import NONZERO
 
 # Ways to go on at one stage of a search, and how they are told in text.
@@ -23,7 +31,7 @@ STEADY = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stage:
+class PaulStage:
     """What is known, and the equations in few unknowns that are left.
 
     Attributes:
@@ -42,7 +50,7 @@ class Stage:
 
     def number(self, variable: Variable) -> str:
         """What tells the coefficients of a variable from others."""
-        return str(self.knowledge.place(variable) + 1)
+        return str(self.knowledge.index(variable) + 1)
 
     def term(self, variable: Variable) -> str:
         """The variable as an equation shows it."""
@@ -67,7 +75,7 @@ class Candidate:
 
     rank: tuple[float, ...]
     variables: tuple[Variable, ...]
-    build: Callable[[], Step]
+    build: Callable[[], SequenceStep]
 
 
 def unsteady(values: NDArray[np.float64]) -> float:
@@ -83,25 +91,25 @@ def divided(numerator: SX, denominator: SX) -> SX:
     return SX(numerator * denominator / (denominator * denominator + NONZERO))
 
 
-def one_unknown(stage: Stage) -> Iterator[Candidate]:
+def one_unknown(stage: PaulStage) -> Iterator[Candidate]:
     """Steps of type 2 and quadratic ones."""
     for equation in stage.equations:
         if len(equation.variables) != 1:
             continue
-        if not equation.variables[0].slides and set(equation.parts) <= {(0,), (1,)}:
+        if not equation.variables[0].prismatic and set(equation.parts) <= {(0,), (1,)}:
             yield _type_2(stage, equation)
-        elif equation.variables[0].slides and (2,) in equation.parts:
+        elif equation.variables[0].prismatic and (2,) in equation.parts:
             yield _quadratic(stage, equation)
 
 
-def _type_2(stage: Stage, equation: Equation) -> Candidate:
+def _type_2(stage: PaulStage, equation: Equation) -> Candidate:
     G, Z = equation.at((1,)), equation.at((0,))
     # after the linear equations, 1 to 3; single joints before sums
     order = 4.0 if equation.variables[0].single else 5.0
     shifted = float(np.max(np.abs(Z)) > ZERO)
     rank = (order, shifted, unsteady(np.abs(G)), float(equation.cost), -float(np.min(np.abs(G))))
 
-    def build() -> Step:
+    def build() -> SequenceStep:
         variable = equation.variables[0]
         own, Z = stage.factor(equation, (1,)), -stage.factor(equation, (0,)).X
         return angle_step(stage, variable, (own.X, own.Y, Z), equation.row.power)
@@ -110,12 +118,12 @@ def _type_2(stage: Stage, equation: Equation) -> Candidate:
 
 
 def angle_step(
-    stage: Stage,
+    stage: PaulStage,
     variable: Variable,
     XYZ: tuple[SX, SX, SX],
     power: int,
     kind: str = "type 2",
-) -> Step:
+) -> SequenceStep:
     """The step that solves X cos q + Y sin q = Z, of which the unit is a power of a length."""
     X, Y, Z = XYZ
     number, shown = stage.number(variable), stage.term(variable)
@@ -128,27 +136,27 @@ def angle_step(
     ]
     right = f"Z{number}" if f"Z{number}" in named else "0"
     sign = SX.sym("sign")
-    found = _roots(stage.knowledge.place(variable), XYZ, sign, stage.matrices.length**power)
+    found = _roots(stage.knowledge.index(variable), XYZ, sign, stage.matrices.length**power)
     found = replace(found, coefficients=named)
     signs = {stage.knowledge.name(variable): sign}
     equation = f"{' + '.join(pieces)} = {right}"
     return step(stage.knowledge.problem, kind, equation, signs, found)
 
 
-def _roots(place: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
+def _roots(index: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
     """Both roots; where Z is zero they are opposite, and always real."""
     X, Y, Z = XYZ
     if not Z.is_zero():
         root = cosine_root(X, Y, Z, sign, scale)
-        return Found({place: root.value}, (root.real,), (root.regular,))
+        return Found({index: root.value}, (root.real,), (root.regular,))
     root = angle_of(sign * X, -sign * Y, scale)
-    return Found({place: root.value}, (), () if root.regular.is_constant() else (root.regular,))
+    return Found({index: root.value}, (), () if root.regular.is_constant() else (root.regular,))
 
 
-def _quadratic(stage: Stage, equation: Equation) -> Candidate:
+def _quadratic(stage: PaulStage, equation: Equation) -> Candidate:
     order = (4.0, 1.0, unsteady(equation.at((2,)).real), float(equation.cost))
 
-    def build() -> Step:
+    def build() -> SequenceStep:
         return length_step(
             stage,
             equation.variables[0],
@@ -158,7 +166,9 @@ def _quadratic(stage: Stage, equation: Equation) -> Candidate:
     return Candidate(order, equation.variables, build)
 
 
-def length_step(stage: Stage, variable: Variable, abc: list[SX], kind: str = "quadratic") -> Step:
+def length_step(
+    stage: PaulStage, variable: Variable, abc: list[SX], kind: str = "quadratic"
+) -> SequenceStep:
     """The step that solves a r^2 + b r + c = 0."""
     a, b, c = abc
     number, shown = stage.number(variable), stage.term(variable)
@@ -171,7 +181,7 @@ def length_step(stage: Stage, variable: Variable, abc: list[SX], kind: str = "qu
     equation = " + ".join(name + powers[name] for name in named) + " = 0"
     regular = () if a.is_constant() else (SX(a * a),)
     found = Found(
-        {stage.knowledge.place(variable): root.value - middle}, (root.real,), regular, named
+        {stage.knowledge.index(variable): root.value - middle}, (root.real,), regular, named
     )
     signs = {stage.knowledge.name(variable): sign}
     return step(stage.knowledge.problem, kind, equation, signs, found)

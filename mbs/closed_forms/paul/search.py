@@ -13,10 +13,10 @@ from casadi import SX
 from mbs.closed_forms.paul.eliminated import eliminated
 from mbs.closed_forms.paul.equation import PRODUCTS, equations, ring_matrices
 from mbs.closed_forms.paul.linear import linear
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, one_unknown
+from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, one_unknown
 from mbs.closed_forms.paul.splits import Knowledge, Variable, beginning
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
-from mbs.closed_forms.sequence import ZERO, Found, Problem, Step, StepSequence, step
+from mbs.closed_forms.sequence import ZERO, Found, Problem, SequenceStep, StepSequence, step
 from mbs.components.joints import Motion
 from mbs.errors import NoClosedForm
 from mbs.recursions.chain import Gap, Ring
@@ -25,31 +25,31 @@ from mbs.spatial import Pose, vector
 # The last angle of a sum that is known.
 
 
-def sums(stage: Stage) -> Iterator[Candidate]:
+def sums(stage: PaulStage) -> Iterator[Candidate]:
     """Steps that take known angles away from a known sum, or one sum away from another."""
     for rest, value, text in _alone(stage):
 
-        def build(rest: Variable = rest, value: SX = value, text: str = text) -> Step:
+        def build(rest: Variable = rest, value: SX = value, text: str = text) -> SequenceStep:
             turns = casadi.floor((value + casadi.pi) / (2 * casadi.pi))
-            found = Found({stage.knowledge.place(rest): SX(value - 2 * casadi.pi * turns)})
+            found = Found({stage.knowledge.index(rest): SX(value - 2 * casadi.pi * turns)})
             return step(stage.knowledge.problem, "sum", text, {}, found)
 
         yield Candidate((0.0,), (rest,), build)
 
 
-def _alone(stage: Stage) -> Iterator[tuple[Variable, SX, str]]:
+def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
     """Single angles, their values, and the equation."""
     knowledge = stage.knowledge
     opened = [
-        (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[place]}")
-        for (rest, value, _), (whole, place) in zip(
+        (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[index]}")
+        for (rest, value, _), (whole, index) in zip(
             knowledge.open_sums(), knowledge.sums, strict=True
         )
     ]
     yield from (own for own in opened if own[0].single)
     for (first, a, text), (second, b, other) in combinations(opened, 2):
         for sense in (1, -1):
-            rest = _combined(first, second, sense)
+            rest = _combine(first, second, sense)
             if len(rest) == 1:
                 ((k, sign),) = rest.items()
                 value = SX(a + sense * b) / sign
@@ -57,10 +57,10 @@ def _alone(stage: Stage) -> Iterator[tuple[Variable, SX, str]]:
 
 
 def _angle(knowledge: Knowledge, k: int) -> Variable:
-    return Variable(not knowledge.ring.joints[k].turns, ((k, 1),))
+    return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 
-def _combined(first: Variable, second: Variable, sense: int) -> dict[int, int]:
+def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
     total = dict(first.members)
     for k, sign in second.members:
         total[k] = total.get(k, 0) + sense * sign
@@ -87,7 +87,7 @@ def at_feet(problem: Problem) -> Ring:
     ring = problem.ring
     for k in range(len(ring.joints) - 1):
         here, after = ring.joints[k], ring.joints[k + 1]
-        if here.turns and after.turns and not ring.gaps[k + 1].pivots:
+        if here.is_rotational and after.is_rotational and not ring.gaps[k + 1].pivots:
             ring = _moved(problem, ring, k)
     return ring
 
@@ -102,7 +102,7 @@ def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
     if np.max(np.abs(values[:, 1])) < ZERO or np.min(np.abs(values[:, 0])) < ZERO:
         return ring
     along = SX(across / sine2)
-    to, back = (Gap(Pose.moved(vector([0, 0, sign * along]))) for sign in (1, -1))
+    to, back = (Gap(Pose.translation(vector([0, 0, sign * along]))) for sign in (1, -1))
     gaps = list(ring.gaps)
     gaps[k] = to.after(gaps[k])
     gaps[k + 1] = gaps[k + 1].after(back)
@@ -135,12 +135,12 @@ def paul(problem: Problem) -> StepSequence:
     """
     _require_simple(problem)
     knowledge = beginning(problem, at_feet(problem))
-    loop, steps = ring_matrices(knowledge.ring), list[Step]()
+    loop, steps = ring_matrices(knowledge.ring), list[SequenceStep]()
     while knowledge.unknown:
-        stage = Stage(knowledge, loop, equations(knowledge))
+        stage = PaulStage(knowledge, loop, equations(knowledge))
         candidate = _cheapest(stage)
         if candidate is None and knowledge.sums:
-            stage = Stage(knowledge, loop, equations(knowledge, PRODUCTS + 1))
+            stage = PaulStage(knowledge, loop, equations(knowledge, PRODUCTS + 1))
             candidate = _cheapest(stage)
         if candidate is None:
             raise NoClosedForm(_refusal(stage, steps))
@@ -151,7 +151,7 @@ def paul(problem: Problem) -> StepSequence:
     return StepSequence(problem.size, tuple(steps))
 
 
-def _cheapest(stage: Stage) -> tuple[Step, tuple[Variable, ...]] | None:
+def _cheapest(stage: PaulStage) -> tuple[SequenceStep, tuple[Variable, ...]] | None:
     """The step of the fewest operations among the first of the simplest kind."""
     for kernels in _KERNELS:
         every = [
@@ -170,14 +170,14 @@ def _cheapest(stage: Stage) -> tuple[Step, tuple[Variable, ...]] | None:
 
 def _require_simple(problem: Problem) -> None:
     for joint in problem.ring.joints:
-        if joint.motion not in _SIMPLE or joint.place is None:
+        if joint.motion not in _SIMPLE or joint.index is None:
             raise NoClosedForm(
                 f"joint {joint.name} is {joint.motion.name.lower()}, and Paul's method knows"
                 " revolute and prismatic joints"
             )
 
 
-def _refusal(stage: Stage, steps: Sequence[Step]) -> str:
+def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
     """Which joints are left, and what the simplest equations in them are like."""
     knowledge = stage.knowledge
     left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
@@ -186,7 +186,7 @@ def _refusal(stage: Stage, steps: Sequence[Step]) -> str:
     return f"no equation gives {left}{after}: {_simplest(stage)}"
 
 
-def _simplest(stage: Stage) -> str:
+def _simplest(stage: PaulStage) -> str:
     if not stage.equations:
         return "every equation of every split of the loop has more than two unknowns"
     groups = dict.fromkeys(

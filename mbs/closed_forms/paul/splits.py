@@ -35,11 +35,11 @@ class Variable:
     """A slide, an angle, or a sum of angles with signs.
 
     Attributes:
-        slides: whether it is the length of a slide.
+        prismatic: whether it is the length of a prismatic joint.
         members: number of each joint in the ring, and its sign; the first sign is +1.
     """
 
-    slides: bool
+    prismatic: bool
     members: Members
 
     @property
@@ -49,7 +49,7 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class LoopSamples:
     """The loop in numbers, lengths divided by one of its own.
 
     Attributes:
@@ -75,7 +75,7 @@ class Knowledge:
 
     problem: Problem
     ring: Ring
-    samples: Samples
+    samples: LoopSamples
     known: frozenset[int] = frozenset()
     sums: tuple[tuple[Variable, int], ...] = ()
 
@@ -84,31 +84,31 @@ class Knowledge:
         """Numbers of the unknown joints."""
         return [k for k in range(len(self.ring.joints)) if k not in self.known]
 
-    def place(self, variable: Variable) -> int:
+    def index(self, variable: Variable) -> int:
         """The place of a variable in x; of a sum the next free one."""
         if variable.single:
-            place = self.ring.joints[variable.members[0][0]].place
-            return -1 if place is None else place
+            index = self.ring.joints[variable.members[0][0]].index
+            return -1 if index is None else index
         return self.problem.size + len(self.sums)
 
     def can_hold(self, variable: Variable) -> bool:
         """Whether a variable is new, and there is a place for it."""
         held = [known.members for known, _, _ in self.open_sums()]
         return variable.single or (
-            variable.members not in held and self.place(variable) < self.problem.x.numel()
+            variable.members not in held and self.index(variable) < self.problem.x.numel()
         )
 
     def name(self, variable: Variable) -> str:
         """The name of a variable as an equation shows it."""
         if variable.single:
             return self.ring.joints[variable.members[0][0]].name
-        return str(self.problem.x[self.place(variable)])
+        return str(self.problem.x[self.index(variable)])
 
     def with_joint(self, variable: Variable) -> Knowledge:
         """The same with one more variable."""
         if variable.single:
             return replace(self, known=self.known | {variable.members[0][0]})
-        return replace(self, sums=(*self.sums, (variable, self.place(variable))))
+        return replace(self, sums=(*self.sums, (variable, self.index(variable))))
 
     def open_sums(self) -> list[tuple[Variable, SX, Matrix]]:
         """Known sums of the unknown joints: expression, and values at the samples."""
@@ -116,12 +116,12 @@ class Knowledge:
 
     def position(self, k: int) -> SX:
         """The symbol of joint number k."""
-        return SX(self.problem.x[self.place(Variable(False, ((k, 1),)))])
+        return SX(self.problem.x[self.index(Variable(False, ((k, 1),)))])
 
 
-def _rest(knowledge: Knowledge, variable: Variable, place: int) -> tuple[Variable, SX, Matrix]:
+def _rest(knowledge: Knowledge, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
     """What is left of a sum when its known members are taken away."""
-    value = SX(knowledge.problem.x[place])
+    value = SX(knowledge.problem.x[index])
     members = [member for member in variable.members if member[0] not in knowledge.known]
     for k, sign in variable.members:
         if k in knowledge.known:
@@ -139,16 +139,16 @@ def beginning(problem: Problem, ring: Ring) -> Knowledge:
     return Knowledge(problem, ring, _samples(problem, ring))
 
 
-def _samples(problem: Problem, ring: Ring) -> Samples:
+def _samples(problem: Problem, ring: Ring) -> LoopSamples:
     stacked = casadi.vertcat(*(gap.pose.matrix for gap in ring.gaps))
     function = Function("gaps", [problem.given], [casadi.densify(stacked)])
-    n, places = len(ring.joints), [joint.place or 0 for joint in ring.joints]
+    n, indices = len(ring.joints), [joint.index or 0 for joint in ring.joints]
     gaps = np.array([np.array(function(given)).reshape(n, 4, 4) for _, given in problem.samples])
-    q = np.array([x[places] for x, _ in problem.samples])
+    q = np.array([x[indices] for x, _ in problem.samples])
     length = float(np.mean(np.linalg.norm(gaps[..., :3, 3], axis=-1))) or 1.0
     gaps[..., :3, 3] /= length
-    slides = [not joint.turns for joint in ring.joints]
-    return Samples(gaps, np.where(slides, q / length, q))
+    prismatic = [not joint.is_rotational for joint in ring.joints]
+    return LoopSamples(gaps, np.where(prismatic, q / length, q))
 
 
 # Rigid transforms as 15 x 15 matrices that act on the invariants of a point and a line.
@@ -200,10 +200,10 @@ def represented_pose(pose: Pose, opposite: Pose) -> SX:
     return SX(casadi.sparsify(D))
 
 
-def joint_basis(slides: bool) -> Matrix:
-    """(3, 15, 15) factors of 1, cos q, sin q of a turn about z; of 1, r, r^2 of a slide along z."""
+def joint_basis(prismatic: bool) -> Matrix:
+    """(3, 15, 15) factors of 1, cos q, sin q of a rotation; of 1, r, r^2 of a translation."""
     T = np.broadcast_to(np.eye(4), (3, 4, 4)).copy()
-    if slides:
+    if prismatic:
         T[1, 2, 3], T[2, 2, 3] = 1.0, -1.0
         one, up, down = represented(T)
         return np.array([one, (up - down) / 2, (up + down) / 2 - one])
@@ -213,11 +213,11 @@ def joint_basis(slides: bool) -> Matrix:
     return np.array([mean, (one - half) / 2, quarter - mean])
 
 
-def motion(q: Matrix, slides: bool) -> Matrix:
-    """(..., 4, 4) slide along z, or turn about z."""
+def motion(q: Matrix, prismatic: bool) -> Matrix:
+    """(..., 4, 4) translation along z, or rotation about z."""
     T = np.zeros((*q.shape, 4, 4))
     T[..., range(4), range(4)] = 1.0
-    if slides:
+    if prismatic:
         T[..., 2, 3] = q
         return T
     c, s = np.cos(q), np.sin(q)
@@ -261,7 +261,7 @@ class Side:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Split:
+class FrameSplit:
     """The equations of two frames: left = right, row by row.
 
     Attributes:
@@ -290,26 +290,26 @@ class _Pieces:
     back: list[Matrix]
     turns: list[Tensor]
     turns_back: list[Tensor]
-    slides: frozenset[int]
+    prismatic: frozenset[int]
 
 
-def splits(knowledge: Knowledge) -> Iterator[Split]:
+def splits(knowledge: Knowledge) -> Iterator[FrameSplit]:
     """Every split of the loop whose sides have few unknown joints each."""
     whole = _pieces(knowledge, slice(0, SIZE))
-    turning = _pieces(knowledge, _DIRECTION)
+    directions = _pieces(knowledge, _DIRECTION)
     w = np.zeros((SIZE, 1))
     w[[0, 8]] = 1.0
     for e, k in enumerate(whole.joints):
-        slides = k in whole.slides
-        for end in (2 * k, 2 * k + 1) if slides else (2 * k,):
-            yield from _of_end(whole, w, (e, slides), (end, 2))
-        for end in (2 * k,) if slides else (2 * k, 2 * k + 1):
-            yield from _of_end(turning, np.eye(3)[:, :2], (e, not slides), (end, 0))
+        prismatic = k in whole.prismatic
+        for end in (2 * k, 2 * k + 1) if prismatic else (2 * k,):
+            yield from _of_end(whole, w, (e, prismatic), (end, 2))
+        for end in (2 * k,) if prismatic else (2 * k, 2 * k + 1):
+            yield from _of_end(directions, np.eye(3)[:, :2], (e, not prismatic), (end, 0))
 
 
 def _of_end(
     pieces: _Pieces, seed: Matrix, joint: tuple[int, bool], end: tuple[int, int]
-) -> Iterator[Split]:
+) -> Iterator[FrameSplit]:
     """The splits that look at one frame.
 
     Args:
@@ -329,16 +329,16 @@ def _of_end(
             continue
         for column in range(seed.shape[1]):
             sides = (Side(s.joints, s.values[:, :, column]) for s in (side, other))
-            rows = _rows(axis, start, start // 2 in pieces.slides)
-            yield Split(start, point, axis + column, rows, *sides)
+            rows = _rows(axis, start, start // 2 in pieces.prismatic)
+            yield FrameSplit(start, point, axis + column, rows, *sides)
 
 
-def _rows(axis: int, start: int, slides: bool) -> tuple[int, ...]:
+def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
     """The elements that are new: a turn of the frame about its z axis leaves the others."""
     after = start % 2 == 1
     if axis == 2:
-        return (3, 4, 6, 7, 9, 10, 12, 13) if after and not slides else tuple(range(1, SIZE))
-    if after and slides:
+        return (3, 4, 6, 7, 9, 10, 12, 13) if after and not prismatic else tuple(range(1, SIZE))
+    if after and prismatic:
         return ()
     return (6, 7) if after else (6, 7, 8)
 
@@ -395,23 +395,23 @@ def _through(side: Side, k: int, basis: Tensor) -> Side:
 
 def _pieces(knowledge: Knowledge, block: slice) -> _Pieces:
     joints = knowledge.unknown
-    gaps = [_merged(knowledge, k) for k in joints]
+    gaps = [_merge(knowledge, k) for k in joints]
     ways = [represented(T)[:, block, block] for T in gaps]
     back = [represented(inverse(T))[:, block, block] for T in gaps]
     turns = [_basis(knowledge, k, 1)[:, block, block] for k in joints]
     turns_back = [_basis(knowledge, k, -1)[:, block, block] for k in joints]
-    slides = frozenset(k for k in joints if not knowledge.ring.joints[k].turns)
-    return _Pieces(joints, ways, back, turns, turns_back, slides)
+    prismatic = frozenset(k for k in joints if not knowledge.ring.joints[k].is_rotational)
+    return _Pieces(joints, ways, back, turns, turns_back, prismatic)
 
 
-def _merged(knowledge: Knowledge, k: int) -> Matrix:
+def _merge(knowledge: Knowledge, k: int) -> Matrix:
     """(samples, 4, 4) the transform to joint k from the unknown joint before it."""
     ring, samples = knowledge.ring, knowledge.samples
     T, n = samples.gaps[:, k], len(ring.joints)
     before = (k - 1) % n
     while before in knowledge.known:
         joint = ring.joints[before]
-        moved = motion(joint.sign * samples.q[:, before], not joint.turns)
+        moved = motion(joint.sign * samples.q[:, before], not joint.is_rotational)
         T = samples.gaps[:, before] @ moved @ T
         before = (before - 1) % n
     return T
@@ -420,8 +420,8 @@ def _merged(knowledge: Knowledge, k: int) -> Matrix:
 def _basis(knowledge: Knowledge, k: int, direction: int) -> Tensor:
     """(3, 15, 15) factors of e^-iq, 1, e^iq, or of r, 1, r^2."""
     joint = knowledge.ring.joints[k]
-    one, first, second = joint_basis(not joint.turns)
-    if not joint.turns:
+    one, first, second = joint_basis(not joint.is_rotational)
+    if not joint.is_rotational:
         return np.array([direction * joint.sign * first, one, second], dtype=complex)
     up = (first - 1j * direction * joint.sign * second) / 2
     return np.array([up.conj(), one, up])
@@ -438,7 +438,7 @@ _MOST_JOINTS = 4
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Where an equation comes from: see `Split`.
+    """Where an equation comes from: see `FrameSplit`.
 
     Attributes:
         start: the frame from which one looks.
@@ -459,13 +459,13 @@ class Row:
 
 
 def simple_rows(
-    split: Split, slides: frozenset[int], most: int
+    split: FrameSplit, prismatic: frozenset[int], most: int
 ) -> Iterator[tuple[Row, dict[Members, Values]]]:
     """The rows that may have few unknowns, and their terms.
 
     Args:
         split: of the loop.
-        slides: numbers of its slides.
+        prismatic: numbers of its prismatic joints.
         most: variables of a row with products of them.
     """
     offset = 0 if split.seed == 2 else -6
@@ -473,7 +473,7 @@ def simple_rows(
     if not rows:
         return
     sides = (split.left, split.right)
-    tables = [_table(side.joints, slides) for side in sides]
+    tables = [_table(side.joints, prismatic) for side in sides]
     masks = [np.max(np.abs(side.values[:, rows]), axis=0) > ZERO for side in sides]
     counts = np.sum([_counts(t, mask) for t, mask in zip(tables, masks, strict=True)], axis=0)
     variables, joints, long = counts
@@ -532,16 +532,16 @@ class _Table:
 
 
 @lru_cache(maxsize=4096)
-def _table(joints: tuple[int, ...], slides: frozenset[int]) -> _Table:
+def _table(joints: tuple[int, ...], prismatic: frozenset[int]) -> _Table:
     every = list(product((-1, 0, 1), repeat=len(joints)))
     terms = list[Members | None]()
     for row in every:
         term = tuple(
-            (k, {-1: 1, 1: 2}[e] if k in slides else e)
+            (k, {-1: 1, 1: 2}[e] if k in prismatic else e)
             for k, e in sorted(zip(joints, row, strict=True))
             if e
         )
-        leading = next((e for k, e in term if k not in slides), 1)
+        leading = next((e for k, e in term if k not in prismatic), 1)
         terms.append(term if leading > 0 else None)
     has = (np.array(every, dtype=int).reshape(len(every), len(joints)) != 0).astype(int)
     pairs = list(combinations(range(len(joints)), 2))

@@ -19,9 +19,15 @@ import numpy as np
 from casadi import SX
 
 from mbs.closed_forms.paul.equation import Equation, Key
-from mbs.closed_forms.paul.one_unknown import Candidate, Stage, angle_step, length_step, unsteady
+from mbs.closed_forms.paul.one_unknown import (
+    Candidate,
+    PaulStage,
+    angle_step,
+    length_step,
+    unsteady,
+)
 from mbs.closed_forms.paul.splits import Variable
-from mbs.closed_forms.sequence import Found, Step, real_quartic, step, trigonometric_quartic
+from mbs.closed_forms.sequence import Found, SequenceStep, real_quartic, step, trigonometric_quartic
 
 _SMALL = 1e-7
 """Factors and shares below it, of equations whose coefficients are of about one, count as zero:
@@ -71,7 +77,7 @@ class _Pair:
         return self.rows[0].variables[self.stays]
 
 
-def two_unknowns(stage: Stage) -> Iterator[Candidate]:
+def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
     """Steps that give one of two unknowns."""
     groups = dict[tuple[Variable, ...], list[Equation]]()
     for equation in stage.equations:
@@ -79,7 +85,7 @@ def two_unknowns(stage: Stage) -> Iterator[Candidate]:
             groups.setdefault(equation.variables, []).append(equation)
     for variables, rows in groups.items():
         for stays in (0, 1):
-            if variables[1 - stays].slides:
+            if variables[1 - stays].prismatic:
                 continue
             fit = [row for row in rows if _fits(row, stays)]
             fit = sorted(fit, key=lambda row: row.cost)[:_ROWS]
@@ -90,18 +96,18 @@ def two_unknowns(stage: Stage) -> Iterator[Candidate]:
 
 
 def _fits(row: Equation, stays: int) -> bool:
-    most = 2 if row.variables[stays].slides else 1
+    most = 2 if row.variables[stays].prismatic else 1
     return any(key[1 - stays] for key in row.parts) and all(
         abs(key[1 - stays]) <= 1 and abs(key[stays]) <= most for key in row.parts
     )
 
 
-def _candidate(stage: Stage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
+def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
     forms = [_form_of_values(row, stays) for row in rows]
     power = _common_power(forms)
     if power is None:
         return None
-    F = np.array(np.broadcast_arrays(*_resultant(forms, power, rows[0].variables[stays].slides)))
+    F = np.array(np.broadcast_arrays(*_resultant(forms, power, rows[0].variables[stays].prismatic)))
     size = np.max(np.abs(F), axis=0)
     if np.min(size) < _VANISHES:
         return None
@@ -146,7 +152,7 @@ def _form_of_values(row: Equation, stays: int) -> _Form:
 
 def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
     """The form from X and Y of each part."""
-    slides = row.variables[stays].slides
+    prismatic = row.variables[stays].prismatic
 
     def key(y: int, q: int) -> Key:
         return (y, q) if stays == 0 else (q, y)
@@ -158,33 +164,33 @@ def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
             return X, Y
         return X, -Y
 
-    if slides:
+    if prismatic:
         return _Form([G(y) for y in (0, 1, 2)], [part(key(y, 0))[0] for y in (0, 1, 2)])
     X, Y = part(key(1, 0))
     return _Form([G(y) for y in (-1, 0, 1)], [part(key(0, 0))[0], X, Y])
 
 
-def _resultant(forms: Sequence[_Form], power: int, slides: bool) -> Numbers:
+def _resultant(forms: Sequence[_Form], power: int, prismatic: bool) -> Numbers:
     """The equation in y alone, from the lowest power on: 1, y .. y^4, or 1, c, s, c2, s2."""
     (x, y), (u, v) = forms[0].G[power], forms[1].G[power]
     n, a, b = x * x + y * y, u * x + v * y, v * x - u * y
     other = [a * one - n * two for one, two in zip(forms[0].B, forms[1].B, strict=True)]
-    squares = [_square(forms[0].B, slides), _square(other, slides)]
-    size = _size(forms[0].G, slides)
+    squares = [_square(forms[0].B, prismatic), _square(other, prismatic)]
+    size = _size(forms[0].G, prismatic)
     return [
         b * b * one + two - b * b * three for one, two, three in zip(*squares, size, strict=True)
     ]
 
 
-def _square(B: Numbers, slides: bool) -> Numbers:
+def _square(B: Numbers, prismatic: bool) -> Numbers:
     z, x, y = B
-    if slides:
+    if prismatic:
         return [z * z, 2 * z * x, x * x + 2 * z * y, 2 * x * y, y * y]
     return [z * z + (x * x + y * y) / 2, 2 * z * x, 2 * z * y, (x * x - y * y) / 2, x * y]
 
 
-def _size(G: list[Complex], slides: bool) -> Numbers:
-    if slides:
+def _size(G: list[Complex], prismatic: bool) -> Numbers:
+    if prismatic:
         parts = [_square([part[k] for part in G], True) for k in (0, 1)]
         return [one + two for one, two in zip(*parts, strict=True)]
     (a, b), (c, d), (e, f) = G
@@ -194,7 +200,7 @@ def _size(G: list[Complex], slides: bool) -> Numbers:
     return [constant, 2 * first[0], -2 * first[1], 2 * second[0], -2 * second[1]]
 
 
-def _built(stage: Stage, pair: _Pair, shares: Any) -> Step:
+def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
     """The step."""
 
     def forms(row: Equation) -> _Form:
@@ -204,14 +210,14 @@ def _built(stage: Stage, pair: _Pair, shares: Any) -> Step:
 
         return _form(row, pair.stays, part)
 
-    slides = pair.variable.slides
-    F = _resultant([forms(row) for row in pair.rows], pair.power, slides)
+    prismatic = pair.variable.prismatic
+    F = _resultant([forms(row) for row in pair.rows], pair.power, prismatic)
     F = [SX(value) if share else SX(0) for value, share in zip(F, shares, strict=True)]
     powers = [row.row.power for row in pair.rows]
-    unit = 4 * powers[0] + 2 * powers[1] - (4 * pair.power if slides else 0)
+    unit = 4 * powers[0] + 2 * powers[1] - (4 * pair.power if prismatic else 0)
     if np.any(shares[3:]):
         return _quartic(stage, pair.variable, F, unit)
-    if slides:
+    if prismatic:
         return length_step(stage, pair.variable, F[2::-1], _kind(pair))
     return angle_step(stage, pair.variable, (F[1], F[2], -F[0]), unit, _kind(pair))
 
@@ -220,7 +226,7 @@ def _kind(pair: _Pair) -> str:
     """The type of the two equations in the table of Khalil."""
     goes = 1 - pair.stays
     factors = {abs(key[pair.stays]) for row in pair.rows for key in row.parts if key[goes]}
-    if pair.variable.slides:
+    if pair.variable.prismatic:
         return "type 4" if factors == {1} else "type 5"
     if factors != {0}:
         return "type 8"
@@ -229,12 +235,12 @@ def _kind(pair: _Pair) -> str:
     return "type 6" if plain else "type 7"
 
 
-def _quartic(stage: Stage, variable: Variable, F: list[SX], unit: int) -> Step:
+def _quartic(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
     """The step with four roots."""
     number, shown = stage.number(variable), stage.term(variable)
     signs = SX.sym("sign", 2)
     scale = stage.matrices.length**unit if unit else SX(1)
-    if variable.slides:
+    if variable.prismatic:
         root = real_quartic(casadi.vertcat(*F[::-1]), signs, stage.matrices.length, scale)
         pieces = ["", f" {shown}", f" {shown}^2", f" {shown}^3", f" {shown}^4"]
     else:
@@ -246,7 +252,7 @@ def _quartic(stage: Stage, variable: Variable, F: list[SX], unit: int) -> Step:
     named = {n: value for n, value in zip(names, F, strict=True) if not value.is_zero()}
     text = [n + piece for n, piece in zip(names, pieces, strict=True) if n in named]
     found = Found(
-        {stage.knowledge.place(variable): root.value}, (root.real,), (root.regular,), named
+        {stage.knowledge.index(variable): root.value}, (root.real,), (root.regular,), named
     )
     name = stage.knowledge.name(variable)
     symbols = {f"{name}a": SX(signs[0]), f"{name}b": SX(signs[1])}

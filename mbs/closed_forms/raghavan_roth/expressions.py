@@ -79,7 +79,7 @@ def eliminated(A: SX, values: Array, columns: int, rank: int) -> tuple[SX, Array
         factors = values[:, :, c] / chosen[:, None, c]
         values = values - factors[:, :, None] * chosen[:, None]
         for k in np.nonzero(np.any(np.abs(factors) > _ZERO, axis=0))[0]:
-            rows[k] = _cleared(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
+            rows[k] = _clear(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
     return SX(casadi.vertcat(*rows)[:, columns:]), values[:, :, columns:]
 
 
@@ -115,7 +115,7 @@ def _pivot(values: Array) -> tuple[int, int]:
     return int(r), int(c)
 
 
-def _cleared(row: SX, values: Array) -> SX:
+def _clear(row: SX, values: Array) -> SX:
     """The row with zeros for the entries that vanish at all samples."""
     cleared = SX(1, row.size2())
     for k in np.nonzero(np.any(np.abs(values) > _ZERO, axis=0))[0]:
@@ -125,14 +125,14 @@ def _cleared(row: SX, values: Array) -> SX:
 
 def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
     u = _pair(ways[5].inverse())[elimination.elements.tolist()]
-    once = _carried(elimination, ways[0].inverse(), _moved(elimination.first, u))
-    return _carried(elimination, ways[1].inverse(), _moved(elimination.second, once))
+    once = _carry(elimination, ways[0].inverse(), _moved(elimination.first, u))
+    return _carry(elimination, ways[1].inverse(), _moved(elimination.second, once))
 
 
 def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
     w = _pair(ways[4])[elimination.elements.tolist()]
-    once = _carried(elimination, ways[3], _moved(elimination.fifth, w))
-    twice = _carried(elimination, ways[2], _moved(elimination.fourth, once))
+    once = _carry(elimination, ways[3], _moved(elimination.fifth, w))
+    twice = _carry(elimination, ways[2], _moved(elimination.fourth, once))
     return [_moved(part[None], twice) for part in elimination.third]
 
 
@@ -141,7 +141,7 @@ def _moved(parts: Array, columns: SX) -> SX:
     return SX(casadi.horzcat(*(casadi.mtimes(_constant(part), columns) for part in parts)))
 
 
-def _carried(elimination: Elimination, T: Pose, columns: SX) -> SX:
+def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
     own = elimination.elements.tolist()
     X = SX(SIZE, SIZE)
     for t, slope in zip(casadi.vertsplit(T.p), SLOPES, strict=True):
@@ -175,21 +175,21 @@ class Characteristic:
     Attributes:
         matrices: the parts M_k, (n, n) expressions of the problem's given.
         joint: name of the joint.
-        place: its number in the problem's x.
-        slides: whether it slides.
+        index: its index in the problem's x.
+        prismatic: whether it slides.
         regularity: reciprocal condition of the matrix at positions that are no solutions.
     """
 
     matrices: tuple[SX, ...]
     joint: str
-    place: int
-    slides: bool
+    index: int
+    prismatic: bool
     regularity: float
 
     def matrix(self, q: SX) -> SX:
         """(n, n) the matrix at a position of the joint [rad or m]."""
         first, *others = self.matrices
-        factors = (q, q * q) if self.slides else (casadi.cos(q), casadi.sin(q))
+        factors = (q, q * q) if self.prismatic else (casadi.cos(q), casadi.sin(q))
         parts = [SX(f * part) for f, part in zip(factors, others, strict=False)]
         return SX(sum(parts, first))
 
@@ -248,19 +248,19 @@ def _loops(problem: Problem) -> list[_Loop]:
     for ring in (problem.ring, problem.ring.reversed()):
         for first in range(6):
             own = ring.rotated(first)
-            slides = np.array([not joint.turns for joint in own.joints])
-            if slides[5]:
+            prismatic = np.array([not joint.is_rotational for joint in own.joints])
+            if prismatic[5]:
                 continue
             ways = _numbers(problem, own, length)
-            pencils = (pencil(elimination, ways) for elimination in eliminations(slides))
+            pencils = (pencil(elimination, ways) for elimination in eliminations(prismatic))
             found += [_Loop(own, one, length) for one in pencils if one.regularity > REGULAR]
     return found
 
 
 def _length(problem: Problem) -> float:
     """A power of two of about the size of the loop at the samples [m]."""
-    places = casadi.horzcat(*(gap.pose.p for gap in problem.ring.gaps))
-    total = [float(np.sum(np.linalg.norm(p, axis=0))) for p in problem.at_samples(SX(places))]
+    indices = casadi.horzcat(*(gap.pose.p for gap in problem.ring.gaps))
+    total = [float(np.sum(np.linalg.norm(p, axis=0))) for p in problem.at_samples(SX(indices))]
     mean = float(np.mean(total))
     return float(2.0 ** round(np.log2(mean))) if mean > 0 else 1.0
 
@@ -287,7 +287,7 @@ def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
         _in_joint([part[rows, :] for part in parts], loop),
         joint.name,
         _place(joint),
-        not joint.turns,
+        not joint.is_rotational,
         regularity(numbers[:, :, rows]),
     )
 
@@ -301,7 +301,7 @@ def _spread(parts: Array) -> Array:
 def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
     """The parts with 1, cos q, sin q, or with the powers of r in metres."""
     joint = loop.ring.joints[2]
-    if joint.turns:
+    if joint.is_rotational:
         return parts[0], parts[1], joint.sign * parts[2]
     if len(parts) == 3:
         parts = [parts[0] + parts[1], 2 * parts[2], parts[0] - parts[1]]
@@ -309,6 +309,6 @@ def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
 
 
 def _place(joint: ChainJoint) -> int:
-    if joint.place is None:
+    if joint.index is None:
         raise NoClosedForm(f"joint {joint.name} has no place among the unknowns of the problem")
-    return joint.place
+    return joint.index

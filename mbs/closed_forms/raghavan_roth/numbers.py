@@ -1,4 +1,4 @@
-"""Configurations for wanted poses by the general method."""
+"""Configurations for target poses by the general method."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 SIZE = 15
 
-#: Numbers of the elements without p.p and p.p l - 2 (p.l) p: a slide r is in them without r^2.
+#: Numbers of the elements without p.p and p.p l - 2 (p.l) p: a displacement r is in them without
+# r^2.
 LINEAR = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 
 
@@ -45,7 +46,7 @@ def _slope(t: Array) -> Array:
 
 
 def _turning() -> Array:
-    """(3, 15, 15) the parts of rho of a turn about z with 1, its cosine and its sine."""
+    """(3, 15, 15) the parts of rho of a rotation about z with 1, its cosine and its sine."""
     Z = np.zeros((3, SIZE, SIZE))
     Z[0, range(3), range(3)] = 1.0
     for k in (3, 6, 9, 12):
@@ -58,10 +59,11 @@ def _turning() -> Array:
 SLOPES = np.array([_slope(axis) for axis in np.eye(3)])
 #: (3, 15, 15) parts of rho of a turn q about z, with 1, cos q, sin q.
 TURN = _turning()
-#: (3, 15, 15) parts of rho of a slide r along z, with 1, r, r^2.
+#: (3, 15, 15) parts of rho of a displacement r along z, with 1, r, r^2.
 SLIDE = np.array([np.eye(SIZE), SLOPES[2], 0.5 * SLOPES[2] @ SLOPES[2]])
 
-#: (6,) elements that a turn about z leaves alone, and (6,) those that a slide along z leaves alone.
+#: (6,) elements that a rotation about z leaves alone, and (6,) those that a prismatic joint along z
+# leaves alone.
 KEPT_BY_TURN = np.array([1, 2, 5, 8, 11, 14])
 KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
 
@@ -108,11 +110,11 @@ def half_parts(prismatic: bool) -> Array:
 #
 # rho(Z_3) rho(C_3) rho(Z_4) rho(C_4) rho(Z_5) w(C_5)
 #     = rho(C_2^-1) rho(Z_2^-1) rho(C_1^-1) rho(Z_1^-1) w(C_6^-1)
-# is fifteen equations, of which the first is 1 = 1; joint 6 is not in them, for it turns about the
-# direction of the pair. The right side is a (14, 8) block times eight monomials of joints 1 and 2,
-# and a constant; the left null vectors of the block leave equations in joints 3, 4 and 5. With the
-# half angles x4, x5 they have the nine monomials x4^i x5^j, i, j <= 2; with their products by x4,
-# or
+# is fifteen equations, of which the first is 1 = 1; joint 6 is not in them, for it rotates about
+# the direction of the pair. The right side is a (14, 8) block times eight monomials of joints 1 and
+# 2, and a constant; the left null vectors of the block leave equations in joints 3, 4 and 5. With
+# the half angles x4, x5 they have the nine monomials x4^i x5^j, i, j <= 2; with their products by
+# x4, or
 # by x5, there are twelve equations in twelve monomials. Slides have r^2 in four of the equations
 # only, so that without these the monomials are fewer.
 #
@@ -166,16 +168,16 @@ class Elimination:
             ways: (N, 6, 4, 4) of the loop.
         """
         u = pair(inverse(ways[:, 5]))[:, self.elements]
-        once = self._carried(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
+        once = self._carry(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
         twice = np.einsum("iab,nbj->naij", self.second, once)
-        return self._carried(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
+        return self._carry(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
 
     def left_side(self, ways: Array) -> Array:
         """(N, n3, s - 1, n4 n5) factors of the monomials x4^i x5^j, for each weight of joint 3."""
         w = pair(ways[:, 4])[:, self.elements]
-        once = self._carried(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
+        once = self._carry(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
         twice = np.einsum("iab,nbj->naij", self.fourth, once)
-        twice = self._carried(ways[:, 2], twice.reshape(*w.shape, -1))
+        twice = self._carry(ways[:, 2], twice.reshape(*w.shape, -1))
         left: Array = np.einsum("kab,nbm->nkam", self.third, twice)[:, :, 1:]
         return left
 
@@ -194,7 +196,7 @@ class Elimination:
         M[:, :, count:, 1 - raised : n4 + 1 - raised, raised : n5 + raised] = E
         return M.reshape(*M.shape[:3], -1)
 
-    def _carried(self, T: Array, columns: Array) -> Array:
+    def _carry(self, T: Array, columns: Array) -> Array:
         moved: Array = rho(T)[:, self.elements[:, None], self.elements] @ columns
         return moved
 
@@ -202,7 +204,7 @@ class Elimination:
 def weights(u: Array, count: int) -> Array:
     """(N, count) of joint 3 at angles u: 1, cos u, sin u, or cos(u/2), sin(u/2) where count is 2.
 
-    A turn is at u, a slide at r = tan(u/2).
+    A turn is at u, a prismatic joint at r = tan(u/2).
     """
     if count == 2:
         return np.stack([np.cos(u / 2), np.sin(u / 2)], axis=-1)
@@ -309,8 +311,8 @@ def _rayleigh(vectors: Array, X: Array) -> Array:
 
 # A loop of six joints, begun at any of them and walked either way.
 #
-# The wanted pose T closes the arm to the loop Z_1 C_1 Z_2 C_2 .. Z_6 C_6 = 1: Z_k is the motion
-# of joint k, C_k the way to the next joint, and the pose is in one of the ways.
+# The target pose T closes the arm to the loop Z_1 C_1 Z_2 C_2 .. Z_6 C_6 = 1: Z_k is the motion
+# of joint k, C_k the path to the next joint, and the pose is in one of the ways.
 
 
 _TINY_LENGTH = 1e-9  # part of an arm's length that is rounding of lengths between its joints
@@ -325,8 +327,8 @@ class Arrangement:
         sign: +1 or -1, of the arm's joint order[k] by the loop's joint k.
         prismatic: (6,) whether each joint of the loop slides.
         offsets: (6,) angles from which the loop's joints are counted [rad]; zero for slides.
-        ways: (6, 4, 4) constant ways; the one at `place` ends where the pose begins.
-        place: number of the way with the pose.
+        ways: (6, 4, 4) constant ways; the one at `index` ends where the pose begins.
+        index: number of the way with the pose.
         after: (4, 4) what comes after the pose in its way.
         length: the unit [m].
     """
@@ -336,15 +338,15 @@ class Arrangement:
     prismatic: NDArray[np.bool_]
     offsets: Array
     ways: Array
-    place: int
+    index: int
     after: Array
     length: float
 
     def all_ways(self, T: Array) -> Array:
-        """(N, 6, 4, 4) the ways for wanted poses T, (N, 4, 4) [m]."""
-        T = _scaled(T, self.length)
+        """(N, 6, 4, 4) the ways for target poses T, (N, 4, 4) [m]."""
+        T = _scale(T, self.length)
         ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
-        ways[:, self.place] = ways[:, self.place] @ self._pose(T) @ self.after
+        ways[:, self.index] = ways[:, self.index] @ self._pose(T) @ self.after
         return ways
 
     def _pose(self, T: Array) -> Array:
@@ -367,7 +369,7 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
         offsets: (6,) angles from which the joints of the loop are counted [rad].
     """
     length = loop_length(arm)
-    G = _scaled(arm.gaps, length)
+    G = _scale(arm.gaps, length)
     back = inverse(G)
     ways = {1: np.array([*G[1:6], G[6]]), -1: np.array([*back[5:0:-1], back[0]])}
     after = {1: G[0], -1: back[6]}
@@ -392,7 +394,7 @@ def loop_length(arm: Arm) -> float:
     return inner if inner > _TINY_LENGTH * arm.length else arm.length
 
 
-def _scaled(T: Array, length: float) -> Array:
+def _scale(T: Array, length: float) -> Array:
     T = np.array(T, dtype=float)
     T[..., :3, 3] /= length
     return T
@@ -459,7 +461,7 @@ def pencil(elimination: Elimination, ways: Array) -> Pencil:
     rows, size = 2 * (len(elimination.elements) - 1 - rank), elimination.size
     if rows < size:
         return Pencil(elimination, rank, np.zeros((size, rows)), 0.0)
-    found = Pencil(elimination, rank, _mixed(size, rows), 0.0)
+    found = Pencil(elimination, rank, _mix(size, rows), 0.0)
     return replace(found, regularity=regularity(found.matrices(ways)))
 
 
@@ -478,7 +480,7 @@ def regularity(M: Array) -> float:
     return float(np.min(np.median(conditions, axis=1)))
 
 
-def _mixed(size: int, rows: int) -> Array:
+def _mix(size: int, rows: int) -> Array:
     """(size, rows) orthonormal rows, the identity where there are as many."""
     if rows == size:
         return np.eye(size)
@@ -533,12 +535,12 @@ def prepare(arm: Arm) -> Prepared:
         arm: of six joints.
 
     Raises:
-        ModelError: the arm has not six joints, or none that turns.
+        ModelError: the arm has not six joints, or none that is revolute.
     """
     if arm.size != 6 or bool(np.all(arm.prismatic)):
         raise ModelError(
             f"arm {' '.join(arm.names)}: the general inverse geometric model is for six joints of"
-            " which one turns at least; use method='search'"
+            " which one is revolute at least; use method='search'"
         )
     T = _reached(arm)
     tried = [
@@ -661,7 +663,7 @@ def roots(M: Array) -> tuple[NDArray[np.int64], Array]:
         (m,) numbers of the matrix, ascending, and (m,) angles in [-pi, pi), of roots e^(i u) near
         the unit circle; a double root is there twice.
     """
-    offset, coefficients = _rotated(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
+    offset, coefficients = _rotate(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
     top, bottom = 1 + 1j * x, 1 - 1j * x
     size = np.log(np.abs(top) + NONZERO) - np.log(np.abs(bottom) + NONZERO)
@@ -682,7 +684,7 @@ def _companion(coefficients: Array) -> Array:
     return companion
 
 
-def _rotated(M: Array) -> tuple[Array, Array]:
+def _rotate(M: Array) -> tuple[Array, Array]:
     """Offsets (N,), and (N, d + 1, n, n) factors of 1, x, .. for u = offset + 2 atan x.
 
     Of eight offsets the one where the last factor, the matrix at x = infinity, is best conditioned.
@@ -704,12 +706,12 @@ def clusters(u: Array) -> list[tuple[float, int]]:
 
     Roots that several solutions share are one group; a wide group is also there in narrow ones.
     """
-    wide = _grouped(u, _COARSE)
-    narrow = [group for group in _grouped(u, _FINE) if not any(_same(group, own) for own in wide)]
+    wide = _group(u, _COARSE)
+    narrow = [group for group in _group(u, _FINE) if not any(_same(group, own) for own in wide)]
     return [(float(np.mean(group)), min(len(group), _LARGEST)) for group in wide + narrow]
 
 
-def _grouped(u: Array, gap: float) -> list[Array]:
+def _group(u: Array, gap: float) -> list[Array]:
     """Around the circle, from the widest gap on."""
     if len(u) < 2:
         return [u] if len(u) else []
@@ -730,14 +732,14 @@ _FAR = 1e3  # slides, in reaches of the arm, that are taken for infinite
 
 
 def candidates(prepared: Prepared, T: Array) -> Array:
-    """(m, 6) configurations that may reach a wanted pose; polish and check them.
+    """(m, 6) configurations that may reach a target pose; polish and check them.
 
     Among them is every isolated configuration that does, near double ones too, some of them twice;
     others do not reach the pose at all.
 
     Args:
         prepared: see `prepare`.
-        T: (4, 4) wanted pose [m].
+        T: (4, 4) target pose [m].
 
     Raises:
         NoClosedForm: the method does not hold for the arm, see `Prepared.regular`.
@@ -750,7 +752,7 @@ def candidates_many(prepared: Prepared, T: Array) -> tuple[Numbers, Array]:
 
     Args:
         prepared: see `prepare`.
-        T: (N, 4, 4) wanted poses [m].
+        T: (N, 4, 4) target poses [m].
 
     Returns:
         (m,) numbers of the poses, ascending, and (m, 6) configurations for them.

@@ -279,7 +279,7 @@ def _sensor_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
         }
         return [value for label in labels for value in found[label]]
 
-    return _loaded(system, seen, read)
+    return _load(system, seen, read)
 
 
 def _energy_variables(system: System, label: str) -> Iterator[FmuVariable]:
@@ -370,7 +370,7 @@ def _wrench_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
         wrenches = wrenches_of_joints(system, s, a, tau, around)
         return [casadi.vertcat(*wrenches[number]) for number in numbers]
 
-    return _loaded(system, seen, between)
+    return _load(system, seen, between)
 
 
 def _check_weld(system: System, seen: Seen, number: int) -> None:
@@ -383,7 +383,7 @@ def _check_weld(system: System, seen: Seen, number: int) -> None:
         )
 
 
-def _loaded(
+def _load(
     system: System,
     seen: Seen,
     make: Callable[[ModelSymbols, SX, SX, Surroundings], list[SX]],

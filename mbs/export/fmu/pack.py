@@ -245,7 +245,7 @@ def write_fmu(
     require_writable(target)
     results = reference_files(model) if reference else {}
     face = FACES[fmi]
-    (code, work), compiled = source(model, adjoint=face.adjoint), _compiled(model, fmi)
+    (code, work), compiled = source(model, adjoint=face.adjoint), _compile(model, fmi)
     unnamed = description(model, fmi, "", compiled)
     tables = header(model, "", work, adjoint=face.adjoint)
     guid = _guid(unnamed, tables, code, *(text for _, text in model.sources))
@@ -254,23 +254,23 @@ def write_fmu(
     texts = {"model.c": code, "model.h": named, **fixed}
     texts.update(model.sources)
     files = {
-        "modelDescription.xml": _identified(unnamed, guid).encode(),
+        "modelDescription.xml": _identify(unnamed, guid).encode(),
         **plain_files(model, fmi, texts[standard_header(fmi)], compiled),
         **results,
         **_binaries(model, fmi, texts, goals),
         **{f"sources/{name}": text.encode() for name, text in texts.items()},
     }
-    write_bytes(_zipped(files), target)
+    write_bytes(_zip(files), target)
     return target
 
 
-def _compiled(model: FmuModel, fmi: str) -> tuple[str, ...]:
+def _compile(model: FmuModel, fmi: str) -> tuple[str, ...]:
     """The C files to compile, those of the user last."""
     own = (name for name, _ in model.sources if name.endswith(".c"))
     return (*FACES[fmi].compiled(model.solver, model.target), *own)
 
 
-def _identified(unnamed: str, guid: str) -> str:
+def _identify(unnamed: str, guid: str) -> str:
     """The model description with its identity: the first attribute that is empty."""
     return unnamed.replace('=""', f'="{guid}"', 1)
 
@@ -333,7 +333,7 @@ def require_writable(target: Path) -> None:
         ) from error
 
 
-def _zipped(files: Mapping[str, bytes]) -> bytes:
+def _zip(files: Mapping[str, bytes]) -> bytes:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for file in sorted(files):

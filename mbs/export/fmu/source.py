@@ -359,7 +359,7 @@ def header(model: FmuModel, guid: str, work: Work, *, adjoint: bool) -> str:
     elif model.solver == "rk4":
         options += f"#define MODEL_FIXED_STEP {float(model.internal_step)!r}\n"
     return _HEADER.format(
-        guid=_quoted(guid),
+        guid=_quote(guid),
         tolerance=repr(float(model.tolerance)),
         nx=len(model.states),
         nu=len(model.inputs),
@@ -409,9 +409,9 @@ def source(model: FmuModel, *, adjoint: bool) -> tuple[str, Work]:
         _numbers("MODEL_NOMINAL", (v.nominal for v in variables)),
         _numbers("MODEL_MIN", low),
         _numbers("MODEL_MAX", high),
-        _table("const char *const MODEL_NAMES", (_quoted(v.name) for v in variables)),
+        _table("const char *const MODEL_NAMES", (_quote(v.name) for v in variables)),
         _table("const char MODEL_FIXED", ("1" if v.fixed else "0" for v in variables)),
-        _table("const char *const MODEL_INDICATORS", map(_quoted, watched(model))),
+        _table("const char *const MODEL_INDICATORS", map(_quote, watched(model))),
         *_sentences(model),
         *_lead_tables(model),
         *_size_tables(model),
@@ -461,7 +461,7 @@ def _sentences(model: FmuModel) -> list[str]:
     """What is said where a rule is broken."""
     if model.rules is None:
         return []
-    return [_table("const char *const MODEL_SENTENCES", map(_quoted, model.rules.sentences))]
+    return [_table("const char *const MODEL_SENTENCES", map(_quote, model.rules.sentences))]
 
 
 def _lead_tables(model: FmuModel) -> list[str]:
@@ -548,6 +548,6 @@ def _table(declaration: str, items: Iterable[str]) -> str:
     return f"{declaration}[] = {{\n" + "".join(f"    {text},\n" for text in texts) + "};\n"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     plain = {byte: chr(byte) for byte in range(32, 127) if chr(byte) not in '"\\?'}
     return '"' + "".join(plain.get(byte, f"\\{byte:03o}") for byte in text.encode()) + '"'

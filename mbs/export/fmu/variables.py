@@ -93,10 +93,10 @@ def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterat
             text = f"{noun} on {label} along {element[1]} of the base"
             yield FmuVariable(name=f"{label}.{element}", unit=unit, description=text)
     for motion in state.motions:
-        yield from _prescribed(system, motion)
+        yield from _prescribe(system, motion)
 
 
-def _prescribed(system: System, motion: InputMotion) -> Iterator[FmuVariable]:
+def _prescribe(system: System, motion: InputMotion) -> Iterator[FmuVariable]:
     speed = system.speeds[motion.velocity]
     if motion.position is not None:
         position, start = system.coordinates[motion.position], system.configuration[motion.position]

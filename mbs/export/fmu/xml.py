@@ -74,11 +74,11 @@ def _walk(function: casadi.Function, level: Callable[[int], int]) -> list[list[_
         elif op == casadi.OP_CONST:
             work[out[0]] = _NONE
         else:
-            work[out[0]] = _combined(op, [work[i] for i in given], level)
+            work[out[0]] = _combine(op, [work[i] for i in given], level)
     return answer
 
 
-def _combined(op: int, terms: list[_Masks], level: Callable[[int], int]) -> _Masks:
+def _combine(op: int, terms: list[_Masks], level: Callable[[int], int]) -> _Masks:
     a, b = terms[0], terms[-1]
     if op in _SCALED:
         return a
@@ -87,17 +87,17 @@ def _combined(op: int, terms: list[_Masks], level: Callable[[int], int]) -> _Mas
     if op == casadi.OP_MUL:
         return _product(a, b, level)
     if op == casadi.OP_DIV:
-        return _product(a, _bent(b), level)
+        return _product(a, _bend(b), level)
     if op == casadi.OP_IF_ELSE_ZERO:
-        return _product(_bent(a), b, level)
-    return _sum(_bent(a), _bent(b))
+        return _product(_bend(a), b, level)
+    return _sum(_bend(a), _bend(b))
 
 
 def _sum(a: _Masks, b: _Masks) -> _Masks:
     return tuple(x | y for x, y in zip(a, b, strict=True))
 
 
-def _bent(a: _Masks) -> _Masks:
+def _bend(a: _Masks) -> _Masks:
     """All of it as through a function that is not linear."""
     return (a[0],) * len(KINDS)
 
@@ -105,11 +105,11 @@ def _bent(a: _Masks) -> _Masks:
 def _product(a: _Masks, b: _Masks, level: Callable[[int], int]) -> _Masks:
     """Each factor is as constant as the other one; what is in both is not linear."""
     both = a[0] & b[0]
-    raised = _sum(_raised(a, level(b[0])), _raised(b, level(a[0])))
+    raised = _sum(_raise_order(a, level(b[0])), _raise_order(b, level(a[0])))
     return tuple(mask | both for mask in raised)
 
 
-def _raised(a: _Masks, kind: int) -> _Masks:
+def _raise_order(a: _Masks, kind: int) -> _Masks:
     return tuple(a[0] if k <= kind else mask for k, mask in enumerate(a))
 
 
@@ -219,7 +219,7 @@ def _rows(
     for kind, output in zip(kinds, rows, strict=False):
         for row, found_in in enumerate(output):
             direct = {references[k]: how for k, how in found_in.items() if k < len(references)}
-            answer[model.first(kind) + row] = _resolved(direct, z, through)
+            answer[model.first(kind) + row] = _resolve(direct, z, through)
     return answer
 
 
@@ -247,7 +247,7 @@ def _is_fixed(model: FmuModel, reference: int) -> bool:
     return model.parameters[reference - model.first("parameter")].fixed
 
 
-def _resolved(direct: Known, z: range, through: Sequence[Known]) -> Known:
+def _resolve(direct: Known, z: range, through: Sequence[Known]) -> Known:
     """Dependent coordinates replaced by what moves them."""
     known = {reference: how for reference, how in direct.items() if reference not in z}
     for reference in direct:

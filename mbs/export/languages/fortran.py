@@ -72,7 +72,7 @@ class Fortran(Language):
         yield "  implicit none"
         for intent, some in (("in", unit.inputs), ("out", unit.outputs)):
             for argument in some:
-                declared = f"double precision, intent({intent}) :: {_declared(argument)}"
+                declared = f"double precision, intent({intent}) :: {_declare(argument)}"
                 yield from _statement(declared)
         yield from _declarations(unit.locals)
         yield ""
@@ -111,7 +111,7 @@ def _title(name: str, arguments: str) -> list[str]:
     return [f"subroutine {name}(&", *_statement(f"{arguments})", "    ")]
 
 
-def _declared(argument: Argument) -> str:
+def _declare(argument: Argument) -> str:
     if argument.scalar:
         return argument.name
     shape = f"{argument.rows}" if argument.is_vector else f"{argument.rows},{argument.columns}"

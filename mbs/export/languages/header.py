@@ -114,7 +114,7 @@ def _angle_names(graph: Graph, inputs: Sequence[Sequence[str]]) -> Iterator[tupl
         letter = {casadi.OP_SIN: "S", casadi.OP_COS: "C"}.get(node.op)
         terms = sums[node.args[0]] if letter else None
         if letter and terms and any(term.label != _OFFSET for term in terms):
-            yield number, letter + _joined(terms, apart)
+            yield number, letter + _join(terms, apart)
 
 
 _OFFSET = "off"
@@ -145,7 +145,7 @@ def _sum_of_angles(
     return tuple(terms)
 
 
-def _joined(terms: Sequence[Term], apart: bool) -> str:
+def _join(terms: Sequence[Term], apart: bool) -> str:
     """The labels in order, `m` before one that is subtracted; the offset comes last, unsigned.
 
     Args:

@@ -205,7 +205,7 @@ class Language(ABC):
 
     def is_reserved(self, name: str) -> bool:
         """Whether the name means something else."""
-        return self._folded(name) in self.reserved
+        return self._fold(name) in self.reserved
 
     def distinct(self, names: Iterable[str]) -> list[str]:
         """The names as the language takes them, no two the same; the first keep theirs."""
@@ -213,13 +213,13 @@ class Language(ABC):
         result = []
         for wanted in names:
             for name in self._spellings(self.legal(wanted)):
-                if self._folded(name) not in used and not self.is_reserved(name):
+                if self._fold(name) not in used and not self.is_reserved(name):
                     break
-            used.add(self._folded(name))
+            used.add(self._fold(name))
             result.append(name)
         return result
 
-    def _folded(self, name: str) -> str:
+    def _fold(self, name: str) -> str:
         return name.lower() if self.folds_case else name
 
     def _spellings(self, name: str) -> Iterator[str]:

@@ -81,11 +81,11 @@ class Latex(Language):
             if title:
                 yield f"\n{title}"
             if lines:
-                yield from _aligned(rf"{_left(line.name)}{_value(line, printer)}" for line in lines)
+                yield from _align(rf"{_left(line.name)}{_value(line, printer)}" for line in lines)
         rest = [store for store in unit.stores if store.label not in names]
         if rest:
             yield "\nThe outputs."
-            yield from _aligned(_left(s.label) + printer.text(s.value) for s in rest)
+            yield from _align(_left(s.label) + printer.text(s.value) for s in rest)
         yield r"\end{document}"
 
 
@@ -93,18 +93,18 @@ def symbol_text(name: str) -> str:
     """A name as people write it: QP2 is the rate of q2, S23 has the index 23."""
     rate = re.fullmatch(r"(QP|QDP|GAM)(\w+)", name)
     if rate:
-        return f"{_ACCENTS[rate[1]]}_{{{_escaped(rate[2])}}}"
+        return f"{_ACCENTS[rate[1]]}_{{{_escape(rate[2])}}}"
     indexed = re.fullmatch(r"([A-Za-z]+)(\d\w*)", name)
     if indexed:
-        return f"{_letters(indexed[1])}_{{{_escaped(indexed[2])}}}"
+        return f"{_letters(indexed[1])}_{{{_escape(indexed[2])}}}"
     return _letters(name)
 
 
 def _letters(name: str) -> str:
-    return name if len(name) == 1 else rf"\mathit{{{_escaped(name)}}}"
+    return name if len(name) == 1 else rf"\mathit{{{_escape(name)}}}"
 
 
-def _escaped(name: str) -> str:
+def _escape(name: str) -> str:
     return name.replace("_", r"\_")
 
 
@@ -112,9 +112,9 @@ def _left(name: str) -> str:
     return f"{symbol_text(name)} &= "
 
 
-def _aligned(equations: Iterator[str]) -> Iterator[str]:
+def _align(equations: Iterator[str]) -> Iterator[str]:
     yield r"\begin{align*}"
-    yield " \\\\\n".join("\n".join(_broken(equation)) for equation in equations)
+    yield " \\\\\n".join("\n".join(_break_lines(equation)) for equation in equations)
     yield r"\end{align*}"
 
 
@@ -129,7 +129,7 @@ def _value(line: CodeLine, printer: Any) -> str:
     )
 
 
-def _broken(equation: str) -> Iterator[str]:
+def _break_lines(equation: str) -> Iterator[str]:
     """An equation on several lines, broken before signs that no bracket encloses."""
     line, depth = "", 0
     for piece in re.split(r"(?= [+-] )", equation):

@@ -107,7 +107,7 @@ class SympyWriter:
             return self.condition(node.args[0], not denied)
         op = _OPPOSITE.get(node.op, node.op) if denied else node.op
         if op in _JOINS:
-            return _joined(_JOINS[op], [self.condition(k, denied) for k in node.args])
+            return _join(_JOINS[op], [self.condition(k, denied) for k in node.args])
         if op not in _COMPARE:
             op = casadi.OP_EQ if denied else casadi.OP_NE
             return _COMPARE[op](self.value(number), number_of(0.0), evaluate=False)
@@ -165,7 +165,7 @@ def number_of(value: float) -> Expr:
 def total(*values: Expr) -> Expr:
     """Their sum, its numbers added up, a positive term first where there is one."""
     every = [term for value in values for term in Add.make_args(value)]
-    terms = _gathered(every, math.fsum, 0.0)
+    terms = _gather(every, math.fsum, 0.0)
     first = next((k for k, term in enumerate(terms) if _factors(term)[0] > 0), 0)
     terms = [terms[first], *terms[:first], *terms[first + 1 :]]
     return terms[0] if len(terms) == 1 else Add(*terms, evaluate=False)
@@ -174,12 +174,10 @@ def total(*values: Expr) -> Expr:
 def product(a: Expr, b: Expr) -> Expr:
     """Their product, the sign and its numbers, multiplied, first."""
     (sign_a, of_a), (sign_b, of_b) = _factors(a), _factors(b)
-    return _product(sign_a * sign_b, _gathered([*of_a, *of_b], math.prod, 1.0))
+    return _product(sign_a * sign_b, _gather([*of_a, *of_b], math.prod, 1.0))
 
 
-def _gathered(
-    parts: list[Expr], join: Callable[[list[float]], float], neutral: float
-) -> list[Expr]:
+def _gather(parts: list[Expr], join: Callable[[list[float]], float], neutral: float) -> list[Expr]:
     """The parts of a sum or product with one number at most, which comes last."""
     numbers = [float(part) for part in parts if part.is_Float]
     others = [part for part in parts if not part.is_Float]
@@ -225,7 +223,7 @@ def _pow(base: Expr, exponent: Expr) -> Expr:
     return Pow(base, exponent, evaluate=False)
 
 
-def _joined(join: str, conditions: list[Expr]) -> Expr:
+def _join(join: str, conditions: list[Expr]) -> Expr:
     """Conditions joined, those that are joined alike in one row."""
     parts = (c.args if type(c).__name__ == join else (c,) for c in conditions)
     return _UNDEFINED[join](*(part for some in parts for part in some))
@@ -233,10 +231,10 @@ def _joined(join: str, conditions: list[Expr]) -> Expr:
 
 def _inverse(value: Expr) -> Expr:
     sign, factors = _factors(value)
-    return _product(sign, [_flipped(factor) for factor in factors])
+    return _product(sign, [_flip(factor) for factor in factors])
 
 
-def _flipped(factor: Expr) -> Expr:
+def _flip(factor: Expr) -> Expr:
     """1 / factor; a factor that stands below a fraction line comes up."""
     below = factor.is_Pow and factor.exp is S.NegativeOne
     return factor.base if below else _pow(factor, S.NegativeOne)
@@ -315,7 +313,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
             raise ModelError(
                 f"{self.title} has no function {name.rstrip('_')}; choose another language"
             )
-        return _called(form, [self._print(arg) for arg in expr.args])
+        return _call_text(form, [self._print(arg) for arg in expr.args])
 
     def _print_Symbol(self, expr: Any) -> str:
         return str(expr.name)
@@ -335,7 +333,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
     def _print_Pow(self, expr: Any, **kwargs: Any) -> str:
         base, exponent = expr.args
         if exponent is S.Half:  # and not the number 0.5, whose power of minus infinity is no NaN
-            return _called(self.forms["sqrt"], [self._print(base)])
+            return _call_text(self.forms["sqrt"], [self._print(base)])
         level = precedence(expr)
         if exponent == S.NegativeOne:
             return f"{type(self).number(1.0)}/{self.parenthesize(base, level)}"
@@ -353,7 +351,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
         return f"{left} {self.comparisons[type(expr).__name__]} {right}"
 
 
-def _called(form: str, arguments: Sequence[str]) -> str:
+def _call_text(form: str, arguments: Sequence[str]) -> str:
     """A form filled in; arguments are in brackets unless they have them as those of a call."""
     texts = []
     for k, text in enumerate(arguments):

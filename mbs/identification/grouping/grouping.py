@@ -34,11 +34,11 @@ def quotient(value: SX, divisor: SX) -> SX:
     rest: list[SX] = []
     for factor in above:
         same = (k for k, other in enumerate(below) if casadi.is_equal(factor, other, _DEPTH))
-        place = next(same, None)
-        if place is None:
+        index = next(same, None)
+        if index is None:
             rest.append(factor)
         else:
-            del below[place]
+            del below[index]
     return SX(prod(rest, start=SX(1)) / prod(below, start=SX(1)))
 
 
@@ -186,14 +186,14 @@ def equation(name: str, terms: Mapping[str, SX]) -> str:
     """
     text = ""
     for parameter, coefficient in terms.items():
-        sign, factor = _signed(coefficient)
+        sign, factor = _sign(coefficient)
         term = parameter if factor == "1" else f"{factor}*{parameter}"
         lead = ("-" if sign == "-" else "") if not text else f" {sign} "
         text += lead + term
     return f"{name} = {text or '0'}"
 
 
-def _signed(coefficient: SX) -> tuple[str, str]:
+def _sign(coefficient: SX) -> tuple[str, str]:
     """The sign of a coefficient and the text of its size, a factor."""
     negative, size = _split(coefficient)
     return "-" if negative else "+", _factor(size)
@@ -215,8 +215,8 @@ def _split(value: SX) -> tuple[bool, SX]:
 class _FactorText(Infix):
     """A factor, absolute values as in mathematics."""
 
-    def _called(self, op: int) -> str:
-        return "abs" if op == casadi.OP_FABS else super()._called(op)
+    def _call_text(self, op: int) -> str:
+        return "abs" if op == casadi.OP_FABS else super()._call_text(op)
 
 
 def _factor(value: SX) -> str:

@@ -64,7 +64,7 @@ _SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))
 def cut_relations(system: System) -> Iterator[Relation]:
     """What a body in the common frame of a cut joint does is the same on either side of it."""
     for cut in system.cuts:
-        axis, shared = _shared(cut)
+        axis, shared = _share(cut)
         sides = [(cut.link_a, cut.pose_a, 1), (cut.link_b, cut.pose_b, -1)]
         through = {
             link: (lambda_transform(pose @ axis), sign) for link, pose, sign in sides if link >= 0
@@ -77,7 +77,7 @@ def cut_relations(system: System) -> Iterator[Relation]:
             yield relation
 
 
-def _shared(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
+def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
     """The frame in which a body is taken, and combinations that both sides see alike."""
     joint = cut.edge.joint
     freedoms = joint.freedoms
@@ -98,7 +98,7 @@ def _shared(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
 
 
 def _along(freedom: Freedom) -> Pose:
-    return Pose.turned(align_z(freedom.axis))
+    return Pose.rotation(align_z(freedom.axis))
 
 
 def pair_relations(
@@ -134,7 +134,7 @@ def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
 
 def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
     """What link b shares with link a, or loses to the base."""
-    through = lambda_transform(Pose.turned(R))
+    through = lambda_transform(Pose.rotation(R))
     names = TEN_PARAMETERS[: (9 if a < 0 else 10) if moments else 6]
     for k, name in enumerate(names):
         yield {(b, name): SX(1), **(on_link(a, -through[:, k]) if a >= 0 else {})}

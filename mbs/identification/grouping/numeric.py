@@ -173,7 +173,7 @@ def random_states(system: System, p: Array, count: int, seed: int) -> States:
 def _any(system: System, count: int, rng: np.random.Generator) -> Array:
     scale = np.array([np.pi if c.unit == "rad" else 1.0 for c in system.coordinates])
     q = scale[:, None] * rng.uniform(-1, 1, (system.nq, count))
-    return _normalised(system, q)
+    return _normalise(system, q)
 
 
 def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
@@ -257,7 +257,7 @@ class _ConfigurationWalk:
         return found.q if state.leads > self.least else None
 
 
-def _normalised(system: System, q: Array) -> Array:
+def _normalise(system: System, q: Array) -> Array:
     for part in quaternion_slices(system.tree):
         q[part] /= np.linalg.norm(q[part], axis=0)
     return q

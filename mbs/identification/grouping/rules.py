@@ -22,7 +22,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
 from mbs.identification.grouping.grouping import parameter_samples
-from mbs.spatial import Inertia, MatrixTurn, Pose, cross, elements
+from mbs.spatial import Inertia, MatrixRotation, Pose, cross, elements
 from mbs.spatial.inertia import TEN_PARAMETERS
 
 # Which axes of a tree are parallel, perpendicular or on one line, and where gravity points.
@@ -225,7 +225,7 @@ def lambda_transform(pose: Pose) -> SX:
     Args:
         pose: of frame j seen from frame i; lengths and angles may be symbols.
     """
-    turn = MatrixTurn(pose.R)
+    turn = MatrixRotation(pose.R)
     units = (Inertia.from_parameters(SX(DM.eye(10)[:, k])) for k in range(10))
     return casadi.horzcat(*(unit.seen_from(turn, pose.p).parameters for unit in units))
 
@@ -283,7 +283,7 @@ def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
         return
     pose = link.pose()
     if link.motion is Motion.PRISMATIC:
-        pose = Pose.turned(pose.R)
+        pose = Pose.rotation(pose.R)
     through = lambda_transform(pose) if link.antecedent >= 0 else None
     for name, own, moved in combinations:
         effects: dict[Key, SX] = {(j, kind): SX(x) for kind, x in own.items()}
@@ -329,7 +329,7 @@ def _about_resting_point(structure: Structure, j: int) -> Iterator[Removal]:
     height = resting_height(structure, j)
     if height is None:
         return
-    at_point = lambda_transform(Pose.moved(height * _Z))
+    at_point = lambda_transform(Pose.translation(height * _Z))
     for name in ("MX", "MY"):
         effects = on_link(j, -_column(at_point, name))
         yield Removal((j, name), {key: x for key, x in effects.items() if key != (j, name)})

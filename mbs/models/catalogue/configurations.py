@@ -134,9 +134,9 @@ def _too_short(method: str, fewest: int) -> Callable[[System], str]:
         longest = _longest_chain(system)
         if longest >= fewest:
             return ""
-        joints = "six joints" if fewest == SIX else "joints"
+        joints = "joints, six of them," if fewest == SIX else "joints"
         return (
-            f"{method} is for {joints} that turn or slide between the base and a frame;"
+            f"{method} is for revolute or prismatic {joints} between the base and a frame;"
             f" {system.name} has {longest or 'none'}{' at most' if longest else ''}"
         )
 

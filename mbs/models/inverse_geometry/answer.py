@@ -156,35 +156,35 @@ class ChainRoot:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ChainPlace:
+class ChainIndices:
     """Where a chain stands in its system.
 
     Attributes:
-        places: numbers of its joints in q.
+        indices: numbers of its joints in q.
         whole: the configuration (nq,) of the system for one of the chain, (n,); NaN where there is
             none.
     """
 
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     whole: Callable[[Array], Array]
 
 
-def roots(target: Target, gathered: Gathered, place: ChainPlace) -> list[ChainRoot]:
+def roots(target: Target, gathered: Gathered, chain: ChainIndices) -> list[ChainRoot]:
     """The distinct solutions, in the order in which they were gathered.
 
     Args:
-        target: the pose that is wanted.
+        target: the target pose.
         gathered: solutions, some of them more than once.
-        place: of the chain in the system.
+        chain: its joints in the system.
     """
-    found = _merged(target, gathered)
+    found = _merge(target, gathered)
     singular = [int(k) for k in np.flatnonzero(_singular(target, found))]
     unsettled = list[int]()
     dropped = set[int]()
     for k in singular:
         if k in dropped:
             continue
-        found[k], settled = _examined(target, found[k], place)
+        found[k], settled = _examine(target, found[k], chain)
         if not settled:
             unsettled.append(k)
         dropped |= _on(target, found, k, [m for m in singular if m > k])
@@ -192,7 +192,7 @@ def roots(target: Target, gathered: Gathered, place: ChainPlace) -> list[ChainRo
     for k in unsettled:
         if k in dropped:
             continue
-        nearly = _nearly_moving(target, found[k], place)
+        nearly = _nearly_moving(target, found[k], chain)
         if nearly is None:
             continue
         found[k] = nearly
@@ -202,7 +202,7 @@ def roots(target: Target, gathered: Gathered, place: ChainPlace) -> list[ChainRo
     return _merged_again(target, [root for k, root in enumerate(found) if k not in dropped])
 
 
-def _merged(target: Target, gathered: Gathered) -> list[ChainRoot]:
+def _merge(target: Target, gathered: Gathered) -> list[ChainRoot]:
     residual = target.residual(gathered.q) if len(gathered.q) else np.zeros(0)
     found = []
     for group in distinct(target, gathered.q):
@@ -218,17 +218,17 @@ def _singular(target: Target, found: list[ChainRoot]) -> NDArray[np.bool_]:
     return np.asarray(target.singular_values(q)[:, -1] < SINGULAR)
 
 
-def _examined(target: Target, root: ChainRoot, place: ChainPlace) -> tuple[ChainRoot, bool]:
+def _examine(target: Target, root: ChainRoot, chain: ChainIndices) -> tuple[ChainRoot, bool]:
     """With its multiplicity or its self-motion, and whether that is certain."""
     dimension, direction = freedoms(reduction(target, root.q))
     found = curve(target, root.q, direction, dimension) if dimension else None
     if found is None:
-        return _isolated(target, root)
-    of = family(target, found, dimension, place.places, place.whole)
+        return _isolate(target, root)
+    of = family(target, found, dimension, chain.indices, chain.whole)
     return replace(root, multiplicity=0, family=of), True
 
 
-def _nearly_moving(target: Target, root: ChainRoot, place: ChainPlace) -> ChainRoot | None:
+def _nearly_moving(target: Target, root: ChainRoot, chain: ChainIndices) -> ChainRoot | None:
     """With the self-motion along which the pose is held within the tolerance of solutions.
 
     It is one of rounding: no configuration on it can be told to be better than the others.
@@ -237,11 +237,11 @@ def _nearly_moving(target: Target, root: ChainRoot, place: ChainPlace) -> ChainR
     found = curve(target, root.q, direction, dimension, 1.0) if dimension else None
     if found is None:
         return None
-    of = family(target, found, dimension, place.places, place.whole)
+    of = family(target, found, dimension, chain.indices, chain.whole)
     return replace(root, multiplicity=0, family=of)
 
 
-def _isolated(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
+def _isolate(target: Target, root: ChainRoot) -> tuple[ChainRoot, bool]:
     """With its multiplicity, moved to where its roots meet, and whether it stays there."""
     q, count = root.q, 1
     for _ in range(_REFINEMENTS):
@@ -282,7 +282,7 @@ class Question:
 
     Attributes:
         chain: that is solved for.
-        target: its wanted pose.
+        target: its target pose.
         p: (np,) parameters.
         wishes: what the user asks for beside the pose.
     """
@@ -293,9 +293,9 @@ class Question:
     wishes: Wishes
 
     @property
-    def place(self) -> ChainPlace:
+    def chain_indices(self) -> ChainIndices:
         """Where the chain stands in the robot."""
-        return ChainPlace(self.chain.places, self.whole)
+        return ChainIndices(self.chain.indices, self.whole)
 
     def whole(self, q: Array) -> Array:
         """(nq,) configuration of the robot for that of its chain, (n,); NaN if loops stay open."""
@@ -308,7 +308,7 @@ class Question:
         if self.chain.system.is_closed:
             return close(self.chain.system, self.chain, q[None, :], self.p, near)
         whole = near.copy()
-        whole[list(self.chain.places)] = q
+        whole[list(self.chain.indices)] = q
         return [ClosedConfiguration(whole, "", 0.0)]
 
 
@@ -387,12 +387,12 @@ def _is_same(target: Target, other: ChainRoot, family: Family, q: Array) -> bool
 
 def _representative(question: Question, family: Family) -> Array:
     """The configuration of a self-motion that is within limits, its free joint near the seed's."""
-    places, near = list(question.chain.places), question.wishes.near
-    value = float(near[places[question.chain.names.index(family.free)]])
+    indices, near = list(question.chain.indices), question.wishes.near
+    value = float(near[indices[question.chain.names.index(family.free)]])
     first = family.nearest(value)
     for q in (first, *family.configurations_from(value)):
         whole = near.copy()
-        whole[places] = q
+        whole[indices] = q
         if not set(question.wishes.bounds.outside(whole)) & set(question.chain.names):
             return np.asarray(q)
     return first
@@ -403,4 +403,4 @@ def _whole(question: Question, found: Nearest) -> Nearest:
     whole = question.whole(found.q)
     if not np.all(np.isfinite(whole)):
         return replace(found, q=whole)
-    return replace(found, q=question.wishes.bounds.wound(whole, question.wishes.near))
+    return replace(found, q=question.wishes.bounds.wrap_to_limits(whole, question.wishes.near))

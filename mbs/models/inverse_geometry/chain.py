@@ -19,7 +19,7 @@ from mbs.closed_forms.ring import PARAMETERS
 from mbs.closed_forms.sequence import Problem
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
-from mbs.loops.pose import defect, pose_numbers, rounded, wanted_pose
+from mbs.loops.pose import defect, pose_numbers, rounded, target_pose
 from mbs.models.geometry import terminal_frame
 from mbs.recursions.chain import Chain, Gap, Ring, tree_chain
 from mbs.spatial import Pose
@@ -36,7 +36,7 @@ class FrameChain:
     Attributes:
         system: whose chain it is.
         frame: at its end.
-        chain: free joints, each with its number in q, and what is between them, of parameters p;
+        chain: free joints, each with its index in q, and what is between them, of parameters p;
             locked joints are in the gaps.
         locked: positions of the other joints on the path by name [rad or m].
     """
@@ -52,14 +52,14 @@ class FrameChain:
         return tuple(joint.name for joint in self.chain.joints)
 
     @property
-    def places(self) -> tuple[int, ...]:
-        """Their numbers in q."""
-        return tuple(joint.place for joint in self.chain.joints if joint.place is not None)
+    def indices(self) -> tuple[int, ...]:
+        """Their indices in q."""
+        return tuple(joint.index for joint in self.chain.joints if joint.index is not None)
 
     @property
     def prismatic(self) -> tuple[bool, ...]:
         """Whether each is prismatic."""
-        return tuple(not joint.turns for joint in self.chain.joints)
+        return tuple(not joint.is_rotational for joint in self.chain.joints)
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -86,7 +86,7 @@ class FrameChain:
         return Chain(self.chain.joints, tuple(Gap(pose) for pose in poses))
 
     def problem(self, p: NDArray[np.float64] | None = None) -> Problem:
-        """The loop that the wanted pose closes.
+        """The loop that the target pose closes.
 
         Args:
             p: (np,) numbers in the place of the parameters; symbols stay symbols when left out.
@@ -100,7 +100,7 @@ class FrameChain:
         T = Pose(casadi.reshape(t[0:9], 3, 3), t[9:12])
         gaps = self.at(p).gaps
         back = gaps[n].then(T.inverse())
-        joints = tuple(replace(joint, place=k) for k, joint in enumerate(self.chain.joints))
+        joints = tuple(replace(joint, index=k) for k, joint in enumerate(self.chain.joints))
         closing = replace(
             gaps[0].after(back), back=gaps[0].pose.inverse() @ T @ gaps[n].pose.inverse()
         )
@@ -233,16 +233,16 @@ def _proposal(system: System, free: list[Link], surplus: int) -> str:
 # Poses as a user gives them: one, or many at once.
 
 
-__all__ = ["wanted_pose", "wanted_poses"]
+__all__ = ["target_pose", "target_poses"]
 
 
-def wanted_poses(system: System, T: Any) -> NDArray[np.float64]:
-    """The poses that are wanted, their orientations exactly orthonormal.
+def target_poses(system: System, T: Any) -> NDArray[np.float64]:
+    """The target poses, their orientations exactly orthonormal.
 
     Args:
         system: named in messages.
         T: (N, 4, 4) homogeneous transforms [m], as one array or a sequence of poses; rounded as
-            `wanted_pose` does.
+            `target_pose` does.
 
     Returns:
         (N, 4, 4) numbers.
@@ -250,7 +250,7 @@ def wanted_poses(system: System, T: Any) -> NDArray[np.float64]:
     Raises:
         ModelError: one of them is no rigid transform; the message tells which, counted from 0.
     """
-    matrices = _stacked(system, T)
+    matrices = _stack(system, T)
     if matrices is None or matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
         shape = "" if matrices is None else f" of shape {matrices.shape}"
         raise ModelError(f"{system.name}: the poses are {quoted(T)}{shape}; give them as (N, 4, 4)")
@@ -264,7 +264,7 @@ def wanted_poses(system: System, T: Any) -> NDArray[np.float64]:
     return poses
 
 
-def _stacked(system: System, T: Any) -> NDArray[np.float64] | None:
+def _stack(system: System, T: Any) -> NDArray[np.float64] | None:
     """The numbers in an array of whatever shape; None where there is more than numbers."""
     if not isinstance(T, list | tuple):
         return pose_numbers(T)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, Named, model_function, require_system
-from mbs.closed_forms.sequence import Leaf, Problem, Step, StepSequence
+from mbs.closed_forms.sequence import Leaf, Problem, SequenceStep, StepSequence
 from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.numbers import NONZERO
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
@@ -58,7 +58,7 @@ def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> S
     require_method(chain.system, method, ("auto", *CLOSED_FORMS))
     found, reasons = list[StepSequence](), list[str]()
     for name in CLOSED_FORMS if method == "auto" else (method,):
-        steps = _kept(chain, name, p)
+        steps = _keep(chain, name, p)
         if isinstance(steps, str):
             reasons.append(f"{name}: {steps}")
             continue
@@ -92,7 +92,7 @@ def given_of(chain: FrameChain, T: SX) -> SX:
     return SX(casadi.vertcat(chain.system.p, casadi.vec(T[:3, :])))
 
 
-def _kept(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
+def _keep(chain: FrameChain, method: str, p: Numbers) -> StepSequence | str:
     """The steps by one method, or why there are none; kept on the system."""
 
     def solve() -> StepSequence | str:
@@ -160,9 +160,9 @@ class CharacteristicFunction(ModelFunction):
         return self._found.joint
 
     @property
-    def slides(self) -> bool:
+    def prismatic(self) -> bool:
         """Whether it slides."""
-        return self._found.slides
+        return self._found.prismatic
 
 
 def characteristic_function(chain: FrameChain) -> Function:
@@ -197,7 +197,7 @@ def characteristic_function(chain: FrameChain) -> Function:
     return made
 
 
-# How far configurations are from the wanted pose: the forward model of a chain on symbols.
+# How far configurations are from the target pose: the forward model of a chain on symbols.
 
 
 def forward(chain: FrameChain, x: SX, p: NDArray[np.float64] | None = None) -> Pose:
@@ -255,7 +255,7 @@ class InverseGeometry(ModelFunction):
         return tuple(self._sequence.label(b) for b in range(self.branches))
 
     @property
-    def steps(self) -> tuple[Step, ...]:
+    def steps(self) -> tuple[SequenceStep, ...]:
         """The equations in the order in which they are solved."""
         return tuple(self._sequence.steps)
 
@@ -263,7 +263,7 @@ class InverseGeometry(ModelFunction):
         """Evaluate it as any model; a branch and a pose given in numbers must be such."""
         T = kwargs.get("T", args[0] if args else None)
         if isinstance(T, (DM, np.ndarray, list, tuple)) and np.shape(np.array(T)) == (4, 4):
-            wanted_pose(self.system, T)
+            target_pose(self.system, T)
         branch = kwargs.get("branch", args[1] if len(args) > 1 else None)
         if isinstance(branch, (int, float, np.ndarray, np.generic)):
             self._require_branch(np.asarray(branch))
@@ -353,7 +353,7 @@ def signs_of(sequence: StepSequence, branch: SX) -> SX:
 def whole_configuration(chain: FrameChain, x: SX) -> SX:
     """(nq, 1) positions of all joints: x of the chain's, the others locked or as assembled."""
     q = SX(DM(chain.system.position(chain.locked)))
-    q[list(chain.places)] = x
+    q[list(chain.indices)] = x
     return q
 
 

@@ -65,7 +65,7 @@ def core() -> ctypes.CDLL | None:
     Raises:
         CompilerError: the compiler refused the code.
     """
-    return _loaded() if compiler_found() else None
+    return _load() if compiler_found() else None
 
 
 def core_of(arm: Arm) -> ctypes.CDLL | None:
@@ -78,7 +78,7 @@ def core_of(arm: Arm) -> ctypes.CDLL | None:
 
 
 @functools.cache
-def _loaded() -> ctypes.CDLL:
+def _load() -> ctypes.CDLL:
     folder = resources.files("mbs.native") / "runtime"
     names = [*_SOURCES, *(name + end for name in _PAIRS for end in (".c", ".h"))]
     files = {name: (folder / name).read_text(encoding="utf-8") for name in names}
@@ -95,14 +95,14 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     Args:
         library: the core.
         arm: whose configurations.
-        T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
     own, residual, _ = _rooms(len(q), arm.size)
     own[:] = q
-    wanted = _wanted(T, *((4, 4) if np.ndim(T) == 2 else (len(q), 4, 4)))
-    stride, handed = 16 if wanted.ndim == 3 else 0, Handed(arm)
-    library.mbs_polish(handed.address, _at(wanted), stride, len(q), _at(own), _at(residual))
+    target = _wanted(T, *((4, 4) if np.ndim(T) == 2 else (len(q), 4, 4)))
+    stride, handed = 16 if target.ndim == 3 else 0, Handed(arm)
+    library.mbs_polish(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
     return own, residual
 
 
@@ -110,32 +110,32 @@ def found_by(
     library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
 ) -> tuple[Array, Hits]:
     """Configurations (m, n) that multi-start Levenberg-Marquardt finds, and how often, (m,)."""
-    wanted = _wanted(T, 4, 4)
+    target = _wanted(T, 4, 4)
     q, residual, hits = _rooms(starts, arm.size)
     handed = Handed(arm)
     count = library.mbs_search(
-        handed.address, _at(wanted), starts, seed, _at(q), _at(residual), hits.ctypes.data
+        handed.address, _at(target), starts, seed, _at(q), _at(residual), hits.ctypes.data
     )
     return q[:count].copy(), hits[:count].copy()
 
 
 def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
     """The distinct ones of configurations q, (m, n), and how many are each of them."""
-    wanted = _wanted(T, 4, 4)
+    target = _wanted(T, 4, 4)
     own, residual, hits = _rooms(len(q), arm.size)
     own[:] = q
     handed = Handed(arm)
     count = library.mbs_merge(
-        handed.address, _at(wanted), len(q), _at(own), _at(residual), hits.ctypes.data
+        handed.address, _at(target), len(q), _at(own), _at(residual), hits.ctypes.data
     )
     return own[:count].copy(), hits[:count].copy()
 
 
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
     """The configuration, (n,), whose pose is nearest to T."""
-    wanted, q = _wanted(T, 4, 4), np.empty(arm.size)
+    target, q = _wanted(T, 4, 4), np.empty(arm.size)
     handed = Handed(arm)
-    library.mbs_nearest(handed.address, _at(wanted), starts, seed, _at(q))
+    library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
     return q
 
 
@@ -210,7 +210,7 @@ class HandedLoop:
             (_int * 6)(*map(int, loop.prismatic)),
             (_double * 6)(*loop.offsets.tolist()),
             (_double * 96)(*loop.ways.ravel().tolist()),
-            loop.place,
+            loop.index,
             (_double * 16)(*loop.after.ravel().tolist()),
             loop.length,
             len(elimination.elements),
@@ -230,17 +230,17 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
     Returns:
         (m,) numbers of the poses, ascending, and (m, 6) configurations for them.
     """
-    wanted = np.ascontiguousarray(T, dtype=float)
-    room = min(_ROOM, _CANDIDATES * len(wanted))
+    target = np.ascontiguousarray(T, dtype=float)
+    room = min(_ROOM, _CANDIDATES * len(target))
     q, start, done = np.empty((room, 6)), 0, ctypes.c_longlong(0)
     number, hits = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     found = list[tuple[Numbers, Array]]()
-    while start < len(wanted) or not found:
+    while start < len(target) or not found:
         count = library.mbs_general(
             handed.arm.address,
             handed.address,
-            wanted[start:].ctypes.data,
-            len(wanted) - start,
+            target[start:].ctypes.data,
+            len(target) - start,
             room,
             q.ctypes.data,
             number.ctypes.data,

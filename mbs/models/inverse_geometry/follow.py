@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, gap_to
-from mbs.closed_forms.ring import spin_places
+from mbs.closed_forms.ring import spin_indices
 from mbs.errors import ModelError
-from mbs.loops.plan import held_beside, regular_configuration
+from mbs.loops.plan import regular_configuration, undetermined_beside
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.chain import frame_chain, wanted_pose, wanted_poses
+from mbs.models.inverse_geometry.chain import frame_chain, target_pose, target_poses
 from mbs.models.inverse_geometry.solutions import WITHIN, CoordinateLimits, Given, apart, bounds
 from mbs.numbers import NONZERO
 from mbs.solvers.least_squares import gauss_newton, levenberg_marquardt
 from mbs.solvers.rank import null_space
 from mbs.text import did_you_mean, quoted
 
-# Predictor and corrector: a configuration carried on while the pose that is wanted moves.
+# Predictor and corrector: a configuration carried on while the target pose moves.
 #
 # The tangent of the path predicts, Newton's method corrects. A step counts only where the
 # corrector is shorter than the predictor and contracts, and where the Jacobian changes by less
@@ -113,7 +113,7 @@ def carried(
         if at == 1.0 or step <= _SMALLEST_STEP or smallest(tracker, point.J) <= SINGULAR:
             break
         to = min(1.0, at + step)
-        found = _stepped(tracker, point, pose(to))
+        found = _step(tracker, point, pose(to))
         if found is None:
             step = (to - at) / 2
         else:
@@ -133,11 +133,11 @@ def smallest(tracker: Tracker, J: Array) -> float:
     return float(values[J.shape[1] - 1 - tracker.slack])
 
 
-def _stepped(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
+def _step(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
     """The configuration at the next pose; None where the step is too long."""
     back, _ = _pseudo_inverse(tracker, point.J)
     led = point.x + back @ tracker.rows(point.x, T)[0]
-    found = _corrected(tracker, led, T)
+    found = _correct(tracker, led, T)
     if found is None or not tracker.may(found.x):
         return None
     ahead, miss = np.linalg.norm(led - point.x), np.linalg.norm(found.x - led)
@@ -146,7 +146,7 @@ def _stepped(tracker: Tracker, point: PathPoint, T: Array) -> PathPoint | None:
     return found if near and change <= _CHANGE else None
 
 
-def _corrected(tracker: Tracker, x: Array, T: Array) -> PathPoint | None:
+def _correct(tracker: Tracker, x: Array, T: Array) -> PathPoint | None:
     """Newton's method; None where it does not contract, or leaves rows that should vanish."""
     before = np.inf
     r, J = tracker.rows(x, T)
@@ -184,8 +184,8 @@ class Follower:
     """The joints that follow, and what they are held against.
 
     Attributes:
-        wanted: the frame, and the loops.
-        places: numbers in q of the joints that move.
+        target: the frame, and the loops.
+        indices: indices in q of the joints that move.
         scale: (n,) what one stands for in each [m]; 1 for angles.
         rows: what is missing to a pose, and how the joints change it.
         slack: directions that no row sees.
@@ -193,8 +193,8 @@ class Follower:
         bounds: limits of the coordinates; None where none holds them.
     """
 
-    wanted: Goal
-    places: tuple[int, ...]
+    target: Goal
+    indices: tuple[int, ...]
     scale: Array
     rows: Rows
     slack: int
@@ -204,7 +204,7 @@ class Follower:
     @property
     def system(self) -> System:
         """Whose joints they are."""
-        return self.wanted.closing.system
+        return self.target.closing.system
 
     @property
     def tracker(self) -> Tracker:
@@ -213,36 +213,36 @@ class Follower:
 
     def scaled(self, q: Array) -> Array:
         """(n,) the joints that move in a configuration (nq,)."""
-        x: Array = q[list(self.places)] / self.scale
+        x: Array = q[list(self.indices)] / self.scale
         return x
 
     def whole(self, q: Array, x: Array) -> Array:
         """(nq,) the configuration q with the joints that move elsewhere."""
         whole = q.copy()
-        whole[list(self.places)] = x * self.scale
+        whole[list(self.indices)] = x * self.scale
         return whole
 
     def pose(self, q: Array) -> Array:
         """(4, 4) of the frame in a configuration (nq,)."""
-        elements = self.wanted.pose(q)[0]
+        elements = self.target.pose(q)[0]
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = elements[3:].reshape(3, 3).T, elements[:3]
         return T
 
     def residual(self, q: Array, T: Array) -> float:
         """Largest element by which a configuration misses a pose, or opens a loop."""
-        return float(np.max(np.abs(self.wanted.at(T).residual(q)[0])))
+        return float(np.max(np.abs(self.target.at(T).residual(q)[0])))
 
     def passed(self, x: Array, slack: float = 0.0) -> tuple[int, float] | None:
-        """A joint, by its number in q, that comes within `slack` of its limit, and this limit."""
+        """A joint, by its index in q, that comes within `slack` of its limit, and this limit."""
         if self.bounds is None:
             return None
-        for place, value in zip(self.places, x * self.scale, strict=True):
-            low, high = float(self.bounds.low[place]), float(self.bounds.high[place])
+        for index, value in zip(self.indices, x * self.scale, strict=True):
+            low, high = float(self.bounds.low[index]), float(self.bounds.high[index])
             if value > high - slack:
-                return place, high
+                return index, high
             if value < low + slack:
-                return place, low
+                return index, low
         return None
 
     def _may(self, x: Array) -> bool:
@@ -250,7 +250,7 @@ class Follower:
 
 
 def follower(
-    wanted: Goal,
+    target: Goal,
     start: Array,
     locked: Mapping[str, float] | None,
     limits: bool | Given | None,
@@ -258,7 +258,7 @@ def follower(
     """What follows the poses of a frame.
 
     Args:
-        wanted: the frame, and the loops.
+        target: the frame, and the loops.
         start: (nq,) configuration, in which joints that do not follow stay.
         locked: by name, joints that stay where they are.
         limits: as in `follow`.
@@ -266,46 +266,46 @@ def follower(
     Raises:
         ModelError: a name is unknown, or the chain has more than six free joints.
     """
-    system, frame = wanted.closing.system, wanted.frame
+    system, frame = target.closing.system, target.frame
     ends = None if limits is False else bounds(system, limits)
     path = system.tree.path(system.frame(frame)[0])
     simple = all(system.tree.links[k].motion.nq == 1 for k in path)
     if simple and not system.is_closed:
         found = frame_chain(system, frame, locked)
-        arm = found.arm(wanted.closing.p)
+        arm = found.arm(target.closing.p)
         scale = arm.units
         exact = arm.size == _WHOLE
-        return Follower(wanted, found.places, scale, _arm_rows(arm, scale), 0, exact, ends)
-    return _closed_follower(wanted, start, list(locked or {}), ends)
+        return Follower(target, found.indices, scale, _arm_rows(arm, scale), 0, exact, ends)
+    return _closed_follower(target, start, list(locked or {}), ends)
 
 
 def _closed_follower(
-    wanted: Goal, start: Array, locked: list[str], ends: CoordinateLimits | None
+    target: Goal, start: Array, locked: list[str], ends: CoordinateLimits | None
 ) -> Follower:
     """Every joint of the system, less those that stay where they are."""
-    system = wanted.closing.system
-    places = {link.name: link.q.start for link in system.tree.links if link.motion.nq == 1}
+    system = target.closing.system
+    indices = {link.name: link.q.start for link in system.tree.links if link.motion.nq == 1}
     for name in locked:
-        if name not in places:
+        if name not in indices:
             raise ModelError(
                 f"{system.name}: joint {quoted(name)} cannot be locked;"
-                f" {did_you_mean(name, places)}"
+                f" {did_you_mean(name, indices)}"
             )
     q = regular_configuration(system)
-    stays = tuple(places[name] for name in locked)
-    still = null_space(np.vstack([wanted.residual(q)[1], np.eye(system.nq)[list(stays)]]))
-    held = {*stays, *held_beside(system, still, ())}
+    stays = tuple(indices[name] for name in locked)
+    still = null_space(np.vstack([target.residual(q)[1], np.eye(system.nq)[list(stays)]]))
+    held = {*stays, *undetermined_beside(system, still, ())}
     moving = tuple(k for k in range(system.nq) if k not in held)
-    slack = len(spin_places(system))
-    free = null_space(wanted.closing.rows(q)[1][:, moving]).shape[1] - slack
+    slack = len(spin_indices(system))
+    free = null_space(target.closing.rows(q)[1][:, moving]).shape[1] - slack
 
     def rows(x: Array, T: Array) -> tuple[Array, Array]:
         at = start.copy()
         at[list(moving)] = x
-        r, J = wanted.at(T).residual(at)
+        r, J = target.at(T).residual(at)
         return -r, J[:, moving]
 
-    return Follower(wanted, moving, np.ones(len(moving)), rows, slack, free == _WHOLE, ends)
+    return Follower(target, moving, np.ones(len(moving)), rows, slack, free == _WHOLE, ends)
 
 
 def _arm_rows(arm: Arm, scale: Array) -> Rows:
@@ -353,7 +353,7 @@ def path_of(system: System, path: Any, samples: int) -> Path:
         ModelError: it is neither poses nor a function that gives poses, or there are none.
     """
     if not callable(path):
-        poses = wanted_poses(system, path)
+        poses = target_poses(system, path)
         if not len(poses):
             raise ModelError(f"{system.name}: the path has no pose; give one at least")
         return Path(poses)
@@ -363,7 +363,7 @@ def path_of(system: System, path: Any, samples: int) -> Path:
         )
 
     def function(s: float) -> Array:
-        return wanted_pose(system, path(s))
+        return target_pose(system, path(s))
 
     numbers = np.linspace(0.0, 1.0, samples)
     return Path(np.array([function(float(s)) for s in numbers]), function)
@@ -427,8 +427,8 @@ def stop_reason(led: Follower, poses: Path, number: int, q: Array, at: float) ->
         return f"{title} is not one that the joints can take: {_miss(led, q, T)}"
     passed = led.passed(x, _AT_LIMIT)
     if passed is not None:
-        place, limit = passed
-        name = led.system.coordinates[place].name
+        index, limit = passed
+        name = led.system.coordinates[index].name
         return f"joint {name} passes its limit {limit:.6g} before {title}"
     nearest, left = _nearest(led, x, T)
     if left > _REACHED:
@@ -472,9 +472,9 @@ def _singular(led: Follower, q: Array) -> str:
 
     moved = np.eye(x.size) * _NUDGE
     rises = [value(x + step) + value(x - step) for step in moved]
-    place = led.places[int(np.argmax(rises))]
-    name = led.system.coordinates[place].name
-    return f"{name} = {q[place]:.3f}, smallest singular value {round(value(x), 12):.1g}"
+    index = led.indices[int(np.argmax(rises))]
+    name = led.system.coordinates[index].name
+    return f"{name} = {q[index]:.3f}, smallest singular value {round(value(x), 12):.1g}"
 
 
 # A path of poses followed on one branch: the joints move continuously, or stop with a reason.
@@ -549,11 +549,11 @@ def follow(
     name = terminal_frame(system) if frame is None else frame
     poses = path_of(system, path, samples)
     q = _start(system, start, locked)
-    wanted = goal(system, name, np.eye(4), None, parameters)
-    return _followed(follower(wanted, q, locked, limits), poses, q)
+    target = goal(system, name, np.eye(4), None, parameters)
+    return _follow(follower(target, q, locked, limits), poses, q)
 
 
-def _followed(led: Follower, poses: Path, q: Array) -> Followed:
+def _follow(led: Follower, poses: Path, q: Array) -> Followed:
     tracker, x, T = led.tracker, led.scaled(q), led.pose(q)
     point, step = point_at(tracker, x, T), 1.0
     kept, reason = list[tuple[Array, float, float]](), ""
@@ -579,8 +579,8 @@ def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Ar
     q = np.array(system.position(given)) if isinstance(given, Mapping) else _numbers(system, given)
     held = np.array(system.position(locked))
     names = [coordinate.name for coordinate in system.coordinates]
-    places = [names.index(name) for name in locked or {}]
-    q[places] = held[places]
+    indices = [names.index(name) for name in locked or {}]
+    q[indices] = held[indices]
     return q
 
 

@@ -58,7 +58,7 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
 
     Args:
         chain: what is solved for.
-        target: the pose that is wanted, of the chain in numbers.
+        target: the target pose, of the chain in numbers.
         method: "pieper", "paul", "general", "search"; "auto" for a closed form, else the general
             method for six joints, else the search.
         p: (np,) the parameters.
@@ -80,8 +80,8 @@ def gather(chain: FrameChain, target: Target, method: str, p: Array) -> Gathered
     if ready is None and method == "general":
         raise ModelError(
             f"{chain.system.name}: the general method does not hold for the joints"
-            f" {', '.join(chain.names)}: it is for six joints, and not for all with slides; use"
-            " method='search'"
+            f" {', '.join(chain.names)}: it is for six joints, and not for all with prismatic ones;"
+            " use method='search'"
         )
     return _by_search(target) if ready is None else _by_general(target, ready)
 
@@ -110,7 +110,7 @@ def _by_closed_form(
     near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
     doubtful = bool(np.min(regular) < _DEGENERATE)
     labels = tuple(sequence.label(int(b)) for b in near)
-    return _polished(target, Gathered(q[near], labels, _name(chain, sequence, p), doubtful))
+    return _polish(target, Gathered(q[near], labels, _name(chain, sequence, p), doubtful))
 
 
 def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
@@ -143,15 +143,15 @@ def _name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
 def _by_general(target: Target, ready: General) -> Gathered:
     q = general(ready, target.T)
     doubtful = ready.prepared.regularity < ILL_CONDITIONED
-    return _polished(target, Gathered(q, ("",) * len(q), "general", doubtful))
+    return _polish(target, Gathered(q, ("",) * len(q), "general", doubtful))
 
 
 def _by_search(target: Target) -> Gathered:
     q = search(target.arm, target.T, _STARTS)
-    return _polished(target, Gathered(q, ("",) * len(q), "search", False))
+    return _polish(target, Gathered(q, ("",) * len(q), "search", False))
 
 
-def _polished(target: Target, gathered: Gathered) -> Gathered:
+def _polish(target: Target, gathered: Gathered) -> Gathered:
     """The solutions beside what was gathered."""
     if not len(gathered.q):
         return gathered

@@ -15,7 +15,7 @@ from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_poses
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
     all_branches,
@@ -72,7 +72,7 @@ def batch(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: 
     """
     plain = _plain(chain, sequence, p)
     if len(T) < _MANY:
-        return _interpreted(plain, T)
+        return _interpret(plain, T)
     key = ("machine code of igm_all", sequence, *chain.key, p.tobytes())
     return _by_machine(chain.system.cached(key, lambda: _machine_code(plain)), plain, T)
 
@@ -87,7 +87,7 @@ def _machine_code(plain: Function) -> Function:
     return compiled(plain.map(_COLUMNS), derivatives=0, fast=True)
 
 
-def _interpreted(plain: Function, T: Array) -> PoseBatch:
+def _interpret(plain: Function, T: Array) -> PoseBatch:
     """By the interpreter, which needs no compiler first."""
     if not len(T):
         return _by_machine(plain, plain, T)
@@ -143,7 +143,7 @@ class BranchSolutions:
     Attributes:
         q: (N, branches, n) positions of the chain's joints [rad or m].
         valid: (N, branches) whether there is a solution.
-        residual: (N, branches) largest difference of an element from the wanted pose.
+        residual: (N, branches) largest difference of an element from the target pose.
         labels: of the branches.
         searched: (N,) whether the solutions are to be looked for by other means: branches meet
             there, or leave a joint undetermined.
@@ -163,7 +163,7 @@ def nothing(arm: Arm, count: int) -> BranchSolutions:
     return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
 
 
-def drafted(
+def draft_solutions(
     chain: FrameChain, sequence: StepSequence, p: Array, arm: Arm, T: Array
 ) -> BranchSolutions:
     """The solutions by a closed form.
@@ -228,7 +228,7 @@ def with_configurations(
         q: (m, n) its solutions [rad or m].
         T: (4, 4) the pose.
     """
-    draft = _widened(draft, len(q))
+    draft = _widen(draft, len(q))
     columns = _nearest_columns(arm, draft.q[k], q)
     draft.valid[k] = False
     draft.valid[k, columns], draft.q[k, columns] = True, q
@@ -236,7 +236,7 @@ def with_configurations(
     return draft
 
 
-def _widened(draft: BranchSolutions, columns: int) -> BranchSolutions:
+def _widen(draft: BranchSolutions, columns: int) -> BranchSolutions:
     """With so many columns at least."""
     more = columns - draft.valid.shape[1]
     if more <= 0:
@@ -371,23 +371,23 @@ def solve_many(
     """
     require_system(system)
     require_method(system, method, METHODS)
-    poses, p = wanted_poses(system, T), np.array(system.parameter_values(parameters))
+    poses, p = target_poses(system, T), np.array(system.parameter_values(parameters))
 
     def solved(pose: Array) -> Solutions:
         return solve(system, pose, frame, method, given, locked=locked, parameters=parameters)
 
     given = limits if system.is_closed else None
     if system.is_closed:
-        return _stacked(system, [solved(pose) for pose in poses])
+        return _stack(system, [solved(pose) for pose in poses])
     robot = _robot(frame_chain(system, frame, locked), method, p)
     draft = robot.draft(poses)
     for k in np.flatnonzero(draft.searched):
         pose = poses[k]
-        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.chain.places)]
+        q = repair(robot.arm, pose) if repair else solved(pose).q[:, list(robot.chain.indices)]
         draft = with_configurations(draft, int(k), robot.arm, q, pose)
     q, valid = robot.whole(draft.q), draft.valid
     if leaves_out(limits):
-        q, within = _wound(bounds(system, limits, robot.chain.places), q)
+        q, within = _unwind(bounds(system, limits, robot.chain.indices), q)
         valid = valid & within
     return ManySolutions(q, valid, draft.residual, draft.labels, draft.searched)
 
@@ -405,7 +405,7 @@ class _Robot:
     def draft(self, T: Array) -> BranchSolutions:
         """The solutions by a closed form, else by the general method."""
         if self.sequence is not None:
-            return drafted(self.chain, self.sequence, self.p, self.arm, T)
+            return draft_solutions(self.chain, self.sequence, self.p, self.arm, T)
         if self.general is not None:
             return general_draft(self.general, T)
         return nothing(self.arm, len(T))
@@ -413,11 +413,11 @@ class _Robot:
     def whole(self, q: Array) -> Array:
         """(N, branches, nq) positions of all joints, those outside the chain as assembled."""
         system = self.chain.system
-        if self.chain.places == tuple(range(system.nq)):
+        if self.chain.indices == tuple(range(system.nq)):
             return q
         every = np.empty((*q.shape[:2], system.nq))
         every[...] = system.position(self.chain.locked)
-        every[..., list(self.chain.places)] = q
+        every[..., list(self.chain.indices)] = q
         return every
 
 
@@ -440,7 +440,7 @@ def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:
         return None
 
 
-def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
+def _stack(system: System, answers: list[Solutions]) -> ManySolutions:
     """The solutions of every pose side by side."""
     columns = max((len(answer) for answer in answers), default=0)
     shape = len(answers), columns
@@ -453,7 +453,7 @@ def _stacked(system: System, answers: list[Solutions]) -> ManySolutions:
     return ManySolutions(q, valid, residual, ("",) * columns, np.ones(len(answers), dtype=bool))
 
 
-def _wound(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
+def _unwind(allowed: CoordinateLimits, q: Array) -> tuple[Array, Booleans]:
     """Configurations (N, branches, nq) changed by whole turns, and whether all is within limits."""
     low, high = allowed.low - WITHIN, allowed.high + WITHIN
     missing = np.where(q < low, low - q, np.where(q > high, high - q, 0.0)) / (2 * np.pi)

@@ -13,7 +13,7 @@ from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry.core import HandedLoop, Numbers, solved_by
 from mbs.models.inverse_geometry.raghavan_roth import Prepared, candidates_many, prepare
 
-# Levenberg and Marquardt's steps of many configurations towards a wanted pose, on numpy arrays.
+# Levenberg and Marquardt's steps of many configurations towards a target pose, on numpy arrays.
 
 
 _STEPS = 60  # at most
@@ -45,12 +45,12 @@ def descend(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
 
     Args:
         arm: whose configurations.
-        T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations to start from [rad or m].
     """
-    wanted = np.broadcast_to(T, (len(q), 4, 4))
+    target = np.broadcast_to(T, (len(q), 4, 4))
     q = np.array(q, dtype=float)
-    cost, gap, J = examine_arm(arm, wanted, q)
+    cost, gap, J = examine_arm(arm, target, q)
     # of the cost, at first; what lies between Newton's method and the gradient's
     damping, stalls = np.full(len(q), 0.1), np.zeros(len(q), dtype=int)
     for _ in range(_STEPS):
@@ -59,7 +59,7 @@ def descend(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
             break
         dx = _step(J[going], gap[going], damping[going] * cost[going] + _LEAST)
         tried = q[going] + arm.units * dx
-        tried_cost, tried_gap, tried_J = examine_arm(arm, wanted[going], tried)
+        tried_cost, tried_gap, tried_J = examine_arm(arm, target[going], tried)
         better = tried_cost < cost[going]
         _settle(going, tried_cost, cost, damping, stalls)
         won = going[better]
@@ -131,7 +131,7 @@ def merged(arm: Arm, T: Array, q: Array) -> Merged:
 
     Args:
         arm: whose configurations.
-        T: (4, 4) wanted pose.
+        T: (4, 4) target pose.
         q: (m, n) solutions [rad or m].
     """
     library = core.core_of(arm)
@@ -143,17 +143,17 @@ def merged(arm: Arm, T: Array, q: Array) -> Merged:
 def merged_with_numpy(arm: Arm, T: Array, q: Array) -> Merged:
     """`merged` where there is no C compiler."""
     residual = relative_residual(arm, T, q)
-    places, hits = list[int](), list[int]()
+    indices, hits = list[int](), list[int]()
     for number, own in enumerate(q):
-        twin = _twin(arm, T, q[places], own)
+        twin = _twin(arm, T, q[indices], own)
         if twin is None:
-            places.append(number)
+            indices.append(number)
             hits.append(1)
             continue
         hits[twin] += 1
-        if residual[number] < residual[places[twin]]:
-            places[twin] = number
-    return Merged(np.array(q[places], dtype=float), np.array(hits, dtype=np.int64))
+        if residual[number] < residual[indices[twin]]:
+            indices[twin] = number
+    return Merged(np.array(q[indices], dtype=float), np.array(hits, dtype=np.int64))
 
 
 def reached(arm: Arm, T: Array, q: Array) -> NDArray[np.bool_]:
@@ -203,7 +203,7 @@ def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
 
     Args:
         arm: whose configurations; compiled for up to seven joints.
-        T: (4, 4) wanted pose.
+        T: (4, 4) target pose.
         starts: how many random configurations.
         seed: of them.
 
@@ -229,15 +229,15 @@ def searched_with_numpy(arm: Arm, T: Array, starts: int, seed: int) -> Merged:
 
 def random_configurations(arm: Arm, T: Array, count: int, seed: int) -> Array:
     """(count, n) configurations: angles in (-pi, pi], slides as far as arm and pose reach."""
-    places = np.arange(1, count * arm.size + 1, dtype=np.uint64)
-    chance = _split_mix(np.array([seed % 2**64], dtype=np.uint64), places).reshape(count, arm.size)
+    indices = np.arange(1, count * arm.size + 1, dtype=np.uint64)
+    chance = _split_mix(np.array([seed % 2**64], dtype=np.uint64), indices).reshape(count, arm.size)
     reach = arm.length + np.linalg.norm(T[:3, 3])
     return np.where(arm.prismatic, reach, np.pi) * (1.0 - 2.0 * chance)
 
 
-def _split_mix(seed: NDArray[np.uint64], places: NDArray[np.uint64]) -> Array:
+def _split_mix(seed: NDArray[np.uint64], indices: NDArray[np.uint64]) -> Array:
     """Numbers in [0, 1). Source: Steele, Lea and Flood 2014."""
-    z = seed + places * np.uint64(0x9E3779B97F4A7C15)
+    z = seed + indices * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     z = z ^ (z >> np.uint64(31))
@@ -250,7 +250,7 @@ def _split_mix(seed: NDArray[np.uint64], places: NDArray[np.uint64]) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Polished:
-    """Configurations and how well they reach the wanted pose.
+    """Configurations and how well they reach the target pose.
 
     Attributes:
         q: (m, n) configurations, angles in (-pi, pi] where they were improved [rad or m].
@@ -269,7 +269,7 @@ def polish(arm: Arm, T: Array, q: Array) -> Polished:
 
     Args:
         arm: whose configurations.
-        T: (4, 4) wanted pose of all, or (m, 4, 4) of each.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
     library = core.core_of(arm)
@@ -323,23 +323,23 @@ def nearest(arm: Arm, T: Array) -> Nearest:
 
     Args:
         arm: whose configurations; compiled for up to seven joints.
-        T: (4, 4) wanted pose [m].
+        T: (4, 4) target pose [m].
     """
     library = core.core_of(arm)
     if library is not None:
-        return _measured(arm, T, core.nearest_by(library, arm, T, _STARTS, SEED))
-    return _measured(arm, T, nearest_with_numpy(arm, T))
+        return _measure(arm, T, core.nearest_by(library, arm, T, _STARTS, SEED))
+    return _measure(arm, T, nearest_with_numpy(arm, T))
 
 
 def nearest_with_numpy(arm: Arm, T: Array) -> Array:
     """(n,) the configuration of `nearest` where there is no C compiler."""
     q, cost = descend(arm, T, random_configurations(arm, T, _STARTS, SEED))
-    best = [_refined(arm, T, q[k]) for k in _apart(cost)]
+    best = [_refine(arm, T, q[k]) for k in _apart(cost)]
     lowest = min(best, key=lambda found: found[1])
     return wrapped(arm, lowest[0])
 
 
-def _measured(arm: Arm, T: Array, q: Array) -> Nearest:
+def _measure(arm: Arm, T: Array, q: Array) -> Nearest:
     pose = arm.pose(q)
     gap = gap_to(T, pose)
     return Nearest(q, float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:])), pose)
@@ -354,7 +354,7 @@ def _apart(cost: Array) -> list[int]:
     return kept[:_KEPT]
 
 
-def _refined(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
+def _refine(arm: Arm, T: Array, q: Array) -> tuple[Array, float]:
     """Newton's method with differences of the slope; the configuration and its cost."""
     cost, slope = _sloped(arm, T, q)
     curvature: Array | None = None
@@ -447,7 +447,7 @@ def general(arm: General, T: Array) -> Array:
 
     Args:
         arm: see `general_of`.
-        T: (4, 4) wanted pose [m].
+        T: (4, 4) target pose [m].
 
     Returns:
         (m, 6) all isolated solutions, each once [rad or m]; samples where there are families.
@@ -460,7 +460,7 @@ def general_many(arm: General, T: Array) -> tuple[Numbers, Array]:
 
     Args:
         arm: see `general_of`.
-        T: (N, 4, 4) wanted poses [m].
+        T: (N, 4, 4) target pose [m].
 
     Returns:
         (m,) numbers of the poses, ascending, and (m, 6) configurations for them.

@@ -122,7 +122,7 @@ def curve(
     along = direction / np.linalg.norm(direction)
     start = q / target.unit
     x = target.corrected(start, along[None, :], along[None, :] @ start)
-    return way.straight(x, direction) or way.followed(x, along)
+    return way.straight(x, direction) or way.follow(x, along)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,21 +146,21 @@ class _Way:
             return None
         return ConfigurationCurve(samples, turns, slope)
 
-    def followed(self, x: Array, direction: Array) -> ConfigurationCurve | None:
+    def follow(self, x: Array, direction: Array) -> ConfigurationCurve | None:
         """The self-motion by small steps, to where it closes or ends."""
-        ahead, closed = self._walked(x, direction)
+        ahead, closed = self._walk(x, direction)
         if closed:
             return ConfigurationCurve(np.array(ahead), True, np.zeros(0))
-        back, _ = self._walked(x, -direction)
+        back, _ = self._walk(x, -direction)
         samples = np.array([*back[:0:-1], *ahead])
         length = float(np.sum(np.linalg.norm(np.diff(samples, axis=0), axis=1)))
         return ConfigurationCurve(samples, False, np.zeros(0)) if length > _SHORTEST else None
 
-    def _walked(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
+    def _walk(self, start: Array, tangent: Array) -> tuple[list[Array], bool]:
         """Configurations from the start on, and whether they come back to it."""
         points, step, target = [start], _STEP, self.target
         while len(points) < self.most and step > _SMALLEST_STEP:
-            x = _stepped(target, points[-1], tangent, step)
+            x = _step(target, points[-1], tangent, step)
             moved = x - points[-1]
             far = np.linalg.norm(moved) > 1.5 * step
             if far or target.residual(x * target.unit) > self.limit:
@@ -177,7 +177,7 @@ class _Way:
         return points, False
 
 
-def _stepped(target: Target, x: Array, tangent: Array, step: float) -> Array:
+def _step(target: Target, x: Array, tangent: Array, step: float) -> Array:
     held = tangent[None, :]
     ahead = x + step * tangent
     return target.corrected(ahead, held, held @ ahead, 12)
@@ -267,7 +267,7 @@ class Family:
 
     def contains(self, q: Array) -> bool:
         """Whether a configuration (nq,) [rad or m] is one of it, up to whole turns."""
-        return bool(self.meets(np.asarray(q, dtype=float)[None, list(self._motion.places)])[0])
+        return bool(self.meets(np.asarray(q, dtype=float)[None, list(self._motion.indices)])[0])
 
     def meets(self, q: Array) -> NDArray[np.bool_]:
         """(m,) whether configurations (m, n) of the chain belong to it."""
@@ -290,7 +290,7 @@ class _SelfMotion:
     target: Target
     curve: ConfigurationCurve
     free: int
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     whole: Whole
 
     def at(self, value: float) -> Array | None:
@@ -341,7 +341,11 @@ class _SelfMotion:
 
 
 def family(
-    target: Target, curve: ConfigurationCurve, dimension: int, places: tuple[int, ...], whole: Whole
+    target: Target,
+    curve: ConfigurationCurve,
+    dimension: int,
+    indices: tuple[int, ...],
+    whole: Whole,
 ) -> Family:
     """The description of a self-motion.
 
@@ -349,14 +353,14 @@ def family(
         target: the pose that is held.
         curve: configurations along it.
         dimension: how many freedoms it has.
-        places: of the chain's joints in q.
+        indices: of the chain's joints in q.
         whole: the configuration (nq,) of the robot for one of the chain, (n,).
     """
     moves = np.ptp(curve.x, axis=0) > _MOVES
     free = _free_joint(curve, moves)
     names = target.arm.names
     moving = tuple(name for name, m in zip(names, moves, strict=True) if m)
-    motion = _SelfMotion(target, curve, free, places, whole)
+    motion = _SelfMotion(target, curve, free, indices, whole)
     relations = _relations(target, curve, free) if dimension == 1 else ()
     return Family(names[free], moving, relations, _range(target, curve, free), dimension, motion)
 
@@ -476,15 +480,13 @@ def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
         if np.all(size < _ARRIVED):
             break
         _, J = target.excess(x)
-        along = _projected(
-            J, difference * np.minimum(1.0, _SURFACE_STEP / np.maximum(size, NONZERO))
-        )
-        x = _corrected(target, x + along)
+        along = _project(J, difference * np.minimum(1.0, _SURFACE_STEP / np.maximum(size, NONZERO)))
+        x = _correct(target, x + along)
     arrived = np.linalg.norm(target.wrapped(end - x), axis=1) < _ARRIVED
     return np.asarray(arrived & (target.residual(x * target.unit) < target.tolerance))
 
 
-def _projected(J: Array, difference: Array) -> Array:
+def _project(J: Array, difference: Array) -> Array:
     """Ways (m, n) within the null spaces of J, (m, 6, n)."""
     _, s, Vt = np.linalg.svd(J, full_matrices=False)
     rows = np.where((s > _ZERO)[..., None], Vt, 0.0)
@@ -492,7 +494,7 @@ def _projected(J: Array, difference: Array) -> Array:
     return np.asarray(difference - np.einsum("mki,mk->mi", rows, across))
 
 
-def _corrected(target: Target, x: Array) -> Array:
+def _correct(target: Target, x: Array) -> Array:
     for _ in range(4):
         e, J = target.excess(x)
         U, s, Vt = np.linalg.svd(J, full_matrices=False)

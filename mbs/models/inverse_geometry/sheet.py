@@ -10,7 +10,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.closed_forms.sequence import Problem, Step, StepSequence
+from mbs.closed_forms.sequence import Problem, SequenceStep, StepSequence
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain
 from mbs.models.inverse_geometry.closed_form import sequence_of
 from mbs.operations import simplify
@@ -58,7 +58,7 @@ class _LineWriter(Infix):
         self._uses = _uses(graph)
         self._known: dict[int, tuple[str, int]] = {}
 
-    def _written(self, number: int) -> tuple[str, int]:
+    def _write(self, number: int) -> tuple[str, int]:
         if number not in self._known:
             text, own = self._expression(self._graph.nodes[number])
             if self._uses[number] > 1 and len(text) > _SHORT:
@@ -86,7 +86,7 @@ class _LineWriter(Infix):
         text = "*".join(factors)
         if constant < 0:
             return f"-{text}", NEGATIVE
-        alone = self._written(numbers[0])[1] if numbers else ATOM
+        alone = self._write(numbers[0])[1] if numbers else ATOM
         return text, PRODUCT if len(factors) > 1 else max(alone, PRODUCT)
 
     def _factors(self, node: Node) -> tuple[float, list[int]]:
@@ -114,9 +114,9 @@ class _LineWriter(Infix):
             term = self.text(number, NEGATIVE)
             if term.startswith("-"):
                 sign, term = -sign, term[1:]
-            text += _joined(text, sign, term)
+            text += _join(text, sign, term)
         if constant or not text:
-            text += _joined(text, -1 if constant < 0 else 1, f"{abs(constant):.12g}")
+            text += _join(text, -1 if constant < 0 else 1, f"{abs(constant):.12g}")
         return text, SUM
 
     def _terms(self, node: Node, sign: int) -> Iterator[tuple[int, int]]:
@@ -135,7 +135,7 @@ class _LineWriter(Infix):
         return inner >= 0 and self._graph.nodes[inner].op in _SUMS and self._uses[inner] == 1
 
 
-def _joined(text: str, sign: int, term: str) -> str:
+def _join(text: str, sign: int, term: str) -> str:
     """What a term adds to the text of a sum."""
     if not text:
         return f"-{term}" if sign < 0 else term
@@ -214,7 +214,7 @@ def _head(chain: FrameChain, sequence: StepSequence) -> Iterator[str]:
     yield f"steps: {len(sequence.steps)}, branches: {sequence.branches}"
 
 
-def _sheet(number: int, one: Step, problem: Problem) -> Iterator[str]:
+def _sheet(number: int, one: SequenceStep, problem: Problem) -> Iterator[str]:
     yield f"{number}. {', '.join(one.names)}: {one.kind}"
     yield f"   {one.equation}"
     for name in one.signs:

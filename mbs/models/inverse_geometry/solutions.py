@@ -72,7 +72,7 @@ class CoordinateLimits:
         nearest: Array = found[order[:_MOST_WINDINGS]]
         return nearest
 
-    def wound(self, q: Array, near: Array) -> Array:
+    def wrap_to_limits(self, q: Array, near: Array) -> Array:
         """(nq,) q changed by whole turns: each coordinate within limits if it can, near `near`."""
         options = [self._options(k, q[k], near[k]) for k in range(q.size)]
         plain = np.where(self.turns, near + _remainder(q - near), q)
@@ -119,8 +119,8 @@ def bounds(
         own[name] = None if pair is None else _pair(system, name, pair)
     pairs = [own[name] or (-math.inf, math.inf) for name in names]
     low, high = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
-    places = set(range(len(names)) if turning is None else turning)
-    turns = [c.kind == "revolute" and k in places for k, c in enumerate(system.coordinates)]
+    indices = set(range(len(names)) if turning is None else turning)
+    turns = [c.kind == "revolute" and k in indices for k, c in enumerate(system.coordinates)]
     return CoordinateLimits(names, low, high, np.array(turns, dtype=bool))
 
 
@@ -162,7 +162,7 @@ _MOST_ROWS = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """One configuration that takes the frame to the wanted pose.
+    """One configuration that takes the frame to the target pose.
 
     Attributes:
         q: (nq,) positions [rad or m].
@@ -191,7 +191,7 @@ class Solution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solutions(Sequence[Solution]):
-    """Every configuration that takes the frame to the wanted pose, a sequence of `Solution`.
+    """Every configuration that takes the frame to the target pose, a sequence of `Solution`.
 
     Attributes:
         system: name of the robot.
@@ -241,7 +241,7 @@ class Solutions(Sequence[Solution]):
                 f"{self.system}: the configuration has {near.size} values, the robot has"
                 f" {len(self.names)}: {', '.join(self.names)}"
             )
-        wound = [replace(s, q=self._bounds.wound(s.q, near)) for s in self.solutions]
+        wound = [replace(s, q=self._bounds.wrap_to_limits(s.q, near)) for s in self.solutions]
         best = min(wound, key=lambda s: float(np.linalg.norm(s.q - near)))
         return replace(best, windings=self._bounds.windings(best.q, near))
 
@@ -302,7 +302,7 @@ def unreachable(target: Target, nearest: Nearest) -> str:
     """Why a pose has no solution at all.
 
     Args:
-        target: the pose that is wanted.
+        target: the target pose.
         nearest: the reachable pose nearest to it.
     """
     arm = target.arm
@@ -330,7 +330,7 @@ def apart(distance: float, angle: float) -> str:
     """
     parts = [f"{distance:.4g} m away"] if distance > _SMALLEST else []
     if angle > _SMALLEST:
-        parts.append(f"turned by {math.degrees(angle):.4g} degrees")
+        parts.append(f"rotated by {math.degrees(angle):.4g} degrees")
     return " and ".join(parts) or "within rounding of it"
 
 
@@ -435,7 +435,7 @@ class Wishes:
         return Solutions(self.system.name, names, tuple(kept), method, reason, nearest, self.bounds)
 
     def _solution(self, draft: RobotSolution) -> Solution:
-        q = self.bounds.wound(draft.q, self.near)
+        q = self.bounds.wrap_to_limits(draft.q, self.near)
         windings = self.bounds.windings(q, self.near)
         return Solution(
             q,

@@ -11,7 +11,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.answer import ChainRoot, Question, answer, roots
-from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, wanted_pose
+from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
 from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS
 from mbs.models.inverse_geometry.gathering import Gathered, gather, gather_further
 from mbs.models.inverse_geometry.solutions import Given, Solutions, Wishes, bounds, leaves_out
@@ -60,12 +60,12 @@ def solve(
     """
     require_system(system)
     p = np.array(system.parameter_values(parameters))
-    wanted = wanted_pose(system, T)
+    target = target_pose(system, T)
     chain = _chain_or_none(system, frame, locked)
     wishes = _wishes(system, chain, limits, seed)
     if chain is None:
-        return parallel(wishes, frame, wanted, p)
-    question = Question(chain, Target(chain.arm(p), wanted), p, wishes)
+        return parallel(wishes, frame, target, p)
+    question = Question(chain, Target(chain.arm(p), target), p, wishes)
     found, used = solved(question, method)
     return answer(question, found, used)
 
@@ -81,7 +81,7 @@ def solved(question: Question, method: str) -> tuple[list[ChainRoot], str]:
     gathered = gather(chain, target, method, p)
     if method in ("auto", *CLOSED_FORMS) and _is_doubtful(target, gathered):
         gathered = gather_further(chain, target, gathered, p)
-    return roots(target, gathered, question.place), gathered.method
+    return roots(target, gathered, question.chain_indices), gathered.method
 
 
 def _chain_or_none(
@@ -113,12 +113,12 @@ def _wishes(
 ) -> Wishes:
     near = np.array(system.position(seed))
     names = [coordinate.name for coordinate in system.coordinates]
-    locked_places = [] if chain is None else [names.index(name) for name in chain.locked]
+    locked_indices = [] if chain is None else [names.index(name) for name in chain.locked]
     if chain is not None:
         if seed is None:
-            near[list(chain.places)] = 0.0
-        near[locked_places] = list(chain.locked.values())
-    turning = None if chain is None or system.is_closed else chain.places
+            near[list(chain.indices)] = 0.0
+        near[locked_indices] = list(chain.locked.values())
+    turning = None if chain is None or system.is_closed else chain.indices
     coupled = [k for c in system.couplings for k in c.coordinates]
-    limited = bounds(system, limits, set(turning or range(system.nq)) - {*locked_places, *coupled})
+    limited = bounds(system, limits, set(turning or range(system.nq)) - {*locked_indices, *coupled})
     return Wishes(system, near, limited, leaves_out(limits), seed is not None)

@@ -30,11 +30,11 @@ linear; and one that is hardly more than rounding."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """The equations of a wanted pose.
+    """The equations of a target pose.
 
     Attributes:
         arm: that moves the frame.
-        T: (4, 4) the wanted pose; (m, 4, 4) of m configurations, each its own.
+        T: (4, 4) the target pose; (m, 4, 4) of m configurations, each its own.
     """
 
     arm: Arm
@@ -250,7 +250,7 @@ def _order(reduced: TargetReduction) -> tuple[int, Array]:
         radius, shift = (_MEETING / size**0.5) ** (1.0 / k), -float(g[k - 1] @ g[k]) / (k * size)
         if max(radius, abs(shift)) > _RADII[0]:
             continue
-        below = np.linalg.norm(_shifted(g, shift)[:k], axis=1) * radius ** np.arange(k)
+        below = np.linalg.norm(_shift(g, shift)[:k], axis=1) * radius ** np.arange(k)
         if np.all(below < _MEETING):
             order, middle = k, shift
     target = reduced.target
@@ -284,7 +284,7 @@ def _simple_roots(g: Array) -> list[float]:
     return found
 
 
-def _shifted(g: Array, by: float) -> Array:
+def _shift(g: Array, by: float) -> Array:
     """Taylor coefficients about another point."""
     orders = range(len(g))
     return np.array(
@@ -345,14 +345,14 @@ def _monomials(c: int, degree: int) -> list[tuple[int, ...]]:
 def _macaulay(powers: list[tuple[int, ...]], columns: Array, degree: int, c: int) -> Array:
     """Rows: the products of monomials and equations, cut off above the degree."""
     kept = _monomials(c, degree)
-    place = {power: k for k, power in enumerate(kept)}
+    index = {power: k for k, power in enumerate(kept)}
     rows = []
     for factor in _monomials(c, degree - 1):
         for equation in columns.T:
             row = np.zeros(len(kept))
             for power, value in zip(powers, equation, strict=True):
                 product = tuple(a + b for a, b in zip(power, factor, strict=True))
-                if product in place:
-                    row[place[product]] += value
+                if product in index:
+                    row[index[product]] += value
             rows.append(row)
     return np.array(rows)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.closed_forms.arm import Array
-from mbs.closed_forms.ring import spin_places
+from mbs.closed_forms.ring import spin_indices
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import CLOSED, TOLERANCE, Closing, difference
 from mbs.loops.modes import closed_configurations, working_modes
@@ -94,11 +94,11 @@ def close(
         if configuration.size:
             q = rest.copy()
             q[list(given)] = [*configuration, *chain.locked.values()]
-            found += _completed(system, given, q, p)
+            found += _complete(system, given, q, p)
     return found
 
 
-def posed(
+def configurations_at(
     system: System, frame: str | int, T: Array, p: Array, seed: Array | None = None
 ) -> list[ClosedConfiguration]:
     """The whole configurations that bring a frame to a pose, where balls or free bodies carry it.
@@ -109,7 +109,7 @@ def posed(
     Args:
         system: open or closed.
         frame: a body, a named frame, or the number of a link.
-        T: (4, 4) wanted pose, as `wanted_pose` gives it.
+        T: (4, 4) target pose, as `target_pose` gives it.
         p: (np,) parameters.
         seed: (nq,) configuration, the assembled one when left out.
 
@@ -126,9 +126,9 @@ def posed(
     if isinstance(plan, str):
         modes = working_modes(system, frame, T, guess=list(rest), parameters=values)
         return [ClosedConfiguration(np.array(mode.q), "", mode.residual) for mode in modes]
-    wanted = goal(system, frame, T, None, values)
-    ways = every_configuration(plan.stages, plan.started(T, rest), p)
-    found = _distinct(system, _reaching(wanted, ways))
+    target = goal(system, frame, T, None, values)
+    branches = every_configuration(plan.stages, plan.started(T, rest), p)
+    found = _distinct(system, _reaching(target, branches))
     return sorted(found, key=lambda configuration: _distance(system, configuration.q, rest))
 
 
@@ -137,7 +137,7 @@ def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
 
     Args:
         system: open or closed.
-        chain: the one that `close` gets, or the frame that `posed` gets.
+        chain: the one that `close` gets, or the frame that `configurations_at` gets.
 
     Returns:
         One sentence; None where all are found by closed forms.
@@ -151,9 +151,9 @@ def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
 
 
 def _given(system: System, chain: FrameChain) -> tuple[int, ...]:
-    """The numbers in q of the free joints of the chain, then of the locked ones."""
+    """The indices in q of the free joints of the chain, then of the locked ones."""
     starts = {link.name: link.q.start for link in system.tree.links}
-    return (*chain.places, *(starts[name] for name in chain.locked))
+    return (*chain.indices, *(starts[name] for name in chain.locked))
 
 
 def _known(system: System, given: tuple[int, ...]) -> Known:
@@ -166,8 +166,8 @@ def _stages(system: System, given: tuple[int, ...]) -> tuple[Stage, ...] | str:
 
     def find() -> tuple[Stage, ...] | str:
         try:
-            places = _known(system, given).places
-            return plan_from(system, (*places, *spin_places(system).values()))
+            indices = _known(system, given).indices
+            return plan_from(system, (*indices, *spin_indices(system).values()))
         except NoClosedForm as error:
             return str(error)
 
@@ -188,41 +188,41 @@ def _plan_to(system: System, frame: str | int) -> Posed | str:
     return plan
 
 
-def _completed(
+def _complete(
     system: System, given: tuple[int, ...], q: Array, p: Array
 ) -> Iterable[ClosedConfiguration]:
     """The closed configurations with the given positions as in q, and the held ones."""
     if not system.is_closed:
         return [ClosedConfiguration(q, "", 0.0)]
     known = _known(system, given)
-    closing = Closing(system, p, known.places)
-    ways = _ways(closing, _stages(system, given), q)
-    return _distinct(system, _closed(closing, _agreeing(system, known, q, ways)))
+    closing = Closing(system, p, known.indices)
+    branches = _branches(closing, _stages(system, given), q)
+    return _distinct(system, _closed(closing, _agreeing(system, known, q, branches)))
 
 
-_Ways = Iterable[tuple[Array, tuple[str, ...]]]
+_Branches = Iterable[tuple[Array, tuple[str, ...]]]
 
 
-def _ways(closing: Closing, stages: tuple[Stage, ...] | str, q: Array) -> _Ways:
+def _branches(closing: Closing, stages: tuple[Stage, ...] | str, q: Array) -> _Branches:
     """All positions and the labels of the branch, by closed forms where every loop has one."""
     if isinstance(stages, str):
         return [(found, ()) for found in closed_configurations(closing, q)]
-    return every_configuration(stages, started_at(closing.system, q, closing.held), closing.p)
+    return every_configuration(stages, started_at(closing.system, q, closing.locked), closing.p)
 
 
-def _agreeing(system: System, known: Known, q: Array, ways: _Ways) -> _Ways:
+def _agreeing(system: System, known: Known, q: Array, branches: _Branches) -> _Branches:
     """Those whose dependent joints are where the chain has them."""
-    places = list(known.dependent)
-    for found, branch in ways:
+    indices = list(known.dependent)
+    for found, branch in branches:
         whole = found[: system.nq].copy()
-        if np.all(np.abs(difference(system, whole, q)[places]) < _AGREE):
-            whole[places] = q[places]
+        if np.all(np.abs(difference(system, whole, q)[indices]) < _AGREE):
+            whole[indices] = q[indices]
             yield whole, branch
 
 
-def _closed(closing: Closing, ways: _Ways) -> Iterator[ClosedConfiguration]:
+def _closed(closing: Closing, branches: _Branches) -> Iterator[ClosedConfiguration]:
     """Those in which the loops are closed."""
-    for found, branch in ways:
+    for found, branch in branches:
         q = found
         if closing.openness(q) > TOLERANCE:
             nearest = closing.nearest(found)
@@ -232,16 +232,16 @@ def _closed(closing: Closing, ways: _Ways) -> Iterator[ClosedConfiguration]:
             yield ClosedConfiguration(q, ", ".join(branch), _largest(closing.rows(q)[0]))
 
 
-def _reaching(wanted: Goal, ways: _Ways) -> Iterator[ClosedConfiguration]:
+def _reaching(target: Goal, branches: _Branches) -> Iterator[ClosedConfiguration]:
     """Those in which the loops are closed and the frame is where it is wanted."""
-    for found, branch in ways:
-        q = found[: wanted.closing.system.nq]
-        if TOLERANCE < wanted.openness(q) < _MOVED:
-            nearest = wanted.nearest(q)
+    for found, branch in branches:
+        q = found[: target.closing.system.nq]
+        if TOLERANCE < target.openness(q) < _MOVED:
+            nearest = target.nearest(q)
             if np.max(np.abs(nearest.q - q)) < _MOVED:
                 q = nearest.q
-        if wanted.openness(q) < CLOSED and wanted.closing.faces(q):
-            yield ClosedConfiguration(q, ", ".join(branch), _largest(wanted.residual(q)[0]))
+        if target.openness(q) < CLOSED and target.closing.faces(q):
+            yield ClosedConfiguration(q, ", ".join(branch), _largest(target.residual(q)[0]))
 
 
 def _distinct(
@@ -293,21 +293,21 @@ def parallel(wishes: Wishes, frame: str | int | None, T: Array, p: Array) -> Sol
     Args:
         wishes: the robot, and what is asked for beside the pose.
         frame: as for `solve`.
-        T: (4, 4) the wanted pose.
+        T: (4, 4) the target pose.
         p: (np,) parameters.
     """
     system = wishes.system
     name = terminal_frame(system) if frame is None else frame
     searched = why_searched(system, name)
-    found = posed(system, name, T, p, wishes.near)
+    found = configurations_at(system, name, T, p, wishes.near)
     method = "loops in closed form" if searched is None else "search"
     reason = "no configuration closes the loops and takes the frame to the pose"
     if searched is not None:
         reason += f"; it was searched for from many starts, which proves nothing: {searched}"
     values = {a.name: float(x) for a, x in zip(system.parameters, p, strict=True)}
-    wanted = goal(system, name, T, None, values)
+    target = goal(system, name, T, None, values)
     drafts = [
-        _draft(configuration, wanted.residual(configuration.q)[1], k)
+        _draft(configuration, target.residual(configuration.q)[1], k)
         for k, configuration in enumerate(found)
     ]
     return wishes.solutions(drafts, method, "" if drafts else reason)

@@ -18,7 +18,7 @@ from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.recursions.force_elements import sum_wrenches, wrench_efforts
 from mbs.recursions.poses import link_poses
 from mbs.recursions.route import BASE, relative_pose
-from mbs.spatial import Wrench, carried
+from mbs.spatial import Wrench, transform_wrench
 from mbs.text import did_you_mean, quoted
 
 Kind = Literal["q", "a"]
@@ -49,8 +49,8 @@ class InputMotion:
     """A joint whose motion is an input.
 
     Attributes:
-        velocity: its number in v.
-        position: number in q where the position is an input too, None where it is a state.
+        velocity: its index in v.
+        position: index in q where the position is an input too, None where it is a state.
     """
 
     velocity: int
@@ -256,7 +256,7 @@ def wrenches_of(system: System, q: SX, frames: Sequence[Frame], u: SX) -> dict[i
         R = relative_pose(system.tree, q, BASE, frame).R
         first = 6 * number
         force, moment = u[first : first + 3], u[first + 3 : first + 6]
-        f, m = carried(pose, (casadi.mtimes(R.T, force), casadi.mtimes(R.T, moment)))
+        f, m = transform_wrench(pose, (casadi.mtimes(R.T, force), casadi.mtimes(R.T, moment)))
         exerted.append({link: (-f, -m)})
     return sum_wrenches(*exerted)
 

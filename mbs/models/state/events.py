@@ -78,7 +78,7 @@ def standstill(
 
 
 States = tuple[Sequence[int], Sequence[int]]
-"""Numbers in q and in v of the positions and velocities that a state begins with."""
+"""Indices in q and in v of the positions and velocities that a state begins with."""
 
 
 def minimal_jump(
@@ -111,8 +111,8 @@ def minimal_jump(
     at = casadi.if_else(now.place == 0, wall, now.place)
     at = casadi.if_else(at == 0, contact.modes.place, at)
     shift = to_limits(system, contact, motion, at)
-    x = _shifted(system, motion.q, x, shift, states[0])
-    return _written(contacts, (x, v), (at, now.held), states), modes
+    x = _shift(system, motion.q, x, shift, states[0])
+    return _write(contacts, (x, v), (at, now.held), states), modes
 
 
 def to_limits(system: System, contact: ContactEquations, motion: TreeMotion, place: SX) -> SX:
@@ -163,7 +163,7 @@ def _after(
     return v + casadi.mmax(held) * dv, modes
 
 
-def _shifted(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) -> SX:
+def _shift(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) -> SX:
     """The state with independent positions of a closed system, which are at q, shifted."""
     after = SX(x)
     if system.is_closed:
@@ -173,9 +173,7 @@ def _shifted(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) 
     return after
 
 
-def _written(
-    contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], states: States
-) -> SX:
+def _write(contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], states: States) -> SX:
     """The state x with velocities v: what is held stands still, what is at a limit is just there.
 
     Args:
@@ -284,7 +282,7 @@ def minimal_events(
             positive.
     """
     contacts, modes = contact.contacts, used_modes(contact.contacts)
-    watched = _watched(contacts)
+    watched = _watch(contacts)
     numbers = [number for number, _ in watched]
     *others, p = point
 
@@ -313,7 +311,7 @@ def at_limits(system: System, contact: ContactEquations | None, motion: TreeMoti
     return RETURN_RATE * to_limits(system, contact, motion, contact.modes.place)
 
 
-def _watched(contacts: Contacts) -> list[tuple[int, str]]:
+def _watch(contacts: Contacts) -> list[tuple[int, str]]:
     """Number among the 5 k indicators, and name, of those that can fall to zero."""
     lower, upper, dry = (
         np.array(flags)[:, 0] > 0

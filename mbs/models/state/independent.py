@@ -58,8 +58,9 @@ from mbs.spatial import Wrench, quaternion_rate, quaternion_rotation
 
 # Quaternion joints in loops whose motion is independent, as a whole or in part.
 #
-# A rod between two ball joints spins about its own axis whatever the loops do, and no element of
-# the quaternion of a ball joint stands for that spin. The quaternion as a whole is then a state,
+# A rod between two spherical joints spins about its own axis whatever the loops do, and no element
+# of the quaternion of a spherical joint stands for that spin. The quaternion as a whole is then a
+# state,
 # and a second one, on the loops, is solved for with the other dependent positions: of all
 # quaternions that close the loops the one that is not turned from the state about the independent
 # axes.
@@ -79,7 +80,7 @@ class Orientation:
 
     Attributes:
         link: that it moves.
-        free: numbers in v of its velocities whose positions may be chosen.
+        free: indices in v of its velocities whose positions may be chosen.
     """
 
     link: Link
@@ -92,7 +93,7 @@ class Orientation:
 
     @property
     def positions(self) -> tuple[int, ...]:
-        """Numbers in q."""
+        """Indices in q."""
         return tuple(range(self.link.q.start, self.link.q.stop))
 
     @property
@@ -122,7 +123,7 @@ def with_unit_length(joints: Sequence[Orientation], q: SX) -> SX:
     return result
 
 
-def tied(system: System, joints: Sequence[Orientation], raw: SX, q: SX) -> SX:
+def tie_orientations(system: System, joints: Sequence[Orientation], raw: SX, q: SX) -> SX:
     """(k, 1) zero where q is moved from the state by none of the independent velocities.
 
     Args:
@@ -185,21 +186,21 @@ class MinimalLayout:
     frame; outputs of devices; efforts; efforts of contacts; what is observed].
 
     Attributes:
-        positions: numbers in q of the first part of x.
+        positions: indices in q of the first part of x.
         orientations: quaternion joints of loops that are among them.
-        velocities: numbers in v of the second part of x.
-        dependents: numbers in q of z, some of them in x too: see `minimal_orientation`.
+        velocities: indices in v of the second part of x.
+        dependents: indices in q of z, some of them in x too: see `minimal_orientation`.
         shown: those of them that are in y, which are not in x.
-        inputs: numbers in v of the efforts of motors.
+        inputs: indices in v of the efforts of motors.
         devices: numbers of the devices whose inputs are in u.
         wrenches: names of the frames on which wrenches act, six numbers each: force and moment
             about the origin, in axes of the base.
         frames: these frames.
         motions: joints whose accelerations, or positions, velocities and accelerations, are in u.
         extra: size of w.
-        accelerations: numbers in v of the first part of y.
-        passive: numbers in v of the velocities and accelerations of dependent joints in y.
-        efforts: numbers in v of the efforts in y, each all that drives the joint but contacts.
+        accelerations: indices in v of the first part of y.
+        passive: indices in v of the velocities and accelerations of dependent joints in y.
+        efforts: indices in v of the efforts in y, each all that drives the joint but contacts.
         contacts: efforts of rigid stops and Coulomb friction in y.
     """
 
@@ -272,7 +273,7 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
 
 
 def _free_positions(system: System, orientations: Sequence[Orientation]) -> tuple[int, ...]:
-    """Numbers in q of the positions that are independent, those of quaternion joints as a whole."""
+    """Indices in q of the positions that are independent, those of quaternion joints as a whole."""
     if not system.is_closed:
         return tuple(range(system.nq))
     numbers = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
@@ -454,20 +455,20 @@ def _driven(wiring: _Wiring, function: Function) -> Function:
     t, x, z, u, p = symbols[:5]
     pushes, inputs, others, w = _parts(u, wiring.sizes)
     p = _parts(p, (motion.numel_in(4), p.numel() - motion.numel_in(4)))[0]
-    q, v = motion.call([t, x, z, _filled(wiring, kind, others), p])
+    q, v = motion.call([t, x, z, _fill(wiring, kind, others), p])
     if drive.effort is not None:
         pushes = casadi.densify(casadi.vec(drive.effort.call([t, q, v, w, p])[0]))
     if drive.device is not None:
         inputs = casadi.densify(casadi.vec(drive.device.call([t, q, v, w, p])[0]))
     given = casadi.vertcat(pushes, inputs, others)
-    return _written(function, symbols, given, kind)
+    return _write(function, symbols, given, kind)
 
 
 def _idle(wiring: _Wiring, function: Function) -> Function:
     """The function, which depends on no effort, with other inputs."""
     symbols = _symbols(wiring, function, SX)
     others = _parts(symbols[3], wiring.sizes)[2]
-    return _written(function, symbols, _filled(wiring, SX, others), SX)
+    return _write(function, symbols, _fill(wiring, SX, others), SX)
 
 
 def _symbols(wiring: _Wiring, function: Function, kind: Any) -> list[Any]:
@@ -477,7 +478,7 @@ def _symbols(wiring: _Wiring, function: Function, kind: Any) -> list[Any]:
     return [kind.sym(name, size) for name, size in zip(names, sizes, strict=False)]
 
 
-def _filled(wiring: _Wiring, kind: Any, others: Any) -> Any:
+def _fill(wiring: _Wiring, kind: Any, others: Any) -> Any:
     """The inputs that a function takes, zero where laws give them."""
     tau, u, _ = wiring.equations.sizes
     return casadi.vertcat(kind.zeros(tau), kind.zeros(u), others)
@@ -488,7 +489,7 @@ def _parts(u: Any, sizes: tuple[int, ...]) -> list[Any]:
     return parts
 
 
-def _written(function: Function, symbols: list[Any], u: Any, kind: Any) -> Function:
+def _write(function: Function, symbols: list[Any], u: Any, kind: Any) -> Function:
     options = {"cse": True} if kind is SX else {}
     values = function.call([*symbols[:3], u, *symbols[4:]])
     return Function(function.name(), symbols, values, options)
@@ -603,7 +604,7 @@ def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> St
     Args:
         system: open or closed.
         layout: what stands where.
-        motors: numbers in v of the efforts in u.
+        motors: indices in v of the efforts in u.
     """
     in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
     in_u = [len(motors), system.u.numel(), 6 * len(layout.frames)]
@@ -737,7 +738,7 @@ def _closure_step(system: System, layout: MinimalLayout) -> tuple[Function, Func
     dependents, s = list(layout.dependents), point_of(system, layout, ())
     symbols, z = SX.sym("q", system.nq), s.z
     raw, q = positions_of(system, layout, s)
-    ties = tied(system, layout.orientations, raw, symbols)
+    ties = tie_orientations(system, layout.orientations, raw, symbols)
     kept = square_closure(system, symbols, dependents, ties)
     every = relative_rows(system, symbols)
     kept, every = casadi.substitute([kept, every], [symbols], [q])

@@ -57,7 +57,7 @@ def signal_function(
     if isinstance(given, SX):
         values, by_name = given, False
     else:
-        values, by_name = _traced(system, signal, given, (t, q, v))
+        values, by_name = _trace(system, signal, given, (t, q, v))
     size = len(signal.elements)
     if values.numel() != size:
         raise ModelError(
@@ -76,7 +76,7 @@ def signal_function(
     return result
 
 
-def _traced(
+def _trace(
     system: System, signal: LawArgument, function: Callable[..., Any], point: tuple[SX, SX, SX]
 ) -> tuple[SX, bool]:
     """The values as an expression of t, q and v, and whether they were given by name."""
@@ -221,8 +221,8 @@ class Prescribed:
 
     Attributes:
         name: of the velocity.
-        velocity: its number in v.
-        position: number in q where the position is prescribed, None where it is free.
+        velocity: its index in v.
+        position: index in q where the position is prescribed, None where it is free.
         holds_speed: whether the velocity is prescribed; an acceleration alone leaves it free.
         time: symbol of the time in the laws [s].
         laws: position, velocity and acceleration as functions of it; what is free is zero.

@@ -105,7 +105,7 @@ def projected(
         loops = independent_closure(system, symbols)
         measures = constraint_sizes(system)[kept_rows(system)]
         J = independent_constraint_rows(system, symbols)
-    distance, place_off, still, slide_off = _touched(system, symbols, v, touch)
+    distance, place_off, still, slide_off = _touch(system, symbols, v, touch)
     r = casadi.vertcat(loops, norms, *places, distance)
     J_q = casadi.jacobian(r, symbols)
     held = [(m.velocity, law[1]) for m, law in zip(motions, laws, strict=True) if m.holds_speed]
@@ -128,22 +128,22 @@ def projected(
     return q - values[0], v - values[1], values[2]
 
 
-def _touched(
+def _touch(
     system: System, q: SX, v: SX, touch: tuple[Contacts, Modes] | None
 ) -> tuple[SX, SX, SX, SX]:
-    """Rows of positions at stops, then of velocities that are held; each with its `_switched`."""
+    """Rows of positions at stops, then of velocities that are held; each with its `_switch`."""
     if touch is None:
         return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
     contacts, modes = touch
     return (
         contacts.distance(q, modes.place),
-        _switched(modes.place**2),
+        _switch(modes.place**2),
         modes.held * contacts.velocity(v),
-        _switched(modes.held),
+        _switch(modes.held),
     )
 
 
-def _switched(acting: SX) -> SX:
+def _switch(acting: SX) -> SX:
     """What stands in for the squares of rows that vanish when they do not act."""
     return casadi.if_else(acting, _SHARED, 1)
 
@@ -279,7 +279,7 @@ def passage(
 
 
 def _position(system: System, number: int) -> int:
-    """The number in q of a velocity of a joint with one degree of freedom."""
+    """The index in q of a velocity of a joint with one degree of freedom."""
     link = next(link for link in system.tree.links if link.v.start <= number < link.v.stop)
     return int(link.q.start + number - link.v.start)
 
@@ -322,7 +322,7 @@ class TreeState:
         states: numbers in X of the states x.
         dependents: numbers in X of the dependents z.
         passive: numbers in X of the velocities of the dependent joints.
-        held: numbers in v of the independent velocities.
+        held: indices in v of the independent velocities.
         units: (nv,) typical velocities, of one size for all joints.
     """
 

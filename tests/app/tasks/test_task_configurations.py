@@ -154,5 +154,5 @@ def test_what_is_no_pose_or_no_name_is_refused(rx90):
         configurations(rx90, T, "tip")
     with pytest.raises(ModelError, match="has length 2"):
         configurations(rx90, T @ np.diag([2.0, 1, 1, 1]))
-    with pytest.raises(ModelError, match="three places and three angles"):
+    with pytest.raises(ModelError, match="three coordinates and three angles"):
         pose_from((1, 2), (0, 0, 0))

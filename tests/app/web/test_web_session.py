@@ -103,7 +103,7 @@ def test_a_large_move_stays_on_its_branch():
 def test_what_cannot_be_reached_is_told_with_the_end_of_the_branch():
     system = Document.of_name("stewart_platform").system()
     with pytest.raises(Unclosable, match=r"cannot be closed with leg1 = 9; .* ends near 0\.3"):
-        moved(system, system.configuration, handles(system)[0].place, 9.0)
+        moved(system, system.configuration, handles(system)[0].index, 9.0)
 
 
 def test_assembly_modes_are_listed_or_a_sentence_says_why_not():

@@ -137,4 +137,4 @@ def test_a_length_that_is_zero_by_default_stays_in_the_equations():
     p = np.array([0.05])
     W = sampled_regressor(system, columns, random_states(system, p, 40, 5), p)
     B = Function("B", [base.symbols, system.p], [jacobian(base.grouping, base.symbols)])(0, p)
-    assert np.abs(W - W[:, base.places] @ np.array(B)).max() < 1e-9 * np.abs(W).max()
+    assert np.abs(W - W[:, base.indices] @ np.array(B)).max() < 1e-9 * np.abs(W).max()

@@ -62,7 +62,7 @@ def test_function_and_matrix_agree_with_the_equations(symbolic):
     names = [column.name for column in base.columns]
     expected = K[names.index("MX2")] + 0.225 * sum(K[names.index(f"M{j}")] for j in (3, 4, 5, 6))
     assert (base.matrix @ K)[row] == pytest.approx(expected, abs=1e-14)
-    assert base.matrix[:, base.places] == pytest.approx(np.eye(base.count), abs=0)
+    assert base.matrix[:, base.indices] == pytest.approx(np.eye(base.count), abs=0)
 
 
 def test_models_of_the_system_in_base_parameters(symbolic):

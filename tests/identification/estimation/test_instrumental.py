@@ -7,7 +7,7 @@ from support.measured_arm import equations, mbs_values, motion, noisy_samples
 import mbs
 from mbs.errors import ModelError
 from mbs.identification.bodies import consistent
-from mbs.identification.leading import active_places, positions
+from mbs.identification.leading import active_indices, positions
 from mbs.identification.least_squares import instrumental, least_squares, simulated_motion
 from mbs.identification.observations import observe
 from mbs.identification.record import Samples
@@ -67,7 +67,7 @@ def test_a_closed_robot_is_simulated_in_its_independent_joints():
     D = regressor(system)
     K = numbers_of(system, D.columns)
     time = np.arange(400) / 200
-    middle = np.array([system.configuration[k] for k in active_places(system)])
+    middle = np.array([system.configuration[k] for k in active_indices(system)])
     wave, w = np.array([0.2, -0.15]), 4.0
     s, c = np.sin(w * time)[:, None] * wave, np.cos(w * time)[:, None] * wave
     q, v, a = middle + s, w * c, -w * w * s

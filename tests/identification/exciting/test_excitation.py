@@ -14,7 +14,7 @@ from mbs.errors import ModelError, NoClosedForm, SolverError
 from mbs.identification import regressor
 from mbs.identification.base_parameters import base_parameters
 from mbs.identification.exciting import Plane, Series, Trajectory, excitation
-from mbs.identification.leading import active_places
+from mbs.identification.leading import active_indices
 from mbs.identification.trajectory import Margin, MotionLimit, limits_of
 from mbs.loops.closing import Closing
 
@@ -260,7 +260,7 @@ def test_passive_joints_of_closed_robots_keep_their_limits(
 ) -> None:
     system, (joint, low, high) = system_of(name), passive
     coordinates = [c.name for c in system.coordinates]
-    places = active_places(system)
+    places = active_indices(system)
     ranges = {
         coordinates[k]: (system.configuration[k] - half, system.configuration[k] + half)
         for k in places

@@ -95,7 +95,7 @@ def test_coupling_is_a_pair_of_joints():
     ("pair", "message"),
     [
         (("q6", "q7"), "puma560: the coupling names 'q7', which is no joint"),
-        (("q6", "q6"), "name two joints that both turn or both slide"),
+        (("q6", "q6"), "name two joints that are both revolute or both prismatic"),
         (("q6",), "does not name two joints"),
         (("q6", 0), "the coupling names 0"),
     ],

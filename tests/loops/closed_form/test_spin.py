@@ -104,5 +104,5 @@ def test_a_ball_that_turns_freely_is_refused():
     m.connect(bar.at(0.5, 0.3), Revolute("r"), crank)
     m.connect(crank.at(0.5), Revolute("k"), arm)
     m.connect(arm.at(0.5), Revolute("x"), bar.at(0.3, 0.1))
-    with pytest.raises(NoClosedForm, match="the quaternion of s turns freely"):
+    with pytest.raises(NoClosedForm, match="the quaternion of s rotates freely"):
         modes(m.assemble(guess={"r": 0.5, "k": 1.0}))

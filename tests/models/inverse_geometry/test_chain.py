@@ -18,7 +18,7 @@ def test_it_is_kept_on_the_system(puma):
     way = frame_chain(puma, locked={"q6": 0.3, "q4": 0.1})
     assert frame_chain(puma, 6, {"q4": 0.1, "q6": 0.3}) is way
     assert frame_chain(puma, 6, {"q4": 0.1, "q6": 0.4}) is not way
-    assert (way.names, way.places) == (("q1", "q2", "q3", "q5"), (0, 1, 2, 4))
+    assert (way.names, way.indices) == (("q1", "q2", "q3", "q5"), (0, 1, 2, 4))
     assert way.locked == {"q4": 0.1, "q6": 0.3}
     p = np.zeros(0)
     assert way.arm(p) is way.arm(p)
@@ -28,7 +28,7 @@ def test_locked_joints_stand_in_its_ways(puma):
     q = np.array([0.3, -0.8, 0.4, 0.2, 0.6, 0.1])
     way = frame_chain(puma, locked={"q2": q[1], "q6": q[5]})
     expected = np.array(mbs.models.direct_geometry(puma)(q))
-    assert way.arm(np.zeros(0)).pose(q[list(way.places)]) == pytest.approx(expected, abs=1e-14)
+    assert way.arm(np.zeros(0)).pose(q[list(way.indices)]) == pytest.approx(expected, abs=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from mbs.loops.modes import closed_configurations
 from mbs.loops.plan import complete
 from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.search import search
-from mbs.models.inverse_geometry.whole_robot import close, posed, why_searched
+from mbs.models.inverse_geometry.whole_robot import close, configurations_at, why_searched
 
 NONE = np.zeros(0)
 FRAMES = {"sr400": 6, "akr3000": 10, "five_bar": "tool", "differential_wrist": "tool"}
@@ -27,7 +27,7 @@ def systems():
 def drawn(system, away, seed):
     """A closed configuration whose independent joints stand elsewhere."""
     rng = np.random.default_rng(seed)
-    held = complete(system, ()).held
+    held = complete(system, ()).undetermined
     q = np.array(system.configuration)
     q[list(held)] += rng.uniform(-away, away, len(held))
     closed = Closing(system, NONE, held).nearest(q)
@@ -100,14 +100,14 @@ def test_delta_has_eight_configurations(systems, seed):
     system = systems["delta"]
     q = drawn(system, 0.3, seed)
     T = pose(system, "tool", q)
-    found = posed(system, "tool", T, NONE)
+    found = configurations_at(system, "tool", T, NONE)
     assert_solved(system, "tool", T, found)
     assert why_searched(system, "tool") is None
     assert len(found) == len(mbs.loops.working_modes(system, "tool", T, tries=100)) == 8
     assert len({configuration.label for configuration in found}) == 8
     assert any(same(system, configuration.q, q, 1e-7) for configuration in found)
     T[:3, :3] = T[:3, :3] @ np.diag([-1, -1, 1])
-    assert posed(system, "tool", T, NONE) == []
+    assert configurations_at(system, "tool", T, NONE) == []
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -123,7 +123,7 @@ def test_an_arm_with_a_ball_for_a_wrist(seed):
     q = np.random.default_rng(seed).uniform(-1.2, 1.2, system.nq)
     q[3:] /= np.linalg.norm(q[3:])
     T = pose(system, "tool", q)
-    found = posed(system, "tool", T, NONE)
+    found = configurations_at(system, "tool", T, NONE)
     assert_solved(system, "tool", T, found)
     modes = mbs.loops.working_modes(system, "tool", T, tries=100)
     assert len(found) == len(modes)
@@ -135,7 +135,7 @@ def test_stewart_platform_has_four_ways_for_every_leg(systems):
     system = systems["stewart_platform"]
     q = drawn(system, 0.05, 1)
     T = pose(system, "centre", q)
-    found = posed(system, "centre", T, NONE, q)
+    found = configurations_at(system, "centre", T, NONE, q)
     assert len(found) == 4**6
     assert same(system, found[0].q, q, 1e-9)
     assert max(configuration.residual for configuration in found) < 1e-12
@@ -197,7 +197,7 @@ def test_chain_joints_that_depend_on_each_other():
     way = frame_chain(system, frame)
     found = solutions(system, frame, pose(system, frame, q))
     assert [same(system, configuration.q, q, 1e-8) for configuration in found] == [True]
-    assert close(system, way, q[list(way.places)] + 0.1, NONE) == []
+    assert close(system, way, q[list(way.indices)] + 0.1, NONE) == []
 
 
 @pytest.mark.parametrize(("closing", "seed"), [("spherical", 1), ("spherical", 2), ("revolute", 1)])
@@ -213,8 +213,8 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
     reason = why_searched(system, way)
     if reason is not None:
         assert "no closed form known here" in reason
-    held = complete(system, way.places).held
-    rest = close(system, way, q[list(way.places)], NONE, q)
+    held = complete(system, way.indices).undetermined
+    rest = close(system, way, q[list(way.indices)], NONE, q)
     assert any(same(system, configuration.q, q, 1e-6) for configuration in rest)
     for configuration in rest:
         np.testing.assert_allclose(configuration.q[list(held)], q[list(held)], atol=1e-12)
@@ -223,7 +223,7 @@ def test_spatial_loops_without_closed_form_are_searched(seed, closing):
 def test_search_with_positions_held_finds_what_closed_forms_find(systems):
     system = systems["akr3000"]
     q = drawn(system, 0.03, 3)
-    places = frame_chain(system, 10).places
+    places = frame_chain(system, 10).indices
     found = closed_configurations(Closing(system, NONE, places), q)
     exact = close(system, frame_chain(system, 10), q[list(places)], NONE)
     assert len(found) == len(exact) == 4

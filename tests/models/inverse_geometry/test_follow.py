@@ -154,7 +154,7 @@ def test_chains_of_fewer_than_six_joints(robot, frame):
     own = frame_chain(system, frame)
     start = np.linspace(0.3, 0.6, system.nq)
     end = start.copy()
-    end[list(own.places)] += np.linspace(0.5, -0.4, len(own.places))
+    end[list(own.indices)] += np.linspace(0.5, -0.4, len(own.indices))
     path = line(start, end, 9)
     T = poses(system, own.frame, path)
     found = follow(system, T, start, frame, limits=False)

@@ -71,7 +71,7 @@ def test_names_and_branches():
     assert isinstance(igm, InverseGeometry)
     assert (igm.name(), igm.name_in(), igm.name_out()) == ("igm", ["T", "branch"], ["q", "valid"])
     assert igm.branches == 8 == len(set(igm.labels))
-    assert sorted(place for one in igm.steps for place in one.places) == list(range(6))
+    assert sorted(place for one in igm.steps for place in one.indices) == list(range(6))
     assert function(igm.system, "pieper") is igm
     assert [name for name, _ in igm.elements("q")] == ["q1", "q2", "q3", "q4", "q5", "q6"]
 
@@ -82,7 +82,7 @@ def test_label_says_which_sign_each_branch_takes():
     igm = function(system, "pieper")
     _, T = state(system, 4)
     q = [np.array(igm(T, b)[0]).ravel() for b in range(8)]
-    order = [one.places[0] for one in igm.steps]
+    order = [one.indices[0] for one in igm.steps]
     for b, label in enumerate(igm.labels):
         for other, theirs in enumerate(igm.labels):
             differ = [x for x, y in zip(label.split(), theirs.split(), strict=True) if x != y]
@@ -214,7 +214,7 @@ def test_general_method_gives_the_characteristic_matrix():
     matrices = function(system, "general")
     assert matrices.name() == "igm_characteristic"
     assert matrices.name_out() == ["M0", "M1", "M2"]
-    assert not matrices.slides
+    assert not matrices.prismatic
     q, T = state(system, 10)
     place = [row.name for row in system.coordinates].index(matrices.joint)
     M0, M1, M2 = (np.array(M) for M in matrices(T))

@@ -75,17 +75,17 @@ def test_windings_are_bounded():
 def test_turns_are_towards_the_seed():
     found = bounds(system(), {f"q{k + 1}": None for k in range(6)})
     near = np.array([7.0, -7.0, 0.0, 20.0, 3.0, 0.0])
-    wound = found.wound(Q, near)
+    wound = found.wrap_to_limits(Q, near)
     assert np.max(np.abs(wound - near)) <= math.pi
     assert np.max(np.abs(np.sin(wound - Q))) < 1e-12
     narrow = bounds(system(), {"q1": (-1.0, 1.0), "q2": None, "q4": None, "q5": None})
-    assert narrow.wound(Q, near)[0] == Q[0]
+    assert narrow.wrap_to_limits(Q, near)[0] == Q[0]
 
 
 def test_a_joint_outside_stays_near_the_seed():
     found = bounds(system(), {"q1": (1.0, 2.0)})
     assert found.outside(Q) == ["q1"]
-    assert found.wound(Q, np.zeros(6))[0] == pytest.approx(Q[0])
+    assert found.wrap_to_limits(Q, np.zeros(6))[0] == pytest.approx(Q[0])
     assert len(found.windings(Q, np.zeros(6))) == 0
 
 

@@ -152,7 +152,7 @@ def test_refusals_name_the_joints_and_the_condition():
     with pytest.raises(NoClosedForm, match="singular in every configuration"):
         pieper(frame_chain(with_wrist("RRRRRR", 4, 3, four)).problem())
     coplanar = {1: {"alpha": H}, 2: {"alpha": 0.0}}
-    with pytest.raises(NoClosedForm, match="slide in one plane"):
+    with pytest.raises(NoClosedForm, match="move in one plane"):
         pieper(frame_chain(with_wrist("PPPRRR", 4, 3, coplanar)).problem())
     parallel = {4: {"alpha": 0.0}}
     with pytest.raises(NoClosedForm, match="axes stay parallel"):

@@ -7,7 +7,7 @@ from support.random_trees import random_rotation
 
 import mbs
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.chain import wanted_pose, wanted_poses
+from mbs.models.inverse_geometry.chain import target_pose, target_poses
 from mbs.spatial import Pose
 
 
@@ -41,12 +41,12 @@ def changed(row, column, value, T=None):
     ],
 )
 def test_forms_of_a_pose(system, form):
-    np.testing.assert_allclose(wanted_pose(system, form(pose())), pose(), atol=1e-15)
+    np.testing.assert_allclose(target_pose(system, form(pose())), pose(), atol=1e-15)
 
 
 def test_integers_are_numbers(system):
     T = [[0, -1, 0, 2], [1, 0, 0, 3], [0, 0, 1, 4], [0, 0, 0, 1]]
-    np.testing.assert_array_equal(wanted_pose(system, T), T)
+    np.testing.assert_array_equal(target_pose(system, T), T)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -56,7 +56,7 @@ def test_rounded_to_the_nearest_rotation(system, seed):
     T = pose(seed)
     T[:3, :3] += noise
     U, _, V = np.linalg.svd(T[:3, :3])
-    found = wanted_pose(system, T)
+    found = target_pose(system, T)
     np.testing.assert_allclose(found[:3, :3], U @ V, atol=1e-15)
     np.testing.assert_array_equal(found[:, 3], T[:, 3])
     assert np.abs(found - T).max() > 1e-8
@@ -90,7 +90,7 @@ SHEARED = np.array([[1, 0.3, 0, 0], [0, np.sqrt(0.91), 0, 0], [0, 0, 1, 0], [0, 
 )
 def test_refusals_name_the_row_or_axis(system, T, message):
     with pytest.raises(ModelError, match=message) as caught:
-        wanted_pose(system, T)
+        target_pose(system, T)
     assert str(caught.value).startswith("puma560: ")
     assert "\n" not in str(caught.value)
 
@@ -98,11 +98,11 @@ def test_refusals_name_the_row_or_axis(system, T, message):
 def test_many_poses_are_rounded_as_one(system):
     T = np.array([pose(seed) for seed in range(20)])
     T[:, :3, :3] += np.random.default_rng(1).uniform(-4e-7, 4e-7, (20, 3, 3))
-    alone = [wanted_pose(system, one) for one in T]
-    np.testing.assert_allclose(wanted_poses(system, T), alone, atol=1e-16)
-    np.testing.assert_array_equal(wanted_poses(system, list(T)), wanted_poses(system, T))
-    assert wanted_poses(system, np.zeros((0, 4, 4))).shape == (0, 4, 4)
-    assert wanted_poses(system, []).shape == (0, 4, 4)
+    alone = [target_pose(system, one) for one in T]
+    np.testing.assert_allclose(target_poses(system, T), alone, atol=1e-16)
+    np.testing.assert_array_equal(target_poses(system, list(T)), target_poses(system, T))
+    assert target_poses(system, np.zeros((0, 4, 4))).shape == (0, 4, 4)
+    assert target_poses(system, []).shape == (0, 4, 4)
 
 
 @pytest.mark.parametrize(
@@ -119,4 +119,4 @@ def test_many_poses_are_rounded_as_one(system):
 )
 def test_refusals_of_many_name_the_first_bad_pose(system, T, message):
     with pytest.raises(ModelError, match=message):
-        wanted_poses(system, T)
+        target_poses(system, T)

@@ -35,7 +35,7 @@ def conditions(arm, found, given, shift, p=()):
     result = []
     for configuration in configurations(arm, np.random.default_rng(11), 12):
         T = arm.pose(configuration)[:3].ravel(order="F")
-        M = np.array(DM(function(configuration[found.place] + shift, np.concatenate([p, T]))))
+        M = np.array(DM(function(configuration[found.index] + shift, np.concatenate([p, T]))))
         s = np.linalg.svd(M, compute_uv=False)
         result.append(s[-1] / s[0])
     return np.array(result)
@@ -47,10 +47,10 @@ def test_characteristic_matrix_is_singular_at_configurations(name):
     own = frame_chain(system)
     problem, arm = own.problem(np.zeros(0)), arm_of(system)
     found = characteristic(problem)
-    assert own.names[found.place] == found.joint
-    assert found.slides == own.prismatic[found.place]
+    assert own.names[found.index] == found.joint
+    assert found.prismatic == own.prismatic[found.index]
     assert np.max(conditions(arm, found, problem.given, 0.0)) < 1e-12
-    shift = 0.4 * (arm.length if found.slides else 1)
+    shift = 0.4 * (arm.length if found.prismatic else 1)
     assert np.median(conditions(arm, found, problem.given, shift)) > 1e-6
 
 

@@ -233,19 +233,19 @@ class Document:
 
     def with_frame(self) -> Document:
         """One more frame at the end."""
-        return self._edited(document_rows.with_frame)
+        return self._edit(document_rows.with_frame)
 
     def without_frame(self, row: int) -> Document:
         """Frame row + 1 taken out; numbers of the others follow."""
-        return self._edited(lambda tables: document_rows.without_frame(tables, row))
+        return self._edit(lambda tables: document_rows.without_frame(tables, row))
 
     def with_loop(self) -> Document:
         """One more loop."""
-        return self._edited(document_rows.with_loop)
+        return self._edit(document_rows.with_loop)
 
     def without_loop(self, row: int) -> Document:
         """Loop row + 1 taken out."""
-        return self._edited(lambda tables: document_rows.without_loop(tables, row))
+        return self._edit(lambda tables: document_rows.without_loop(tables, row))
 
     @property
     def problems(self) -> tuple[CellProblem, ...]:
@@ -311,7 +311,7 @@ class Document:
         Raises:
             DescriptionError: as in `table`.
         """
-        return self._written(write_toml, "robot.toml")
+        return self._write(write_toml, "robot.toml")
 
     def par(self) -> str:
         """The text of a .par file of the table.
@@ -319,14 +319,14 @@ class Document:
         Raises:
             DescriptionError: as in `table`, or the format cannot say it.
         """
-        return self._written(write_par, "robot.par")
+        return self._write(write_par, "robot.par")
 
-    def _edited(self, edit: Callable[[Tables], Tables]) -> Document:
+    def _edit(self, edit: Callable[[Tables], Tables]) -> Document:
         if self.origin is not None:
             raise DescriptionError(f"rows cannot be changed: {self.origin.reason}")
         return replace(self, tables=edit(self.tables))
 
-    def _written(self, write: Callable[[RobotTable, Path], None], name: str) -> str:
+    def _write(self, write: Callable[[RobotTable, Path], None], name: str) -> str:
         table = self.table()
         with tempfile.TemporaryDirectory(prefix="mbs-app-") as folder:
             path = Path(folder) / name

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import cast
+from typing import Any
 
 from nicegui import ui
 
 from mbs.app.tasks.base import BaseTable, base
-from mbs.app.tasks.equations import entry
 from mbs.app.web.app import App
-from mbs.app.web.panels.equations import open_equations
-from mbs.app.web.panels.form import Given, OptionForm
-from mbs.app.web.panels.layout import (
-    Asking,
-    in_a_row,
-    main_button,
-    side_button,
-    tell_of_changes,
-    two_sides,
-    waiting_note,
-)
+from mbs.app.web.panels.one_answer import PanelTexts, open_one_answer
 from mbs.app.web.panels.text_view import column, plain_table, text_buttons
 
 KEY = "base-parameters"
 
+_TEXTS = PanelTexts(
+    button="Find",
+    waiting="The table appears here.",
+    label="Finding base parameters",
+    equations="As text",
+    explanation="In words, or in a language",
+)
 _BASE_COLUMNS = (
     ("name", "parameter", "left"),
     ("unit", "unit", "left"),
@@ -39,31 +34,11 @@ async def open_base(app: App) -> None:
     Args:
         app: of the page.
     """
-    one = entry(KEY)
-    given = cast(Given, app.session.notes.setdefault(f"options {KEY}", {}))
-    if app.checked_system() is None:
-        return
-    with app.open(one.title, key=KEY):
-        left, shown = two_sides("240px")
-    with left:
-        form = OptionForm(app, one, given)
-        with in_a_row():
-            button = main_button("Find")
-            side_button("As text", partial(open_equations, app, KEY), "In words, or in a language")
-    with shown:
-        waiting_note("The table appears here.")
 
-    tell_of_changes(app, shown)
+    def arguments(options: dict[str, Any]) -> tuple[Any, ...]:
+        return options.pop("method", "symbolic"), options
 
-    async def find() -> None:
-        options = form.given
-        method = options.pop("method", "symbolic")
-        asking = Asking(app, button, shown, partial(_show, app))
-        await asking.run("Finding base parameters", base, method, options)
-
-    button.on_click(find)
-    await form.fill()
-    await find()
+    await open_one_answer(app, KEY, _TEXTS, base, arguments, show=_show, width="240px")
 
 
 def _show(app: App, made: BaseTable) -> None:

@@ -136,7 +136,7 @@ def _headline(made: ConfigurationList) -> str:
     told = f"{made.system}, frame {made.frame}: {count} configuration{'s' if count > 1 else ''}"
     told += f" by {made.method}"
     if made.locked:
-        told += "; held: " + ", ".join(f"{name} = {x:.4g}" for name, x in made.locked)
+        told += "; locked: " + ", ".join(f"{name} = {x:.4g}" for name, x in made.locked)
     return told + (f"; {outside} outside of limits" if outside else "")
 
 
@@ -146,7 +146,7 @@ def _nothing(app: App, made: ConfigurationList) -> None:
     if near is None:
         return
     angle = round(near.angle * _DEGREES, 6)
-    away = f"{round(near.distance, 9):.4g} m away and turned by {angle:.4g} degrees"
+    away = f"{round(near.distance, 9):.4g} m away and rotated by {angle:.4g} degrees"
     with in_a_row():
         show = ui.button(
             "Show the nearest configuration", on_click=lambda: app.set_configuration(near.q)

@@ -116,13 +116,13 @@ class _EquationsPanel:
         try:
             while self._again and not self._shown.is_deleted:
                 self._again = False
-                await self._written()
+                await self._write()
         finally:
             self._busy = False
             if not self._button.is_deleted:
                 self._button.enable()
 
-    async def _written(self) -> None:
+    async def _write(self) -> None:
         one, app = self._entry, self._app
         passes = (passes_of(app.session) or EVERY_PASS) if self._optimizer.value else ()
         args = (one.key, self._form.given, self._language.value, passes)
@@ -150,11 +150,11 @@ def _show_counts(made: WrittenEquations) -> None:
 
 
 def _about(made: WrittenEquations) -> str:
-    chosen = ", ".join(f"{name} {_said(value)}" for name, value in made.choices)
+    chosen = ", ".join(f"{name} {_say(value)}" for name, value in made.choices)
     ends = f"{', '.join(made.inputs)} -> {', '.join(made.outputs)}" if made.inputs else ""
     told = "; ".join(part for part in (ends, chosen, f"{made.seconds:.2g} s") if part)
     return f"{made.system}: {told}"
 
 
-def _said(value: object) -> str:
+def _say(value: object) -> str:
     return "(" + " ".join(map(str, value)) + ")" if isinstance(value, tuple) else str(value)

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import cast
+from typing import Any
 
 from nicegui import ui
 
-from mbs.app.tasks.equations import entry
 from mbs.app.tasks.singular import DeterminantFactor, Singular, singular
 from mbs.app.web.app import App
-from mbs.app.web.panels.equations import open_equations
-from mbs.app.web.panels.form import Given, OptionForm
-from mbs.app.web.panels.layout import (
-    Asking,
-    in_a_row,
-    main_button,
-    side_button,
-    tell_of_changes,
-    two_sides,
-    waiting_note,
-)
+from mbs.app.web.panels.layout import in_a_row
+from mbs.app.web.panels.one_answer import PanelTexts, open_one_answer
 from mbs.app.web.panels.text_view import text_view
 
 KEY = "determinant"
+
+_TITLE = "Determinant and singular configurations"
+_TEXTS = PanelTexts(
+    button="Factor",
+    waiting="The factors appear here.",
+    label="Factoring the determinant",
+    equations="Equations",
+    explanation="The determinant as a function, in any language",
+)
 
 
 async def open_singular(app: App) -> None:
@@ -32,30 +31,13 @@ async def open_singular(app: App) -> None:
     Args:
         app: of the page.
     """
-    one = entry(KEY)
-    given = cast(Given, app.session.notes.setdefault(f"options {KEY}", {}))
-    if app.checked_system() is None:
-        return
-    with app.open("Determinant and singular configurations", key=KEY):
-        left, shown = two_sides()
-    with left:
-        form = OptionForm(app, one, given)
-        with in_a_row():
-            button = main_button("DeterminantFactor")
-            act = partial(open_equations, app, KEY, "c")
-            side_button("Equations", act, "The determinant as a function, in any language")
-    with shown:
-        waiting_note("The factors appear here.")
 
-    tell_of_changes(app, shown)
+    def arguments(options: dict[str, Any]) -> tuple[Any, ...]:
+        return options, app.q
 
-    async def factor() -> None:
-        asking = Asking(app, button, shown, partial(_show, app))
-        await asking.run("Factoring the determinant", singular, form.given, app.q)
-
-    button.on_click(factor)
-    await form.fill()
-    await factor()
+    await open_one_answer(
+        app, KEY, _TEXTS, singular, arguments, show=_show, title=_TITLE, language="c"
+    )
 
 
 def _show(app: App, made: Singular) -> None:

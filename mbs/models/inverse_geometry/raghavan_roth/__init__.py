@@ -2,7 +2,7 @@
 
 Once for each arm, `prepare`:
 
-1. `arrangement`: the wanted pose closes the arm to a loop Z_1 C_1 .. Z_6 C_6 = 1, which may begin
+1. `arrangement`: the target pose closes the arm to a loop Z_1 C_1 .. Z_6 C_6 = 1, which may begin
    at any joint whose predecessor turns, and run either way.
 2. `elimination`: which equations, and whether x4 or x5 multiplies them.
 3. `pencil`: the choice whose matrix is farthest from singular is kept; it depends on the arm alone.

@@ -1,0 +1,83 @@
+"""Centres of rotation in a loop: what lies beyond one only sees a point, whatever its joints do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from casadi import SX
+
+from mbs.closed_forms.ring import always_zero, axes_meet, meeting_point
+from mbs.components.joints import Motion
+from mbs.recursions.chain import ChainJoint, Gap, Ring
+from mbs.spatial import Pose, vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Centre:
+    """Consecutive unknown joints that leave one point where it is, the centre of their rotations.
+
+    Attributes:
+        first: number of the first of them in the loop.
+        count: how many: one spherical joint, or two or three revolute ones.
+        before: (3, 1) the point in the frame before the first one.
+        after: (3, 1) the point in the frame after the last one.
+    """
+
+    first: int
+    count: int
+    before: SX
+    after: SX
+
+    def joints(self, size: int) -> list[int]:
+        """Its joints in a loop of so many joints."""
+        return [(self.first + k) % size for k in range(self.count)]
+
+
+def centres(ring: Ring, q: SX, p: SX) -> list[Centre]:
+    """Of spherical joints, and of two or three revolute neighbours whose axes meet in a point."""
+    found = list[Centre]()
+    for k, joint in enumerate(ring.joints):
+        if joint.motion is Motion.SPHERICAL:
+            found.append(Centre(k, 1, vector([0, 0, 0]), vector([0, 0, 0])))
+        elif are_revolute(ring, k, 2) and axes_meet(gap_pose(ring, k + 1), q, p):
+            first, second = meeting_point(gap_pose(ring, k + 1))
+            found.append(Centre(k, 2, vector([0, 0, first]), vector([0, 0, second])))
+            if are_revolute(ring, k, 3):
+                seen = gap_pose(ring, k + 2).inverse()
+                third = seen.p + seen.R @ vector([0, 0, second])
+                if always_zero(third[0:2], q, p):
+                    found.append(Centre(k, 3, vector([0, 0, first]), vector([0, 0, third[2]])))
+    return found
+
+
+def with_spherical(ring: Ring, q: SX, p: SX) -> Ring:
+    """The loop with a spherical joint for every three revolute ones whose axes meet in a point."""
+    for centre in centres(ring, q, p):
+        if centre.count == 3 and len(ring.joints) > 3:
+            return with_spherical(merge_centre(ring, centre), q, p)
+    return ring
+
+
+def merge_centre(ring: Ring, centre: Centre) -> Ring:
+    """The loop begun at a centre, which is one spherical joint."""
+    begun = ring.rotated(centre.first)
+    joints, gaps = begun.joints[centre.count :], begun.gaps[centre.count :]
+    name = ", ".join(joint.name for joint in begun.joints[: centre.count])
+    spherical = ChainJoint(name, Motion.SPHERICAL, None, 1)
+    first = begun.gaps[0].then(Pose.translation(centre.before))
+    leave = Gap(Pose.translation(-centre.after))
+    if not joints:
+        return Ring((spherical,), (first.after(leave),))
+    return Ring((spherical, *joints), (first, gaps[0].after(leave), *gaps[1:]))
+
+
+def gap_pose(ring: Ring, k: int) -> Pose:
+    """The known transform before joint k, counted around the loop."""
+    return ring.gaps[k % len(ring.gaps)].pose
+
+
+def are_revolute(ring: Ring, first: int, count: int) -> bool:
+    """Whether so many different neighbours are revolute."""
+    n = len(ring.joints)
+    among = [ring.joints[(first + k) % n] for k in range(count)]
+    return count <= n and all(joint.motion is Motion.REVOLUTE for joint in among)

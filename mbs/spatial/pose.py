@@ -10,7 +10,7 @@ import casadi
 from casadi import DM, SX
 
 from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, axis_turn
-from mbs.spatial.vectors import cross, elements, exact_product, is_zero, zeros
+from mbs.spatial.vectors import cross, elements, exact_product, formula, is_zero, zeros
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +84,7 @@ class Pose:
     @property
     def matrix(self) -> SX:
         """(4, 4) homogeneous transform."""
-        return casadi.vertcat(
-            casadi.horzcat(self.R, self.p), casadi.horzcat(SX(DM([[0, 0, 0]])), SX(1))
-        )
+        return _homogeneous(self.R, self.p)
 
     def at(self, p: SX) -> Pose:
         """A frame with the same orientation and its origin at p, (3, 1)."""
@@ -96,6 +94,11 @@ class Pose:
     def is_identity(self) -> bool:
         """Whether it is the constant identity."""
         return bool(casadi.is_equal(self.matrix, casadi.densify(SX(DM.eye(4))), 1))
+
+
+@formula((3, 3), (3, 1))
+def _homogeneous(R: SX, p: SX) -> SX:
+    return casadi.vertcat(casadi.horzcat(R, p), casadi.horzcat(SX(DM([[0, 0, 0]])), SX(1)))
 
 
 def _joined(first: Pose, second: Pose) -> tuple[AxisTurn | Pose, ...]:
@@ -217,22 +220,32 @@ class Screw:
 
     def point(self, r: SX) -> SX:
         """A point of frame j, (3, 1), in frame i [m]."""
-        moved = SX(self.turn.apply(r))
-        moved[self.axis] += self.t
-        return moved
+        return _moved_point(self.turn.apply(r), self.t, self.axis)
 
     def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
-        f, m = self.turn.apply(f), SX(self.turn.apply(m))
-        if not self.t.is_zero():
-            k, h = self.turn.across
-            m[k] -= self.t * f[h]
-            m[h] += self.t * f[k]
-        return f, m
+        f, m = self.turn.apply(f), self.turn.apply(m)
+        return f, m if self.t.is_zero() else _moved_moment(f, m, self.t, *self.turn.across)
 
     def body(self, thing: Thing) -> Thing:
         """What is given about and in frame j, such as an inertia, about and in frame i."""
         return thing.turned(self.turn).slid(self.axis, self.t)
+
+
+@formula((3, 1), (1, 1))
+def _moved_point(r: SX, t: SX, axis: int) -> SX:
+    moved = SX(r)
+    moved[axis] += t
+    return moved
+
+
+@formula((3, 1), (3, 1), (1, 1))
+def _moved_moment(f: SX, m: SX, t: SX, k: int, h: int) -> SX:
+    """The moment about a point that is t [m] before along the axis that k and h are across."""
+    moved = SX(m)
+    moved[k] -= t * f[h]
+    moved[h] += t * f[k]
+    return moved
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ import gc
 import math
 import os
 import random
+import sys
 from collections import defaultdict
 
 from support.sweeps import EVERY_CASE
@@ -11,6 +12,10 @@ from support.sweeps import EVERY_CASE
 # Each worker of a run fills a core: threads of linear algebra would only wait for one another.
 # NumPy reads it when it is loaded, which is after this file.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Programs that tests start would compile every module of the package anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Where values are compared the compiler need not take its time; with every case it does.
 if not EVERY_CASE:

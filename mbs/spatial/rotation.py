@@ -224,6 +224,7 @@ def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -
 # Unit quaternions w, x, y, z for joints that turn freely.
 
 
+@formula((4, 1))
 def quaternion_rotation(quaternion: SX) -> SX:
     """(3, 3) orientation of the turned frame, of a unit quaternion (w, x, y, z).
 

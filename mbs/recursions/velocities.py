@@ -109,8 +109,10 @@ def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
         wd: (3, 1) angular acceleration.
         across: x^2 + y^2 of w where it is known; y^2 then needs no product.
     """
-    known = across is not None and not w[0].is_zero() and not w[1].is_zero()
-    U, *spread = _rotation_rate(w, wd, across if known else SX(0), known)
+    if across is None or w[0].is_zero() or w[1].is_zero():
+        U, *spread = _rotation_rate(w, wd, SX(0), False)
+    else:
+        U, *spread = _rotation_rate(w, wd, across, True)
     return RotationRate(U, (spread[0], spread[1], spread[2]))
 
 

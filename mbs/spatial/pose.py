@@ -12,6 +12,8 @@ from casadi import DM, SX
 from mbs.spatial.rotation import MatrixTurn, Rotation, Turn, axis_turn
 from mbs.spatial.vectors import cross, elements, exact_product, formula, is_zero, zeros
 
+_EYE = casadi.densify(SX(DM.eye(3)))
+
 
 @dataclass(frozen=True, slots=True)
 class AxisTurn:
@@ -41,7 +43,7 @@ class Pose:
     @staticmethod
     def identity() -> Pose:
         """The frame itself."""
-        return Pose(casadi.densify(SX(DM.eye(3))), zeros())
+        return Pose(SX(_EYE), zeros())
 
     @staticmethod
     def turned(R: SX) -> Pose:
@@ -67,6 +69,9 @@ class Pose:
     def __matmul__(self, other: Pose) -> Pose:
         """T_ik from T_ij and T_jk."""
         chain = _joined(self, other) if self.chain or other.chain else ()
+        for one, rest in ((self, other), (other, self)):
+            if one.is_identity():
+                return Pose(_with_lone_ones(_own(rest.R)), _own(rest.p), chain)
         return Pose(
             _with_lone_ones(exact_product(self.R, other.R)),
             exact_product(self.R, other.p, self.p),
@@ -77,7 +82,7 @@ class Pose:
         """T_ji from T_ij."""
         return Pose(
             self.R.T,
-            exact_product(-self.R.T, self.p),
+            zeros() if self.p.is_zero() else exact_product(-self.R.T, self.p),
             tuple(_inverse(step) for step in reversed(self.chain)),
         )
 
@@ -93,7 +98,12 @@ class Pose:
 
     def is_identity(self) -> bool:
         """Whether it is the constant identity."""
-        return bool(casadi.is_equal(self.matrix, casadi.densify(SX(DM.eye(4))), 1))
+        return self.p.is_zero() and SX.binary(casadi.OP_SUB, self.R, _EYE).is_zero()
+
+
+def _own(value: SX) -> SX:
+    """A dense copy, to be changed."""
+    return SX(value) if value.is_dense() else casadi.densify(value)
 
 
 @formula((3, 3), (3, 1))

@@ -14,7 +14,7 @@ from typing import Protocol
 import casadi
 from casadi import DM, SX
 
-from mbs.spatial.vectors import formula, sin_cos, skew
+from mbs.spatial.vectors import formula, product_with_vector, sin_cos, skew
 
 Rows = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 """A (3, 3) matrix of numbers, row by row."""
@@ -76,10 +76,7 @@ class Turn:
     @property
     def matrix(self) -> SX:
         """(3, 3) orientation of the turned frame."""
-        k, h = self.across
-        R = SX(DM.eye(3))
-        R[k, k], R[k, h], R[h, k], R[h, h] = self.c, -self.s, self.s, self.c
-        return casadi.densify(R)
+        return _turn_matrix(self.s, self.c, self.axis)
 
     def apply(self, vector: SX) -> SX:
         """The vector of the turned frame in the fixed one."""
@@ -107,6 +104,14 @@ def _across(axis: str) -> tuple[int, int]:
     """Numbers of the axes that turn, the first towards the second."""
     along = _AXES.index(axis)
     return (along + 1) % 3, (along + 2) % 3
+
+
+@formula((1, 1), (1, 1))
+def _turn_matrix(s: SX, c: SX, axis: str) -> SX:
+    k, h = _across(axis)
+    R = SX(DM.eye(3))
+    R[k, k], R[k, h], R[h, k], R[h, h] = c, -s, s, c
+    return casadi.densify(R)
 
 
 @formula((3, 1), (1, 1), (1, 1))
@@ -151,11 +156,11 @@ class MatrixTurn:
 
     def apply(self, vector: SX) -> SX:
         """The vector of the turned frame in the fixed one."""
-        return casadi.mtimes(self.matrix, vector)
+        return product_with_vector(self.matrix, vector)
 
     def apply_inverse(self, vector: SX) -> SX:
         """The vector of the fixed frame in the turned one."""
-        return casadi.mtimes(self.matrix.T, vector)
+        return product_with_vector(self.matrix.T, vector)
 
     def apply_to_tensor(self, tensor: SX) -> SX:
         """The symmetric tensor of the turned frame in the fixed one."""
@@ -163,7 +168,12 @@ class MatrixTurn:
 
     def apply_to_square(self, square: SX) -> SX:
         """Any tensor of the turned frame in the fixed one."""
-        return casadi.mtimes(casadi.mtimes(self.matrix, square), self.matrix.T)
+        return _turned_by_matrix(square, self.matrix)
+
+
+@formula((3, 3), (3, 3))
+def _turned_by_matrix(square: SX, R: SX) -> SX:
+    return casadi.mtimes(casadi.mtimes(R, square), R.T)
 
 
 def axis_turn(axis: str, angle: SX) -> Turn:

@@ -108,7 +108,8 @@ def _product(A: SX, B: SX) -> SX:
 
 
 @formula((3, 3), (3, 1))
-def _product_with_vector(A: SX, b: SX) -> SX:
+def product_with_vector(A: SX, b: SX) -> SX:
+    """A b, (3, 1)."""
     return casadi.mtimes(A, b)
 
 
@@ -128,7 +129,7 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
     if C is not None:
         dense = _sum_with_product(A, B, C)
     else:
-        dense = _product(A, B) if B.is_square() else _product_with_vector(A, B)
+        dense = _product(A, B) if B.is_square() else product_with_vector(A, B)
     if dense.is_constant() and not any(0 < abs(x) < _SMALL for x in DM(dense).nonzeros()):
         return dense
     largest = _largest_number(B) if C is None else max(_largest_number(B), _largest_number(C))

@@ -88,6 +88,7 @@ SOLVED = {
 }
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", SOLVED)
 def test_leaves_hold_every_configuration(name):
     system, steps, at = solved(name)

@@ -6,5 +6,5 @@ EVERY_CASE = os.environ.get("MBS_TEST_ALL") == "1"
 
 
 def examples(number: int) -> int:
-    """How many examples hypothesis draws: all of them, or a fifth and three at least."""
-    return number if EVERY_CASE else max(3, number // 5)
+    """How many examples hypothesis draws: all of them, or a tenth and three at least."""
+    return number if EVERY_CASE else max(3, number // 10)

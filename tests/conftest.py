@@ -1,13 +1,10 @@
 """Settings of every run of the tests."""
 
 import gc
-import math
 import os
-import random
 import sys
-from collections import defaultdict
 
-from support.sweeps import EVERY_CASE
+from support.sweeps import EVERY_CASE, left_out
 
 # Each worker of a run fills a core: threads of linear algebra would only wait for one another.
 # NumPy reads it when it is loaded, which is after this file.
@@ -43,22 +40,7 @@ def pytest_collection_modifyitems(config, items):
     """Of each sweep a tenth, three at least; of a rule tried with several seeds one."""
     if EVERY_CASE:
         return
-    sweeps, seeds = defaultdict(list), defaultdict(list)
-    for item in items:
-        name = item.nodeid.partition("[")[0]
-        given = item.callspec.params if hasattr(item, "callspec") else {}
-        if item.get_closest_marker("sweep"):
-            sweeps[name].append(item)
-        elif "seed" in given:
-            # the cases of one rule hold the same objects but for the seed
-            others = (id(value) for key, value in sorted(given.items()) if key != "seed")
-            seeds[name, *others].append(item)
-    left = set()
-    for groups, least, part in ((sweeps, 3, 10), (seeds, 1, math.inf)):
-        for cases in groups.values():
-            kept = max(least, math.ceil(len(cases) / part))
-            chosen = random.Random(f"{os.environ['MBS_TEST_SEED']} {cases[0].nodeid}")
-            left.update(chosen.sample(cases, max(0, len(cases) - kept)))
+    left = left_out(items, os.environ["MBS_TEST_SEED"])
     config.hook.pytest_deselected(items=[item for item in items if item in left])
     items[:] = [item for item in items if item not in left]
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 from support.random_trees import random_body
 
-import mbs
 from mbs.components import (
     ConstantVelocity,
     Cylindrical,
@@ -168,7 +168,7 @@ def test_a_joint_without_kernel_is_named():
 
 
 def test_the_sign_is_that_of_the_elbow():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     for mode in modes(system, {"j1": 0.3}):
         j1, j2, j4 = mode.q
         angle = j4 - (j1 + j2) - np.pi  # of j3, counted from where coupler and rocker are in line

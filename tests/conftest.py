@@ -1,16 +1,18 @@
 """Settings of every run of the tests."""
 
 import gc
-import math
 import os
-import random
-from collections import defaultdict
+import sys
 
-from support.sweeps import EVERY_CASE
+from support.sweeps import EVERY_CASE, left_out
 
 # Each worker of a run fills a core: threads of linear algebra would only wait for one another.
 # NumPy reads it when it is loaded, which is after this file.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Programs that tests start would compile every module of the package anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Where values are compared the compiler need not take its time; with every case it does.
 if not EVERY_CASE:
@@ -35,24 +37,10 @@ def pytest_report_header(config):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of each sweep a fifth, three at least; of a rule tried with several seeds one."""
+    """Of each sweep a tenth, three at least; of a rule tried with several seeds one."""
     if EVERY_CASE:
         return
-    sweeps, seeds = defaultdict(list), defaultdict(list)
-    for item in items:
-        name = item.nodeid.partition("[")[0]
-        given = item.callspec.indices if hasattr(item, "callspec") else {}
-        if item.get_closest_marker("sweep"):
-            sweeps[name].append(item)
-        elif "seed" in given:
-            others = sorted((key, place) for key, place in given.items() if key != "seed")
-            seeds[f"{name} {others}"].append(item)
-    left = set()
-    for groups, least, part in ((sweeps, 3, 5), (seeds, 1, math.inf)):
-        for name, cases in groups.items():
-            kept = max(least, math.ceil(len(cases) / part))
-            chosen = random.Random(f"{os.environ['MBS_TEST_SEED']} {name}")
-            left.update(chosen.sample(cases, max(0, len(cases) - kept)))
+    left = left_out(items, os.environ["MBS_TEST_SEED"])
     config.hook.pytest_deselected(items=[item for item in items if item in left])
     items[:] = [item for item in items if item not in left]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
-from support.page import PROGRAM, blocks, documented_extras
+from support.page import PROGRAM, absent, blocks, documented_extras
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -25,8 +25,8 @@ AFTERWARDS = {
 def test_python_blocks_run_in_the_installation_that_is_documented(
     page: Path, tmp_path: Path
 ) -> None:
-    extras = ",".join(documented_extras(page)) or "none"
-    command = [sys.executable, str(PROGRAM), str(page), extras, AFTERWARDS.get(page.name, "")]
+    refused = ",".join(absent(documented_extras(page)))
+    command = [sys.executable, str(PROGRAM), str(page), refused, AFTERWARDS.get(page.name, "")]
     ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
     printed, text = ran.stdout, page.read_text(encoding="utf-8")
@@ -49,9 +49,9 @@ def test_what_an_installation_without_extras_lacks(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("```python\nimport mbs\nimport matplotlib\n```\n", encoding="utf-8")
     command = [sys.executable, str(PROGRAM), str(page)]
-    ran = subprocess.run([*command, "none"], capture_output=True, text=True)
+    ran = subprocess.run([*command, ",".join(absent(()))], capture_output=True, text=True)
     assert "No module named 'matplotlib'" in ran.stderr
-    assert subprocess.run([*command, "plot"], capture_output=True).returncode == 0
+    assert subprocess.run([*command, ",".join(absent(("plot",)))]).returncode == 0
 
 
 def _size_and_pictures(film: Path) -> tuple[int, int, int]:

@@ -149,7 +149,7 @@ class Closing:
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
         """Residual (m,) and its derivative by the free positions (m, n)."""
-        r, J = (np.array(m) for m in self._functions()[0](q, self.p))
+        r, J = (m.full() for m in self._functions()[0](q, self.p))
         return r.ravel(), J[:, self.free]
 
     @property

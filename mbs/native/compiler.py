@@ -354,6 +354,7 @@ def cached_library(
     compiler: Compiler | None = None,
     suffix: str = LIBRARY_SUFFIX,
     common: Collection[str] = (),
+    together: Collection[str] = (),
 ) -> Path:
     """The shared library of these sources, built when nobody has built it yet.
 
@@ -366,6 +367,8 @@ def cached_library(
         compiler: that builds it, the one of this computer when left out.
         suffix: of the library.
         common: of the C files, those that many libraries have; each is compiled once and kept too.
+        together: of the C files, those that are compiled as one, which reads their headers once;
+            they share no name.
 
     Returns:
         path of the library.
@@ -375,16 +378,20 @@ def cached_library(
     """
     chosen, flags = compiler or find_compiler(), at_chosen_level(flags)
     try:
-        return _library_in(cache_dir(), files, flags, chosen, suffix, common)
+        return _library_in(cache_dir(), files, flags, chosen, suffix, common, together)
     except OSError:  # the disk of the cache is full, or a file in it belongs to somebody else
         folder = _process_dir()
         try:
-            return _library_in(folder, files, flags, chosen, suffix, common)
+            return _library_in(folder, files, flags, chosen, suffix, common, together)
         except OSError as error:
             raise CompilerError(
                 f"a library could not be built in {folder} ({error.strerror or error}); free space"
                 " on its disk, or set MBS_CACHE_DIR to a folder on another one"
             ) from error
+
+
+_TOGETHER = "all_of_them.c"
+"""In the folder of a build: it includes the files that are compiled as one."""
 
 
 def _library_in(
@@ -394,6 +401,7 @@ def _library_in(
     compiler: Compiler,
     suffix: str,
     common: Collection[str],
+    together: Collection[str],
 ) -> Path:
     key = _key(files, flags, compiler)
     known = _known(folder, key, suffix)
@@ -406,8 +414,12 @@ def _library_in(
         parts = [
             _common_object(file, files, flags, compiler, build) if file in common else build / file
             for file in files
-            if file.endswith(".c")
+            if file.endswith(".c") and file not in together
         ]
+        if together:
+            parts.append(build / _TOGETHER)
+            lines = (f'#include "{file}"\n' for file in together)
+            parts[-1].write_text("".join(lines), encoding="utf-8")
         output = build / f"library{suffix}"
         library = compile_library(parts, [build], flags, output, compiler=compiler)
         return _install(library, folder / f"{key}-{_sum_of(library)}{suffix}")

@@ -28,6 +28,7 @@ from mbs.spatial import (
     Wrench,
     body_through,
     cross,
+    formula,
     is_zero,
     skew,
     wrench_through,
@@ -77,17 +78,7 @@ class ArticulatedInertia:
         """The body displaced by t [m] along a coordinate axis; ten products."""
         if t.is_zero():
             return self
-        k, h = (axis + 1) % 3, (axis + 2) % 3
-        M, old, H, J = self.M, self.H, SX(self.H), SX(self.J)
-        H[:, k] -= t * M[:, h]
-        H[:, h] += t * M[:, k]
-        J[k, k] -= t * (old[h, k] + H[h, k])
-        J[h, h] += t * (old[k, h] + H[k, h])
-        J[k, h] += t * (old[k, k] - H[h, h])
-        J[k, axis] -= t * old[h, axis]
-        J[h, axis] += t * old[k, axis]
-        J[h, k], J[axis, k], J[axis, h] = J[k, h], J[k, axis], J[h, axis]
-        return ArticulatedInertia(M, H, J)
+        return ArticulatedInertia(self.M, *_slid(self.M, self.H, self.J, t, axis))
 
     def column(self, direction: int) -> SX:
         """(6, 1) wrench for a unit acceleration along one direction of a twist."""
@@ -97,19 +88,43 @@ class ArticulatedInertia:
 
     def without(self, pivot: Pivot) -> ArticulatedInertia:
         """What is felt of the body when it may move freely along the direction of the pivot."""
-        k, g, own = pivot.direction % 3, pivot.gain, pivot.rest
-        u = SX(pivot.column)
-        u[pivot.direction] = 0
-        M, H, J = (
-            self.M + _symmetric_product(g[:3], u[:3]),
-            self.H + casadi.mtimes(g[:3], u[3:].T),
-            self.J + _symmetric_product(g[3:], u[3:]),
+        felt = _without(
+            self.M, self.H, self.J, pivot.column, pivot.gain, pivot.rest, pivot.direction
         )
-        if pivot.direction < 3:
-            M[k, :], M[:, k], H[k, :] = own[:3].T, own[:3], own[3:].T
-        else:
-            J[k, :], J[:, k], H[:, k] = own[3:].T, own[3:], own[:3]
-        return ArticulatedInertia(M, H, J)
+        return ArticulatedInertia(*felt)
+
+
+@formula((3, 3), (3, 3), (3, 3), (1, 1))
+def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
+    """H and J of an articulated body displaced along an axis."""
+    k, h = (axis + 1) % 3, (axis + 2) % 3
+    H, J = SX(old), SX(tensor)
+    H[:, k] -= t * M[:, h]
+    H[:, h] += t * M[:, k]
+    J[k, k] -= t * (old[h, k] + H[h, k])
+    J[h, h] += t * (old[k, h] + H[k, h])
+    J[k, h] += t * (old[k, k] - H[h, h])
+    J[k, axis] -= t * old[h, axis]
+    J[h, axis] += t * old[k, axis]
+    J[h, k], J[axis, k], J[axis, h] = J[k, h], J[k, axis], J[h, axis]
+    return H, J
+
+
+@formula((3, 3), (3, 3), (3, 3), (6, 1), (6, 1), (6, 1))
+def _without(M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int) -> tuple[SX, SX, SX]:
+    """M, H and J of an articulated body when the joint of a pivot may move freely."""
+    k, u = direction % 3, SX(column)
+    u[direction] = 0
+    M, H, J = (
+        M + _symmetric_product(g[:3], u[:3]),
+        H + casadi.mtimes(g[:3], u[3:].T),
+        J + _symmetric_product(g[3:], u[3:]),
+    )
+    if direction < 3:
+        M[k, :], M[:, k], H[k, :] = own[:3].T, own[:3], own[3:].T
+    else:
+        J[k, :], J[:, k], H[:, k] = own[3:].T, own[3:], own[:3]
+    return M, H, J
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,29 +166,48 @@ class Pivot:
     def of(body: ArticulatedInertia, direction: int, drive: RotorDrive) -> Pivot:
         """Along a direction of a body, with what drives the joint."""
         column = body.column(direction)
-        column[3:] += drive.momentum
-        D = column[direction] + drive.inertia
-        inverse = -1 / D
-        ratio = -drive.inertia * inverse
-        gain, rest = column * inverse, column * ratio
-        gain[direction] = 0
-        rest[3:] -= drive.momentum
-        return Pivot(direction, column, rest, D, inverse, gain, ratio)
+        return Pivot(direction, *_pivot(column, drive.inertia, drive.momentum, direction))
 
     def transmit(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
         """The wrench (6, 1) that passes on to the antecedent, and the effort that accelerates."""
-        left = effort - wrench[self.direction]
-        wrench = wrench - self.gain * left
-        wrench[self.direction] = effort - self.ratio * left
-        return wrench, left
+        return _transmitted(wrench, effort, self.gain, self.ratio, self.direction)
 
     def accelerate(self, twist: SX, left: SX) -> tuple[SX, SX]:
         """The acceleration (6, 1) behind the joint, and its part that the joint adds."""
-        before = twist[self.direction]
-        own = casadi.dot(self.gain, twist) - self.inverse * left + self.ratio * before
-        twist = SX(twist)
-        twist[self.direction] = own
-        return twist, own - before
+        return _accelerated(twist, left, self.gain, self.inverse, self.ratio, self.direction)
+
+
+@formula((6, 1), (1, 1), (3, 1))
+def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, SX, SX, SX, SX, SX]:
+    """Column, rest, size, inverse, gain and ratio of a pivot."""
+    column = SX(column)
+    column[3:] += momentum
+    D = column[direction] + inertia
+    inverse = -1 / D
+    ratio = -inertia * inverse
+    gain, rest = column * inverse, column * ratio
+    gain[direction] = 0
+    rest[3:] -= momentum
+    return column, rest, D, inverse, gain, ratio
+
+
+@formula((6, 1), (1, 1), (6, 1), (1, 1))
+def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) -> tuple[SX, SX]:
+    left = effort - wrench[direction]
+    wrench = wrench - gain * left
+    wrench[direction] = effort - ratio * left
+    return wrench, left
+
+
+@formula((6, 1), (1, 1), (6, 1), (1, 1), (1, 1))
+def _accelerated(
+    twist: SX, left: SX, gain: SX, inverse: SX, ratio: SX, direction: int
+) -> tuple[SX, SX]:
+    before = twist[direction]
+    own = casadi.dot(gain, twist) - inverse * left + ratio * before
+    twist = SX(twist)
+    twist[direction] = own
+    return twist, own - before
 
 
 def _symmetric_product(a: SX, b: SX) -> SX:

@@ -13,7 +13,7 @@ from casadi import SX
 from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
 from mbs.recursions.poses import LinkPose
-from mbs.spatial import cross, is_zero, vector, zeros
+from mbs.spatial import cross, formula, is_zero, vector, zeros
 
 # What an elementary motion adds to a link: its velocity, and the effort that it feels.
 
@@ -22,12 +22,18 @@ def motion_behind(motion: Motion, v: SX) -> tuple[SX, SX]:
     """Linear and angular velocity of frame j with respect to its placement, both in frame j."""
     match motion:
         case Motion.REVOLUTE:
-            return zeros(), casadi.vertcat(SX(0), SX(0), v)
+            return zeros(), _along_z(v)
         case Motion.PRISMATIC:
-            return casadi.vertcat(SX(0), SX(0), v), zeros()
+            return _along_z(v), zeros()
         case Motion.SPHERICAL:
             return zeros(), v
     return v[0:3], v[3:6]
+
+
+def _along_z(v: SX) -> SX:
+    column = zeros()
+    column[2] = v
+    return column
 
 
 def effort(motion: Motion, f: SX, m: SX) -> SX:
@@ -103,9 +109,18 @@ def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
         wd: (3, 1) angular acceleration.
         across: x^2 + y^2 of w where it is known; y^2 then needs no product.
     """
+    if across is None or w[0].is_zero() or w[1].is_zero():
+        U, *spread = _rotation_rate(w, wd, SX(0), False)
+    else:
+        U, *spread = _rotation_rate(w, wd, across, True)
+    return RotationRate(U, (spread[0], spread[1], spread[2]))
+
+
+@formula((3, 1), (3, 1), (1, 1))
+def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, SX]:
     x, y, z = w[0], w[1], w[2]
     xx, zz, xy, xz, yz = x * x, z * z, x * y, x * z, y * z
-    xy_square = xx + y * y if across is None or x.is_zero() or y.is_zero() else across
+    xy_square = across if known else xx + y * y
     xz_square, xz_difference = xx + zz, xx - zz
     yz_square = xy_square - xz_difference
     U = casadi.vertcat(
@@ -113,7 +128,7 @@ def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
         casadi.horzcat(xy + wd[2], -xz_square, yz - wd[0]),
         casadi.horzcat(xz - wd[1], yz + wd[0], -xy_square),
     )
-    return RotationRate(U, (xz_square - xy_square, xz_difference, yz_square - xz_square))
+    return U, xz_square - xy_square, xz_difference, yz_square - xz_square
 
 
 def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
@@ -125,20 +140,32 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
         S: (3, 3) second moments of the body's mass.
         rate: of its rotation.
     """
-    rows, U = [], rate.U
-    for k in range(3):
+    pairs = [(rate.U[n, m], rate.U[m, n]) for m, n in ((1, 2), (2, 0), (0, 1))]
+    signs = tuple(_relation(a, b) for a, b in pairs)
+    return _moment_of_rotation(S, rate.U, *rate.spread, signs)
+
+
+@formula((3, 3), (3, 3), (1, 1), (1, 1), (1, 1))
+def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[int, ...]) -> SX:
+    rows = []
+    for k, spread in enumerate((s_x, s_y, s_z)):
         m, n = (k + 1) % 3, (k + 2) % 3
-        row = U[n, k] * S[k, m] - U[m, k] * S[k, n] + rate.spread[k] * S[m, n]
-        rows.append(row + _difference(U[n, m], S[m, m], U[m, n], S[n, n]))
+        row = U[n, k] * S[k, m] - U[m, k] * S[k, n] + spread * S[m, n]
+        rows.append(row + _difference(U[n, m], S[m, m], U[m, n], S[n, n], signs[k]))
     return casadi.vertcat(*rows)
 
 
-def _difference(a: SX, first: SX, b: SX, second: SX) -> SX:
+def _relation(a: SX, b: SX) -> int:
+    """1 where a = -b, -1 where a = b, else 0."""
+    if SX.binary(casadi.OP_ADD, a, b).is_zero():
+        return 1
+    return -1 if SX.binary(casadi.OP_SUB, a, b).is_zero() else 0
+
+
+def _difference(a: SX, first: SX, b: SX, second: SX, sign: int) -> SX:
     """A first - b second; one product when a = b or a = -b."""
-    if (a + b).is_zero():
-        return a * (first + second)
-    if (a - b).is_zero():
-        return a * (first - second)
+    if sign:
+        return a * (first + second if sign > 0 else first - second)
     return a * first - b * second
 
 

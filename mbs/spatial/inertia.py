@@ -9,7 +9,7 @@ import casadi
 from casadi import SX
 
 from mbs.spatial.rotation import Rotation
-from mbs.spatial.vectors import cross, exact_sum, skew, zeros
+from mbs.spatial.vectors import cross, exact_sum, formula, skew, zeros
 
 TEN_PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 """Names of the inertial parameters, in the order of Khalil & Kleinfinger 1986."""
@@ -68,10 +68,7 @@ class Inertia:
             linear: (3, 1) of the origin, in the same frame.
             angular: (3, 1) in the same frame.
         """
-        return (
-            self.m * linear + cross(angular, self.ms),
-            casadi.mtimes(self.J, angular) + cross(self.ms, linear),
-        )
+        return _momentum(self.J, self.ms, self.m, linear, angular)
 
     def seen_from(self, R: Rotation, p: SX) -> Inertia:
         """The same body about the origin of frame i and in its axes.
@@ -126,6 +123,11 @@ class Inertia:
     def massive(self) -> tuple[Inertia, Inertia]:
         """Two bodies that make this one: the first has no mass, the second M alone."""
         return Inertia(self.J, self.ms, SX(0)), Inertia(zeros(3, 3), zeros(), self.m)
+
+
+@formula((3, 3), (3, 1), (1, 1), (3, 1), (3, 1))
+def _momentum(J: SX, ms: SX, m: SX, linear: SX, angular: SX) -> tuple[SX, SX]:
+    return m * linear + cross(angular, ms), casadi.mtimes(J, angular) + cross(ms, linear)
 
 
 # The second, first and zeroth moments of a body's mass.

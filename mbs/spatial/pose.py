@@ -10,7 +10,9 @@ import casadi
 from casadi import DM, SX
 
 from mbs.spatial.rotation import AxisRotation, MatrixRotation, Rotation, axis_rotation
-from mbs.spatial.vectors import cross, elements, exact_product, is_zero, zeros
+from mbs.spatial.vectors import cross, elements, exact_product, formula, is_zero, zeros
+
+_EYE = casadi.densify(SX(DM.eye(3)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,7 @@ class Pose:
     @staticmethod
     def identity() -> Pose:
         """The frame itself."""
-        return Pose(casadi.densify(SX(DM.eye(3))), zeros())
+        return Pose(SX(_EYE), zeros())
 
     @staticmethod
     def rotation(R: SX) -> Pose:
@@ -67,6 +69,9 @@ class Pose:
     def __matmul__(self, other: Pose) -> Pose:
         """T_ik from T_ij and T_jk."""
         chain = _join(self, other) if self.chain or other.chain else ()
+        for one, rest in ((self, other), (other, self)):
+            if one.is_identity():
+                return Pose(_with_lone_ones(_own(rest.R)), _own(rest.p), chain)
         return Pose(
             _with_lone_ones(exact_product(self.R, other.R)),
             exact_product(self.R, other.p, self.p),
@@ -77,16 +82,14 @@ class Pose:
         """T_ji from T_ij."""
         return Pose(
             self.R.T,
-            exact_product(-self.R.T, self.p),
+            zeros() if self.p.is_zero() else exact_product(-self.R.T, self.p),
             tuple(_inverse(step) for step in reversed(self.chain)),
         )
 
     @property
     def matrix(self) -> SX:
         """(4, 4) homogeneous transform."""
-        return casadi.vertcat(
-            casadi.horzcat(self.R, self.p), casadi.horzcat(SX(DM([[0, 0, 0]])), SX(1))
-        )
+        return _homogeneous(self.R, self.p)
 
     def at(self, p: SX) -> Pose:
         """A frame with the same orientation and its origin at p, (3, 1)."""
@@ -98,7 +101,17 @@ class Pose:
 
     def is_identity(self) -> bool:
         """Whether it is the constant identity."""
-        return bool(casadi.is_equal(self.matrix, casadi.densify(SX(DM.eye(4))), 1))
+        return self.p.is_zero() and SX.binary(casadi.OP_SUB, self.R, _EYE).is_zero()
+
+
+def _own(value: SX) -> SX:
+    """A dense copy, to be changed."""
+    return SX(value) if value.is_dense() else casadi.densify(value)
+
+
+@formula((3, 3), (3, 1))
+def _homogeneous(R: SX, p: SX) -> SX:
+    return casadi.vertcat(casadi.horzcat(R, p), casadi.horzcat(SX(DM([[0, 0, 0]])), SX(1)))
 
 
 def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
@@ -224,22 +237,32 @@ class ScrewDisplacement:
 
     def point(self, r: SX) -> SX:
         """A point of frame j, (3, 1), in frame i [m]."""
-        moved = SX(self.rotation.apply(r))
-        moved[self.axis] += self.t
-        return moved
+        return _shift_point(self.rotation.apply(r), self.t, self.axis)
 
     def wrench(self, f: SX, m: SX) -> Wrench:
         """Force and moment about the origin of frame j, in frame j, about the origin of i in i."""
-        f, m = self.rotation.apply(f), SX(self.rotation.apply(m))
-        if not self.t.is_zero():
-            k, h = self.rotation.across
-            m[k] -= self.t * f[h]
-            m[h] += self.t * f[k]
-        return f, m
+        f, m = self.rotation.apply(f), self.rotation.apply(m)
+        return f, m if self.t.is_zero() else _shift_moment(f, m, self.t, *self.rotation.across)
 
     def body(self, thing: Thing) -> Thing:
         """What is given about and in frame j, such as an inertia, about and in frame i."""
         return thing.rotate(self.rotation).shift(self.axis, self.t)
+
+
+@formula((3, 1), (1, 1))
+def _shift_point(r: SX, t: SX, axis: int) -> SX:
+    moved = SX(r)
+    moved[axis] += t
+    return moved
+
+
+@formula((3, 1), (3, 1), (1, 1))
+def _shift_moment(f: SX, m: SX, t: SX, k: int, h: int) -> SX:
+    """The moment about a point that is t [m] before along the axis that k and h are across."""
+    moved = SX(m)
+    moved[k] -= t * f[h]
+    moved[h] += t * f[k]
+    return moved
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from typing import Protocol
 import casadi
 from casadi import DM, SX
 
-from mbs.spatial.vectors import sin_cos, skew
+from mbs.spatial.vectors import formula, product_with_vector, sin_cos, skew
 
 Rows = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 """A (3, 3) matrix of numbers, row by row."""
@@ -71,59 +71,81 @@ class AxisRotation:
     @property
     def across(self) -> tuple[int, int]:
         """Numbers of the axes that rotate, the first towards the second."""
-        return (self.along + 1) % 3, (self.along + 2) % 3
+        return _across(self.axis)
 
     @property
     def matrix(self) -> SX:
         """(3, 3) orientation of the rotated frame."""
-        k, h = self.across
-        R = SX(DM.eye(3))
-        R[k, k], R[k, h], R[h, k], R[h, h] = self.c, -self.s, self.s, self.c
-        return casadi.densify(R)
+        return _rotation_matrix(self.s, self.c, self.axis)
 
     def apply(self, vector: SX) -> SX:
         """The vector of the rotated frame in the fixed one."""
-        return self._rotate(vector, self.s)
+        return _rotate_vector(vector, self.s, self.c, self.axis)
 
     def apply_inverse(self, vector: SX) -> SX:
-        """The vector of the fixed frame in the turned one."""
-        return self._rotate(vector, -self.s)
-
-    def _rotate(self, vector: SX, s: SX) -> SX:
-        k, h = self.across
-        turned = +vector
-        turned[k] = self.c * vector[k] - s * vector[h]
-        turned[h] = s * vector[k] + self.c * vector[h]
-        return turned
+        """The vector of the fixed frame in the rotated one."""
+        return _rotate_vector(vector, -self.s, self.c, self.axis)
 
     def apply_to_tensor(self, tensor: SX) -> SX:
         """The symmetric tensor of the rotated frame in the fixed one; eight multiplications."""
-        k, h = self.across
-        m, turned = self.along, self.apply_to_square(tensor)
-        turned[h, k], turned[m, k], turned[m, h] = turned[k, h], turned[k, m], turned[h, m]
-        return turned
+        return _rotate_square(tensor, self.s, self.c, self.axis, self._block, True)
 
     def apply_to_square(self, square: SX) -> SX:
-        """Any tensor of the rotated frame in the fixed one; twelve multiplications.
+        """Any tensor of the rotated frame in the fixed one; twelve multiplications."""
+        return _rotate_square(square, self.s, self.c, self.axis, self._block, False)
 
-        With w = c (a - e) - s (b + d) the rotated block is [[e + c w, b + s w], [d + s w, a - c w]]
-        for the block [[a, b], [d, e]].
-        """
-        (k, h), m = self.across, self.along
-        s, c = self.s, self.c
-        a, b, d, e = square[k, k], square[k, h], square[h, k], square[h, h]
-        turned = +square
-        if c.is_zero():
-            turned[k, k], turned[k, h], turned[h, k], turned[h, h] = e, -d, -b, a
-        elif not s.is_zero():
-            w = c * (a - e) - s * (b + d)
-            cw, sw = c * w, s * w
-            turned[k, k], turned[h, h] = e + cw, a - cw
-            turned[k, h], turned[h, k] = b + sw, d + sw
-        for first, second in (((k, m), (h, m)), ((m, k), (m, h))):
-            turned[first] = c * square[first] - s * square[second]
-            turned[second] = s * square[first] + c * square[second]
-        return turned
+    @property
+    def _block(self) -> str:
+        """How the two axes across it turn: by a quarter, not at all, or by any angle."""
+        return "quarter" if self.c.is_zero() else "still" if self.s.is_zero() else "any"
+
+
+def _across(axis: str) -> tuple[int, int]:
+    """Numbers of the axes that rotate, the first towards the second."""
+    along = _AXES.index(axis)
+    return (along + 1) % 3, (along + 2) % 3
+
+
+@formula((1, 1), (1, 1))
+def _rotation_matrix(s: SX, c: SX, axis: str) -> SX:
+    k, h = _across(axis)
+    R = SX(DM.eye(3))
+    R[k, k], R[k, h], R[h, k], R[h, h] = c, -s, s, c
+    return casadi.densify(R)
+
+
+@formula((3, 1), (1, 1), (1, 1))
+def _rotate_vector(vector: SX, s: SX, c: SX, axis: str) -> SX:
+    k, h = _across(axis)
+    turned = +vector
+    turned[k] = c * vector[k] - s * vector[h]
+    turned[h] = s * vector[k] + c * vector[h]
+    return turned
+
+
+@formula((3, 3), (1, 1), (1, 1))
+def _rotate_square(square: SX, s: SX, c: SX, axis: str, block: str, symmetric: bool) -> SX:
+    """A tensor turned.
+
+    With w = c (a - e) - s (b + d) the turned block is [[e + c w, b + s w], [d + s w, a - c w]]
+    for the block [[a, b], [d, e]].
+    """
+    (k, h), m = _across(axis), _AXES.index(axis)
+    a, b, d, e = square[k, k], square[k, h], square[h, k], square[h, h]
+    turned = +square
+    if block == "quarter":
+        turned[k, k], turned[k, h], turned[h, k], turned[h, h] = e, -d, -b, a
+    elif block == "any":
+        w = c * (a - e) - s * (b + d)
+        cw, sw = c * w, s * w
+        turned[k, k], turned[h, h] = e + cw, a - cw
+        turned[k, h], turned[h, k] = b + sw, d + sw
+    for first, second in (((k, m), (h, m)), ((m, k), (m, h))):
+        turned[first] = c * square[first] - s * square[second]
+        turned[second] = s * square[first] + c * square[second]
+    if symmetric:
+        turned[h, k], turned[m, k], turned[m, h] = turned[k, h], turned[k, m], turned[h, m]
+    return turned
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,11 +156,11 @@ class MatrixRotation:
 
     def apply(self, vector: SX) -> SX:
         """The vector of the rotated frame in the fixed one."""
-        return casadi.mtimes(self.matrix, vector)
+        return product_with_vector(self.matrix, vector)
 
     def apply_inverse(self, vector: SX) -> SX:
-        """The vector of the fixed frame in the turned one."""
-        return casadi.mtimes(self.matrix.T, vector)
+        """The vector of the fixed frame in the rotated one."""
+        return product_with_vector(self.matrix.T, vector)
 
     def apply_to_tensor(self, tensor: SX) -> SX:
         """The symmetric tensor of the rotated frame in the fixed one."""
@@ -146,7 +168,12 @@ class MatrixRotation:
 
     def apply_to_square(self, square: SX) -> SX:
         """Any tensor of the rotated frame in the fixed one."""
-        return casadi.mtimes(casadi.mtimes(self.matrix, square), self.matrix.T)
+        return _turned_by_matrix(square, self.matrix)
+
+
+@formula((3, 3), (3, 3))
+def _turned_by_matrix(square: SX, R: SX) -> SX:
+    return casadi.mtimes(casadi.mtimes(R, square), R.T)
 
 
 def axis_rotation(axis: str, angle: SX) -> AxisRotation:
@@ -207,6 +234,7 @@ def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -
 # Unit quaternions w, x, y, z for joints that rotate freely.
 
 
+@formula((4, 1))
 def quaternion_rotation(quaternion: SX) -> SX:
     """(3, 3) orientation of the rotated frame, of a unit quaternion (w, x, y, z).
 

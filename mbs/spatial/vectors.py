@@ -1,11 +1,12 @@
 """3-vectors of SX scalars, constants made exact, sines and cosines of quarter turns."""
 
 import math
-from collections.abc import Iterable
-from typing import cast
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar, cast
 
 import casadi
-from casadi import DM, SX
+from casadi import DM, SX, Function
 
 _ROUNDING = 2e-15
 """Part of its terms that a sum may have left from their rounding: some ten units of their last
@@ -14,6 +15,41 @@ digit, far above what two or three roundings leave and far below any tilt that w
 
 _SMALL = 1e-9
 """What is larger in numbers is no rounding of anything smaller than 1000 km, and needs no look."""
+
+
+Given = ParamSpec("Given")
+Made = TypeVar("Made")
+
+
+def formula(
+    *shapes: tuple[int, int],
+) -> Callable[[Callable[Given, Made]], Callable[Given, Made]]:
+    """A formula that is written on symbols once for each of its cases, then evaluated.
+
+    Evaluated on expressions it makes the operations that its text makes, constants folded; ten of
+    them take the time that one takes from Python.
+
+    Args:
+        shapes: of its leading arguments, which are SX; what follows them is the case, to which
+            the text may look.
+    """
+
+    def evaluated(text: Callable[Given, Made]) -> Callable[Given, Made]:
+        functions: dict[tuple[Any, ...], Function] = {}
+        count = len(shapes)
+
+        def on_expressions(*arguments: Any) -> Any:
+            case = arguments[count:]
+            if case not in functions:
+                symbols = [SX.sym(f"x{k}", *shape) for k, shape in enumerate(shapes)]
+                found: Any = cast("Callable[..., Any]", text)(*symbols, *case)
+                results = [*found] if isinstance(found, tuple) else [found]
+                functions[case] = Function(text.__name__.strip("_"), symbols, results)
+            return functions[case](*arguments[:count])
+
+        return cast("Callable[Given, Made]", wraps(text)(on_expressions))
+
+    return evaluated
 
 
 def vector(elements: Iterable[SX | float]) -> SX:
@@ -27,6 +63,7 @@ def zeros(rows: int = 3, columns: int = 1) -> SX:
     return SX.zeros(rows, columns)
 
 
+@formula((3, 1))
 def skew(a: SX) -> SX:
     """(3, 3) matrix of the vector product: times b it is a x b."""
     x, y, z = a[0], a[1], a[2]
@@ -35,6 +72,7 @@ def skew(a: SX) -> SX:
     )
 
 
+@formula((3, 1), (3, 1))
 def cross(a: SX, b: SX) -> SX:
     """Vector product of a and b, (3, 1), scalar by scalar so that zeros fold."""
     (a_x, a_y, a_z), (b_x, b_y, b_z) = elements(a), elements(b)
@@ -58,20 +96,40 @@ def exact_sum(a: SX, b: SX) -> SX:
     Constants that ought to cancel fold only so; what is small by itself stays.
     """
     if not (a.is_constant() and b.is_constant()):
-        return a + b
+        return SX.binary(casadi.OP_ADD, a, b)  # a + b, without a search among types
     first, second = float(a), float(b)
     total = first + second
     return SX(0 if abs(total) <= _ROUNDING * (abs(first) + abs(second)) else total)
 
 
+@formula((3, 3), (3, 3))
+def _product(A: SX, B: SX) -> SX:
+    return casadi.mtimes(A, B)
+
+
+@formula((3, 3), (3, 1))
+def product_with_vector(A: SX, b: SX) -> SX:
+    """A b, (3, 1)."""
+    return casadi.mtimes(A, b)
+
+
+@formula((3, 3), (3, 1), (3, 1))
+def _sum_with_product(A: SX, b: SX, c: SX) -> SX:
+    return c + casadi.mtimes(A, b)
+
+
 def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
-    """A B + C, dense; an element is zero where numbers cancel but for their last digits.
+    """A B + C; an element is zero where numbers cancel but for their last digits.
+
+    A is (3, 3), B is (3, 3) or, as C always, (3, 1).
 
     Rotations that undo each other leave 1e-17 in the place of a zero, which would never fold. What
     is small by itself, such as the sine of a tilt of 1e-12, stays.
     """
-    product = casadi.mtimes(A, B) if C is None else C + casadi.mtimes(A, B)
-    dense = casadi.densify(product)
+    if C is not None:
+        dense = _sum_with_product(A, B, C)
+    else:
+        dense = _product(A, B) if B.is_square() else product_with_vector(A, B)
     if dense.is_constant() and not any(0 < abs(x) < _SMALL for x in DM(dense).nonzeros()):
         return dense
     largest = _largest_number(B) if C is None else max(_largest_number(B), _largest_number(C))

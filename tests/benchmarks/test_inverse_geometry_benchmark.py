@@ -6,12 +6,11 @@ from inverse_geometry_cases import CASES
 from inverse_geometry_peers import _common_perpendicular, _screw_x, _screw_z, _standard
 from support import arms
 from support.arm_search import plain_arm
-
-import mbs
+from support.catalogue_systems import catalogue_system
 
 ARMS = {
-    "puma560": lambda: mbs.load("puma560").assemble(),
-    "ur5": lambda: mbs.load("ur5").assemble(),
+    "puma560": lambda: catalogue_system("puma560"),
+    "ur5": lambda: catalogue_system("ur5"),
     "general": lambda: arms.general_6r(3),
 }
 

@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.rod_mechanisms import acrobot, four_bar
 
 import mbs
@@ -150,7 +151,7 @@ def test_step_in_a_batch_is_the_step():
     assert np.abs(found - wanted).max() < 1e-13
 
 
-@pytest.mark.parametrize("make", [lambda: mbs.load("puma560").assemble(), four_bar])
+@pytest.mark.parametrize("make", [lambda: catalogue_system("puma560"), four_bar])
 def test_steps_in_a_batch_follow_the_simulation(make):
     """A simulation with error control, through a quarter of a second with constant efforts."""
     system = make()

@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.change_points import linkage
 
 import mbs
@@ -23,7 +24,7 @@ def rows_after(dae, u, count, dt, substeps=2, x0=None, **options):
 
 @pytest.mark.parametrize("name", ["delta", "five_bar"])
 def test_rows_are_closed_or_flagged(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     dae = mbs.models.dae(system)
     u = np.random.default_rng(3).uniform(-1, 1, (48, dae.u.numel()))
     x = rows_after(dae, u, 300, 0.002)
@@ -65,7 +66,7 @@ def test_a_change_of_branch_is_flagged(lengths, guess, goes_on):
 
 
 def test_a_parallelogram_turns_over():
-    system = mbs.load("n_four_bar").assemble()
+    system = catalogue_system("n_four_bar")
     dae = mbs.models.dae(system)
     x = rows_after(dae, np.zeros((1, dae.u.numel())), 120, 0.01, 1, np.array([[np.pi / 2, -4.0]]))
     start = {"q0": {"a0": np.pi / 2}, "v0": {"a0": -4.0}}
@@ -109,7 +110,7 @@ def test_rows_are_flagged_as_a_whole():
 
 def test_checks_are_not_in_the_derivatives():
     """J of a step is that of the step without checks."""
-    dae = mbs.models.dae(mbs.load("cart_pole").assemble())
+    dae = mbs.models.dae(catalogue_system("cart_pole"))
     point = [dae.x0 + 0.1, [0.3], dae.p0, 0.01, 0]
     one, other = (step(dae, checked=checked).jacobian()(*point)[0] for checked in (True, False))
     np.testing.assert_allclose(one.full(), other.full(), rtol=1e-12, atol=1e-15)

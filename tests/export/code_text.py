@@ -5,6 +5,7 @@ import re
 
 import casadi
 from casadi import Function
+from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
@@ -15,7 +16,7 @@ PROPER = [name for name in LANGUAGES if name != "octave"]
 
 @functools.cache
 def idm(name="puma560"):
-    return mbs.models.inverse_dynamics(mbs.load(name).assemble())
+    return mbs.models.inverse_dynamics(catalogue_system(name))
 
 
 def lines(text):

@@ -6,6 +6,7 @@ import casadi
 import pytest
 from casadi import SX, Function
 from export.code_text import idm, lines, vector
+from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
@@ -102,7 +103,7 @@ def test_two_angles_of_one_name_stay_apart():
 
 
 def test_symmetric_matrix_has_one_name_for_two_elements():
-    text = mbs.export.code(mbs.models.inertia_matrix(mbs.load("puma560").assemble()), "c")
+    text = mbs.export.code(mbs.models.inertia_matrix(catalogue_system("puma560")), "c")
     assert "A[1] = A12;" in text
     assert "A[6] = A12;" in text
     assert "A21" not in text

@@ -197,7 +197,7 @@ def test_the_library_of_each_platform_lands_in_its_folder(tmp_path, monkeypatch)
     library.write_bytes(b"machine code")
     wanted = []
 
-    def built(files, flags, *, compiler, suffix, common):
+    def built(files, flags, *, compiler, suffix, **ways):
         wanted.append((compiler, suffix))
         return library
 

@@ -10,6 +10,7 @@ import pytest
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.validation import validate_fmu
 from fmu_instances import Fmu3, refused
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ExportError, ModelError
@@ -25,7 +26,7 @@ def pairs(tmp_path_factory):
     """The FMU with arrays and that without, of each mechanism."""
     folder, found = tmp_path_factory.mktemp("arrays"), {}
     for name in NAMES:
-        system = mbs.load(name).assemble()
+        system = catalogue_system(name)
         found[name] = tuple(
             Fmu3(
                 mbs.export.fmu(system, folder / f"{name}{k}.fmu", fmi="3.0", arrays=bool(k)),
@@ -169,7 +170,7 @@ def test_joints_that_turn_and_slide_share_no_unit(pairs):
 
 
 def test_elements_are_named_in_the_pages_and_results(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     path = mbs.export.fmu(
         system, tmp_path / "x.fmu", fmi="3.0", arrays=True, reference=True, stop_time=0.1
     )
@@ -185,7 +186,7 @@ def test_elements_are_named_in_the_pages_and_results(tmp_path):
 
 
 def test_fmi_2_has_no_arrays(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     with pytest.raises(ExportError, match=r"four_bar: arrays are variables of FMI 3\.0, and fmi"):
         mbs.export.fmu(system, tmp_path / "x.fmu", arrays=True)
 

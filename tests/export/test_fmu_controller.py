@@ -4,6 +4,7 @@ import casadi as ca
 import fmpy
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, DCMotor, Revolute
@@ -241,7 +242,7 @@ def test_a_law_drives_the_joints_whose_motion_is_no_input() -> None:
 
 
 def test_a_law_sees_the_whole_tree_of_a_closed_system() -> None:
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     driven = [speed.name for speed in system.speeds].index("j1")
     model = fmu_model(system, Contents(controller=lambda t, q, v: [-3 * sum(q.nz) - v[0], 0, 0]))
     plain = fmu_model(system)

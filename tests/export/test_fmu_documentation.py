@@ -5,15 +5,15 @@ import xml.etree.ElementTree as ET
 
 import pytest
 from fmu_models import pendulum
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.export.fmu.documentation import documentation
 from mbs.export.fmu.system_fmu import fmu_model
 
 
 @pytest.fixture(scope="module")
 def page():
-    return documentation(fmu_model(mbs.load("four_bar").assemble()))
+    return documentation(fmu_model(catalogue_system("four_bar")))
 
 
 def test_the_page_is_well_formed_and_needs_no_other_file(page):
@@ -37,7 +37,7 @@ def test_the_page_is_well_formed_and_needs_no_other_file(page):
 def test_the_page_tells_names_units_and_starts(page):
     root = ET.fromstring(page[page.index("<main>") : page.index("</main>") + len("</main>")])
     cells = [["".join(c.itertext()) for c in row] for row in root.iter("tr")]
-    model = fmu_model(mbs.load("four_bar").assemble())
+    model = fmu_model(catalogue_system("four_bar"))
     for entry in model.entries:
         row = next(row for row in cells if row[0] == entry.variable.name)
         assert row[1] == entry.variable.unit
@@ -49,7 +49,7 @@ def test_the_page_tells_names_units_and_starts(page):
 def test_the_page_counts_operations(page):
     from mbs.operations import count
 
-    model = fmu_model(mbs.load("four_bar").assemble())
+    model = fmu_model(catalogue_system("four_bar"))
     counted = count(model.rhs)
     assert f"<td>{counted.mul}</td><td>{counted.add}</td>" in page
 

@@ -3,6 +3,7 @@
 import fmpy
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.contact_mechanisms import block, pendulum, stick_slip, stopped_rocker
 
 import mbs
@@ -48,7 +49,7 @@ def test_the_description_has_modes_and_indicators():
 
 
 def test_nothing_jumps_without_contacts():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     assert jumps(system, minimal_state(system)) is None
     assert fmu_model(system).jumps is None
 

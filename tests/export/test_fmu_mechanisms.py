@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from elf_versions import glibc_versions
 from fmu_mechanisms import CASES, imported, simulated
+from support.catalogue_systems import catalogue_system
 
 import mbs
 
@@ -32,7 +33,7 @@ def test_model_exchange_co_simulation_and_simulation_agree(name, tmp_path):
 @pytest.fixture(scope="module")
 def four_bar(tmp_path_factory):
     folder = tmp_path_factory.mktemp("four_bar")
-    path = mbs.export.fmu(mbs.load("four_bar").assemble(), folder / "four_bar.fmu")
+    path = mbs.export.fmu(catalogue_system("four_bar"), folder / "four_bar.fmu")
     return path
 
 
@@ -69,7 +70,7 @@ def test_a_guess_near_the_own_branch_keeps_it(four_bar):
 def test_a_library_for_linux_needs_no_glibc_after_2_17(tmp_path):
     pytest.importorskip("ziglang")
     path = mbs.export.fmu(
-        mbs.load("puma560").assemble(), tmp_path / "arm.fmu", platforms=["x86_64-linux"]
+        catalogue_system("puma560"), tmp_path / "arm.fmu", platforms=["x86_64-linux"]
     )
     with zipfile.ZipFile(path) as archive:
         library = archive.read("binaries/linux64/puma560.so")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.observed_four_bar import four_bar
 
 import mbs
@@ -108,7 +109,7 @@ def test_bad_outputs_are_refused(outputs, message) -> None:
 
 def test_a_system_without_sensors_has_none_to_show() -> None:
     with pytest.raises(ModelError, match="there is no sensor to show; add one"):
-        fmu_model(mbs.load("four_bar").assemble(), Contents(outputs=["sensors"]))
+        fmu_model(catalogue_system("four_bar"), Contents(outputs=["sensors"]))
 
 
 def test_wrenches_of_welds_and_outer_wrenches_on_their_link_are_refused() -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import (
@@ -105,7 +106,7 @@ def test_a_tree_comes_back(tmp_path):
 
 @pytest.mark.parametrize("robot", ["puma560", "stanford", "ur5", "cart_pole", "flyball_governor"])
 def test_robots_come_back(tmp_path, robot):
-    system = mbs.load(robot).assemble()
+    system = catalogue_system(robot)
     mbs.export.mjcf(system, tmp_path / "m.xml")
     back = mbs.load(tmp_path / "m.xml").assemble()
     driven = [s.actuated for s in system.speeds]
@@ -120,7 +121,7 @@ def test_robots_come_back(tmp_path, robot):
 @pytest.mark.parametrize("robot", ["four_bar", "sr400", "stewart_platform", "delta", "bricard"])
 def test_loops_come_back(tmp_path, robot):
     """Revolute joints as two connects, spherical ones as one, rods as tendons that keep length."""
-    system = mbs.load(robot).assemble()
+    system = catalogue_system(robot)
     mbs.export.mjcf(system, tmp_path / "m.xml")
     back = mbs.load(tmp_path / "m.xml").assemble()
     assert back.closure.mobility == system.closure.mobility

@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.random_trees import random_tree
 
 import mbs
@@ -41,7 +42,7 @@ def same_models(before, path):
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "two_branch_tree", "sr400", "scara"])
 def test_catalogue_robots_survive(name, tmp_path):
-    same_models(mbs.load(name).assemble(), tmp_path / f"{name}.par")
+    same_models(catalogue_system(name), tmp_path / f"{name}.par")
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -160,7 +161,7 @@ def test_symbols_named_like_joint_variables(name, tmp_path):
 
 
 def test_closed_loops_keep_their_cuts_and_configuration(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     mbs.export.par(system, tmp_path / "four_bar.par")
     after = mbs.load(tmp_path / "four_bar.par").assemble()
     assert after.is_closed

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.random_trees import random_tree
 from support.written_files import (
     CLOSE,
@@ -34,7 +35,7 @@ def again(system, tmp_path):
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "scara", "rx90", "two_branch_tree"])
 def test_robots_of_the_catalogue(tmp_path, name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     found = again(system, tmp_path).assemble()
     assert set(names_of(row for row in system.bodies)) <= set(found.frames)
     assert_same_tree(system, found, np.random.default_rng(1))
@@ -120,7 +121,7 @@ CLOSED = ["four_bar", "five_bar", "slider_crank", "sr400", "akr3000", "bricard",
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_loops_are_joints_with_a_second_parent(tmp_path, name):
-    one = mbs.load(name).assemble()
+    one = catalogue_system(name)
     active = [one.speeds[k].name.replace(".", "_") for k in one.active]
     other = again(one, tmp_path).assemble(active=active)
     assert other.closure.residual < CLOSE

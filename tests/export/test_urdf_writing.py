@@ -5,6 +5,7 @@ from dataclasses import replace
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.random_trees import random_tree
 from support.written_files import assert_coupling_is_kept, assert_same_tree, names_of, written_arm
 
@@ -29,7 +30,7 @@ def again(system, tmp_path):
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "scara", "rx90", "two_branch_tree"])
 def test_robots_of_the_catalogue(tmp_path, name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     same(system, again(system, tmp_path).assemble(), np.random.default_rng(1))
 
 

@@ -5,6 +5,7 @@ import functools
 import casadi
 import numpy as np
 from casadi import SX, Function
+from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
@@ -14,7 +15,7 @@ from mbs.components import Body, Free, Mechanism, Prismatic, Revolute
 @functools.cache
 def system(name):
     """A robot of the catalogue."""
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 BUILDERS = {

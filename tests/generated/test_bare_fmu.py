@@ -14,6 +14,7 @@ from fmpy import fmi2
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.validation import validate_fmu
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, CoulombFriction, Revolute
@@ -31,7 +32,7 @@ SYSTEMS = ("puma560", "four_bar")
 
 
 def export(folder, name="four_bar", fmi="2.0", target="bare", **options):
-    system = mbs.load(name).assemble() if isinstance(name, str) else name
+    system = catalogue_system(name) if isinstance(name, str) else name
     folder.mkdir(exist_ok=True)
     path = folder / f"{target}.fmu"
     return mbs.export.fmu(system, path, fmi=fmi, solver="rk4", target=target, **options)
@@ -174,7 +175,7 @@ def moved(instance, fmi, references, names, inputs, steps):
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_a_motion_has_the_bits_of_the_hosted_fmu(name, fmi, unpacked):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     shown = [f"{c.name}.q" for c in system.coordinates]
     shown += [f"{s.name}.{kind}" for kind in "va" for s in system.speeds]
     efforts = [f"{s.name}.tau" for s in system.speeds if s.name in _driven(system)]
@@ -437,7 +438,7 @@ def friction():
 
 @pytest.mark.parametrize("solver", ["dopri5", "rodas"])
 def test_other_solvers_are_refused(solver, tmp_path):
-    system = mbs.load("simple_pendulum").assemble()
+    system = catalogue_system("simple_pendulum")
     with pytest.raises(ExportError, match=f"solver is '{solver}', .*; use solver='rk4'"):
         mbs.export.fmu(system, tmp_path / "x.fmu", target="bare", solver=solver)
     assert not list(tmp_path.iterdir())

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 from support.bare_library import EXACT, Motion, called, header_number, loaded
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Box, CoulombFriction, Free, Prismatic, Revolute
@@ -82,7 +83,7 @@ def floating():
 @pytest.mark.parametrize("real", ["double", "float"])
 @pytest.mark.parametrize("name", ["puma560", "four_bar", "five_bar"])
 def test_it_needs_functions_of_numbers_alone(name, real, tmp_path):
-    folder = written(mbs.load(name).assemble(), tmp_path / "lib", real=real)
+    folder = written(catalogue_system(name), tmp_path / "lib", real=real)
     calls, memory = compiled(sources(folder), tmp_path)
     plain = {call.removesuffix("f") if real == "float" else call for call in calls}
     plain |= {call for call in calls if call in ("memcpy", "memset")}
@@ -102,13 +103,13 @@ def test_quaternions_and_parameters_compile_without_warnings(tmp_path):
 
 def test_long_models_compile_without_warnings(tmp_path):
     """Some thousand operations, in several pieces."""
-    system = mbs.load("stewart_platform").assemble()
+    system = catalogue_system("stewart_platform")
     folder = mbs.export.c_library(system, tmp_path / "lib", target="bare", real="float")
     assert compiled(sources(folder), tmp_path)[1] == [(0, 0)] * 2
 
 
 def test_what_drops_checks_is_refused(tmp_path):
-    folder = written(mbs.load("four_bar").assemble(), tmp_path / "lib")
+    folder = written(catalogue_system("four_bar"), tmp_path / "lib")
     for file in sources(folder):
         command = [*find_compiler().command, "-ffast-math", "-fsyntax-only", str(file)]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -117,7 +118,7 @@ def test_what_drops_checks_is_refused(tmp_path):
 
 @pytest.mark.skipif(not shutil.which("g++"), reason="g++ is not installed")
 def test_compilers_of_cpp_take_it(tmp_path):
-    folder = written(mbs.load("four_bar").assemble(), tmp_path / "lib")
+    folder = written(catalogue_system("four_bar"), tmp_path / "lib")
     for file in sources(folder):
         command = ["g++", "-x", "c++", "-Wall", "-Werror", "-fsyntax-only", str(file)]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -126,7 +127,7 @@ def test_compilers_of_cpp_take_it(tmp_path):
 
 def test_the_equations_of_an_fmu_are_bare(tmp_path):
     """model.c and closure.c of a hosted FMU need what a bare library needs."""
-    path = mbs.export.fmu(mbs.load("four_bar").assemble(), tmp_path / "m.fmu", solver="rk4")
+    path = mbs.export.fmu(catalogue_system("four_bar"), tmp_path / "m.fmu", solver="rk4")
     with zipfile.ZipFile(path) as archive:
         archive.extractall(tmp_path)
     files = [tmp_path / "sources" / "model.c", tmp_path / "sources" / "closure.c"]
@@ -138,7 +139,7 @@ def test_the_equations_of_an_fmu_are_bare(tmp_path):
 @pytest.mark.skipif(not shutil.which("cppcheck"), reason="cppcheck is not installed")
 @pytest.mark.parametrize("kind", ["hosted", "double", "float", "fmu"])
 def test_a_static_checker_finds_nothing(kind, tmp_path):
-    system, undefined = mbs.load("four_bar").assemble(), []
+    system, undefined = catalogue_system("four_bar"), []
     if kind == "hosted":
         models = [mbs.models.inverse_dynamics(system), mbs.models.direct_dynamics(system).map(2)]
         folder = mbs.export.c_library(models, tmp_path / "lib")
@@ -214,7 +215,7 @@ def efforts(count, steps):
     [("simple_pendulum", 0, 200), ("puma560", 6, 200), ("four_bar", 1, 400), ("five_bar", 2, 200)],
 )
 def test_the_motion_is_that_of_an_fmu_to_the_last_bit(name, count, steps, tmp_path):
-    system, inputs = mbs.load(name).assemble(), efforts(count, steps)
+    system, inputs = catalogue_system(name), efforts(count, steps)
     folder = mbs.export.c_library(system, tmp_path / "lib", target="bare")
     motion = Motion(folder, loaded(folder), system)
     assert motion.start() == OK
@@ -226,7 +227,7 @@ def test_the_motion_is_that_of_an_fmu_to_the_last_bit(name, count, steps, tmp_pa
 
 def test_starts_guesses_and_parameters_are_those_of_an_fmu(tmp_path):
     """The other branch of a four-bar, whose coupler has an unknown mass."""
-    system = mbs.assembly.symbolic(mbs.load("four_bar").assemble(), ["M2"])
+    system = mbs.assembly.symbolic(catalogue_system("four_bar"), ["M2"])
     folder = mbs.export.c_library(system, tmp_path / "lib", target="bare")
     motion = Motion(folder, loaded(folder), system)
     assert motion.start([0.3, 1.5], [-1.2, -0.9], [5.0]) == OK
@@ -263,7 +264,7 @@ def test_a_body_that_floats_is_that_of_an_fmu(tmp_path):
 
 
 def test_the_order_of_the_method_is_four(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     folder = mbs.export.c_library(system, tmp_path / "lib", target="bare")
     motion, ends = Motion(folder, loaded(folder), system), []
     for count in (400, 800, 6400):
@@ -277,7 +278,7 @@ def test_the_order_of_the_method_is_four(tmp_path):
 
 
 def test_steps_that_have_no_meaning(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     folder = mbs.export.c_library(system, tmp_path / "lib", target="bare")
     motion = Motion(folder, loaded(folder), system)
     assert motion.start([np.nan, 0.0]) == NOT_FINITE
@@ -333,7 +334,7 @@ def test_events_are_refused(tmp_path):
 def test_single_precision_is_near(tmp_path):
     """Parts of the largest element: 6e-8 for each of some hundred operations, and what the inverse
     of the inertia matrix makes of it."""
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     idm, ddm = mbs.models.inverse_dynamics(system), mbs.models.direct_dynamics(system)
     folder = mbs.export.c_library([idm, ddm], tmp_path / "lib", target="bare", real="float")
     library, rng, errors = loaded(folder), np.random.default_rng(11), []
@@ -350,7 +351,7 @@ def test_single_precision_is_near(tmp_path):
 
 def test_loops_in_single_precision(tmp_path):
     """The bound is wider, and configurations that are closed in double precision stay so."""
-    system = mbs.load("five_bar").assemble()
+    system = catalogue_system("five_bar")
     ddm = mbs.models.direct_dynamics(system)
     folder = mbs.export.c_library([system, ddm], tmp_path / "lib", target="bare", real="float")
     library, q = loaded(folder), np.array(system.configuration)
@@ -366,7 +367,7 @@ def test_loops_in_single_precision(tmp_path):
 
 @pytest.mark.parametrize(("name", "count"), [("puma560", 6), ("four_bar", 1)])
 def test_the_motion_in_single_precision_is_near(name, count, tmp_path):
-    system, inputs, ends = mbs.load(name).assemble(), efforts(count, 500), []
+    system, inputs, ends = catalogue_system(name), efforts(count, 500), []
     for real, dtype in (("double", np.float64), ("float", np.float32)):
         folder = mbs.export.c_library(system, tmp_path / real, target="bare", real=real)
         motion = Motion(folder, loaded(folder), system, dtype)
@@ -395,7 +396,7 @@ def test_a_bound_of_more_than_zero_stays_one_in_single_precision(tmp_path):
 
 
 def test_numbers_are_those_of_python_to_the_last_bit(tmp_path):
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     models = [mbs.models.inverse_dynamics(system), mbs.models.lagrange(system)]
     folder = mbs.export.c_library(models, tmp_path / "lib", target="bare")
     library, q = loaded(folder), system.configuration
@@ -409,7 +410,7 @@ def test_numbers_are_those_of_python_to_the_last_bit(tmp_path):
 
 
 def test_the_example_runs(tmp_path):
-    folder = written(mbs.load("four_bar").assemble(), tmp_path / "four_bar", real="float")
+    folder = written(catalogue_system("four_bar"), tmp_path / "four_bar", real="float")
     flags = [flag for flag in EXACT if flag not in ("-fPIC", "-shared")]
     files = [*map(str, sources(folder)), "example.c"]
     command = [*find_compiler().command, *flags, "-Wall", "-Werror", *files, "-o", "example", "-lm"]
@@ -419,7 +420,7 @@ def test_the_example_runs(tmp_path):
 
 
 def test_files_and_names(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     folder = mbs.export.c_library(
         {"left": system, "right": system}, tmp_path / "lib", target="bare"
     )
@@ -443,14 +444,14 @@ def test_files_and_names(tmp_path):
     ],
 )
 def test_options_that_are_none(options, message, tmp_path):
-    idm = mbs.models.inverse_dynamics(mbs.load("four_bar").assemble())
+    idm = mbs.models.inverse_dynamics(catalogue_system("four_bar"))
     with pytest.raises(ExportError, match=message):
         mbs.export.c_library(idm, tmp_path / "lib", **options)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_names_that_meet(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     idm = mbs.models.inverse_dynamics(system)
     with pytest.raises(ModelError, match="lib_real is the type of numbers; give the function"):
         mbs.export.c_library({"lib_real": idm}, tmp_path / "lib", target="bare")

@@ -5,6 +5,7 @@ import subprocess
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
@@ -16,7 +17,7 @@ ROBOTS = ("puma560", "stanford", "two_branch_tree", "sr400", "four_bar", "five_b
 
 
 def models(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     builders = (
         mbs.models.inverse_dynamics,
         mbs.models.direct_dynamics,
@@ -252,6 +253,6 @@ def test_what_is_no_function(tmp_path, functions, message):
 
 def test_a_system_is_no_function(tmp_path):
     with pytest.raises(ModelError, match="four_bar is a System, whose motion bare libraries have"):
-        mbs.export.c_library(mbs.load("four_bar").assemble(), tmp_path / "lib")
+        mbs.export.c_library(catalogue_system("four_bar"), tmp_path / "lib")
     with pytest.raises(ExportError, match="3 is not a path"):
         mbs.export.c_library(example(), 3)

@@ -4,6 +4,7 @@ import casadi
 import numpy as np
 import pytest
 from support.bare_library import called, loaded
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Spherical
@@ -41,7 +42,7 @@ class Written:
 
 @TARGETS
 def test_loops(target, tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     ddm = Written(tmp_path / "lib", mbs.models.direct_dynamics(system), target=target)
     q = np.array(system.configuration)
     assert ddm.status(q, [0.1], [0.2]) == OK
@@ -55,7 +56,7 @@ def test_loops(target, tmp_path):
 @TARGETS
 def test_the_bound_of_open_loops_is_that_of_python(target, tmp_path):
     """A crank turned by ever more, the others left: one step opens the loop too far for both."""
-    system = mbs.load("five_bar").assemble()
+    system = catalogue_system("five_bar")
     ddm = Written(tmp_path / "lib", mbs.models.direct_dynamics(system), target=target)
     q, seen = np.array(system.configuration), set()
     for angle in np.geomspace(1e-7, 1e-5, 41):
@@ -98,7 +99,7 @@ def test_quaternions_and_parameters(target, tmp_path):
 
 def test_models_ask_for_what_they_use(tmp_path):
     """On the tree loops may be open; every column of a map is asked."""
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     tree = mbs.models.inverse_dynamics(system, coordinates="tree")
     q = np.array(system.configuration)
     assert Written(tmp_path / "tree", tree).status(q + 0.1, q, q) == OK
@@ -160,7 +161,7 @@ def test_numbers_whose_sum_overflows_are_numbers(tmp_path):
 
 @TARGETS
 def test_unchecked(target, tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     model = mbs.models.inverse_dynamics(system)
     folder = mbs.export.c_library(model, tmp_path / "lib", checked=False, target=target)
     q = np.array(system.configuration) + 0.1
@@ -173,7 +174,7 @@ def test_unchecked(target, tmp_path):
 
 
 def test_the_header_names_what_a_call_returns(tmp_path):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     models = [mbs.models.inverse_dynamics(system)]
     text = (mbs.export.c_library(models, tmp_path / "lib") / "lib.h").read_text()
     assert "Returns MBS_OK, MBS_NOT_FINITE, MBS_OPEN, MBS_UNDETERMINED or MBS_NO_RESULT." in text
@@ -185,7 +186,7 @@ def test_the_header_names_what_a_call_returns(tmp_path):
 
 def test_two_libraries_meet_in_one_program(tmp_path):
     """The statuses are defined once; no name of one library stands in the other."""
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     left = mbs.export.c_library({"one": mbs.models.inverse_dynamics(system)}, tmp_path / "left")
     mbs.export.c_library({"two": mbs.models.direct_dynamics(system)}, left.parent / "right")
     both = tmp_path / "both"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Box, Free, Mechanism, Prismatic, Revolute, Spherical
@@ -14,11 +15,11 @@ TOLERANCE = 1e-12
 
 
 def puma():
-    return mbs.load("puma560").assemble()
+    return catalogue_system("puma560")
 
 
 def four_bar():
-    return mbs.load("four_bar").assemble()
+    return catalogue_system("four_bar")
 
 
 def floating():

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.measured_arm import arm
 
 import mbs
@@ -16,7 +17,7 @@ def test_open_systems_are_their_own_configuration():
 
 
 def test_angles_that_follow_do_not_jump():
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     places = active_indices(system)
     swing = np.linspace(-0.6, 0.6, 121)
     rates = np.array([1, 1, 1, 1, 1, -0.5])
@@ -29,7 +30,7 @@ def test_angles_that_follow_do_not_jump():
 
 
 def test_a_platform_is_followed_from_its_arms():
-    system = mbs.load("delta").assemble()
+    system = catalogue_system("delta")
     assert not is_explicit(system)
     configurations = positions(system, np.array([[0.0, 0.0, 0.0], [0.2, 0.2, 0.2]]))
     assert configurations[0] == pytest.approx(np.array(system.configuration), abs=1e-9)

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
@@ -22,7 +23,7 @@ from mbs.identification.record import Record
 
 @cache
 def sr400():
-    return mbs.load("sr400").assemble()
+    return catalogue_system("sr400")
 
 
 def swinging(middle, size, seed=3):

@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
@@ -12,7 +13,7 @@ from mbs.loops import closure, solve
 
 
 def four_bar():
-    return mbs.load("four_bar").assemble()
+    return catalogue_system("four_bar")
 
 
 def elbow(q, a=0.4, b=1.0, c=0.9, ground=0.8):
@@ -38,7 +39,7 @@ def test_a_full_turn_stays_on_the_branch(angle):
 
 @pytest.mark.parametrize(("j2", "root"), [(-1.0, -1.695449), (-1.7, -1.695449), (2.0, 0.544084)])
 def test_a_guess_of_one_joint_leads_to_the_nearest_root_without_turns(j2, root):
-    q = solve(mbs.load("four_bar").assemble(), {"j1": 0.3}, guess={"j2": j2})
+    q = solve(catalogue_system("four_bar"), {"j1": 0.3}, guess={"j2": j2})
     assert q[1] == pytest.approx(root, abs=1e-6)
     assert abs(q[2]) < 2 * np.pi
 
@@ -123,7 +124,7 @@ def test_closed_geometry_is_differentiable_and_refuses_what_it_cannot_reach():
 @pytest.mark.parametrize("q7", [-2.0, 1.97, 3.1])
 def test_a_parallelogram_goes_straight_through_its_flat_configuration(q7):
     """At the flat configuration two branches meet; the one that continues is taken."""
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     q = solve(system, {"q7": q7})
     assert q[2] == pytest.approx(np.pi / 2 - q[1] + q7, abs=1e-9)
     assert q[7] == pytest.approx(q[1] - q7, abs=1e-9)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
@@ -88,7 +89,7 @@ def test_the_parameters_count():
 
 
 def test_an_open_chain_has_nothing_to_examine():
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     refused(ModelError, "an open chain has no loops", by=lambda: examine(system, [0, 0]))
 
 

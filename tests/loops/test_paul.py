@@ -11,6 +11,7 @@ import pytest
 from casadi import DM, SX, Function
 from support.arm_search import distance, plain_arm, some
 from support.arms import general_6r, slides_and_turns, spherical, three_parallel
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.closed_forms.paul import paul
@@ -36,7 +37,7 @@ def arm(*rows):
 
 
 def catalogue(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def puma_5r():
@@ -88,6 +89,7 @@ SOLVED = {
 }
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", SOLVED)
 def test_leaves_hold_every_configuration(name):
     system, steps, at = solved(name)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.configurations import same
 from support.parallel_geometry import LEGS, rotation
 from support.sweeps import examples
@@ -20,7 +21,7 @@ CRANK, COUPLER, GROUND = 0.25, 0.35, 0.2
 
 @pytest.fixture(scope="module")
 def systems():
-    return {name: mbs.load(name).assemble() for name in (*TOOLS, "five_bar")}
+    return {name: catalogue_system(name) for name in (*TOOLS, "five_bar")}
 
 
 def moved(system, away, seed):

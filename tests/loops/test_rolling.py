@@ -8,6 +8,7 @@ import pytest
 from casadi import SX, Function
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Free, Planar, Prismatic, Revolute, RollingDisc
@@ -198,7 +199,7 @@ CANONICAL_C1 = np.array([[0, 33.86641391492494], [-0.85035641456978, 1.685403973
 
 def linearised_bicycle(speed):
     """A, and K and C of A a = K q + C v, for lean and steer about straight running."""
-    system = mbs.load("whipple_bicycle").assemble()
+    system = catalogue_system("whipple_bicycle")
     names = [c.name for c in system.coordinates]
     active = [system.speeds[k].name for k in system.active]
     q, v = SX.sym("q", system.nq), SX.sym("v", 3)

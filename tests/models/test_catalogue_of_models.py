@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
@@ -11,7 +12,7 @@ from mbs.models.catalogue.entry import regular_part
 @pytest.fixture(scope="module")
 def systems():
     names = ("rx90", "sr400", "four_bar", "planar_2r", "panda", "scara", "five_bar")
-    return {name: mbs.load(name).assemble() for name in names}
+    return {name: catalogue_system(name) for name in names}
 
 
 def test_keys_are_unique_and_found():
@@ -78,7 +79,7 @@ def test_a_refusal_says_why(systems):
     assert entry("closure").refusal(systems["rx90"]).endswith("closed loops; rx90 has none")
     assert "four_bar has 2 at most" in entry("igm-pieper").refusal(systems["four_bar"])
     assert entry("igm-pieper").applies(systems["sr400"])
-    delta = mbs.load("delta").assemble()
+    delta = catalogue_system("delta")
     assert "solved by iteration" in entry("dgm").refusal(delta)
     assert entry("dgm").refusal(systems["four_bar"]) == ""
     assert "delta has 1 at most" in entry("igm-pieper").refusal(delta)
@@ -111,7 +112,7 @@ def test_joints_of_a_chain(systems):
     assert moving_joints(panda, 4) == ("q1", "q2", "q3", "q4")
     assert surplus_joints(panda, 7) == ("q3",)
     assert surplus_joints(panda, 6) == ()
-    assert moving_joints(mbs.load("stewart_platform").assemble(), "centre") == ()
+    assert moving_joints(catalogue_system("stewart_platform"), "centre") == ()
     assert held_at(panda, ("q3",), range(7)) == {"q3": 2.0}
 
 

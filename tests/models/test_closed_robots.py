@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.parallel_geometry import LEGS, rotation, three_spheres
 
 import mbs
@@ -22,7 +23,7 @@ CRANK, COUPLER, GROUND = 0.25, 0.35, 0.2
 
 @pytest.fixture(scope="module")
 def systems():
-    return {name: mbs.load(name).assemble() for name in TOOLS}
+    return {name: catalogue_system(name) for name in TOOLS}
 
 
 def numbers(function, *arguments):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.components import Body, Free, JointStop, Mechanism, Prismatic, Revolute
 from mbs.errors import DescriptionError, ModelError
 from mbs.models import limits
@@ -33,13 +33,13 @@ def test_every_limit_is_in_its_place(system):
 
 
 def test_motors_without_limits_are_unlimited():
-    found = limits(mbs.load("rx90").assemble())
+    found = limits(catalogue_system("rx90"))
     assert np.all(np.isinf(found.tau_upper))
     assert np.all(np.isinf(found.v_lower))
 
 
 def test_velocities_and_efforts_are_those_of_the_description():
-    panda = mbs.load("panda").assemble()
+    panda = catalogue_system("panda")
     found = limits(panda)
     np.testing.assert_array_equal(found.q_upper[:3], [2.8973, 1.7628, 2.8973])
     np.testing.assert_array_equal(found.v_upper, [2.175] * 4 + [2.61] * 3)

@@ -155,6 +155,7 @@ def test_invariants_do_not_change_along_a_motion(name, form):
         np.testing.assert_allclose(numbers(value), 0, atol=1e-11 * scale)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("form", ["reduced", *IMPLICIT])
 @pytest.mark.parametrize("name", [*CLOSED, *OPEN])
 def test_every_element_has_a_name_of_its_own(name, form):

@@ -4,6 +4,7 @@ import casadi
 import numpy as np
 import pytest
 from casadi import MX, SX
+from support.catalogue_systems import catalogue_system
 from support.driven_trees import driven_tree
 from support.random_trees import random_state, random_tree
 from test_derivatives import TREES, arm_with_parameters, assert_close, differences, tree_of
@@ -44,7 +45,7 @@ def test_implicit_formula_equals_differentiation(system):
 
 @pytest.mark.parametrize("name", ["planar_2r", "stanford"])
 def test_auto_takes_fewer_operations(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     totals = []
     for method in ("auto", "ad", "implicit"):
         taken = count(direct_dynamics_derivatives(system, method))
@@ -65,7 +66,7 @@ def test_accelerations_with_respect_to_parameters(method):
 
 @pytest.mark.parametrize("name", ["four_bar", "five_bar", "sr400"])
 def test_closed_systems_along_their_motion(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     m, rng = len(system.active), np.random.default_rng(0)
     start = np.array(system.configuration)[list(system.active)]
     q = np.array(mbs.loops.solve(system, start + 0.1))
@@ -99,7 +100,7 @@ def names_of(system, q):
 
 
 def test_names_of_closed_systems():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     f = inverse_dynamics_derivatives(system)
     assert f.name_in() == ["q", "v_a", "a_a"]
     assert f.name_out() == ["dtau_a_dq_a", "dtau_a_dv_a", "dtau_a_da_a", "tau_a"]
@@ -119,7 +120,7 @@ def test_names_of_closed_systems():
 )
 def test_what_there_is_not_is_refused(call, says):
     with pytest.raises(ModelError, match=says):
-        call(mbs.load("four_bar").assemble())
+        call(catalogue_system("four_bar"))
 
 
 def test_joint_without_inertia_is_refused():
@@ -132,7 +133,7 @@ def test_joint_without_inertia_is_refused():
 
 @pytest.mark.parametrize("name", ["stanford", "puma560"])
 def test_implicit_jacobian_is_used_and_right(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     ddm = mbs.models.direct_dynamics(system)
     ours = mbs.models.with_implicit_jacobian(system, ddm)
     assert ours.name_in() == ddm.name_in()
@@ -190,7 +191,7 @@ def test_implicit_jacobian_of_quaternions():
     "wrong", [None, lambda s: s, mbs.models.inverse_dynamics], ids=["none", "function", "idm"]
 )
 def test_implicit_jacobian_wants_the_direct_model(wrong):
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     model = wrong(system) if wrong else None
     with pytest.raises(ModelError, match="takes the direct model"):
         mbs.models.with_implicit_jacobian(system, model)

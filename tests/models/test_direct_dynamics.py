@@ -6,6 +6,7 @@ import pytest
 from casadi import SX
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import planar_loop
 from support.messages import refused
 from support.mujoco_rounding import as_exact_as
@@ -51,7 +52,7 @@ def assert_methods_agree(system, seed):
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_methods_agree_on_catalogue_robots(name):
-    assert_methods_agree(mbs.load(name).assemble(), 0)
+    assert_methods_agree(catalogue_system(name), 0)
 
 
 @pytest.mark.sweep
@@ -75,7 +76,7 @@ def test_solve_inertia_is_the_inverse_of_the_inertia_matrix(seed, options):
 
 
 def test_solve_inertia_of_no_columns():
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     poses = link_poses(system.tree, SX.sym("q", 2))
     assert solve_inertia(system.tree, poses, SX(2, 0)).shape == (2, 0)
 
@@ -155,7 +156,7 @@ def test_rotors_springs_and_drives(reverse):
 @pytest.mark.parametrize("method", ["articulated", "composite"])
 @pytest.mark.parametrize("name", ["rx90", "two_branch_tree"])
 def test_moving_base(method, name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     rng = np.random.default_rng(2)
     q, v, a = random_state(system, rng)
     motion = (*rng.uniform(-1, 1, (2, 6)), np.linalg.qr(rng.standard_normal((3, 3)))[0])
@@ -168,7 +169,7 @@ def test_moving_base(method, name):
 @pytest.mark.parametrize("method", ["articulated", "composite"])
 @pytest.mark.parametrize("name", ["puma560", "two_branch_tree", "four_bar"])
 def test_external_wrenches(method, name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     method = "composite" if system.is_closed else method
     rng = np.random.default_rng(3)
     m = len(system.active)
@@ -202,7 +203,7 @@ def test_auto_is_the_cheaper_of_the_two():
 
     chosen = set()
     for system in (
-        mbs.load("rx90").assemble(),
+        catalogue_system("rx90"),
         random_tree(3, n=5, kinds=("universal",), serial=True).mechanism.assemble(),
         random_tree(5, n=3, kinds=("free",)).mechanism.assemble(),
     ):
@@ -234,7 +235,7 @@ def test_articulated_bodies_take_fewer_operations_than_the_literature():
 
 
 def test_unknown_method_is_refused():
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     refused(
         ModelError,
         "method is 'aba'; use one of auto, articulated, composite",
@@ -310,7 +311,7 @@ def test_light_bodies_are_not_taken_for_massless(size):
 
 
 def test_articulated_bodies_can_be_differentiated_twice():
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     q, v, tau = random_state(system, np.random.default_rng(3))
     found = {}
     for method in ("articulated", "composite"):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain
 from support.messages import refused
 from support.random_trees import random_tree
@@ -49,7 +50,7 @@ def test_a_closed_chain_moves_as_with_the_effort_that_was_found(closing):
 
 
 def test_one_prescribed_joint_of_a_four_bar_fixes_the_motion():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     closure = mbs.models.acceleration_closure(system)
     q, v_a = np.array(system.configuration), [1.3]
     G = np.array(mbs.loops.reduction_matrix(system)(q))
@@ -70,5 +71,5 @@ def test_one_prescribed_joint_of_a_four_bar_fixes_the_motion():
     ],
 )
 def test_impossible_prescriptions_are_refused(names, told):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     refused(ModelError, told, by=lambda: mbs.models.hybrid_dynamics(system, names))

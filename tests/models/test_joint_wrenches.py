@@ -6,6 +6,7 @@ import casadi
 import numpy as np
 import pytest
 from support.body_balance import State, along, balanced, column
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain
 from support.driven_trees import driven_tree
 from support.mujoco_rounding import as_exact_as
@@ -160,7 +161,7 @@ def test_parameters_and_derivatives():
 def test_only_systems():
     with pytest.raises(ModelError, match="is not a System"):
         joint_wrenches(mbs.Mechanism("m"))
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     assert [row.name for row in system.joints] == [c.name for c in system.coordinates]
     assert not any(row.cut for row in system.joints)
 

@@ -6,6 +6,7 @@ import pytest
 from casadi import SX
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain
 from support.random_trees import ALL_KINDS, random_body, random_rotation, random_state, random_tree
 from support.sweeps import examples
@@ -74,7 +75,7 @@ def test_jacobian_in_any_axes_is_the_velocity_of_the_frame(seed, moved, axes):
 @pytest.mark.parametrize("intermediate", range(7))
 @pytest.mark.parametrize("reference", [None, 0, 2, 6])
 def test_renaud_with_any_frames(intermediate, reference):
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     q = np.linspace(-1, 1.5, 6)
     asked = jacobian(system, 6, form="renaud", intermediate=intermediate, reference=reference)
     R6, L, J = (np.array(x) for x in asked(q))
@@ -85,7 +86,7 @@ def test_renaud_with_any_frames(intermediate, reference):
 
 
 def test_jacobian_of_the_base_is_zero():
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     assert not np.any(np.array(jacobian(system, "base")(np.ones(6))))
     R6, L, J = jacobian(system, 0, form="renaud")(np.ones(6))
     assert not np.any(np.array(J))
@@ -240,7 +241,7 @@ def test_pinocchio_agrees(robot):
 
 
 def test_functions_have_names_and_are_cached():
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     factors = jacobian(system, 6, form="renaud")
     assert (factors.name(), factors.name_out()) == ("jacobian_renaud", ["R6", "L", "J"])
     moving = link_accelerations(system, moving_base=True)
@@ -266,14 +267,14 @@ def test_functions_have_names_and_are_cached():
     ],
 )
 def test_wrong_arguments_are_refused(arguments, message):
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     with pytest.raises(ModelError) as refused:
         jacobian(system, **{"frame": 6, **arguments})
     assert message in str(refused.value)
 
 
 def test_wrong_arguments_of_the_others_are_refused():
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     with pytest.raises(ModelError, match="there is no frame 'tol'"):
         jacobian_dot_velocity(system, "tol")
     with pytest.raises(ModelError, match="coordinates is 'all'"):

@@ -6,6 +6,7 @@ import pytest
 from casadi import SX
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain, planar_loop
 from support.messages import refused
 from support.random_trees import ALL_KINDS, random_state, random_tree
@@ -33,7 +34,7 @@ ARMS = ("puma560", "rx90", "stanford")
 @pytest.mark.parametrize("axes", ["base", 3, 6])
 @pytest.mark.parametrize("name", ARMS)
 def test_arm(name, axes):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     rng = np.random.default_rng(1)
     for _ in range(4):
         q, v = rng.uniform(-2, 2, (2, 6))
@@ -99,7 +100,7 @@ def test_factors_of_an_arm_with_symbols(name, constant, factors):
     ],
 )
 def test_singular_configuration_is_where_a_factor_vanishes(name, configuration, vanish):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     q = np.array(system.position({f"q{k}": 0.3 + 0.2 * k for k in range(1, 7)} | configuration))
     factors = singularities(system, 6).factors
     assert {f.text for f in factors if abs(float(f.function(q))) < 1e-12} == vanish
@@ -108,14 +109,14 @@ def test_singular_configuration_is_where_a_factor_vanishes(name, configuration, 
 
 
 def test_inverse_at_a_singular_configuration_is_refused():
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     with pytest.raises(ModelError, match="the configuration is singular"):
         inverse_jacobian(system, 6)([0.1, 0.2, 0.3, 0.4, 0.0, 0.6])
 
 
 @pytest.mark.parametrize("name", [*ARMS, "scara"])
 def test_product_of_factors_is_the_determinant(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     n = system.nv
     rows = None if n == 6 else [0, 1, 2, 5]
     found = singularities(system, n, rows=rows)
@@ -188,7 +189,7 @@ def test_part_of_a_closed_system():
 
 
 def test_wrist_of_a_robot_with_a_parallelogram_separates():
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     motors = {"q1": 0.3, "q2": -1.2, "q4": 0.2, "q5": 0.7, "q6": 0.4, "q7": 0.3}
     q = np.array(mbs.loops.solve(system, motors)).ravel()
     J = np.array(jacobian(system, 6)(q))
@@ -217,7 +218,7 @@ def test_planar_loop():
 
 
 def test_functions_are_named_cached_and_differentiable():
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     f = inverse_jacobian(system, 6)
     assert (f.name(), f.name_in(), f.name_out()) == ("inverse_jacobian", ["q"], ["J_inv"])
     assert inverse_jacobian(system, 6, rows=range(6)) is f
@@ -254,12 +255,12 @@ def test_functions_are_named_cached_and_differentiable():
     "model", [inverse_jacobian, inverse_kinematics, jacobian_determinant, singularities]
 )
 def test_wrong_arguments_are_refused(model, arguments, parts):
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     refused(ModelError, *parts, by=lambda: model(system, **{"frame": 6, **arguments}))
 
 
 def test_rows_and_columns_by_name():
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     named = jacobian_determinant(system, 6, rows=["Vx", "wz"], columns=["q2", "q1"])
     assert named is jacobian_determinant(system, 6, rows=[0, 5], columns=[1, 0])
     q = np.linspace(0, 1, 6)

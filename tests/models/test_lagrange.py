@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain
 from support.driven_trees import driven_tree
 from support.messages import refused
@@ -44,7 +45,7 @@ def test_christoffel_symbols_with_rotors(seed):
 
 @pytest.mark.parametrize("name", [*SPATIAL, *PLANAR])
 def test_cheaper_method_is_taken(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     q, v, _ = random_state(system, np.random.default_rng(1))
     same(*both(system, q, v))
     taken = [
@@ -68,7 +69,7 @@ def test_closed_system():
 
 @pytest.mark.parametrize("method", ["euler", None, "Renaud"])
 def test_other_methods_are_refused(method):
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     refused(
         ModelError,
         f"planar_2r: method is {method!r}; use one of auto, renaud, christoffel",

@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.contact_mechanisms import five_bar, stick_slip, stopped_rocker
 from support.minimal_runs import moved, start_of
 
@@ -69,9 +70,9 @@ def on_body(system, q, frame, wrench):
 
 
 _WRENCHES = {
-    "arm": (lambda: mbs.load("puma560").assemble(), "link6"),
-    "link number": (lambda: mbs.load("puma560").assemble(), 4),
-    "closed": (lambda: mbs.load("sr400").assemble(), "link8"),
+    "arm": (lambda: catalogue_system("puma560"), "link6"),
+    "link number": (lambda: catalogue_system("puma560"), 4),
+    "closed": (lambda: catalogue_system("sr400"), "link8"),
     "floating": (floating, "arm"),
     "point": (floating, "tip"),
 }
@@ -126,7 +127,7 @@ def test_a_wrench_moves_a_loop_with_dry_friction_as_force_elements_do():
 
 
 def test_prescribed_positions_and_accelerations_move_as_in_a_simulation():
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     state = minimal_state(system, drive=DriveInputs(motions=(("q2", "q"), ("q4", "a"))))
     assert state.velocities == (0, 2, 3, 4, 5)
     assert state.accelerations == (0, 2, 4, 5)
@@ -169,7 +170,7 @@ def test_a_prescribed_acceleration_of_a_loop_is_that_of_hybrid_dynamics():
 @pytest.mark.parametrize("name", ["bricard", "four_bar"])
 def test_the_acceleration_that_a_loop_has_anyway_needs_no_drive(name):
     """One of them has rows whose independence changes with the configuration."""
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     first = system.active[0]
     motion = ((system.speeds[first].name, "a"),)
     free, driven = (minimal_state(system, drive=DriveInputs(motions=m)) for m in ((), motion))

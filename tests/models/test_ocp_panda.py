@@ -7,8 +7,8 @@ import casadi
 import numpy as np
 import pytest
 from casadi import MX, Function
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.models import inverse_dynamics, limits
 
 FROM = np.array([0, -0.6, 0, -2.2, 0, 1.6, 0.8])
@@ -18,7 +18,7 @@ SECONDS = 1.5
 
 @pytest.fixture(scope="module")
 def arm():
-    return mbs.load("panda").assemble()
+    return catalogue_system("panda")
 
 
 def solved(opti):

@@ -5,6 +5,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.random_trees import random_state, random_tree
 
 import mbs
@@ -25,7 +26,7 @@ STATES = 19
 def system_of(name):
     if name == "floating":
         return random_tree(3, 4, ("free", "spherical", "revolute")).mechanism.assemble()
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def states_of(name, model):

@@ -88,6 +88,19 @@ def test_what_libraries_have_in_common_is_compiled_once(cache, monkeypatch):
     assert sorted(file.suffix for file in cache.iterdir()) == [".o", first.suffix, first.suffix]
 
 
+def test_files_that_are_compiled_as_one(cache, monkeypatch):
+    compiled = []
+    module = sys.modules["mbs.native.compiler"]
+    run = module._compile
+    monkeypatch.setattr(
+        module, "_compile", lambda c, given, s: (compiled.append(s), run(c, given, s))
+    )
+    library = cached_library(PARTS, together=("shared.c", "own.c"))
+    assert ctypes.CDLL(str(library)).f() == 42
+    ((one,),) = compiled
+    assert one.name not in PARTS
+
+
 def test_a_header_of_a_header_makes_another_object(cache):
     cached_library(PARTS, common=("shared.c",))
     changed = cached_library({**PARTS, "base.h": "#define BASE 41"}, common=("shared.c",))

@@ -2,6 +2,7 @@
 
 import pytest
 from operations.expressions import require_equal
+from support.catalogue_systems import catalogue_system
 from symbolic_robots import symbolic_robot
 
 import mbs
@@ -33,7 +34,7 @@ def test_the_jacobian_of_the_rx90():
     ],
 )
 def test_catalogue(robot, model, most):
-    f = getattr(mbs.models, model)(mbs.load(robot).assemble())
+    f = getattr(mbs.models, model)(catalogue_system(robot))
     simple = simplify(f)
     assert count(simple).total <= min(most, count(f).total)
     require_equal(f, simple, -1.0, 1.0)
@@ -43,5 +44,5 @@ def test_catalogue(robot, model, most):
 
 @pytest.mark.parametrize("robot", ["puma560", "stanford"])
 def test_what_is_simple_stays_as_it_is(robot):
-    f = simplify(mbs.models.inverse_dynamics(mbs.load(robot).assemble()))
+    f = simplify(mbs.models.inverse_dynamics(catalogue_system(robot)))
     assert count(simplify(f)) == count(f)

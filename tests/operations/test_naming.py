@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 from casadi import SX, Function
+from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
@@ -46,7 +47,7 @@ def test_two_names_of_one_scalar_are_both_found():
 
 
 def test_a_simplified_model_has_the_values_of_its_names():
-    idm = mbs.models.inverse_dynamics(mbs.load("rx90").assemble())
+    idm = mbs.models.inverse_dynamics(catalogue_system("rx90"))
     small, named = simplify(idm), idm.annotated()
     found = small.annotated()
     assert 90 < found.n_out() < named.n_out()

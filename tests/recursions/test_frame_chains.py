@@ -4,6 +4,7 @@ import casadi
 import numpy as np
 import pytest
 from casadi import DM, SX, Function
+from support.catalogue_systems import catalogue_system
 from support.random_trees import ALL_KINDS, random_state, random_tree
 
 import mbs
@@ -67,7 +68,7 @@ def test_backwards_through_a_joint_is_its_inverse():
 
 
 def test_the_ends_of_a_ring_coincide():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     q = SX.sym("q", extent(system))
     ring = ring_of(system, 0, (), q)
     found = mbs.loops.solve(system, {system.coordinates[system.active[0]].name: 0.4})
@@ -86,7 +87,7 @@ def test_the_ends_of_a_ring_coincide():
 
 
 def test_frames_at_zero_are_those_of_zero_positions():
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     chain = tree_chain(system.tree, system.frame("base"), system.frame(6), (), SX(0, 1))
     ends = [DM(pose.matrix) for pose in frames_at_zero(chain.gaps)]
     moved = [DM(pose.matrix) for pose in transforms(chain, SX(6, 1))]

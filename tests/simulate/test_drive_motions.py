@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import planar_loop
 from support.messages import refused
 
@@ -244,5 +245,5 @@ def test_inputs_that_are_refused(options, parts):
 
 
 def test_inputs_of_a_system_without_motors_are_refused():
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     refused(ModelError, "no motor", "tau", by=lambda: run(system, 0.1, u={"motor": 1.0}))

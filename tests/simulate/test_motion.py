@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
@@ -23,7 +24,7 @@ def run(system, seconds=1.0, **options):
 
 
 def test_a_crank_that_is_turned_gives_its_work_to_the_loop():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     start = system.configuration[0]
     result = run(system, 2.0, motion={"j1.q": lambda t: start + 2 * t + 0.3 * t**2}, step=1e-3)
     t = result.time
@@ -37,7 +38,7 @@ def test_a_crank_that_is_turned_gives_its_work_to_the_loop():
 
 
 def test_every_joint_of_an_arm_driven_needs_the_efforts_of_the_inverse_model():
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     names = [c.name for c in system.coordinates]
     laws = {
         f"{n}.q": (lambda t, k=k: 0.1 * k * (1 - casadi.cos(2 * t))) for k, n in enumerate(names)
@@ -50,7 +51,7 @@ def test_every_joint_of_an_arm_driven_needs_the_efforts_of_the_inverse_model():
 
 
 def test_velocities_and_accelerations_leave_their_positions_to_be_integrated():
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     laws = {"q1.v": 1.0, "q2.a": lambda t: t}
     result = run(system, motion=laws, q0={"q1": 0.5}, v0={"q2": 0.2}, tolerance=1e-10)
     assert result["q1.q"][-1] == pytest.approx(1.5, abs=1e-9)
@@ -96,12 +97,12 @@ def test_a_pendulum_on_a_shaken_pivot_obeys_its_equation():
     ],
 )
 def test_impossible_motions_are_refused(law, told):
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     refused(ModelError, told, by=lambda: run(system, motion=law))
 
 
 def test_a_start_against_the_law_is_refused():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     law = {"j1.q": lambda t: 0.3 + t}
     assert run(system, 0.1, motion=law, q0={"j1": 0.3})["j1.q"][0] == pytest.approx(0.3)
     refused(

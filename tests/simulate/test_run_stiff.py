@@ -4,6 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import PointMass, Prismatic, Spring
@@ -32,7 +33,7 @@ def test_a_stiff_tie_acts_as_a_weld():
 
 
 def test_flyball_governor_is_the_same_by_both_methods():
-    system = mbs.load("flyball_governor").assemble()
+    system = catalogue_system("flyball_governor")
     start = {"spin": 2 * pi}
     explicit, implicit = (
         run(system, 2, v0=start, method=method, tolerance=1e-8, quiet=True)
@@ -43,7 +44,7 @@ def test_flyball_governor_is_the_same_by_both_methods():
 
 
 def test_loops_stay_closed():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     explicit, implicit = (
         run(system, 2, method=method, quiet=True) for method in ("dopri5", "rodas")
     )

@@ -87,6 +87,7 @@ def chosen(system):
     return closure.rows, closure.slips, closure.active, closure.free, closure.varies
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", [*CLOSED, "n_four_bar(8)"])
 def test_noise_changes_no_choice(name, request):
     mechanism = n_four_bar(8) if name == "n_four_bar(8)" else mbs.load(name)

@@ -11,6 +11,7 @@ import acados
 import casadi
 import numpy as np
 from acados.acados_template import AcadosModel, AcadosOcp, AcadosOcpSolver
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.bridges import acados_fields, step
@@ -59,7 +60,7 @@ def slack(advance, dae, x, u):
 
 def main(robot, form):
     """Solve it and print what came out."""
-    dae = mbs.models.dae(mbs.load(robot).assemble(), form)
+    dae = mbs.models.dae(catalogue_system(robot), form)
     goal, motors = dae.x0.copy(), dae.u.numel()
     goal[:motors] += np.linspace(1.0, -0.5, motors)
     solver = AcadosOcpSolver(problem(dae, goal), json_file="arm.json")
@@ -70,7 +71,7 @@ def main(robot, form):
     status = solver.solve()
     x = np.array([solver.get(k, "x") for k in range(STAGES + 1)])
     u = np.array([solver.get(k, "u") for k in range(STAGES)])
-    advance = step(mbs.models.dae(mbs.load(robot).assemble()))
+    advance = step(mbs.models.dae(catalogue_system(robot)))
     ends = [advance(x[k], u[k], dae.p0, DURATION / STAGES) for k in range(STAGES)]
     found = {
         "status": int(status),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain
 from support.random_trees import random_tree
 
-import mbs
 from mbs.components import (
     Body,
     Box,
@@ -86,7 +86,7 @@ def rolling():
 
 def sr400():
     """An arm with a parallelogram."""
-    return mbs.load("sr400").assemble()
+    return catalogue_system("sr400")
 
 
 CLOSED = {
@@ -101,5 +101,5 @@ CLOSED = {
 }
 """By name what assembles a system with loops or rolling discs."""
 
-OPEN = {"floating": floating, "rx90": lambda: mbs.load("rx90").assemble()}
+OPEN = {"floating": floating, "rx90": lambda: catalogue_system("rx90")}
 """By name what assembles a system without."""

@@ -1,14 +1,16 @@
 """Runs the Python blocks of a page, in order, in the current folder.
 
-A program for any Python that has mbs: `python page.py PAGE [EXTRAS [CODE]]`. With EXTRAS (names
-between commas, or "none") what another installation would not have is refused on import, so that
-an environment with every tool stands for one with these extras alone; "all" refuses nothing. CODE
+A program for any Python that has mbs: `python page.py PAGE [REFUSED [CODE]]`. REFUSED are names of
+modules between commas, which cannot be imported: those of `absent(extras)` are what an installation
+with these extras alone would not have, so that an environment with every tool stands for it. CODE
 runs after the page, with its names.
 """
 
 import importlib.metadata
 import re
 import sys
+from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.abc import MetaPathFinder
 from pathlib import Path
 
@@ -66,16 +68,27 @@ def needed(extras: tuple[str, ...]) -> set[str]:
     return found
 
 
-class Absent(MetaPathFinder):
-    """Refuses to import what some distributions bring."""
+@cache
+def absent(extras: tuple[str, ...]) -> tuple[str, ...]:
+    """The modules here that an installation with some extras does not have."""
+    present = needed(extras)
+    return tuple(
+        module
+        for module, bringers in _provided().items()
+        if not {re.sub(r"[-_.]+", "-", name).lower() for name in bringers} & present
+    )
 
-    def __init__(self, present: set[str]) -> None:
-        provided = importlib.metadata.packages_distributions()
-        self.modules = {
-            module
-            for module, bringers in provided.items()
-            if not {re.sub(r"[-_.]+", "-", name).lower() for name in bringers} & present
-        }
+
+@cache
+def _provided() -> Mapping[str, list[str]]:
+    return importlib.metadata.packages_distributions()
+
+
+class Absent(MetaPathFinder):
+    """Refuses to import some modules."""
+
+    def __init__(self, modules: Iterable[str]) -> None:
+        self.modules = frozenset(modules)
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         """Not there, as Python itself says it."""
@@ -83,11 +96,9 @@ class Absent(MetaPathFinder):
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
-def main(page: str, extras: str = "all", code: str = "") -> None:
+def main(page: str, refused: str = "", code: str = "") -> None:
     """Run a page."""
-    if extras != "all":
-        chosen = () if extras == "none" else tuple(extras.split(","))
-        sys.meta_path.insert(0, Absent(needed(chosen)))
+    sys.meta_path.insert(0, Absent(refused.split(",")))
     names: dict[str, object] = {"__name__": "__main__"}
     run(Path(page), names)
     exec(code, names)

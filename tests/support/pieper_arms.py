@@ -7,6 +7,7 @@ from functools import cache
 import casadi
 import numpy as np
 from support.arm_search import distance, merged, plain_arm, searched
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.closed_forms.pieper import pieper
@@ -99,7 +100,7 @@ def assert_complete(leaves, arm, seed):
 
 
 def catalogue(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def kinds_of(sequence):

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.identification.record import Record, joint_side
 from mbs.robots.rows import frame, robot
 
@@ -34,7 +34,7 @@ def panda_record():
     Source: Gaz et al. 2019.
     """
     numbers = _archive("panda_exciting_traj1.npz")
-    system = mbs.load("panda").assemble()
+    system = catalogue_system("panda")
     return system, Record.of(system, *(numbers[k] for k in ("time", "q", "tau", "qd")))
 
 

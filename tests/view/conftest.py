@@ -3,6 +3,7 @@
 import functools
 
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 
@@ -11,7 +12,7 @@ import mbs
 def assembled():
     @functools.cache
     def assemble(name):
-        return mbs.load(name).assemble()
+        return catalogue_system(name)
 
     return assemble
 

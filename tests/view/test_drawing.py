@@ -7,6 +7,7 @@ import zlib
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Box, Cylinder, Free, Revolute, Spring
@@ -40,7 +41,7 @@ def pixels(data):
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_all_that_is_drawn_lies_in_the_picture(name):
-    root = ET.fromstring(svg(drawing(mbs.load(name).assemble()), name))
+    root = ET.fromstring(svg(drawing(catalogue_system(name)), name))
     width, height = (float(x) for x in root.get("viewBox").split()[2:])
     names = 0
     for element in root:
@@ -56,7 +57,7 @@ def test_all_that_is_drawn_lies_in_the_picture(name):
 
 
 def test_an_icon_of_its_own_has_no_names():
-    root = ET.fromstring(standalone(drawing(mbs.load("four_bar").assemble()), "<four>").encode())
+    root = ET.fromstring(standalone(drawing(catalogue_system("four_bar")), "<four>").encode())
     assert not [e for e in root.iter() if e.tag.endswith("text")]
     assert [e.text for e in root.iter() if e.tag.endswith("title")] == ["<four>"]
 
@@ -67,7 +68,7 @@ def test_png_keeps_every_pixel():
 
 
 def test_the_icon_of_a_robot_is_drawn_quickly_and_twice_the_same():
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     first = icon(drawing(system))
     assert first == icon(drawing(system))
     share = np.mean(pixels(first)[..., 3] > 0)
@@ -80,7 +81,7 @@ def middle_of(stroke):
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_joints_that_close_loops_stand_out(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     drawn = drawing(system)
     closing = {label.text for label in drawn.names if label.colour == "loop"}
     assert set(", ".join(closing).split(", ")) == {j.name for j in system.joints if j.cut}
@@ -89,13 +90,13 @@ def test_joints_that_close_loops_stand_out(name):
 
 def test_a_planar_mechanism_is_seen_in_its_plane():
     """Bars are as much longer than others as in the four-bar: 0.4, 0.9 and 1 m."""
-    drawn = drawing(mbs.load("four_bar").assemble())
+    drawn = drawing(catalogue_system("four_bar"))
     bars = [np.array(s.points) for s in drawn.strokes if s.role == "link"]
     short, middle, long = sorted(np.linalg.norm(b[:, None] - b, axis=2).max() for b in bars)
     # round ends are 32-sided, 0.5 % off a circle of 1/30 of the length
     assert (long - short) / (middle - short) == pytest.approx(0.6 / 0.5, rel=2e-3)
     assert drawn.caption == "in the plane of the motion"
-    assert drawing(mbs.load("scara").assemble()).caption == "seen from above at an angle"
+    assert drawing(catalogue_system("scara")).caption == "seen from above at an angle"
 
 
 @pytest.mark.parametrize(
@@ -116,7 +117,7 @@ def test_down_is_down(axis, gravity, q):
 
 
 def test_up_is_up_in_a_view_at_an_angle():
-    drawn = drawing(mbs.load("puma560").assemble())
+    drawn = drawing(catalogue_system("puma560"))
     up = next(s for s in drawn.strokes if s.colour == "axes.2")
     (x0, y0), (x1, y1) = up.points
     assert abs(x1 - x0) < 1e-9
@@ -167,7 +168,7 @@ def test_the_hull_leaves_inner_points_and_points_on_sides_out():
 
 
 def test_the_page_of_a_drawing_follows_the_choice_of_its_reader():
-    drawn = drawing(mbs.load("four_bar").assemble())
+    drawn = drawing(catalogue_system("four_bar"))
     both, light = svg(drawn, "four_bar"), svg(drawn, "four_bar", "light")
     assert "prefers-color-scheme: dark" in both
     assert "prefers-color-scheme" not in light

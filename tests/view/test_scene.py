@@ -27,6 +27,7 @@ def numbers(value):
     return [value] if isinstance(value, (int, float)) else []
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_mechanism_has_a_scene(name, assembled):
     system = assembled(name)
@@ -48,6 +49,7 @@ def test_every_mechanism_has_a_scene(name, assembled):
     assert named == {joint.name for joint in system.joints if joint.kind not in ("free", "fixed")}
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_links_stand_where_the_models_say(name, assembled):
     system = assembled(name)

@@ -93,6 +93,11 @@ class Face:
         """The C files to compile with a solver, in the folder `sources` of the FMU."""
         return ("model.c", *self._own(solver, target))
 
+    def together(self, solver: Solver, target: Target = "hosted") -> tuple[str, ...]:
+        """Those of the C files that are compiled as one: all but the run-time, which is common."""
+        runtime = {f"{name}.c" for name in _runtime(solver, target)}
+        return tuple(name for name in self._own(solver, target) if name not in runtime)
+
     def _own(self, solver: Solver, target: Target) -> tuple[str, ...]:
         heap = () if target == "bare" and self.callbacks else (_MEMORY,)
         core = (*_CORE, *(_HOSTED if target == "hosted" else ()))
@@ -281,9 +286,10 @@ def _binaries(
     """The libraries: name in the FMU to content."""
     flags = (*plain_flags(texts["model.c"]), "-fvisibility=hidden", "-std=gnu99")
     common = tuple(f"{name}.c" for name in _runtime(model.solver, model.target))
+    together = FACES[fmi].together(model.solver, model.target)
     libraries: dict[Platform, Path] = {}
     if goals is None:
-        libraries[host_platform()] = cached_library(texts, flags, common=common)
+        libraries[host_platform()] = cached_library(texts, flags, common=common, together=together)
     for goal in goals or ():
         stripped = (*flags, "-s")
         libraries[goal] = cached_library(
@@ -292,6 +298,7 @@ def _binaries(
             compiler=cross_compiler(goal),
             suffix=goal.suffix,
             common=common,
+            together=together,
         )
     return {
         f"binaries/{folder_of(goal, fmi)}/{model.identifier}{goal.suffix}": library.read_bytes()

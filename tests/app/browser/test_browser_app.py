@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from support.browser_app import Visitor, browser, served
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.app.web.document.document import Document
@@ -90,7 +91,7 @@ def test_every_configuration_of_a_pose_can_be_shown(visitor):
 
 
 def test_a_four_bar_is_simulated_and_leaves_as_an_fmu(visitor, tmp_path):
-    direct = mbs.simulate.run(mbs.load("four_bar").assemble(), 0.5, tau={"j1": 1.0}, quiet=True)
+    direct = mbs.simulate.run(catalogue_system("four_bar"), 0.5, tau={"j1": 1.0}, quiet=True)
     visitor.arrive()
     _open(visitor, "four_bar")
     visitor.choose("Simulate", "Motion")

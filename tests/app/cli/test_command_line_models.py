@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.operations import count, simplify
@@ -11,11 +12,11 @@ from mbs.operations import count, simplify
 
 @pytest.fixture(scope="module")
 def puma():
-    return mbs.load("puma560").assemble()
+    return catalogue_system("puma560")
 
 
 def test_the_text_is_that_of_the_simplified_model(command) -> None:
-    idm = simplify(mbs.models.inverse_dynamics(mbs.load("planar_2r").assemble()))
+    idm = simplify(mbs.models.inverse_dynamics(catalogue_system("planar_2r")))
     answer = command("model", "planar_2r", "idm", "--language", "fortran")
     assert answer.code == 0
     assert answer.out == mbs.export.code(idm, "fortran")
@@ -78,7 +79,7 @@ def test_the_usual_models_are_counted_when_none_is_named(command) -> None:
 def test_options_reach_the_counted_model(command) -> None:
     words = ("planar_2r", "jacobian", "--no-optimise", "--option", "frame=1", "--json")
     [row] = json.loads(command("count", *words).out)
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     here = count(mbs.models.jacobian(system, 1))
     base = count(mbs.models.jacobian(system, 2))
     assert (row["before"]["mul"], row["before"]["total"]) == (here.mul, here.total)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.models import inverse_geometry
@@ -21,7 +22,7 @@ def read_csv(text: str) -> dict[str, np.ndarray]:
 def test_every_configuration_of_the_pose_of_a_configuration(command) -> None:
     words = ("--q", "q1=0.3", "--q", "q2=0.5", "--q", "q3=pi/3", "--q", "q5=1")
     data = json.loads(command("solve-ik", "rx90", *words, "--json").out)
-    system = mbs.load("rx90").assemble()
+    system = catalogue_system("rx90")
     T = np.array(mbs.models.direct_geometry(system)([0.3, 0.5, np.pi / 3, 0, 1, 0]))
     np.testing.assert_allclose(data["pose"], T, atol=1e-15)
     expected = inverse_geometry.solve(system, T)
@@ -62,7 +63,7 @@ def test_the_motion_is_that_of_the_package(command, tmp_path: Path) -> None:
     assert answer.code == 0
     assert "closure_residual" in answer.out
     columns = read_csv((tmp_path / "motion.csv").read_text())
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     import casadi
 
     def tau(t, q, v):
@@ -91,7 +92,7 @@ def test_a_study_has_a_line_for_each_case(command, tmp_path: Path) -> None:
     columns = read_csv(command("sweep", "planar_2r", *words).out)
     np.testing.assert_array_equal(columns["q1.q"], [0, 0, 0.5, 0.5, 1, 1])
     np.testing.assert_array_equal(columns["q2.tau"], [0, 5, 0, 5, 0, 5])
-    system = mbs.load("planar_2r").assemble()
+    system = catalogue_system("planar_2r")
     one = mbs.simulate.run(system, 0.05, q0={"q1": 0.5}, tau={"q2": 5.0})
     assert columns["q1.q.end"][3] == pytest.approx(one["q1.q"][-1], abs=1e-12)
     data = json.loads(command("sweep", "planar_2r", *words, "-o", "s.csv", "--json").out)

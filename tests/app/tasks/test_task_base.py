@@ -7,6 +7,7 @@ import pickle
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.app.tasks.base import base
@@ -16,7 +17,7 @@ from mbs.identification.regressors import values_of
 
 
 def test_the_table_of_the_rx90_is_that_of_the_model():
-    rx90 = mbs.load("rx90").assemble()
+    rx90 = catalogue_system("rx90")
     table, found = base(rx90), base_parameters(rx90)
     assert len(table.rows) == found.count == 52
     assert tuple(row.name for row in table.rows) == found.names
@@ -32,7 +33,7 @@ def test_the_table_of_the_rx90_is_that_of_the_model():
 
 
 def test_values_are_the_groupings_of_the_description():
-    rx90 = mbs.load("rx90").assemble()
+    rx90 = catalogue_system("rx90")
     found = base_parameters(rx90)
     K = np.array(casadi.DM(values_of(rx90, found.columns))).ravel()
     values = [row.value for row in base(rx90).rows]
@@ -41,7 +42,7 @@ def test_values_are_the_groupings_of_the_description():
 
 
 def test_csv_reads_back():
-    four_bar = mbs.load("four_bar").assemble()
+    four_bar = catalogue_system("four_bar")
     table = base(four_bar, "numeric")
     rows = list(csv.DictReader(io.StringIO(table.csv())))
     assert [row["name"] for row in rows] == [row.name for row in table.rows]
@@ -65,4 +66,4 @@ def test_a_symbol_without_value_leaves_its_parameter_without():
 
 def test_an_unknown_method_is_refused():
     with pytest.raises(ModelError, match="use 'symbolic' or 'numeric'"):
-        base(mbs.load("planar_2r").assemble(), "guess")
+        base(catalogue_system("planar_2r"), "guess")

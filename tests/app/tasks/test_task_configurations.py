@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.app.tasks.configurations import (
@@ -22,12 +23,12 @@ START = (0.3, -0.5, 0.7, 0.4, -0.9, 0.2)
 
 @pytest.fixture(scope="module")
 def rx90():
-    return mbs.load("rx90").assemble()
+    return catalogue_system("rx90")
 
 
 @pytest.fixture(scope="module")
 def five_bar():
-    return mbs.load("five_bar").assemble()
+    return catalogue_system("five_bar")
 
 
 def _is_in(found, q):
@@ -51,7 +52,7 @@ def test_every_method_finds_eight_configurations_of_the_rx90(rx90, method):
 
 
 def test_configurations_of_robots_with_loops_close_them(five_bar):
-    sr400 = mbs.load("sr400").assemble()
+    sr400 = catalogue_system("sr400")
     q = mbs.loops.solve(sr400, {"q2": -1.2, "q4": 0.3, "q5": 0.8, "q6": -0.4})
     found = configurations(sr400, pose_of(sr400, q), seed=q)
     assert np.allclose(found.rows[0].q, q, atol=1e-9)
@@ -64,10 +65,10 @@ def test_configurations_of_robots_with_loops_close_them(five_bar):
 
 
 def test_legs_and_short_chains():
-    delta = mbs.load("delta").assemble()
+    delta = catalogue_system("delta")
     found = configurations(delta, pose_of(delta, None), method="pieper")
     assert (len(found.rows), found.method) == (8, "loops in closed form")
-    tree = mbs.load("two_branch_tree").assemble()
+    tree = catalogue_system("two_branch_tree")
     q = [0.2, 0.1, -0.3, 0.05, 0.6, -0.7, 0.4]
     found = configurations(tree, pose_of(tree, q), method="general", seed=q)
     assert found.method == "search"
@@ -77,7 +78,7 @@ def test_legs_and_short_chains():
 
 
 def test_seven_joints_keep_one_where_it_is():
-    panda = mbs.load("panda").assemble()
+    panda = catalogue_system("panda")
     q = [0.1, 0.3, -0.2, -1.5, 0.2, 1.4, 0.3]
     assert locked_by_default(panda, seed=q) == {"q3": -0.2}
     found = configurations(panda, pose_of(panda, q), seed=q)
@@ -86,7 +87,7 @@ def test_seven_joints_keep_one_where_it_is():
 
 
 def test_limits_are_told_joint_by_joint():
-    puma = mbs.load("puma560").assemble()
+    puma = catalogue_system("puma560")
     found = configurations(puma, pose_of(puma, [0.3, 0.2, 0.4, 0.1, 0.5, 0.2]))
     for row in found.rows:
         assert row.within_limits == (not row.outside)

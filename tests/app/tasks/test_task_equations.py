@@ -3,6 +3,7 @@
 import pickle
 
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.app.tasks.equations import (
@@ -136,7 +137,7 @@ def test_the_words_of_a_closed_form_name_its_joints(systems):
     sheet = equations(systems["sr400"], "igm-paul").text
     assert "Inverse geometric model of sr400: q1, q2, q3, q4, q5, q6" in sheet
     with pytest.raises(NoClosedForm, match="no closed form gives"):
-        equations(mbs.load("panda").assemble(), "igm-paul", language="words")
+        equations(catalogue_system("panda"), "igm-paul", language="words")
 
 
 def test_entries_stand_in_the_menus_of_table_1():

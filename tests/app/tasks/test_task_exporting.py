@@ -8,6 +8,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
@@ -17,7 +18,7 @@ from mbs.errors import ExportError, ExpressionError, ModelError
 
 @pytest.fixture(scope="module")
 def four_bar():
-    return mbs.load("four_bar").assemble()
+    return catalogue_system("four_bar")
 
 
 def test_a_c_library_is_what_the_exporter_writes(four_bar, tmp_path):
@@ -71,7 +72,7 @@ def test_robot_files_read_back_as_the_same_dynamics(four_bar, tmp_path, write, s
 
 def test_toml_keeps_names_ranges_and_configuration(tmp_path):
     for name in ("panda", "sr400"):
-        system = mbs.load(name).assemble()
+        system = catalogue_system(name)
         path = tmp_path / f"{name}.toml"
         path.write_bytes(toml(system))
         again = mbs.load(path).assemble()
@@ -102,5 +103,5 @@ def test_mistakes_are_refused_with_a_sentence(four_bar):
     refused(ExportError, "'4.0'", by=lambda: fmu(four_bar, FmuSettings(fmi="4.0")))
     refused(ExpressionError, "stop_time", by=lambda: fmu(four_bar, FmuSettings(stop_time="1/0")))
     refused(ModelError, "'nope'", by=lambda: fmu(four_bar, FmuSettings(outputs=("nope",))))
-    bicycle = mbs.load("whipple_bicycle").assemble()
+    bicycle = catalogue_system("whipple_bicycle")
     refused(ModelError, "rear_contact", by=lambda: toml(bicycle))

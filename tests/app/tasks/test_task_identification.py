@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
@@ -28,7 +29,7 @@ NOISE = 0.02
 
 @cache
 def _arm():
-    return mbs.load("planar_2r").assemble()
+    return catalogue_system("planar_2r")
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,7 @@ def test_settings_reach_the_estimation(arm, record):
 
 
 def test_a_closed_system_needs_its_independent_joints_alone():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     columns = record_columns(system)
     assert columns["tau"] == ("j1.tau",)
     assert set(columns["q"]) == {"j1.q", "j2.q", "j4.q"}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
@@ -26,7 +27,7 @@ from mbs.errors import DescriptionError, ExpressionError, ModelError
 
 @pytest.fixture(scope="module")
 def arm():
-    return mbs.load("planar_2r").assemble()
+    return catalogue_system("planar_2r")
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +79,7 @@ def test_symbols_of_the_system_stand_in_laws_and_numbers(symbolic_arm):
 
 
 def test_a_four_bar_stays_closed_and_keeps_its_energy():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     result = simulate(system, SimulationSettings(duration=1, q0={"j1": 0.5}), quiet=True)
     assert result["closure_residual"].max() < 1e-8
     energy = result["kinetic_energy"] + result["potential_energy"]
@@ -134,7 +135,7 @@ def test_mistakes_are_refused_with_a_sentence(arm, given, parts):
 
 
 def test_a_joint_without_motor_has_no_effort():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     refused(
         ModelError,
         "'j2'",

@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.app.tasks.singular import condition, singular
@@ -14,7 +15,7 @@ NEAR = [0.2, 0.4, -0.5, 0.3, 0.7, 0.1]
 
 
 def test_the_rx90_is_singular_in_three_ways():
-    rx90 = mbs.load("rx90").assemble()
+    rx90 = catalogue_system("rx90")
     found = singular(rx90, near=NEAR)
     assert found.determinant == "det J = (-0.091125) * (S23 - C2) * (C3) * (S5)"
     words = [one.condition for one in found.factors]
@@ -28,7 +29,7 @@ def test_the_rx90_is_singular_in_three_ways():
 
 
 def test_the_configurations_shown_are_singular_and_near():
-    rx90 = mbs.load("rx90").assemble()
+    rx90 = catalogue_system("rx90")
     for one in singular(rx90, near=NEAR).factors:
         J = np.array(jacobian(rx90, 6)(one.configuration))
         assert np.linalg.svd(J)[1][-1] < 1e-9
@@ -39,7 +40,7 @@ def test_the_configurations_shown_are_singular_and_near():
 
 
 def test_loops_are_closed_where_a_closed_robot_is_singular():
-    five_bar = mbs.load("five_bar").assemble()
+    five_bar = catalogue_system("five_bar")
     found = singular(five_bar)
     assert (found.rows, found.columns) == (("Vx", "Vy"), ("q1", "q3"))
     for one in found.factors:
@@ -48,7 +49,7 @@ def test_loops_are_closed_where_a_closed_robot_is_singular():
 
 
 def test_no_configuration_or_every_configuration_is_singular():
-    planar = mbs.load("planar_2r").assemble()
+    planar = catalogue_system("planar_2r")
     flat = singular(planar, {"frame": 1, "rows": ("wz",), "columns": ("q1",)})
     assert (flat.factors, flat.constant) == ((), "1")
     assert flat.verdict == "The determinant is 1 in every configuration; none is singular."
@@ -85,7 +86,7 @@ def test_conditions_in_words():
 
 
 def test_wrong_options_are_refused():
-    rx90 = mbs.load("rx90").assemble()
+    rx90 = catalogue_system("rx90")
     with pytest.raises(ModelError, match="there is no option 'row'"):
         singular(rx90, {"row": ("Vx",)})
     with pytest.raises(ModelError, match="3 rows and 2 columns"):

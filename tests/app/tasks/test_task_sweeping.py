@@ -7,6 +7,7 @@ import io
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
@@ -16,7 +17,7 @@ from mbs.errors import ExpressionError, ModelError
 
 
 def test_the_rows_are_the_ends_of_single_simulations():
-    arm = mbs.load("planar_2r").assemble()
+    arm = catalogue_system("planar_2r")
     grid = grid_of({"q1.q": "0:1:0.5", "q2.v": "0, pi/2"})
     table = sweep(arm, grid, SimulationSettings(duration=0.1, tau={"q1": "t"}), quiet=True)
     assert table.columns[:2] == ("q1.q", "q2.v")
@@ -33,7 +34,7 @@ def test_the_rows_are_the_ends_of_single_simulations():
 
 
 def test_a_case_that_fails_leaves_its_fields_empty():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     table = sweep(system, {"j4.q": [0.0, 1.2]}, SimulationSettings(duration=0.02), quiet=True)
     assert set(table.failures) == {0, 1}
     assert all("j4" in sentence for sentence in table.failures.values())

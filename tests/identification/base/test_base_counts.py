@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.base_counts import CATALOGUE, ELBOW, OBLIQUE, OPEN, TWO_ROOTS, under
 from support.base_robots import system
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.identification.base_parameters import base_parameters
@@ -60,6 +61,6 @@ def test_a_floating_base_keeps_its_own_ten_parameters():
 
 @pytest.mark.parametrize(("name", "expected"), [("scara", 37), ("puma560", 60)])
 def test_a_base_that_moves_does_not_inherit_the_set_of_a_resting_one(name, expected):
-    base = base_parameters(mbs.load(name).assemble(), moving_base=True)
+    base = base_parameters(catalogue_system(name), moving_base=True)
     assert base.count == base.check.rank == expected
     assert base.check.error < 1e-12

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from casadi import Function, jacobian
 from support.base_counts import ALONG_Y, LEVEL, PARALLELOGRAM, parallelogram, under
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.components import Body, Prismatic, Revolute
@@ -36,7 +37,7 @@ def counts(system):
 @pytest.mark.sweep
 @pytest.mark.parametrize(("name", "gravity"), COUNTS)
 def test_counts(name, gravity):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     system = system if gravity is None else under(system, gravity)
     assert counts(system) == COUNTS[name, gravity]
 
@@ -68,7 +69,7 @@ def test_parallelogram_on_a_base_that_moves():
 
 @pytest.mark.parametrize("name", ["sr400", "four_bar", "delta"])
 def test_efforts_in_base_parameters_are_the_same(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     base = base_parameters(system)
     full = mbs.models.inverse_dynamics(system)
     fewer = mbs.models.inverse_dynamics(base.apply())
@@ -81,7 +82,7 @@ def test_efforts_in_base_parameters_are_the_same(name):
 
 
 def test_links_of_a_parallelogram_share_their_tensors():
-    base = base_parameters(mbs.load("sr400").assemble())
+    base = base_parameters(catalogue_system("sr400"))
     gone = {column.name for column in base.eliminated}
     assert {f"{kind}{link}" for kind in ("XX", "XY", "XZ", "YZ", "ZZ") for link in (7, 8)} <= gone
     equation = next(text for text in base.equations if text.startswith("ZZ2R"))
@@ -90,7 +91,7 @@ def test_links_of_a_parallelogram_share_their_tensors():
 
 def test_what_the_rules_miss_is_told_and_applied():
     """The gears turn by sums and differences of the angles of the tool."""
-    base = base_parameters(mbs.load("differential_wrist").assemble())
+    base = base_parameters(catalogue_system("differential_wrist"))
     assert not base.check.agrees
     assert base.check.applied
     assert base.count == base.check.rank == 20
@@ -103,7 +104,7 @@ def test_what_the_rules_miss_is_told_and_applied():
 
 def test_squares_of_rates_are_dependent():
     """Pitch is half the sum of the motors' angles, roll half the difference."""
-    base = base_parameters(mbs.load("differential_wrist").assemble())
+    base = base_parameters(catalogue_system("differential_wrist"))
     equations = {
         name.removesuffix("R"): text for name, text in zip(base.names, base.equations, strict=True)
     }

@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.measured_arm import equations, mbs_values, motion, noisy_samples
 
-import mbs
 from mbs.errors import ModelError
 from mbs.identification.bodies import consistent
 from mbs.identification.leading import active_indices, positions
@@ -63,7 +63,7 @@ def test_simulated_motion_follows_the_measured_one():
 
 
 def test_a_closed_robot_is_simulated_in_its_independent_joints():
-    system = mbs.load("five_bar").assemble()
+    system = catalogue_system("five_bar")
     D = regressor(system)
     K = numbers_of(system, D.columns)
     time = np.arange(400) / 200

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.measured_arm import arm, motion, noisy_record, true_efforts
 
 import mbs
@@ -156,7 +157,7 @@ def test_columns_named_in_another_order_than_the_joints_are_refused():
 
 
 def test_a_closed_robot_is_recorded_at_its_independent_joints():
-    system = mbs.load("delta").assemble()
+    system = catalogue_system("delta")
     record = Record.of(system, TIME, 0.1 * Q, TAU)
     assert record.names == record.efforts == ("q1", "q2", "q3")
     whole = np.zeros((len(TIME), system.nq))

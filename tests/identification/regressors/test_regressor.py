@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.regressor_states import CLOSED, OPEN, ROTORS, TREES, moving, state_of, system_of
 from symbolic_robots import ROBOTS, symbolic_robot
 
@@ -251,4 +252,4 @@ def test_the_same_call_gives_the_same_function(build):
     assert build(system) is made
     assert build(system, columns_of(system)) is made
     assert build(system, friction=False) is not made
-    assert build(mbs.load("planar_2r").assemble()) is not made
+    assert build(catalogue_system("planar_2r")) is not made

@@ -3,11 +3,10 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 
-import mbs
-import mbs.models
 from mbs import Parameter
 from mbs.components import Body, Coupling, Mechanism, Revolute
 from mbs.errors import LoopError
@@ -151,7 +150,7 @@ def test_derivatives_by_lengths():
 
 
 def test_sr400():
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     rng = np.random.default_rng(4)
     f = function(system)
     for _ in range(5):
@@ -199,7 +198,7 @@ def test_a_gear_backwards():
 
 
 def test_an_open_chain_has_one_mode():
-    system = mbs.load("scara").assemble()
+    system = catalogue_system("scara")
     (mode,) = modes(system, [0.1, 0.2, 0.3, 0.4])
     assert mode.q == (0.1, 0.2, 0.3, 0.4)
     assert mode.branch == ()

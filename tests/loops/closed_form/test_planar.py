@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.catalogue_systems import catalogue_system
 from support.configurations import active, same, searched
 from support.flat_loops import flat_loop
 from support.random_trees import random_body
 
-import mbs
 from mbs.components import (
     ConstantVelocity,
     Cylindrical,
@@ -53,6 +53,7 @@ def system(request):
     return flat_loop(seed, kinds, driven).assemble()
 
 
+@pytest.mark.sweep
 def test_the_modes_are_those_that_a_search_finds(system):
     q_a = active(system)
     listed, found = modes(system, q_a), searched(system, q_a, starts=80)
@@ -63,6 +64,7 @@ def test_the_modes_are_those_that_a_search_finds(system):
     assert len({mode.branch for mode in listed}) == len(listed)
 
 
+@pytest.mark.sweep
 def test_the_function_gives_every_mode(system):
     q_a = active(system)
     for mode in modes(system, q_a):
@@ -71,6 +73,7 @@ def test_the_function_gives_every_mode(system):
         np.testing.assert_allclose(solve(system, q_a, branch=mode.branch), mode.q, atol=1e-12)
 
 
+@pytest.mark.sweep
 def test_the_assembled_branch_is_followed(system):
     rng = np.random.default_rng(1)
     assert same(system, np.array(function(system)(active(system))).ravel(), system.configuration)
@@ -80,6 +83,7 @@ def test_the_assembled_branch_is_followed(system):
         assert same(system, q, solve(system, list(q_a)), 1e-8)
 
 
+@pytest.mark.sweep
 def test_the_first_and_second_derivatives(system):
     q_a = active(system)
     x = casadi.SX.sym("x", len(q_a))
@@ -164,7 +168,7 @@ def test_a_joint_without_kernel_is_named():
 
 
 def test_the_sign_is_that_of_the_elbow():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     for mode in modes(system, {"j1": 0.3}):
         j1, j2, j4 = mode.q
         angle = j4 - (j1 + j2) - np.pi  # of j3, counted from where coupler and rocker are in line

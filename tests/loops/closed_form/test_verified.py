@@ -5,8 +5,8 @@ from dataclasses import replace
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.errors import NoClosedForm
 from mbs.loops import modes
 from mbs.loops.plan import plan, started_at, verify
@@ -21,7 +21,7 @@ def changed(stage, labels, change):
 
 
 def test_a_way_that_never_closes_is_left_out():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     (stage,) = plan(system)
     more = changed(
         stage, ("x", *stage.labels), lambda v: casadi.horzcat(v[:, 0] + 0.3, v[:, 0], v[:, 1])
@@ -34,7 +34,7 @@ def test_a_way_that_never_closes_is_left_out():
 
 
 def test_a_plan_that_does_not_give_the_assembled_configuration_is_refused():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     (stage,) = plan(system)
     wrong = changed(stage, stage.labels, lambda v: v + 0.3)
     with pytest.raises(NoClosedForm, match="the loop of j3 does not close as the directions"):
@@ -42,7 +42,7 @@ def test_a_plan_that_does_not_give_the_assembled_configuration_is_refused():
 
 
 def test_a_way_out_of_reach_is_kept():
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     (stage,) = plan(system)
     lost = changed(
         stage, (*stage.labels, "x"), lambda v: casadi.horzcat(v, casadi.sqrt(-1 - v[:, 0] ** 2))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
@@ -11,7 +12,7 @@ from mbs.models.inverse_geometry.chain import frame_chain
 
 @pytest.fixture(scope="module")
 def puma():
-    return mbs.load("puma560").assemble()
+    return catalogue_system("puma560")
 
 
 def test_it_is_kept_on_the_system(puma):
@@ -48,7 +49,7 @@ def test_refusals(puma, frame, locked, message):
 
 def test_the_elbow_is_not_proposed_to_be_locked():
     with pytest.raises(ModelError, match=r"7 joints are free .* locked=\{'q3': 0\}"):
-        frame_chain(mbs.load("panda").assemble())
+        frame_chain(catalogue_system("panda"))
 
 
 def test_many_poses_need_a_system():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.arms import general_6r
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
@@ -15,7 +16,7 @@ def equations(sequence):
 
 
 def test_pieper_is_taken_for_a_wrist_and_kept():
-    way = frame_chain(mbs.load("puma560").assemble())
+    way = frame_chain(catalogue_system("puma560"))
     auto = sequence_of(way)
     assert equations(auto) == equations(sequence_of(way, "pieper"))
     assert sequence_of(frame_chain(way.system)) is auto
@@ -24,7 +25,7 @@ def test_pieper_is_taken_for_a_wrist_and_kept():
 
 
 def test_paul_is_taken_where_no_axes_meet():
-    way = frame_chain(mbs.load("ur5").assemble())
+    way = frame_chain(catalogue_system("ur5"))
     assert equations(sequence_of(way)) == equations(sequence_of(way, "paul"))
     with pytest.raises(NoClosedForm, match=r"^ur5: no closed form gives q1, .*\(pieper: "):
         sequence_of(way, "pieper")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.closed_mechanisms import closed_chain
 from support.configurations import same
 
@@ -143,7 +144,7 @@ def test_stewart_platform_has_four_ways_for_every_leg(systems):
 
 
 def test_a_tree_keeps_the_other_arm_where_it_is():
-    system = mbs.load("two_branch_tree").assemble()
+    system = catalogue_system("two_branch_tree")
     rng = np.random.default_rng(3)
     q = rng.uniform(-1, 1, 7)
     for frame, other in ((4, [4, 5, 6]), (7, [1, 2, 3])):
@@ -171,7 +172,7 @@ def test_joints_that_nothing_determines_stay(systems):
 
 
 def test_locked_joints_are_known():
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     q = drawn(system, 0.4, 4)
     way = frame_chain(system, 6, {"q4": float(q[3])})
     found = close(system, way, q[[0, 1, 2, 4, 5]], NONE)
@@ -191,7 +192,7 @@ def test_a_configuration_of_the_chain_that_leaves_the_loop_open(systems):
 def test_chain_joints_that_depend_on_each_other():
     """A point of the coupler of a four-bar: its two joints fit the loop, or there is no
     configuration."""
-    system = mbs.load("four_bar").assemble()
+    system = catalogue_system("four_bar")
     q = drawn(system, 0.3, 1)
     frame = next(k + 1 for k in range(len(system.tree.links)) if len(system.tree.path(k)) == 2)
     way = frame_chain(system, frame)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from support.arm_completeness import assert_complete, assert_exact, assert_same_set
 from support.arm_search import merged, plain_arm
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.models.inverse_geometry import solve
 
 ROBOTS = (
@@ -35,7 +35,7 @@ PRINTED = [
 
 @cache
 def assembled(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def configuration(arm, name, seed):

@@ -7,8 +7,8 @@ import pytest
 from support.arm_completeness import assert_complete, assert_exact, assert_same_set
 from support.arm_poses import folded, least_gap, over_shoulder, stretched, with_wrist
 from support.arm_search import distance, merged, plain_arm, searched, some, wrapped
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.models.inverse_geometry import solve
 
 WRISTS = ("puma560", "rx90", "tx90", "kr6", "irb120")
@@ -17,7 +17,7 @@ HALF_TURN = np.array([0, 0, 0, np.pi, 0, np.pi])
 
 @cache
 def assembled(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def configuration(name, seed=0):

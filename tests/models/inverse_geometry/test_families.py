@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
@@ -13,7 +14,7 @@ from mbs.models.inverse_geometry import solve
 
 @cache
 def assembled(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def pose(system, q):

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
@@ -16,7 +17,7 @@ ELBOW_UP = np.array([0.3, -0.8, 0.4, 0.2, 0.6, 0.1])
 
 @pytest.fixture(scope="module")
 def puma():
-    return mbs.load("puma560").assemble()
+    return catalogue_system("puma560")
 
 
 def poses(system, frame, configurations):
@@ -150,7 +151,7 @@ def test_start_near_the_first_pose(puma):
 @pytest.mark.parametrize(("robot", "frame"), [("scara", None), ("two_branch_tree", 4)])
 def test_chains_of_fewer_than_six_joints(robot, frame):
     """Between the poses of a path the straight line leaves what the joints can reach."""
-    system = mbs.load(robot).assemble()
+    system = catalogue_system(robot)
     own = frame_chain(system, frame)
     start = np.linspace(0.3, 0.6, system.nq)
     end = start.copy()
@@ -170,7 +171,7 @@ def test_chains_of_fewer_than_six_joints(robot, frame):
     [("sr400", 6), ("akr3000", 10), ("five_bar", "tool"), ("delta", "tool")],
 )
 def test_closed_loops_stay_closed(robot, frame):
-    system = mbs.load(robot).assemble()
+    system = catalogue_system(robot)
     names = [system.speeds[k].name for k in system.free]
     places = [[c.name for c in system.coordinates].index(name) for name in names]
     start = np.array(system.configuration)[places]
@@ -185,7 +186,7 @@ def test_closed_loops_stay_closed(robot, frame):
 
 
 def test_joints_that_the_frame_does_not_see_stay_where_they_start():
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     motors = {"q1": 0.2, "q2": -1.2, "q7": 0.1, "q4": 0.5, "q5": -0.6, "q6": 0.7}
     start = mbs.loops.solve(system, motors)
     end = mbs.loops.solve(system, motors | {"q1": 0.5, "q2": -1.5, "q7": 0.3})
@@ -195,7 +196,7 @@ def test_joints_that_the_frame_does_not_see_stay_where_they_start():
 
 
 def test_locked_joints_stay():
-    system = mbs.load("sr400").assemble()
+    system = catalogue_system("sr400")
     start = mbs.loops.solve(system, {"q4": 0.5, "q5": -0.6})
     end = mbs.loops.solve(system, {"q1": 0.3, "q4": 0.5, "q5": -0.4})
     T = poses(system, 6, [start, end])

@@ -8,6 +8,7 @@ import pytest
 from casadi import DM, MX, SX, Function
 from support.arm_search import distance, plain_arm, searched
 from support.arms import general_6r
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
@@ -22,7 +23,7 @@ POINTER = ctypes.POINTER(ctypes.c_double)
 
 
 def assembled(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def symbolic_puma():

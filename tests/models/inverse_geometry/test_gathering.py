@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.gathering import gather, gather_further
@@ -16,7 +16,7 @@ NONE = np.zeros(0)
 
 @cache
 def way(name):
-    return frame_chain(mbs.load(name).assemble())
+    return frame_chain(catalogue_system(name))
 
 
 def target(name, q):

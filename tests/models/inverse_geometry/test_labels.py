@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.models.inverse_geometry import solve
@@ -14,7 +15,7 @@ from mbs.models.inverse_geometry.chain import frame_chain
 
 @cache
 def arm(name):
-    return frame_chain(mbs.load(name).assemble()).arm(np.zeros(0))
+    return frame_chain(catalogue_system(name)).arm(np.zeros(0))
 
 
 def label(name, q):
@@ -36,7 +37,7 @@ def test_anatomy(name, expected):
 
 @pytest.mark.parametrize("name", ["puma560", "rx90"])
 def test_eight_branches_have_eight_names(name):
-    system = mbs.load(name).assemble()
+    system = catalogue_system(name)
     T = np.array(mbs.models.direct_geometry(system)([0.3, -0.5, 0.7, 0.4, 0.9, 0.2]))
     names = {s.branch for s in solve(system, T)}
     assert names == {
@@ -49,7 +50,7 @@ def test_eight_branches_have_eight_names(name):
 
 def test_right_is_where_a_positive_joint_2_lifts_the_wrist():
     q, step = np.array([0.3, -0.5, 0.7, 0.4, 0.9, 0.2]), np.array([0, 1e-6, 0, 0, 0, 0])
-    wrist = mbs.models.transform(mbs.load("puma560").assemble(), 4)
+    wrist = mbs.models.transform(catalogue_system("puma560"), 4)
     for turn in (0.0, 1.2, 2.4, -2.0):
         configuration = q + turn * np.eye(6)[1]
         height = [float(wrist(configuration + way)[2, 3]) for way in (step, -step)]
@@ -59,7 +60,7 @@ def test_right_is_where_a_positive_joint_2_lifts_the_wrist():
 
 
 def test_up_is_where_the_elbow_is_above_the_line_to_the_wrist():
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     elbow, wrist = mbs.models.transform(system, 3), mbs.models.transform(system, 4)
     rng = np.random.default_rng(5)
     shoulder = mbs.models.transform(system, 2)
@@ -80,7 +81,7 @@ def test_names_are_left_out_between_two_branches():
 
 def _straight(q3):
     """The angle next to q3 at which the two parts of the arm lie along one line."""
-    system = mbs.load("puma560").assemble()
+    system = catalogue_system("puma560")
     wrist = np.array(mbs.models.transform(system, 4, 2)([0, 0, q3, 0, 0, 0]))[:2, 3]
     elbow = np.array(mbs.models.transform(system, 3, 2)(np.zeros(6)))[:2, 3]
     fore = wrist - elbow

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError
@@ -16,7 +17,7 @@ TURN = 2 * math.pi
 
 @cache
 def system():
-    return mbs.load("puma560").assemble()
+    return catalogue_system("puma560")
 
 
 Q = np.array([0.3, -0.5, 0.7, 0.4, 0.9, 0.2])
@@ -95,7 +96,7 @@ def test_the_edge_belongs_to_the_range():
 
 
 def test_slides_are_never_wound():
-    scara = mbs.load("scara").assemble()
+    scara = catalogue_system("scara")
     found = bounds(scara, {"q4": (-20, 20)})
     assert found.windings(np.array([0.1, 0.2, 0.3, -0.1]), np.full(4, 9.0))[:, 3] == -0.1
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.arm_search import distance, plain_arm, searched
 from support.arms import general_5r, general_6r
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
@@ -15,7 +16,7 @@ LOCKED = {"panda": {"q3": 0.4}}
 
 
 def assembled(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 def poses(system, count, seed, locked=None):

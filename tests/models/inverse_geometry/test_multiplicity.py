@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.closed_forms.arm import Arm
 from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.target import Target, multiplicity, reduction
@@ -23,7 +23,7 @@ def counted(arm, q):
 
 
 def arm_of(name):
-    return frame_chain(mbs.load(name).assemble()).arm(np.zeros(0))
+    return frame_chain(catalogue_system(name)).arm(np.zeros(0))
 
 
 def test_a_regular_configuration_counts_once():

@@ -3,9 +3,9 @@
 import casadi
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 from support.random_trees import random_rotation
 
-import mbs
 from mbs.errors import ModelError
 from mbs.models.inverse_geometry.chain import target_pose, target_poses
 from mbs.spatial import Pose
@@ -13,7 +13,7 @@ from mbs.spatial import Pose
 
 @pytest.fixture(scope="module")
 def system():
-    return mbs.load("puma560").assemble()
+    return catalogue_system("puma560")
 
 
 def pose(seed=0):

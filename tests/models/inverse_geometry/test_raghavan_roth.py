@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 from support.arms import general_6r, placements, slides_and_turns, spherical, three_parallel
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.closed_forms.arm import Arm, gap_to, motion
 from mbs.closed_forms.raghavan_roth.numbers import (
     back_parts,
@@ -136,7 +136,7 @@ def test_parts_of_a_joint_make_its_map(slides, q):
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robots_are_solved_completely(name):
-    assert_complete(arm_of(mbs.load(name).assemble()), np.random.default_rng(2), 4)
+    assert_complete(arm_of(catalogue_system(name)), np.random.default_rng(2), 4)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -162,7 +162,7 @@ def test_slides_against_a_search(kinds):
 
 
 def test_sixteen_configurations_of_one_pose():
-    arm = arm_of(mbs.load("manseur_doty").assemble())
+    arm = arm_of(catalogue_system("manseur_doty"))
     T = arm.pose(configurations(arm, np.random.default_rng(0), 40))
     number, q = candidates_many(prepare(arm), T)
     reached = np.max(np.abs(arm.pose(q) - T[number]), axis=(1, 2)) < 1e-7

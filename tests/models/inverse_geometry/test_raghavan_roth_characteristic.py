@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from casadi import DM, SX, Function
 from support.arms import general_6r, slides_and_turns
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import NoClosedForm
@@ -9,10 +10,10 @@ from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.raghavan_roth import characteristic
 
 CHARACTERISTIC = {
-    "puma560": lambda: mbs.load("puma560").assemble(),
-    "ur5": lambda: mbs.load("ur5").assemble(),
-    "stanford": lambda: mbs.load("stanford").assemble(),
-    "gantry": lambda: mbs.load("gantry").assemble(),
+    "puma560": lambda: catalogue_system("puma560"),
+    "ur5": lambda: catalogue_system("ur5"),
+    "stanford": lambda: catalogue_system("stanford"),
+    "gantry": lambda: catalogue_system("gantry"),
     "general": lambda: general_6r(0),
     "one slide": lambda: slides_and_turns("RRPRRR", 0),
     "slides apart": lambda: slides_and_turns("PRRPRR", 0),
@@ -71,6 +72,6 @@ def test_characteristic_matrix_of_symbolic_lengths():
 
 
 def test_characteristic_matrix_needs_six_joints():
-    problem = frame_chain(mbs.load("scara").assemble()).problem(np.zeros(0))
+    problem = frame_chain(catalogue_system("scara")).problem(np.zeros(0))
     with pytest.raises(NoClosedForm, match="4 joints"):
         characteristic(problem)

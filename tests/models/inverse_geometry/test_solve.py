@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.arms import general_6r
+from support.catalogue_systems import catalogue_system
 
 import mbs
 from mbs.errors import ModelError, NoClosedForm
@@ -24,7 +25,7 @@ ROBOTS = {
 
 @cache
 def assembled(name):
-    return mbs.load(name).assemble()
+    return catalogue_system(name)
 
 
 @cache

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from support.catalogue_systems import catalogue_system
 
-import mbs
 from mbs.models.inverse_geometry.chain import frame_chain
 from mbs.models.inverse_geometry.target import Target, distinct
 
@@ -11,7 +11,7 @@ Q = np.array([0.3, 0.5, 0.2, 0.1, 0.4, 0.6])
 
 
 def target(name="stanford", q=Q):
-    arm = frame_chain(mbs.load(name).assemble()).arm(np.zeros(0))
+    arm = frame_chain(catalogue_system(name)).arm(np.zeros(0))
     return Target(arm, arm.pose(q))
 
 

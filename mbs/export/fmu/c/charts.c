@@ -66,7 +66,7 @@ static int by_chart(core *c, const double *y, found *f) {
     return 0;
 }
 
-static int find(core *c, found *f) {
+static int found_state(core *c, found *f) {
     const double *x = c->m.values + SLOTS;
     return (c->m.charts.tangent ? by_chart(c, x, f) : by_joints(c, x, f)) ||
            !stepper_all_finite(f->slope, NT);
@@ -83,7 +83,7 @@ core_status charts_refresh(core *c) {
     double *v = c->m.values;
     found f;
     int i;
-    if (find(c, &f)) return lost(c);
+    if (found_state(c, &f)) return lost(c);
     memcpy(c->m.tree, f.X, sizeof f.X);
     memcpy(c->m.slope, f.slope, sizeof f.slope);
     memcpy(v + OUTPUTS, f.y, NY * sizeof *v);
@@ -95,7 +95,7 @@ core_status charts_refresh(core *c) {
 }
 
 /* The motion is followed from here. */
-static void follow(core *c) {
+static void follow_from_here(core *c) {
     core_charts *m = &c->m.charts;
     m->time = c->m.time;
     memcpy(m->X, c->m.tree, sizeof m->X);
@@ -140,21 +140,21 @@ static core_status begin(core *c) {
     c->m.charts.tangent = c->m.charts.loose = 0;
     status = charts_refresh(c);
     if (status) return status;
-    follow(c);
+    follow_from_here(c);
     return choose(c, 1.0);
 }
 
 /* The joints are the states outside. */
-static void show_joints(core *c) {
+static void joints_are_states(core *c) {
     int i;
     for (i = 0; i < NX; i++) c->m.values[SLOTS + i] = c->m.values[STATES + i];
 }
 
 core_status charts_start(core *c) {
-    show_joints(c);
+    joints_are_states(c);
     if (c->m.singular) {
         c->m.singular = 0;
-        follow(c);
+        follow_from_here(c);
         return choose(c, 1.0);
     }
     passage_start(c->passage);
@@ -165,7 +165,7 @@ core_status charts_set(core *c) {
     core_status status = c->m.charts.tangent ? core_refresh(c) : CORE_OK;
     c->m.charts.tangent = 0;
     c->m.charts.loose = 1;
-    show_joints(c);
+    joints_are_states(c);
     return status;
 }
 
@@ -180,9 +180,9 @@ static double indicator(core *c) {
 }
 
 /* The states are on the motion, and no branch was left on the way to them. */
-static core_status accept(core *c) {
+static core_status accept_states(core *c) {
     core_status status = c->m.charts.tangent ? CORE_OK : guard_pass(c);
-    if (!status) follow(c);
+    if (!status) follow_from_here(c);
     return status;
 }
 
@@ -191,7 +191,7 @@ core_status charts_show_indicator(core *c) {
     double shown;
     if (status) return status;
     shown = indicator(c);
-    if (shown > 0.0) status = accept(c);
+    if (shown > 0.0) status = accept_states(c);
     if (status) return status;
     c->m.values[CHART] = shown == 0.0 ? -DBL_MIN : shown;
     return CORE_OK;
@@ -200,7 +200,7 @@ core_status charts_show_indicator(core *c) {
 core_status charts_completed(core *c, int *event) {
     core_charts *m = &c->m.charts;
     core_status status = core_refresh(c);
-    if (!status) status = accept(c);
+    if (!status) status = accept_states(c);
     if (status) return status;
     *event = !(indicator(c) > 0.0) || (m->tangent && room(c) > LEAVE);
     return CORE_OK;
@@ -216,7 +216,7 @@ core_status charts_update(core *c, int *changed) {
     memcpy(before, c->m.values + SLOTS, sizeof before);
     status = core_refresh(c);
     if (status) return status;
-    follow(c);
+    follow_from_here(c);
     status = choose(c, m->tangent ? LEAVE : 1.0 + NEAR);
     *changed = memcmp(before, c->m.values + SLOTS, NX * sizeof *before) != 0;
     return status;

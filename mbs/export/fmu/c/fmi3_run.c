@@ -117,15 +117,15 @@ VECTOR(fmi3GetContinuousStateDerivatives, core_get_derivatives)
 VECTOR(fmi3GetNominalsOfContinuousStates, core_get_nominals)
 VECTOR(fmi3GetEventIndicators, core_get_indicators)
 
-static fmi3Status counted(fmi3Instance c, size_t *n, size_t count) {
+static fmi3Status give_number(fmi3Instance c, size_t *n, size_t count) {
     NEED(c);
     if (!n) return refused(c, "the place of the number is NULL");
     *n = count;
     return fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) { return counted(c, n, NK + NC); }
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) { return counted(c, n, NX); }
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) { return give_number(c, n, NK + NC); }
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) { return give_number(c, n, NX); }
 
 /* ---- co-simulation ---- */
 

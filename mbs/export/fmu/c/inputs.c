@@ -7,7 +7,7 @@
 static double *slopes(core *c, int order) { return c->m.slopes + (order - 1) * NU; }
 
 /* Derivative number `first` of an input, `after` its derivatives were given. */
-static double follow(core *c, int input, int first, double after) {
+static double extrapolated(core *c, int input, int first, double after) {
     double sum = 0.0;
     int order;
     for (order = INPUT_ORDERS; order > first; order--)
@@ -18,14 +18,14 @@ static double follow(core *c, int input, int first, double after) {
 const double *core_inputs(core *c, double t) {
     int i;
     if (c->m.inputs != INPUTS_MOVE) return c->m.values + INPUTS;
-    for (i = 0; i < NU; i++) c->u[i] = follow(c, i, 0, t - c->m.input_time);
+    for (i = 0; i < NU; i++) c->u[i] = extrapolated(c, i, 0, t - c->m.input_time);
     return c->u;
 }
 
 void core_input_rates(core *c, double t, double *du) {
     int i;
     for (i = 0; i < NU; i++)
-        du[i] = c->m.inputs == INPUTS_HELD ? 0.0 : follow(c, i, 1, t - c->m.input_time);
+        du[i] = c->m.inputs == INPUTS_HELD ? 0.0 : extrapolated(c, i, 1, t - c->m.input_time);
 }
 
 static void hold(core *c) {
@@ -44,9 +44,9 @@ void core_end_inputs(core *c) {
     int i, order;
     if (c->m.inputs != INPUTS_MOVE) return;
     for (i = 0; i < NU; i++) {
-        c->m.values[INPUTS + i] = follow(c, i, 0, after);
+        c->m.values[INPUTS + i] = extrapolated(c, i, 0, after);
         for (order = 1; order <= INPUT_ORDERS; order++)
-            slopes(c, order)[i] = follow(c, i, order, after);
+            slopes(c, order)[i] = extrapolated(c, i, order, after);
     }
     c->m.input_time = c->m.time;
     c->m.inputs = INPUTS_MOVED;

@@ -29,7 +29,7 @@ static int jacobian(void *user, double t, const double *x, double *J, double *f_
 #ifdef MODEL_TREE
 
 #define TOLERANCE 1e-12 /* largest row of the loops, for coordinates of size one */
-#define ITERATIONS 10
+#define PROJECTIONS 10
 
 static int tree_rhs(void *user, double t, const double *x, double *xdot) {
     core *c = user;
@@ -44,7 +44,7 @@ static int tree_project(void *user, double t, double *x) {
     double moved[NT], residual = HUGE_VAL;
     int k, i;
     if (!passage_project(c->passage, t, x)) return 0;
-    for (k = 0; k < ITERATIONS; k++) {
+    for (k = 0; k < PROJECTIONS; k++) {
         double scale = 1.0;
         core_point(c, &t, x, c->z);
         c->res[0] = moved;

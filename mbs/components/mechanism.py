@@ -380,6 +380,8 @@ class Mechanism:
             remedy = "write one of its methods loads, energy, rates, rows, velocity_rows or outputs"
         elif isinstance(component, Joint) and not (component.places or component.closes):
             remedy = "write its method closing_rows"
+        elif isinstance(component, Sensor) and not component.reads:
+            remedy = "derive it from Custom, whose outputs are what it reads"
         elif isinstance(component, (RigidBody, Joint, Coupling, Sensor)):
             return
         else:

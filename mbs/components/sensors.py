@@ -7,7 +7,7 @@ no part in the motion; `mbs.models.measurements` says what it reads.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from mbs.components.component import Component, Point
 from mbs.components.on_points import OnPair, OnPoints
@@ -54,7 +54,13 @@ _DISTANCE = (Quantity("L", "m"), Quantity("Ld", "m/s"))
 
 @dataclass(frozen=True, slots=True)
 class Sensor(OnPoints):
-    """A component that reads something and changes nothing."""
+    """A component that reads something and changes nothing.
+
+    What a sensor of a user's own reads are the outputs of a `Custom` component.
+    """
+
+    reads: ClassVar[str] = ""
+    """What kind of reading it is: absolute, relative, distance, coordinate, wrench or power."""
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
@@ -108,6 +114,8 @@ class AbsoluteSensor(MotionSensor):
         quantities: those to read, some of p, R, v, w, a, wd; all of them when left out.
     """
 
+    reads = "absolute"
+
     point: Any
     axes: str = "world"
     quantities: Any = None
@@ -139,6 +147,8 @@ class RelativeSensor(OnPair, MotionSensor):
         quantities: those to read, some of p, R, v, w, a, wd; all of them when left out.
     """
 
+    reads = "relative"
+
     axes: str = "a"
     quantities: Any = None
 
@@ -155,6 +165,8 @@ class DistanceSensor(OnPair, Sensor):
     Attributes:
         a, b: the points, or bodies for their reference frames.
     """
+
+    reads = "distance"
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
@@ -200,6 +212,8 @@ class JointSensor(OnJoint):
         joint: name of the coordinate, such as "j1" or "slide.s".
     """
 
+    reads = "coordinate"
+
     @property
     def measured(self) -> tuple[Quantity, ...]:
         """Depends on the coordinate."""
@@ -217,6 +231,8 @@ class WrenchSensor(OnJoint):
         axes: in which they are: "a" or "b" for those of the joint's frame_a or frame_b, or
             "world".
     """
+
+    reads = "wrench"
 
     axes: str = "b"
 
@@ -239,6 +255,8 @@ class PowerSensor(OnJoint):
     Attributes:
         joint: its name.
     """
+
+    reads = "power"
 
     @property
     def measured(self) -> tuple[Quantity, ...]:

@@ -13,15 +13,6 @@ from mbs.assembly.model_function import Named, model_function, require_system
 from mbs.assembly.tables import AttachedSensor
 from mbs.assembly.tree import Frame
 from mbs.components.custom import RelativeMotion, regular_length
-from mbs.components.sensors import (
-    AbsoluteSensor,
-    DistanceSensor,
-    JointSensor,
-    PowerSensor,
-    RelativeSensor,
-    Sensor,
-    WrenchSensor,
-)
 from mbs.errors import ModelError
 from mbs.models.joint_wrenches import motion_inputs, wrenches_of_joints
 from mbs.models.loop_kinematics import cut_coordinate
@@ -103,7 +94,7 @@ def readings(
     state = _observed(system, s, a, tau, around)
     outputs: list[tuple[str, SX]] = []
     for attached in system.sensors:
-        read = _READ[type(attached.sensor)](state, attached)
+        read = _READ[attached.sensor.reads](state, attached)
         outputs += [(name, read[quantity.name]) for name, quantity in attached.outputs]
     return outputs
 
@@ -214,11 +205,11 @@ def _power(state: _Observed, attached: AttachedSensor) -> Readings:
     return {"P": casadi.dot(f, V) + casadi.dot(m, w)}
 
 
-_READ: dict[type[Sensor], Callable[[_Observed, AttachedSensor], Readings]] = {
-    AbsoluteSensor: _absolute,
-    RelativeSensor: _relative,
-    DistanceSensor: _distance,
-    JointSensor: _coordinate,
-    WrenchSensor: _transmitted,
-    PowerSensor: _power,
+_READ: dict[str, Callable[[_Observed, AttachedSensor], Readings]] = {
+    "absolute": _absolute,
+    "relative": _relative,
+    "distance": _distance,
+    "coordinate": _coordinate,
+    "wrench": _transmitted,
+    "power": _power,
 }

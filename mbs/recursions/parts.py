@@ -29,7 +29,6 @@ from mbs.components.custom import (
     Row,
     regular_length,
 )
-from mbs.components.sensors import AbsoluteSensor, DistanceSensor, JointSensor, RelativeSensor
 from mbs.errors import AssemblyError
 from mbs.expressions import to_sx
 from mbs.recursions.poses import link_poses
@@ -201,16 +200,16 @@ class PartsAt:
         sensor = attached.sensor
         name, _, element = source.signal.partition(".")
         readings: Mapping[str, SX] = {}
-        if isinstance(sensor, JointSensor):
+        if sensor.reads == "coordinate":
             readings = self._on_coordinate(attached.coordinate)
-        elif isinstance(sensor, (AbsoluteSensor, RelativeSensor, DistanceSensor)):
+        elif sensor.reads in ("absolute", "relative", "distance"):
             a, b = attached.frames if len(attached.frames) == 2 else (BASE, *attached.frames)
             motion = relative_motion(self.tree, a, b, self.q, self.moving)
-            if isinstance(sensor, DistanceSensor):
+            if sensor.reads == "distance":
                 length = regular_length(motion.p)
                 readings = {"L": length, "Ld": casadi.dot(motion.p, motion.V) / length}
             else:
-                axes = {"world": BASE, "body": b, "a": a, "b": b}[sensor.axes]
+                axes = {"world": BASE, "body": b, "a": a, "b": b}[getattr(sensor, "axes", "world")]
                 R = relative_pose(self.tree, self.q, axes, a).R
                 vectors = {"p": motion.p, "v": motion.V, "w": motion.w}
                 readings = {n: casadi.mtimes(R, vector) for n, vector in vectors.items()}

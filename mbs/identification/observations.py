@@ -90,7 +90,8 @@ def known_of(regressor: Any, samples: Samples) -> Array:
     if not _has_elements(system):
         return np.zeros(samples.tau.shape)
     q, v, _ = motion_of(regressor, samples)
-    known = known_efforts(system, "independent" if _is_reduced(regressor) else "tree")
+    laws = [column.symbol for column in regressor.columns if column.symbol]
+    known = known_efforts(system, "independent" if _is_reduced(regressor) else "tree", laws)
     pairs = zip(q, v, strict=True)
     return np.array([DM(known(*state)).full()[:, 0] for state in pairs])
 

@@ -68,6 +68,8 @@ _SLIDING = {
     "Jm": "kg.m2",
 }
 
+_LAW = "law "
+
 Joints = tuple[str | int, str | int]
 """Two joints of the tree, by name or by the number of their link, from 1."""
 
@@ -79,6 +81,7 @@ class ColumnChoice(TypedDict, total=False):
     friction: bool
     offsets: bool
     couplings: Sequence[Joints]
+    laws: Sequence[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +91,9 @@ class Column:
     Attributes:
         name: kind and number of the link, such as "XX3".
         kind: XX XY XZ YY YZ ZZ MX MY MZ M; Ia, Fv, Fs, offset of the joint of the link; Jm, the
-            inertia of a rotor that spins with it; Iam, Fvm, Fsm of a motor of two joints.
-        link: number of the link, from 1.
+            inertia of a rotor that spins with it; Iam, Fvm, Fsm of a motor of two joints; "law k"
+            of the symbol k of force elements and other components.
+        link: number of the link, from 1; 0 for a symbol of components.
         unit: of the parameter.
         other: number of the link of the second joint of a motor of two joints, else 0.
     """
@@ -105,6 +109,11 @@ class Column:
         """What it is the parameter of, whatever its name."""
         return self.kind, self.link, self.other
 
+    @property
+    def symbol(self) -> str:
+        """The symbol of components that it is; empty for all others."""
+        return self.kind.removeprefix(_LAW) if self.kind.startswith(_LAW) else ""
+
 
 def columns_of(
     system: System,
@@ -113,8 +122,9 @@ def columns_of(
     friction: bool = True,
     offsets: bool = False,
     couplings: Sequence[Joints] = (),
+    laws: Sequence[str] = (),
 ) -> tuple[Column, ...]:
-    """The parameters of a system, link by link, those of motors of two joints last.
+    """The parameters of a system, link by link, motors of two joints and laws last.
 
     A link has the ten inertial parameters, also where they are zero. Passive joints have Ia, and
     free joints Ia and friction, only where the system gives them values that are not zero.
@@ -129,10 +139,12 @@ def columns_of(
         offsets: whether to take a constant effort of every joint of one degree of freedom.
         couplings: for each motor of two joints the joint it belongs to and the other; it turns
             with the sum of their velocities.
+        laws: symbols of the system in which force elements and other components are linear, such
+            as the stiffness of a spring.
 
     Raises:
-        ModelError: `system` is not a System, or a coupling does not name two joints of one degree
-            of freedom and of one kind.
+        ModelError: `system` is not a System, a law is no such symbol, or a coupling does not name
+            two joints of one degree of freedom and of one kind.
     """
     require_system(system)
     columns: list[Column] = []
@@ -146,7 +158,76 @@ def columns_of(
         columns += [Column(f"{kind}{number}", kind, number, _unit(link, kind)) for kind in kinds]
     for pair in couplings:
         columns += _couple(system, pair)
+    columns += [_law_column(system, name, laws) for name in laws]
     return tuple(columns)
+
+
+def _law_column(system: System, name: str, laws: Sequence[str]) -> Column:
+    """The column of a symbol of components, where all of `laws` are columns.
+
+    Raises:
+        ModelError: there is no such symbol, or the efforts are not linear in it alone.
+    """
+    symbols = system.symbol_table
+    if name not in symbols:
+        raise ModelError(
+            f"{system.name}: laws names {quoted(name)}; {did_you_mean(str(name), symbols)}"
+        )
+    s, symbol = symbols_of(system, "tree"), symbols[name]
+    acting = element_efforts(parts_at(system, s.q, s.v_tree), s.poses)
+    slopes = casadi.jacobian(acting, symbol)
+    elsewhere = [*values_of(system, columns_of(system)).nz, *spring_effort(system.tree, s.q).nz]
+    placed = [frame.parameters for link in system.tree.links for frame in link.frames]
+    others = casadi.veccat(*elsewhere, *(x for row in placed for x in row), system.tree.gravity)
+    if not casadi.depends_on(acting, symbol) or casadi.depends_on(others, symbol):
+        raise ModelError(
+            f"{system.name}: laws names {name!r}, which is not a symbol of force elements or other"
+            " components alone; name one that stands in their laws only"
+        )
+    for other in laws:
+        if other in symbols and casadi.depends_on(slopes, symbols[other]):
+            both = f"{name!r}" if other == name else f"{name!r} and {other!r} together"
+            raise ModelError(
+                f"{system.name}: the efforts are not linear in {both}; name symbols in which they"
+                " are, such as a stiffness"
+            )
+    unit = next(p.unit for p in system.parameters if p.name == name)
+    return Column(name, f"{_LAW}{name}", 0, unit)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LawColumns:
+    """Columns of symbols in which force elements and other components are linear.
+
+    Attributes:
+        system: whose components they are.
+        s: its symbols.
+    """
+
+    system: System
+    s: ModelSymbols
+
+    def effort(self, column: Column) -> SX:
+        """(nv, 1) efforts of the tree for a unit of the symbol."""
+        acting = element_efforts(parts_at(self.system, self.s.q, self.s.v_tree), self.s.poses)
+        return casadi.densify(casadi.jacobian(acting, self.system.symbol_table[column.symbol]))
+
+    def energy(self, column: Column) -> SX:
+        """What the components store for a unit of it."""
+        stored, symbol = parts_at(self.system, self.s.q).energy(), column.symbol
+        slope = casadi.jacobian(stored, self.system.symbol_table[symbol])
+        if casadi.depends_on(slope, self.system.symbol_table[symbol]):
+            raise ModelError(
+                f"{self.system.name}: what components store is not linear in {symbol!r}, as the"
+                " energy model needs; use regressor or filtered_regressor, or name other symbols"
+            )
+        return SX(slope)
+
+    def power(self, column: Column) -> SX:
+        """Power that they take and do not store."""
+        rate = position_rate(self.system.tree, self.s.q, self.s.v_tree)
+        stored = casadi.jtimes(self.energy(column), self.s.q, rate)
+        return SX(casadi.dot(self.s.v_tree, self.effort(column)) - stored)
 
 
 def chosen_columns(
@@ -199,6 +280,7 @@ def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...
         system,
         offsets=any(column.kind == "offset" for column in columns),
         couplings=list(dict.fromkeys((c.link, c.other) for c in columns if c.other)),
+        laws=list(dict.fromkeys(c.symbol for c in columns if c.symbol)),
     )
 
 
@@ -227,6 +309,9 @@ def values_of(system: System, columns: Iterable[Column]) -> SX:
     ten = [link.inertia.parameters for link in links]
     values = []
     for column in columns:
+        if column.symbol:
+            values.append(system.symbol_table[column.symbol])
+            continue
         link = links[column.link - 1]
         if column.kind in INERTIAL:
             values.append(ten[column.link - 1][INERTIAL.index(column.kind)])
@@ -513,7 +598,7 @@ def regressor(
         coordinates: of a closed system, "independent" for D(q, v_a, a_a) with D = G' D_tree, or
             "tree".
         moving_base: add the inputs v_0, a_0 and R_0 of `mbs.models.inverse_dynamics`.
-        choice: rotors, friction, offsets, couplings; see `columns_of`.
+        choice: rotors, friction, offsets, couplings, laws; see `columns_of`.
 
     Returns:
         Function of q (nq, 1), v and a (m, 1), v_0, a_0, R_0; D (m, n) with `columns`.
@@ -528,11 +613,15 @@ def regressor(
         a_tree, tree = s.tree_acceleration(a), system.tree
         around = surroundings(system, moves=moving_base)
         motions = link_accelerations(tree, s.poses, s.v_tree, a_tree, around.base)
-        joints = JointColumns.of(tree, s.poses, s.v_tree)
+        joints, laws = JointColumns.of(tree, s.poses, s.v_tree), LawColumns(system, s)
         D = side_by_side(
             taken,
             inertial_regressor(tree, s.poses, motions),
-            lambda column: joints.effort(column, a_tree, motions, around.base),
+            lambda column: (
+                laws.effort(column)
+                if column.symbol
+                else joints.effort(column, a_tree, motions, around.base)
+            ),
         )
         return [(name, a), *around.inputs], [("D", s.reduced_effort(D))]
 
@@ -540,7 +629,9 @@ def regressor(
     return regressor_function(system, key, taken, build)
 
 
-def known_efforts(system: System, coordinates: str = "independent") -> Function:
+def known_efforts(
+    system: System, coordinates: str = "independent", laws: Sequence[str] = ()
+) -> Function:
     """``known_efforts(q, v) -> tau``: what springs, stops and force elements ask of the joints.
 
     It is what the efforts of `mbs.models.inverse_dynamics` have beside D K.
@@ -548,6 +639,7 @@ def known_efforts(system: System, coordinates: str = "independent") -> Function:
     Args:
         system: open or closed; q must close the loops.
         coordinates: as for `regressor`.
+        laws: symbols of components that are columns of the regressor.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); tau (m, 1) [N m or N].
@@ -556,11 +648,18 @@ def known_efforts(system: System, coordinates: str = "independent") -> Function:
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         acting = element_efforts(parts_at(system, s.q, s.v_tree), s.poses)
+        columns = LawColumns(system, s)
+        for name in laws:
+            column = _law_column(system, name, laws)
+            acting = acting - columns.effort(column) * system.symbol_table[name]
+        if laws:
+            chosen = casadi.vertcat(*(system.symbol_table[name] for name in laws))
+            acting = casadi.substitute(acting, chosen, SX.zeros(chosen.numel()))
         tau = s.reduced_effort(acting + spring_effort(system.tree, s.q))
         return [("q", s.q), ("v" + s.suffix, s.v)], [("tau" + s.suffix, tau)]
 
     check = configuration_check(system, coordinates)
-    return model_function(system, ("known_efforts", coordinates), build, check)
+    return model_function(system, ("known_efforts", coordinates, *laws), build, check)
 
 
 def regressor_function(
@@ -629,7 +728,7 @@ def energy_regressor(
         system: open or closed; q must close the loops.
         columns: as for `regressor`.
         coordinates: of a closed system, "independent" or "tree".
-        choice: rotors, friction, offsets, couplings; see `columns_of`.
+        choice: rotors, friction, offsets, couplings, laws; see `columns_of`.
 
     Returns:
         Function of q (nq, 1) and v (m, 1); h (1, n) with `columns`.
@@ -642,7 +741,9 @@ def energy_regressor(
     def build(s: ModelSymbols) -> tuple[Named, Named]:
         joints = JointColumns.of(system.tree, s.poses, s.v_tree)
         blocks = inertial_energy(system.tree, s.poses, joints.velocities)
-        return [], [("h", side_by_side(taken, blocks, joints.energy))]
+        laws = LawColumns(system, s)
+        h = side_by_side(taken, blocks, lambda c: laws.energy(c) if c.symbol else joints.energy(c))
+        return [], [("h", h)]
 
     return regressor_function(system, ("energy_regressor", False, coordinates), taken, build)
 
@@ -676,7 +777,11 @@ def power_regressor(
     def build(s: ModelSymbols) -> tuple[Named, Named]:
         joints = JointColumns.of(system.tree, s.poses, s.v_tree)
         blocks = [zeros(1, 10) for _ in system.tree.links]
-        return [], [("P", side_by_side(taken, blocks, joints.power))]
+        laws = LawColumns(system, s)
+        power = side_by_side(
+            taken, blocks, lambda c: laws.power(c) if c.symbol else joints.power(c)
+        )
+        return [], [("P", power)]
 
     return regressor_function(system, ("power_regressor", False, coordinates), taken, build)
 
@@ -706,7 +811,7 @@ def filtered_regressor(
         columns: as for `regressor`.
         coordinates: of a closed system, "independent" or "tree".
         moving_base: add the inputs v_0 and R_0 of `mbs.models.inverse_dynamics`.
-        choice: rotors, friction, offsets, couplings; see `columns_of`.
+        choice: rotors, friction, offsets, couplings, laws; see `columns_of`.
 
     Returns:
         Function of q (nq, 1), v (m, 1), v_0 and R_0; D1 and D2 (m, n) with `columns`.
@@ -721,8 +826,13 @@ def filtered_regressor(
         joints = JointColumns.of(tree, s.poses, s.v_tree, base)
         momenta = momentum_regressor(tree, s.poses, joints.velocities)
         rests = position_regressor(tree, s.poses, joints.velocities)
-        D1 = side_by_side(taken, momenta, joints.momentum)
-        D2 = s.reduced_effort(side_by_side(taken, rests, joints.rest))
+        laws = LawColumns(system, s)
+        D1 = side_by_side(
+            taken, momenta, lambda c: zeros(system.nv) if c.symbol else joints.momentum(c)
+        )
+        D2 = s.reduced_effort(
+            side_by_side(taken, rests, lambda c: laws.effort(c) if c.symbol else joints.rest(c))
+        )
         if s.reduction is not None:
             D2 = D2 - casadi.mtimes(_rate(system, s, s.reduction.G).T, D1)
         return inputs, [("D1", s.reduced_effort(D1)), ("D2", D2)]

@@ -103,6 +103,18 @@ def test_two_dips_in_one_step(compiled):
 
 
 @BOTH
+def test_a_dip_before_the_first_look(compiled):
+    # below zero from 0.7 to 1.3 ms; the first step is 25 ms long
+    side, fired = ca.SX.sym("side"), ca.SX.sym("fired")
+    rhs = ca.Function("f", [T, X, side], [ca.vertcat(1, 0)])
+    g = 0.5 * (1 - 1e3 * T) ** 2 - 0.045
+    jump = ca.Function("j", [T, X, side, fired], [X, -side])
+    events = Events(ca.Function("g", [T, X, side], [side * g]), jump, [1])
+    motion = integrate_events(rhs, [1, 1], [0, 1], events, compiled=compiled)
+    assert np.allclose([e.time for e in motion.events], [7e-4, 1.3e-3], rtol=0, atol=1e-15)
+
+
+@BOTH
 def test_max_step_bounds_the_steps(compiled):
     # a switch that is on for a tenth of a second, and no indicator says so
     rhs = ca.Function("f", [T, X], [ca.vertcat(ca.fabs(T - 5) < 0.05, 0)])

@@ -2,8 +2,8 @@
 
 One operator, constant, condition, index or statement of mbs/spatial, solvers, recursions or loops
 is changed in memory, while it is imported; no file is. Then the tests that execute its line run,
-the quickest of the package first, until one fails. A mutant that none of them notices has survived: the tests have
-a gap, or the change means nothing.
+the quickest of the package first, until one fails. A mutant that none of them notices has survived:
+the tests have a gap, or the change means nothing.
 
     python benchmarks/mutation.py cover tests/spatial       which tests execute which line; adds up
     python benchmarks/mutation.py run --count 200 --seed 1  the sample; goes on where it was stopped
@@ -25,7 +25,6 @@ import importlib.util
 import json
 import os
 import random
-import re
 import subprocess
 import sys
 import time
@@ -351,34 +350,24 @@ def tests_of(mutant: Mutant, known: dict) -> list[str]:
 
 
 def _lines(mutant: Mutant, module: ast.Module) -> set[int]:
-    """Lines that execute it; of what is executed by the import, the lines that use its name."""
+    """Lines that execute it; of what is executed by the import, the functions that use its name."""
     first, last = mutant.lines
-    inside = [
-        node
-        for node in ast.walk(module)
-        if isinstance(node, ast.FunctionDef) and node.body[0].lineno <= first <= node.end_lineno
-    ]
+    functions = [node for node in ast.walk(module) if isinstance(node, ast.FunctionDef)]
+    inside = [f for f in functions if f.body[0].lineno <= first <= f.end_lineno]
     if inside:
         # a line of an expression over several lines counts as its statement
-        statements = [
-            node
-            for node in ast.walk(inside[-1])
-            if isinstance(node, ast.stmt)
-            and not hasattr(node, "body")
-            and node.lineno <= first <= node.end_lineno
-        ]
-        for node in statements:
-            first, last = min(first, node.lineno), max(last, node.end_lineno)
+        for node in ast.walk(inside[-1]):
+            plain = isinstance(node, ast.stmt) and not hasattr(node, "body")
+            if plain and node.lineno <= first <= node.end_lineno:
+                first, last = node.lineno, node.end_lineno
         return set(range(first, last + 1))
-    for node in module.body:
-        if node.lineno <= first <= node.end_lineno:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef):
-                return set(range(node.lineno + 1, node.end_lineno + 1))
-            names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
-            pattern = re.compile(r"\b(" + "|".join(map(re.escape, names)) + r")\b")
-            text = (ROOT / mutant.file).read_text("utf-8").splitlines()
-            return {k for k, line in enumerate(text, start=1) if pattern.search(line)}
-    return set()
+    top = next(node for node in module.body if node.lineno <= first <= node.end_lineno)
+    if isinstance(top, ast.FunctionDef | ast.ClassDef):
+        return set(range(top.lineno, top.end_lineno + 1))
+    nodes = [node for node in ast.walk(top) if isinstance(node, ast.Name)]
+    names = {node.id for node in nodes if isinstance(node.ctx, ast.Store)}
+    users = [f for f in functions if names & {n.id for n in ast.walk(f) if isinstance(n, ast.Name)}]
+    return {k for f in users or functions for k in range(f.body[0].lineno, f.end_lineno + 1)}
 
 
 # Running.

@@ -9,6 +9,7 @@ import mbs.models
 from mbs.components import Body, Box, Mechanism, Revolute
 from mbs.errors import ModelError, Unclosable
 from mbs.loops import closure, solve
+from mbs.loops.configuration import starts
 
 
 def four_bar():
@@ -147,3 +148,16 @@ def test_values_of_wrong_kinds():
             call()
     with pytest.raises(Unclosable, match="give one less than 400 away"):
         solve(system, {"j1": 1e8})
+
+
+def test_starts_go_further_and_further_to_half_a_turn():
+    first, free = np.full(1000, 0.5), list(range(0, 1000, 2))
+    drawn = list(starts(first, free, 9))
+    assert np.array_equal(drawn[0], first)
+    eighths = []
+    for q in drawn[1:]:
+        assert np.array_equal(q[1::2], first[1::2])
+        eighths.append(8 * np.max(np.abs(q - first)) / np.pi)
+    # the farthest of 500 even draws is within a hundredth of the limit
+    reach = np.array([2, 3, 4, 5, 6, 7, 8, 8, 8])
+    assert np.all((0.98 * reach < eighths) & (eighths <= reach))

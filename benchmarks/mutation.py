@@ -40,11 +40,11 @@ ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "build" / "mutation"
 PACKAGES = ("spatial", "solvers", "recursions", "loops")
 
-CAP = 40.0
+CAP = 15.0
 """Seconds of tests for a mutant: those that notice one mostly do in the first few."""
 
-FIRST = 8
-"""Tests that are tried before the others, two of them first: to collect many files takes longer."""
+FIRST = 5
+"""Tests that are tried before the others: to collect those of many files takes longer than these."""
 
 HANGS = 45.0
 """Seconds beyond three times those of its tests after which a mutant counts as one that does not
@@ -457,7 +457,7 @@ def try_mutant(mutant: Mutant, known: dict) -> dict:
     tests = tests_of(mutant, known)
     start = time.monotonic()
     said = {"outcome": "no test", "by": ""}
-    for wave in filter(None, (tests[:2], tests[2:FIRST], tests[FIRST:])):
+    for wave in filter(None, (tests[:FIRST], tests[FIRST:])):
         said = outcome(mutant, wave, 3 * sum(known[test]["seconds"] for test in wave) + HANGS)
         if said["outcome"] == "killed":
             break

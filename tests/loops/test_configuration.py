@@ -10,6 +10,7 @@ from mbs.components import Body, Box, Mechanism, Revolute
 from mbs.errors import ModelError, Unclosable
 from mbs.loops import closure, solve
 from mbs.loops.configuration import starts
+from mbs.loops.plan import plan, ways_at
 
 
 def four_bar():
@@ -161,3 +162,13 @@ def test_starts_go_further_and_further_to_half_a_turn():
     # the farthest of 500 even draws is within a hundredth of the limit
     reach = np.array([2, 3, 4, 5, 6, 7, 8, 8, 8])
     assert np.all((0.98 * reach < eighths) & (eighths <= reach))
+
+
+@pytest.mark.parametrize(("away", "led"), [(3e-6, True), (3e-5, False)])
+def test_ways_lead_to_a_configuration_to_a_hundred_thousandth(away, led):
+    system = mbs.load("four_bar").assemble()
+    q = np.array(system.configuration)
+    q[list(system.closure.passive)] += away
+    stages = plan(system)
+    assert len(stages) > 0
+    assert len(ways_at(system, stages, q, np.array(system.p_default))) == led * len(stages)

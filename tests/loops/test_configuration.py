@@ -9,6 +9,7 @@ import mbs.models
 from mbs.components import Body, Box, Mechanism, Revolute
 from mbs.errors import ModelError, Unclosable
 from mbs.loops import closure, solve
+from mbs.loops.closure import facing
 from mbs.loops.configuration import starts
 from mbs.loops.plan import plan, ways_at
 
@@ -172,3 +173,11 @@ def test_ways_lead_to_a_configuration_to_a_hundred_thousandth(away, led):
     stages = plan(system)
     assert len(stages) > 0
     assert len(ways_at(system, stages, q, np.array(system.p_default))) == led * len(stages)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "bricard"])
+def test_axes_of_a_revolute_cut_must_face_one_way(name):
+    system = mbs.load(name).assemble()
+    q = casadi.SX.sym("q", system.nq)
+    cosines = casadi.Function("cosines", [q], [facing(system, q)])(system.configuration)
+    np.testing.assert_allclose(np.array(cosines), [[1.0]], atol=1e-12, strict=True)

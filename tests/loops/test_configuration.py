@@ -6,9 +6,9 @@ import pytest
 
 import mbs
 import mbs.models
-from mbs.components import Body, Box, Mechanism, Revolute
+from mbs.components import Body, Box, Mechanism, Prismatic, Revolute
 from mbs.errors import ModelError, Unclosable
-from mbs.loops import closure, solve
+from mbs.loops import closure, modes, solve
 from mbs.loops.closure import facing
 from mbs.loops.configuration import starts
 from mbs.loops.plan import plan, ways_at
@@ -181,3 +181,26 @@ def test_axes_of_a_revolute_cut_must_face_one_way(name):
     q = casadi.SX.sym("q", system.nq)
     cosines = casadi.Function("cosines", [q], [facing(system, q)])(system.configuration)
     np.testing.assert_allclose(np.array(cosines), [[1.0]], atol=1e-12, strict=True)
+
+
+def test_all_axes_of_a_prismatic_cut_must_face_one_way():
+    m = Mechanism("stage")
+    a, b, c = (m.add(Body(name, mass=1.0, inertia=(1, 1, 1))) for name in "abc")
+    m.connect(m.world, Prismatic("j1", axis="x", actuated=True), a)
+    m.connect(a, Prismatic("j2", axis="y", actuated=True), b)
+    m.connect(m.world, Prismatic("j3", axis="y"), c)
+    m.connect(c, Prismatic("j4", axis="x"), b)
+    system = m.assemble()
+    q = casadi.SX.sym("q", system.nq)
+    cosines = casadi.Function("cosines", [q], [facing(system, q)])(system.configuration)
+    np.testing.assert_array_equal(np.array(cosines), np.ones((3, 1)), strict=True)
+
+
+def test_a_mode_tells_its_largest_row():
+    system = mbs.load("four_bar").assemble()
+    rows = closure(system)
+    found = [modes(system, {"j1": x}) for x in (0.3, 1.1, 2.0)]
+    told = [mode.residual for some in found for mode in some]
+    largest = [np.abs(np.array(rows(mode.q))).max() for some in found for mode in some]
+    np.testing.assert_allclose(told, largest, rtol=1e-12)
+    assert max(told) > 0

@@ -40,10 +40,10 @@ ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "build" / "mutation"
 PACKAGES = ("spatial", "solvers", "recursions", "loops")
 
-CAP = 15.0
+CAP = 40.0
 """Seconds of tests for a mutant: those that notice one mostly do in the first few."""
 
-FIRST = 5
+FIRST = 8
 """Tests that are tried before the others: to collect those of many files takes longer than these."""
 
 HANGS = 45.0

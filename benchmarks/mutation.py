@@ -44,7 +44,7 @@ CAP = 40.0
 """Seconds of tests for a mutant: those that notice one mostly do in the first few."""
 
 FIRST = 8
-"""Tests that are tried before the others: to collect those of many files takes longer than these."""
+"""Tests that are tried before the others: to collect those of many files takes longer."""
 
 HANGS = 45.0
 """Seconds beyond three times those of its tests after which a mutant counts as one that does not

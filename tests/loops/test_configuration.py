@@ -7,9 +7,12 @@ from support.catalogue_systems import catalogue_system
 
 import mbs
 import mbs.models
-from mbs.components import Body, Box, Mechanism, Revolute
+from mbs.components import Body, Box, Mechanism, Prismatic, Revolute
 from mbs.errors import ModelError, Unclosable
-from mbs.loops import closure, solve
+from mbs.loops import closure, modes, solve
+from mbs.loops.closure import facing
+from mbs.loops.configuration import starts
+from mbs.loops.plan import branches_at, plan
 
 
 def four_bar():
@@ -148,3 +151,57 @@ def test_values_of_wrong_kinds():
             call()
     with pytest.raises(Unclosable, match="give one less than 400 away"):
         solve(system, {"j1": 1e8})
+
+
+def test_starts_go_further_and_further_to_half_a_turn():
+    first, free = np.full(1000, 0.5), list(range(0, 1000, 2))
+    drawn = list(starts(first, free, 9))
+    assert np.array_equal(drawn[0], first)
+    eighths = []
+    for q in drawn[1:]:
+        assert np.array_equal(q[1::2], first[1::2])
+        eighths.append(8 * np.max(np.abs(q - first)) / np.pi)
+    # the farthest of 500 even draws is within a hundredth of the limit
+    reach = np.array([2, 3, 4, 5, 6, 7, 8, 8, 8])
+    assert np.all((0.98 * reach < eighths) & (eighths <= reach))
+
+
+@pytest.mark.parametrize(("away", "led"), [(3e-6, True), (3e-5, False)])
+def test_ways_lead_to_a_configuration_to_a_hundred_thousandth(away, led):
+    system = mbs.load("four_bar").assemble()
+    q = np.array(system.configuration)
+    q[list(system.closure.passive)] += away
+    stages = plan(system)
+    assert len(stages) > 0
+    assert len(branches_at(system, stages, q, np.array(system.p_default))) == led * len(stages)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "bricard"])
+def test_axes_of_a_revolute_cut_must_face_one_way(name):
+    system = mbs.load(name).assemble()
+    q = casadi.SX.sym("q", system.nq)
+    cosines = casadi.Function("cosines", [q], [facing(system, q)])(system.configuration)
+    np.testing.assert_allclose(np.array(cosines), [[1.0]], atol=1e-12, strict=True)
+
+
+def test_all_axes_of_a_prismatic_cut_must_face_one_way():
+    m = Mechanism("stage")
+    a, b, c = (m.add(Body(name, mass=1.0, inertia=(1, 1, 1))) for name in "abc")
+    m.connect(m.world, Prismatic("j1", axis="x", actuated=True), a)
+    m.connect(a, Prismatic("j2", axis="y", actuated=True), b)
+    m.connect(m.world, Prismatic("j3", axis="y"), c)
+    m.connect(c, Prismatic("j4", axis="x"), b)
+    system = m.assemble()
+    q = casadi.SX.sym("q", system.nq)
+    cosines = casadi.Function("cosines", [q], [facing(system, q)])(system.configuration)
+    np.testing.assert_array_equal(np.array(cosines), np.ones((3, 1)), strict=True)
+
+
+def test_a_mode_tells_its_largest_row():
+    system = mbs.load("four_bar").assemble()
+    rows = closure(system)
+    found = [modes(system, {"j1": x}) for x in (0.3, 1.1, 2.0)]
+    told = [mode.residual for some in found for mode in some]
+    largest = [np.abs(np.array(rows(mode.q))).max() for some in found for mode in some]
+    np.testing.assert_allclose(told, largest, rtol=1e-12)
+    assert max(told) > 0

@@ -11,7 +11,8 @@ import mbs
 from mbs.components import Body, Revolute
 from mbs.errors import AssemblyError, DescriptionError, ModelError, SingularPosture, Unclosable
 from mbs.loops import examine
-from mbs.loops.examine import require_determined
+from mbs.loops.examine import require_determined, row_independence
+from mbs.loops.velocity import constraint_jacobian, scales
 
 GUESS = {"j1": 1.0, "j2": -0.5, "j4": 1.5}
 
@@ -120,3 +121,15 @@ def test_of_velocities_that_depend_on_each_other_one_is_independent():
     assert {names[k] for k in system.active} in ({"a0", "free"}, {"a1", "free"})
     assert {names[k] for k in system.motors} == {"a0", "a1", "free"}
     assert math.isclose(m.assemble(active=["a0", "free"]).closure.mobility, 2)
+
+
+def test_a_row_alone_is_as_independent_as_it_is_long():
+    system = mbs.load("modelica_rod_four_bar").assemble()
+    units = [speed.unit for speed in system.speeds]
+    found, p = scales(system), system.p_default
+    draws = np.random.default_rng(0).uniform(-4, 4, (100, system.nq))
+    rows = [np.array(constraint_jacobian(system)(q, p)) for q in draws]
+    squares = [float(np.sum((found.rows * J * found.columns(units)) ** 2)) for J in rows]
+    told = [float(row_independence(system)(q, p)) for q in draws]
+    assert min(squares) < 0.5 < 1.5 < max(squares)
+    np.testing.assert_allclose(told, np.minimum(squares, 1), rtol=1e-12)

@@ -12,6 +12,7 @@ from support.sweeps import examples
 import mbs
 from mbs.components import Body, Mechanism, Revolute
 from mbs.errors import LoopError, ModelError, Unclosable
+from mbs.loops.pose import goal
 
 COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 TOOLS = {"sr400": 6, "akr3000": 10, "delta": "tool", "stewart_platform": "centre"}
@@ -232,3 +233,16 @@ def test_refusals(systems, change, message):
     frame, T = given.pop("frame"), given.pop("T")
     with pytest.raises(ModelError, match=message):
         mbs.loops.working_modes(systems["five_bar"], frame, T, **given)
+
+
+@pytest.mark.parametrize("rows", [None, ["x", "y", "z", "axis"]])
+def test_how_far_a_frame_is_away(systems, rows):
+    system, frame = systems["sr400"], TOOLS["sr400"]
+    q = np.array(system.configuration)
+    T = np.array(mbs.models.transform(system, frame)(q))
+    # 0.5 m away, and turned by 0.3 rad about its own x axis
+    c, s = np.cos(0.3), np.sin(0.3)
+    turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    T[:3, :3], T[:3, 3] = T[:3, :3] @ turn, T[:3, 3] + [0.3, 0, -0.4]
+    gap = goal(system, frame, T, rows, None).gap(q)
+    assert gap == pytest.approx((0.5, 0.3), rel=1e-9)

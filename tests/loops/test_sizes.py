@@ -12,6 +12,9 @@ from mbs.errors import LoopError, ModelError
 from mbs.loops import examine, modes, solve
 from mbs.loops.closing import Closing, closure_parameters, mechanism_size, row_sizes
 from mbs.loops.function import follow_active
+from mbs.loops.pose import goal
+from mbs.loops.velocity import constraint_jacobian, scales
+from mbs.models import transform
 from mbs.models.state.tree import full_state
 from mbs.robots import four_bar as catalogue_four_bar
 
@@ -181,3 +184,22 @@ def test_ranks_do_not_depend_on_the_unit_of_length(size):
 def test_other_errors_stand():
     with pytest.raises(ModelError, match="an open chain has no loops"):
         examine(catalogue_system("planar_2r"), [0.0, 0.0])
+
+
+def test_rows_of_velocities_are_of_unit_length(scaled):
+    size, system = scaled
+    J = np.array(constraint_jacobian(system)(list(system.configuration), system.p_default))
+    found = scales(system)
+    lengths = np.linalg.norm(found.rows[:, None] * J, axis=1)
+    vanish = np.linalg.norm(J, axis=1) < 1e-9 * size
+    assert 0 < np.count_nonzero(vanish) < len(vanish)
+    np.testing.assert_allclose(lengths, np.where(vanish, 0, 1), atol=1e-9)
+    assert 0.1 * size < found.length < 3 * size
+
+
+def test_a_goal_is_as_open_as_its_loops(scaled):
+    _, system = scaled
+    q = np.add(system.configuration, [0.1, -0.2, 0.3])
+    wanted = goal(system, "c", np.array(transform(system, "c")(q)), None, None)
+    assert wanted.openness(q) == pytest.approx(wanted.closing.openness(q), rel=1e-12)
+    assert wanted.openness(q) > 0.01

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 from mbs.errors import ModelError, SolverError
-from mbs.solvers import Events, integrate, integrate_events
+from mbs.solvers import Events, integrate, integrate_events, stepper
+from mbs.solvers.problem import equations
+from mbs.solvers.stepper import Stepper
 
 T, X = ca.SX.sym("t"), ca.SX.sym("x", 2)
 BOTH = pytest.mark.parametrize("compiled", [True, False], ids=["compiled", "python"])
@@ -103,12 +105,84 @@ def test_two_dips_in_one_step(compiled):
 
 
 @BOTH
+def test_a_dip_before_the_first_look(compiled):
+    # below zero from 0.7 to 1.3 ms; the first step is 25 ms long
+    side, fired = ca.SX.sym("side"), ca.SX.sym("fired")
+    rhs = ca.Function("f", [T, X, side], [ca.vertcat(1, 0)])
+    g = 0.5 * (1 - 1e3 * T) ** 2 - 0.045
+    jump = ca.Function("j", [T, X, side, fired], [X, -side])
+    events = Events(ca.Function("g", [T, X, side], [side * g]), jump, [1])
+    motion = integrate_events(rhs, [1, 1], [0, 1], events, compiled=compiled)
+    assert np.allclose([e.time for e in motion.events], [7e-4, 1.3e-3], rtol=0, atol=1e-15)
+
+
+@BOTH
+def test_a_dip_that_only_the_look_within_a_step_tells(compiled):
+    # one step of a second, at whose ends the indicator rises; below zero from 7/12 to 11/12 s
+    side, fired = ca.SX.sym("side"), ca.SX.sym("fired")
+    rhs = ca.Function("f", [T, X, side], [ca.vertcat(1, 0)])
+    g = ca.Function("g", [T, X, side], [ca.if_else(side, 0.5 + ca.sin(2 * ca.pi * T), 1)])
+    events = Events(g, ca.Function("j", [T, X, side, fired], [X, 0]), [1])
+    loose = {"rtol": 1e3, "atol": 1e3}
+    motion = integrate_events(rhs, [1, 1], [0, 1], events, compiled=compiled, **loose)
+    assert [e.time for e in motion.events] == pytest.approx([7 / 12], rel=0, abs=1e-15)
+
+
+@BOTH
+@pytest.mark.parametrize("power", [1, 3, 9])
+def test_an_event_is_at_the_first_number_where_its_indicator_is_not_positive(power, compiled):
+    p, fired = ca.SX.sym("p", 9), ca.SX.sym("fired", 9)
+    rhs, levels = ca.Function("f", [T, X, p], [ca.vertcat(1, 0)]), np.linspace(0.1, 0.9, 9) ** power
+    value = ca.Function("value", [T], [ca.vertcat(*levels) - T**power])
+    g = ca.Function("g", [T, X, p], [ca.if_else(p, 1, value(T))])
+    events = Events(g, ca.Function("j", [T, X, p, fired], [X, ca.fmax(p, fired)]), np.zeros(9))
+    motion = integrate_events(rhs, [0, 0], [0, 1], events, compiled=compiled)
+    assert [event.fired for event in motion.events] == [(k,) for k in range(9)]
+    for k, event in enumerate(motion.events):
+        assert value(event.time)[k] <= 0 < value(np.nextafter(event.time, 0))[k]
+
+
+@pytest.mark.parametrize("falling", [0.5 - T**2, ca.exp(-5 * T) - 0.2])
+def test_an_event_is_located_in_few_looks(falling, monkeypatch):
+    # halving would take 50, and secants with an end that never moves 20 and then halving
+    looks, state = [], Stepper.state
+    monkeypatch.setattr(Stepper, "state", lambda self, t: looks.append(t) or state(self, t))
+    rhs, events = clock(T)
+    p = ca.SX.sym("p")
+    once = Events(ca.Function("g", [T, X, p], [ca.if_else(p, 1, falling)]), events.jump, [0.0])
+    motion = integrate_events(rhs, [0, 0], [0, 1], once, compiled=False)
+    assert len(motion.events) == 1
+    between = [t for t in looks if abs(t - motion.events[0].time) < 0.1]
+    assert len(between) <= 16
+
+
+@BOTH
 def test_max_step_bounds_the_steps(compiled):
     # a switch that is on for a tenth of a second, and no indicator says so
     rhs = ca.Function("f", [T, X], [ca.vertcat(ca.fabs(T - 5) < 0.05, 0)])
     x = integrate(rhs, [0, 0], [0, 10], max_step=0.02, compiled=compiled)
     assert x[1, 0] == pytest.approx(0.1, abs=1e-5)
     assert integrate(rhs, [0, 0], [0, 10], compiled=compiled)[1, 0] == 0
+
+
+@BOTH
+def test_too_many_steps_between_two_rows(compiled, monkeypatch):
+    monkeypatch.setattr(stepper, "MAX_STEPS", 50)  # what is compiled takes 100 000 of them
+    end = 1.0 if compiled else 1e-3
+    rhs = ca.Function("f", [T, X], [ca.vertcat(1, 0)])
+    with pytest.raises(SolverError, match="more than 100000 steps between two output times"):
+        integrate(rhs, [0, 0], [0, end], max_step=9e-6, compiled=compiled)
+    x = integrate(rhs, [0, 0], [0, 3e-4, 6e-4, 9e-4], max_step=9e-6, compiled=compiled)
+    assert x[-1, 0] == pytest.approx(9e-4, rel=1e-12)
+
+
+@pytest.mark.parametrize("modes", [0, 2])
+def test_a_jump_leaves_as_many_modes_as_there_are(modes):
+    rhs, events = clock(T, modes=np.zeros(modes))
+    p, fired = ca.SX.sym("p", modes), ca.SX.sym("fired")
+    jump = ca.Function("j", [T, X, p, fired], [X, p] if modes else [X])
+    functions = equations(rhs, None, "dopri5", Events(events.indicators, jump, np.zeros(modes)))
+    assert functions.jump.numel_out(1) == modes
 
 
 @BOTH

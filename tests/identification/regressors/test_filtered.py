@@ -42,6 +42,17 @@ def test_rate_and_rest_are_the_dynamic_model(name):
     assert motion.largest(motion.rate(D1) + D2 - dynamic, state) < 1e-12 * scale
 
 
+def test_at_rest_only_the_weight_is_left():
+    # shoulder and elbow are parallel, and the shoulder's seat turns the direction of gravity
+    _, D, filtered = parts("puma560")
+    q = np.random.default_rng(4).uniform(-3, 3, 6)
+    D1, D2 = (np.array(part) for part in filtered(q, np.zeros(6)))
+    weight = np.array(D(q, np.zeros(6), np.zeros(6)))
+    assert np.max(np.abs(weight)) > 9
+    np.testing.assert_allclose(D2, weight, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(D1, 0, rtol=0, atol=0)
+
+
 @pytest.mark.parametrize("name", ["puma560", "scara", "sr400", "ball_base"])
 def test_momentum_is_the_derivative_of_energy(name):
     system, _, filtered = parts(name)

@@ -248,7 +248,7 @@ def test_angles_of_a_chain_are_read_off_as_they_were_written():
 def test_a_pose_that_symbols_turn_without_a_chain_is_refused():
     al = SX.sym("al")
     R = Pose.about("x", al).R
-    with pytest.raises(ValueError, match="chain of turns"):
+    with pytest.raises(ValueError, match="chain of rotations"):
         frames_to(Pose.rotation(R), 1.0)
 
 

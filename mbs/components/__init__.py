@@ -2,6 +2,15 @@
 
 from mbs.components.bodies import Body, Box, Cylinder, KhalilBody, PointMass, RigidBody, World
 from mbs.components.component import Component, Point
+from mbs.components.contact import (
+    BoxPlaneContact,
+    CapsulePlaneContact,
+    Contact,
+    HeightFieldContact,
+    SphereBoxContact,
+    SpherePlaneContact,
+    SphereSphereContact,
+)
 from mbs.components.constraints import (
     ConstantVelocity,
     PointOnLine,
@@ -64,9 +73,12 @@ __all__ = [
     "Attraction",
     "Body",
     "Box",
+    "BoxPlaneContact",
     "Bushing",
+    "CapsulePlaneContact",
     "Component",
     "ConstantVelocity",
+    "Contact",
     "CoulombFriction",
     "Coupling",
     "Custom",
@@ -84,6 +96,7 @@ __all__ = [
     "ForceElement",
     "Free",
     "Gear",
+    "HeightFieldContact",
     "IdealGear",
     "Joint",
     "JointFriction",
@@ -113,6 +126,9 @@ __all__ = [
     "ShaftDamper",
     "ShaftInertia",
     "Shape",
+    "SphereBoxContact",
+    "SpherePlaneContact",
+    "SphereSphereContact",
     "Spherical",
     "Spring",
     "Torque",

@@ -449,6 +449,8 @@ class Custom(OnPoints):
     - `rows(at)`: what must be zero, by label: `Row`s of positions, unknowns and parameters.
     - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
     - `outputs(at)`: the value of every output, by name.
+    - `crossings(at)`: by label, what passes through zero where the law has a bend or is short:
+      simulations end a step there, and step over none of them.
 
     Source: Haug 1989 for forces and rows; Modelica Association 2023 for the equations that a
     connection stands for.
@@ -562,6 +564,13 @@ class Custom(OnPoints):
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The value of every output, by its name."""
+        return {}
+
+    def crossings(self, at: Any) -> Mapping[str, SX]:
+        """What passes through zero where the law has a bend or is short, by label.
+
+        It is of positions, states and parameters. A step of `mbs.simulate.run` ends there.
+        """
         return {}
 
     # What the assembly asks.

@@ -23,7 +23,7 @@ from mbs.components.forces import ForceElement
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, out_of_bounds, to_float, to_sx
 from mbs.spatial import cross, vector, zeros
-from mbs.text import did_you_mean, one_line, quoted
+from mbs.text import did_you_mean, quoted
 
 _LAWS = ("regularised", "bristle")
 _OUTPUTS = {"normal_force": "N", "friction_force": "N", "depth": "m", "slip": "m/s"}
@@ -342,10 +342,16 @@ def damping_for(restitution: float, impact_speed: float) -> float:
     # positive below the root, negative above; the root is within these bounds
     low, high = 0.75 * (1 - e**2) / (1 + e**3), 1 / e
     while low < (middle := 0.5 * (low + high)) < high:
-        value = middle * (1 + e) - math.log1p(middle)
-        value = value + math.log1p(-e * middle) if e * middle < 1 else -math.inf
+        value = _bend(middle) - _bend(-e * middle) if e * middle < 1 else -math.inf
         low, high = (middle, high) if value > 0 else (low, middle)
     return 0.0 if e == 1 else low / impact_speed
+
+
+def _bend(x: float) -> float:
+    """x - ln(1 + x), to rounding where x is small."""
+    if abs(x) > 0.1:
+        return x - math.log1p(x)
+    return sum((-x) ** k / k for k in range(2, 20))  # 0.1^20 is below rounding
 
 
 def _power(depth: SX, exponent: SX) -> SX:
@@ -561,11 +567,16 @@ class HeightFieldContact(Contact):
         except Exception as error:
             raise DescriptionError(
                 f"{self.name}: height cannot be written with CasADi symbols"
-                f" ({one_line(str(error))}); give a function of (x, y) made of CasADi operations"
+                f" ({type(error).__name__}); give a function of (x, y) made of CasADi operations"
             ) from error
         if value.shape != (1, 1):
             raise DescriptionError(
                 f"{self.name}: height has the shape {value.shape}; give one value for (x, y)"
+            )
+        if value.is_constant() and not value.is_regular():
+            raise DescriptionError(
+                f"{self.name}: height is {float(value)} for symbols x and y; make it of CasADi"
+                " operations on them"
             )
         strange = [s.name() for s in casadi.symvar(value) if s.name() not in ("x", "y")]
         if strange:

@@ -9,6 +9,15 @@ from mbs.components.constraints import (
     Rod,
     RollingDisc,
 )
+from mbs.components.contact import (
+    BoxPlaneContact,
+    CapsulePlaneContact,
+    Contact,
+    HeightFieldContact,
+    SphereBoxContact,
+    SpherePlaneContact,
+    SphereSphereContact,
+)
 from mbs.components.couplings import Coupling, Gear, Helical, RackAndPinion, Screw
 from mbs.components.custom import Custom, Flange
 from mbs.components.drives import (
@@ -68,10 +77,13 @@ __all__ = [
     "Attraction",
     "Body",
     "Box",
+    "BoxPlaneContact",
     "Bushing",
+    "CapsulePlaneContact",
     "Cartesian",
     "Component",
     "ConstantVelocity",
+    "Contact",
     "CoulombFriction",
     "Coupling",
     "Custom",
@@ -90,6 +102,7 @@ __all__ = [
     "Free",
     "Gear",
     "Gimbal",
+    "HeightFieldContact",
     "Helical",
     "IdealGear",
     "Joint",
@@ -122,6 +135,9 @@ __all__ = [
     "ShaftDamper",
     "ShaftInertia",
     "Shape",
+    "SphereBoxContact",
+    "SpherePlaneContact",
+    "SphereSphereContact",
     "Spherical",
     "Spring",
     "Torque",

@@ -140,7 +140,7 @@ SLIPS = ("slip x", "slip y")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contact:
+class RimContact:
     """A disc on a plane, in axes whose z is the normal of the plane.
 
     Attributes:
@@ -185,7 +185,7 @@ class RollingDisc(Constraint):
         """Frame_b in axes at frame_a whose z is the normal of the plane."""
         return Pose.rotation(align_z(self.normal)).inverse() @ pose
 
-    def contact(self, pose: Pose, symbols: SymbolTable) -> Contact:
+    def contact(self, pose: Pose, symbols: SymbolTable) -> RimContact:
         """Where it touches the plane.
 
         Args:
@@ -196,7 +196,7 @@ class RollingDisc(Constraint):
         u = casadi.mtimes(pose.R, SX(DM(list(self.axis))))
         s = casadi.sqrt(u[0] * u[0] + u[1] * u[1])
         point = radius * casadi.vertcat(u[2] * u[0] / s, u[2] * u[1] / s, -s)
-        return Contact(pose.p[2] - radius * s, point, s)
+        return RimContact(pose.p[2] - radius * s, point, s)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
         """The rim stays on the plane."""

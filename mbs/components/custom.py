@@ -451,6 +451,8 @@ class Custom(OnPoints):
       configurations that the rows allow is meant.
     - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
     - `outputs(at)`: the value of every output, by name.
+    - `crossings(at)`: by label, what passes through zero where the law has a bend or is short:
+      simulations end a step there, and step over none of them.
 
     Source: Haug 1989 for forces, rows and the work that they do.
 
@@ -567,6 +569,13 @@ class Custom(OnPoints):
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The value of every output, by its name."""
+        return {}
+
+    def crossings(self, at: Any) -> Mapping[str, SX]:
+        """What passes through zero where the law has a bend or is short, by label.
+
+        It is of positions, states and parameters. A step of `mbs.simulate.run` ends there.
+        """
         return {}
 
     # What the assembly asks.

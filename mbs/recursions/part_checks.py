@@ -92,6 +92,11 @@ class _Check:
         energy, heat = self._scalar("energy"), self._scalar("dissipation")
         if energy is not None:
             self._require_free_of(energy, "energy", self.v, "velocities")
+        if self.element.has("crossings"):
+            free = casadi.vertcat(self.v, self.system.u)
+            for label, value in self._mapping("crossings").items():
+                what = f"the crossing {label!r}"
+                self._require_free_of(self._value(what, value), what, free, "velocities or inputs")
         seen = self._outputs()
         self.used += [*seen.values(), *rates.values()]
         self._require_use_of_inputs()

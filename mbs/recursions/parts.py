@@ -368,6 +368,14 @@ class PartsAt:
                 rates += [SX(found[name]) for name in part.states]
         return casadi.vertcat(*rates)
 
+    def crossings(self) -> SX:
+        """(nc, 1) what passes through zero where the laws of components have bends."""
+        found = [SX(0, 1)]
+        for part in self.parts:
+            if part.element.has("crossings"):
+                found += map(SX, part.element.crossings(self.at(part)).values())
+        return casadi.vertcat(*found)
+
     def outputs(self, lam: SX | None = None) -> SX:
         """(ny, 1) outputs of all components.
 

@@ -39,7 +39,7 @@ from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
-from mbs.solvers.problem import Event, failed
+from mbs.solvers.problem import Event, Passage, failed
 from mbs.text import did_you_mean, quoted
 
 # Rigid stops and Coulomb friction in a simulation: how they start, and what a result tells of them.
@@ -298,6 +298,10 @@ _SINGULAR = 1e-6
 _FLAT = 1e-3
 """Sine of the angle between a rolling disc and its plane at which it counts as flat."""
 
+_FIRST_STEP = 1e-9
+"""Step behind a crossing [s], from which steps grow tenfold where nothing errs: what two bodies do
+to each other is met at any speed before they are through each other."""
+
 Stop = SolverError | Interrupted | None
 """Why a motion ends early; None where it does not."""
 
@@ -452,18 +456,83 @@ def _motion(
     p: Sequence[float],
     options: dict[str, Any],
 ) -> EventMotion:
-    """The motion as far as it comes."""
-    return integrate_events(
-        state.rhs,
-        x0,
-        times,
-        events,
-        p=p,
-        project=state.project,
-        passage=state.passage,
-        partial=True,
-        **options,
+    """The motion as far as it comes; its steps end where laws of components have bends."""
+    rhs, project, passage = state.rhs, state.project, state.passage
+    own, count = events, 0
+    if state.crossings is not None:
+        own, wrapped = with_crossings(state, x0, times[0], events, p)
+        rhs, project, passage = wrapped
+        count = state.crossings.numel_out(0)
+    motion = integrate_events(
+        rhs, x0, times, own, p=p, project=project, passage=passage, partial=True, **options
     )
+    return _without_crossings(motion, events, count) if count else motion
+
+
+def with_crossings(
+    state: FullState, x0: Array, t0: float, events: Events | None, p: Sequence[float]
+) -> tuple[Events, tuple[Function, Function | None, Passage | None]]:
+    """Events with the crossings behind them, and the functions of the state with their modes.
+
+    On which side of a crossing the motion is, 1 or -1, is its mode; nothing jumps there, so that
+    it does not matter whether a step stops a little before or behind it.
+
+    Args:
+        state: with crossings.
+        x0: (nx,) at the start.
+        t0: time of it [s].
+        events: others; None where there are none.
+        p: (np,) parameters, without modes.
+    """
+    assert state.crossings is not None
+    modes = () if events is None else tuple(np.ravel(np.asarray(events.modes, dtype=float)))
+    count = state.crossings.numel_out(0)
+    n, n_p, first = len(x0), len(p) + len(modes), 0
+    if events is not None:
+        first = events.indicators.numel_out(0)
+    t, x, pm, fired = (
+        SX.sym(name, size)
+        for name, size in (("t", 1), ("x", n), ("p", n_p + count), ("fired", first + count))
+    )
+    at, sides = [t, x, pm[:n_p]], pm[n_p:]
+
+    def wide(function: Function) -> Function:
+        return Function(function.name(), [t, x, pm], function.call(at))
+
+    crossed = state.crossings.call(at)[0]
+    indicators, moved, after = [sides * crossed], x, [SX(0, 1)]
+    if events is not None:
+        indicators.insert(0, events.indicators.call(at)[0])
+        jumps = casadi.mmax(fired[:first])
+        there, changed = events.jump.call([*at, fired[:first]])
+        moved = casadi.if_else(jumps, there, x)
+        after = [casadi.if_else(jumps, changed, pm[len(p) : n_p])]
+    after.append(casadi.if_else(fired[first:] > 0, -sides, sides))
+    start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
+    watched = Events(
+        Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
+        Function("jump", [t, x, pm, fired], [moved, casadi.vertcat(*after)]),
+        [*modes, *np.where(start > 0, 1.0, -1.0)],
+        _FIRST_STEP,
+    )
+    passage = state.passage
+    if passage is not None:
+        parts = {name: wide(getattr(passage, name)) for name in ("rows", "forces", "regularity")}
+        passage = replace(passage, **parts)
+    project = None if state.project is None else wide(state.project)
+    return watched, (wide(state.rhs), project, passage)
+
+
+def _without_crossings(motion: EventMotion, events: Events | None, count: int) -> EventMotion:
+    """The motion with the modes and events of others alone."""
+    first = 0 if events is None else events.indicators.numel_out(0)
+    kept = motion.modes.shape[1] - count
+    told = tuple(
+        replace(event, fired=others, modes=event.modes[:kept])
+        for event in motion.events
+        if (others := tuple(k for k in event.fired if k < first))
+    )
+    return replace(motion, modes=motion.modes[:, :kept], events=told)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -560,7 +629,11 @@ def _leg(
         Function("end", [t, x, pm, fired], [x, SX(1)]),
         [0.0],
     )
-    motion = integrate_events(rhs, x0, times, events, p=p, project=project, partial=True, **options)
+    ending = replace(state, rhs=rhs, project=project, passage=None)
+    if state.crossings is not None:
+        crossed = state.crossings(t, x, parameters)
+        ending = replace(ending, crossings=Function("crossings", [t, x, pm], [crossed]))
+    motion = _motion(ending, x0, times, events, p, options)
     reached = times[: len(motion.x)]
     before = reached <= (motion.events[0].time if motion.events else np.inf)
     return Leg(state, reached[before], motion.x[before]), motion

@@ -204,7 +204,8 @@ def _load(path: Path, has_events: bool, has_passage: bool) -> ctypes.CDLL:
 def _opened(library: ctypes.CDLL, problem: IntegrationProblem) -> Iterator[ctypes.c_void_p]:
     n, p, start = len(problem.x0), problem.p, float(problem.times[0])
     indicators = problem.equations.indicators
-    control = np.array([problem.rtol, problem.atol, problem.max_step])
+    afresh = problem.equations.first_step
+    control = np.array([problem.rtol, problem.atol, problem.max_step, afresh])
     driver = library.mbs_open(n, len(p), _pointer(p), _pointer(control), start)
     full = not driver
     try:

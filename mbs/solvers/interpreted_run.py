@@ -333,7 +333,7 @@ def _vector(value: casadi.DM) -> Array:
 def _stepper(problem: IntegrationProblem, p: Array) -> Stepper:
     functions, start, state = problem.equations, float(problem.times[0]), problem.x0
     project = _projection(problem, p)
-    control = problem.rtol, problem.atol, problem.max_step
+    control = problem.rtol, problem.atol, problem.max_step, functions.first_step
 
     def slope(t: float, x: Array) -> Array:
         return _vector(functions.rhs(t, x, p))

@@ -58,11 +58,14 @@ class Events:
         jump: `jump(t, x, p, fired) -> (x, modes)`, state and modes after an event; fired is 1 for
             each indicator that is not positive, 0 for the others. Without modes x alone will do.
         modes: (nm,) at the start.
+        first_step: length of the step after an event [s], from which the steps grow; estimated
+            from the slopes there where zero, which may be too long for what is short.
     """
 
     indicators: casadi.Function
     jump: casadi.Function
     modes: npt.ArrayLike = ()
+    first_step: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,6 +138,7 @@ class Equations:
         rates: `mbs_rates(t, x, p) -> dg/dt` along the motion.
         jump: `mbs_jump(t, x, p, fired) -> (x, modes)`.
         passage: `mbs_rows`, `mbs_forces` and `mbs_regularity`; None where no rows become dependent.
+        first_step: as `Events` has it.
     """
 
     rhs: casadi.Function
@@ -144,6 +148,7 @@ class Equations:
     rates: casadi.Function | None = None
     jump: casadi.Function | None = None
     passage: Passage | None = None
+    first_step: float = 0.0
 
     @property
     def all(self) -> list[casadi.Function]:
@@ -242,7 +247,8 @@ def equations(
     through = None if passage is None else _passage(passage, txp)
     if events is None:
         return Equations(f, jacobian, g, passage=through)
-    return Equations(f, jacobian, g, *_event_functions(events, txp, slope), passage=through)
+    found = _event_functions(events, txp, slope)
+    return Equations(f, jacobian, g, *found, passage=through, first_step=events.first_step)
 
 
 def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:

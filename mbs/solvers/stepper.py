@@ -76,6 +76,7 @@ class Stepper(ABC):
         t: present time.
         x: present state, (n,).
         max_step: the longest step, s.
+        afresh: length of the first step after a jump, s; estimated where 0.
         h: step that error control wants next; 0 before the first one.
         slope: slope at the present state, or None when it is not known.
         last_step: length of the last step.
@@ -90,6 +91,7 @@ class Stepper(ABC):
     rtol: float
     atol: float
     max_step: float = math.inf
+    afresh: float = 0.0
     h: float = 0.0
     error: float = LEAST_ERROR
     since_output: int = 0
@@ -160,7 +162,7 @@ class Stepper(ABC):
 
     def restart(self, x: Array) -> None:
         """Go on from another state at the present time, with a new first step."""
-        self.x, self.slope, self.h, self.error = x, None, 0.0, LEAST_ERROR
+        self.x, self.slope, self.h, self.error = x, None, self.afresh, LEAST_ERROR
 
     def step(self, limit: float) -> int:
         """Try steps towards limit until one is accepted.

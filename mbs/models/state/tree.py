@@ -453,6 +453,8 @@ class FullState:
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
             and Coulomb friction, whose modes are then the last of p; None where there are none.
         passage: for steps through singular configurations of the loops; None where there are none.
+        crossings: `crossings(t, x, p)`, what passes through zero where the laws of components have
+            bends; None where there are none.
     """
 
     rhs: Function
@@ -460,6 +462,7 @@ class FullState:
     observe: Function
     events: tuple[Function, Function] | None = None
     passage: Passage | None = None
+    crossings: Function | None = None
 
 
 def full_state(
@@ -502,6 +505,7 @@ def full_state(
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
     moved = [casadi.vertcat(*kept, z), residual]
     p = casadi.vertcat(p, contact.values) if contact else p
+    crossed = parts.crossings()
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
@@ -509,6 +513,7 @@ def full_state(
         observe=dense_function("observe", [t, x, p], observed),
         events=_events(system, contact, [t, x, p], u) if contact else None,
         passage=through,
+        crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
     )
 
 

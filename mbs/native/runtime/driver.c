@@ -269,6 +269,7 @@ EXPORT driver *mbs_open(int n, int n_p, const double *p, const double *control, 
     d->solver.rtol = control[0];
     d->solver.atol = control[1];
     d->solver.h_max = control[2];
+    d->solver.afresh = control[3];
     stepper_start(&d->solver, t);
     return d;
 }

@@ -43,7 +43,7 @@ void stepper_fix(stepper *s, double h) { s->h_max = s->fixed = h; }
 
 void stepper_restart_afresh(stepper *s) {
     stepper_restart(s);
-    s->memory[STEP] = s->fixed;
+    s->memory[STEP] = s->fixed > 0.0 ? s->fixed : s->afresh;
 }
 
 double stepper_time(const stepper *s) { return s->memory[TIME]; }

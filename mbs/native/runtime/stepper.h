@@ -58,7 +58,8 @@ struct stepper {
     stepper_jacobian jacobian; /* for implicit methods */
     void *user;
     double rtol, atol, h_max;
-    double fixed; /* length of all steps; 0: error control finds it */
+    double fixed;  /* length of all steps; 0: error control finds it */
+    double afresh; /* length of the first step after a jump; 0: it is estimated */
     const double *nominal; /* typical size of each state, which scales atol; NULL: 1 */
     long max_steps;
     double *memory, *work;
@@ -82,7 +83,7 @@ void stepper_restart(stepper *s);
 /* Before stepper_start: begin with steps of this length, and make no longer ones. */
 void stepper_fix(stepper *s, double h);
 
-/* The state jumped: the step size is found anew too, where it is not fixed. */
+/* The state jumped: the step size is found anew too, where it is neither fixed nor given. */
 void stepper_restart_afresh(stepper *s);
 
 double stepper_time(const stepper *s);

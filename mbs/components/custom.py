@@ -57,7 +57,7 @@ EFFORT = "effort"
 REQUIRED: Any = object()
 """Stands where there is no default."""
 
-_KINDS_OF_FIELDS = ("frame", "coordinate", "parameter", "state", "unknown")
+_KINDS_OF_FIELDS = ("frame", "coordinate", "parameter", "state", "mode", "unknown")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +65,7 @@ class Declared:
     """One thing that a component has.
 
     Attributes:
-        kind: frame, flange, coordinate, parameter, state, unknown, input or output.
+        kind: frame, flange, coordinate, parameter, state, mode, unknown, input or output.
         unit: of its value.
         default: of a parameter or an input; the start of a state, the guess of an unknown.
         low, high: least and greatest value of a parameter.
@@ -132,6 +132,17 @@ def state(unit: str = "1", *, start: float = 0.0, nominal: float = 1.0) -> Any:
         nominal: typical size, by which solvers measure errors.
     """
     return Declared("state", unit, start, nominal=nominal)
+
+
+def mode(start: float = 0.0) -> Any:
+    """A number that is constant between events, such as 1 where something is locked.
+
+    It is a state whose rate is zero, and which `events` sets.
+
+    Args:
+        start: at the start of a motion; it may be given by its name.
+    """
+    return Declared("mode", "1", start)
 
 
 def unknown(unit: str = "m", *, guess: float = 0.0) -> Any:
@@ -429,6 +440,20 @@ class Row:
     unit: str = "m"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Event:
+    """Something that happens at once.
+
+    Attributes:
+        when: (1, 1) positive before; it happens where this is not positive any more. After it,
+            `when` must be positive again, or leave zero upwards.
+        then: what states and modes of the component become, by name.
+    """
+
+    when: SX
+    then: Mapping[str, Any]
+
+
 Load = FrameLoad | SX | float
 """A wrench on a frame; a force [N] or torque [N m] along a coordinate or on a flange."""
 
@@ -451,6 +476,8 @@ class Custom(OnPoints):
       configurations that the rows allow is meant.
     - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
     - `outputs(at)`: the value of every output, by name.
+    - `events(at)`: by label, when something happens at once, and what states and modes become; in
+      simulations and FMUs.
     - `crossings(at)`: by label, what passes through zero where the law has a bend or is short:
       simulations end a step there, and step over none of them.
 
@@ -571,6 +598,10 @@ class Custom(OnPoints):
         """The value of every output, by its name."""
         return {}
 
+    def events(self, at: Any) -> Mapping[str, Event]:
+        """What happens at once, by label: of positions, velocities, states, modes and inputs."""
+        return {}
+
     def crossings(self, at: Any) -> Mapping[str, SX]:
         """What passes through zero where the law has a bend or is short, by label.
 
@@ -601,8 +632,8 @@ class Custom(OnPoints):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Its states."""
-        return self.names_of("state")
+        """Its states, modes among them."""
+        return self.names_of("state", "mode")
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -660,7 +691,9 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
             setattr(cls, name, _Handle(what.kind, name))
             continue
         annotations[name] = Any
-        if what.kind in ("state", "unknown") or (what.kind == "frame" and what.default is None):
+        if what.kind in ("state", "mode", "unknown") or (
+            what.kind == "frame" and what.default is None
+        ):
             setattr(cls, name, dataclass_field(default=what.default, kw_only=True))
         elif what.default is REQUIRED:
             delattr(cls, name)
@@ -714,6 +747,7 @@ _CHECKS: Mapping[str, Callable[[Custom, str, Declared], None]] = {
     "coordinate": _check_coordinate,
     "parameter": _check_parameter,
     "state": _check_number,
+    "mode": _check_number,
     "unknown": _check_number,
 }
 
@@ -721,6 +755,7 @@ __all__ = [
     "At",
     "CoordinateAt",
     "Custom",
+    "Event",
     "FlangeAt",
     "FrameAt",
     "FrameLoad",
@@ -733,6 +768,7 @@ __all__ = [
     "force",
     "frame",
     "input",
+    "mode",
     "output",
     "parameter",
     "pull",

@@ -176,7 +176,7 @@ def contacts_of(system: System) -> Contacts:
 
 
 def require_no_contacts(system: System, what: str) -> None:
-    """Refuse a system with rigid stops or Coulomb friction, for what does not know them.
+    """Refuse a system with rigid stops, Coulomb friction or events, for what does not know them.
 
     Raises:
         ModelError: names the element, and what to use instead.
@@ -188,6 +188,11 @@ def require_no_contacts(system: System, what: str) -> None:
             raise ModelError(
                 f"{system.name}: {what} has no events yet, which {kind} {force.element.name} needs;"
                 f" use a {smooth}, or mbs.simulate.run"
+            )
+        if force.element.has("events"):
+            raise ModelError(
+                f"{system.name}: {what} has no events yet, which {type(force.element).__name__}"
+                f" {force.name} needs; use mbs.simulate.run or an FMU"
             )
 
 

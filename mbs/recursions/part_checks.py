@@ -6,7 +6,7 @@ symbols of what the methods return, loads against the energy, heat that is negat
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import casadi
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
-from mbs.components.custom import At, FlangeAt, FrameLoad, Row
+from mbs.components.custom import At, Event, FlangeAt, FrameLoad, Row
 from mbs.errors import AssemblyError, MbsError
 from mbs.recursions.parts import PartsAt, parts_at
 from mbs.text import did_you_mean, one_line, quoted
@@ -87,7 +87,9 @@ class _Check:
     def run(self) -> None:
         """All questions."""
         loads = self._loads()
-        rates = self._named("rates", self.part.states)
+        modes = self.element.names_of("mode")
+        rates = self._named("rates", [name for name in self.part.states if name not in modes])
+        self._events(modes)
         self._rows()
         energy, heat = self._scalar("energy"), self._scalar("dissipation")
         if energy is not None:
@@ -212,6 +214,30 @@ class _Check:
                 f"{self._title}: {len(unknowns)} unknowns have {count} rows, which do not determine"
                 " them; give a row for each at least"
             )
+
+    def _events(self, modes: Sequence[str]) -> None:
+        set_somewhere: set[str] = set()
+        for label, event in (self._mapping("events") if self.element.has("events") else {}).items():
+            if not isinstance(event, Event):
+                raise AssemblyError(
+                    f"{self._title}: events gives {_kind(event)} for {label!r}; give"
+                    " custom.Event(when, {state: value})"
+                )
+            self._value(f"when of the event {label!r}", event.when)
+            for name, value in event.then.items():
+                if name not in self.part.states:
+                    raise AssemblyError(
+                        f"{self._title}: the event {label!r} sets {quoted(name)}, which is no"
+                        f" state or mode; {did_you_mean(str(name), self.part.states)}"
+                    )
+                self._value(f"{name} after the event {label!r}", value)
+                set_somewhere.add(name)
+        for name in modes:
+            if name not in set_somewhere:
+                raise AssemblyError(
+                    f"{self._title}: no event sets the mode {name!r}; write events, or declare it"
+                    " as a parameter"
+                )
 
     def _scalar(self, method: str) -> SX | None:
         if not self.element.has(method):

@@ -7,7 +7,7 @@ its numbers. Signals run along wires, each output following from states, ports a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -365,8 +365,21 @@ class PartsAt:
         for part in self.parts:
             if part.states:
                 found = part.element.rates(self.at(part))
-                rates += [SX(found[name]) for name in part.states]
+                modes = part.element.names_of("mode")
+                rates += [SX(0) if name in modes else SX(found[name]) for name in part.states]
         return casadi.vertcat(*rates)
+
+    def events(self) -> list[PartEvent]:
+        """What happens at once in all components, in their order."""
+        found, first = list[PartEvent](), 0
+        for part in self.parts:
+            if part.element.has("events"):
+                index = {name: first + k for k, name in enumerate(part.states)}
+                for label, event in part.element.events(self.at(part)).items():
+                    then = {index[name]: SX(value) for name, value in event.then.items()}
+                    found.append(PartEvent(part.name, label, SX(event.when), then))
+            first += len(part.states)
+        return found
 
     def crossings(self) -> SX:
         """(nc, 1) what passes through zero where the laws of components have bends."""
@@ -419,6 +432,44 @@ class PartsAt:
 
 def _same(value: SX) -> SX:
     return value
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PartEvent:
+    """An event of a component.
+
+    Attributes:
+        name: of the component.
+        label: of the event in it.
+        when: (1, 1) positive before it.
+        then: what elements of z become, by their indices.
+    """
+
+    name: str
+    label: str
+    when: SX
+    then: Mapping[int, SX]
+
+
+def part_events(system: System) -> list[PartEvent]:
+    """What happens at once in the components of a system, in their order."""
+    q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
+    return parts_at(system, q, v).events()
+
+
+def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
+    """(nz, 1) states of components after events.
+
+    Args:
+        system: whose components they are.
+        events: of all components.
+        fired: 1 for each event that happens, 0 for the others.
+    """
+    after = SX(system.z)
+    for k, event in enumerate(events):
+        for index, value in event.then.items():
+            after[index] = casadi.if_else(fired[k], value, after[index])
+    return after
 
 
 def parts_at(system: System, q: SX, v: SX | None = None) -> PartsAt:

@@ -21,7 +21,7 @@ from mbs.loops.closure import least_upright, rolling_discs
 from mbs.loops.configuration import Values, start
 from mbs.loops.examine import row_independence
 from mbs.loops.velocity import constraint_jacobian, scales
-from mbs.models.contacts import Contacts, contacts_of, require_lasting_rows, require_undriven
+from mbs.models.contacts import KINDS, Contacts, contacts_of, require_lasting_rows, require_undriven
 from mbs.models.direct_dynamics import hybrid_dynamics
 from mbs.models.inverse_dynamics import bias
 from mbs.models.measurements import measurements
@@ -35,6 +35,7 @@ from mbs.models.state.signals import (
 )
 from mbs.models.state.tree import FullState, full_state
 from mbs.progress import progress
+from mbs.recursions.parts import part_events
 from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
@@ -140,13 +141,24 @@ def every_effort(system: System, tau: Array, efforts: Array) -> Array:
     return total
 
 
-def told(system: System, contact: ContactMotion | None) -> tuple[tuple[float, str, str], ...]:
-    """Time, name of the element and what it does, of every event."""
+def list_events(
+    system: System, contact: ContactMotion | None, others: Sequence[Event] = ()
+) -> tuple[tuple[float, str, str], ...]:
+    """Time, name of the element or component and what it does, of every event.
+
+    Args:
+        system: in motion.
+        contact: what contacts do, their events and those of components behind them.
+        others: events of components alone, where there are no contacts.
+    """
+    own = [(event.name, event.label) for event in part_events(system)]
+    happened = [(event.time, *own[k]) for event in others for k in event.fired]
     if contact is None:
-        return ()
+        return tuple(happened)
     contacts, before = contacts_of(system), contact.first
-    happened = []
+    count = len(KINDS) * len(contacts)
     for event in contact.events:
+        happened += [(event.time, *own[k - count]) for k in event.fired if k >= count]
         for j in range(len(contacts)):
             for name, what in _changes(contacts, j, before, event):
                 happened.append((event.time, name, what))
@@ -317,6 +329,7 @@ class Leg:
         contact: what rigid stops and Coulomb friction do meanwhile, None where there are none.
         first_slope: as `EventMotion` has it.
         driven: numbers of the velocities whose motion is prescribed.
+        happened: events of components, where there are no contacts.
         first_bias: (nv,) efforts of gravity and velocities at the first time; None as before.
     """
 
@@ -327,6 +340,7 @@ class Leg:
     first_slope: Array | None = None
     driven: tuple[int, ...] = ()
     first_bias: Array | None = None
+    happened: tuple[Event, ...] = ()
 
     @property
     def without_start(self) -> Leg:
@@ -429,7 +443,7 @@ def _integrate(
         q, parameters = x0[: system.nq], np.array(p, dtype=float)
         if float(row_independence(system)(q, parameters)) < _SINGULAR:
             state = equations(rows_at(system, q, parameters))  # the start may be regular for others
-    if state.events is not None:
+    if len(contacts_of(system)):
         return _with_contacts(system, state, x0, times, p, options)
     discs = [disc.name for _, disc in rolling_discs(system)]
     if discs:
@@ -443,8 +457,11 @@ def _integrate(
             " no single point of a disc touches; end the run before, or keep it upright",
             time=end,
         )
-    motion = _motion(state, x0, times, None, p, options)
-    leg = Leg(state, times[: len(motion.x)], motion.x, first_slope=motion.first_slope)
+    watched = Events(*state.events) if state.events else None
+    motion = _motion(state, x0, times, watched, p, options)
+    happened = motion.events if state.events else ()
+    reached = times[: len(motion.x)]
+    leg = Leg(state, reached, motion.x, first_slope=motion.first_slope, happened=happened)
     return [leg], motion.stop
 
 
@@ -942,7 +959,7 @@ def _result(system: System, legs: Sequence[Leg], p: Sequence[float], stop: Stop)
     for name, unit, values in contact_columns(system, contact, held):
         column(name, unit, values)
     values = np.column_stack(columns)
-    events = told(system, contact)
+    events = list_events(system, contact, legs[0].happened)
     stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
     return Result(
         times, values, units, name=system.name, events=events, system=system, stopped=stopped

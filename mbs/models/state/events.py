@@ -20,6 +20,7 @@ from mbs.models.contacts import KINDS, ContactEquations, Contacts, impact, jump
 from mbs.models.state.drive import TreeMotion
 from mbs.models.symbols import dense_function, outputs_of
 from mbs.numbers import NONZERO
+from mbs.recursions.parts import PartEvent, after_events
 
 # What keeps dependent joints at rest that rigid stops or Coulomb friction hold.
 #
@@ -301,6 +302,51 @@ def minimal_events(
         first=written("first", [], [start[modes], beyond[numbers]]),
         indicators=written("indicators", [], [contact.indicators[numbers]]),
         jump=written("jump", [fired], [x, now[modes]]),
+    )
+
+
+def join_part_events(
+    system: System,
+    contacts: MinimalEvents | None,
+    own: Sequence[PartEvent],
+    point: Sequence[SX],
+) -> MinimalEvents | None:
+    """The events of contacts, and behind them those of components.
+
+    Args:
+        system: open or closed.
+        contacts: None where there are none.
+        own: events of all components.
+        point: t, x that ends with the states of components, z, u and p, without modes.
+    """
+    if not own:
+        return contacts
+    *others, p = point
+    x, modes = point[1], SX.sym("modes", len(contacts.modes) if contacts else 0)
+    every = [*others, casadi.vertcat(p, modes)]
+    count = len(contacts.names) if contacts else 0
+    fired = SX.sym("fired", count + len(own))
+    first, beyond = SX(0, 1), SX(0, 1)
+    watched, after, now = SX(0, 1), x, modes
+    if contacts:
+        first, beyond = contacts.first.call(every)
+        (watched,) = contacts.indicators.call(every)
+        there, changed = contacts.jump.call([*every, fired[:count]])
+        jumps = casadi.mmax(fired[:count])
+        after, now = casadi.if_else(jumps, there, x), casadi.if_else(jumps, changed, modes)
+    start = x.numel() - system.z.numel()
+    after = casadi.vertcat(after[:start], after_events(system, own, fired[count:]))
+    indicators = casadi.vertcat(watched, *(event.when for event in own))
+    allowed = casadi.vertcat(beyond, -SX.ones(len(own)))
+    return MinimalEvents(
+        modes=contacts.modes if contacts else (),
+        names=(
+            *(contacts.names if contacts else ()),
+            *(f"{event.name} {event.label}" for event in own),
+        ),
+        first=dense_function("first", every, [first, allowed]),
+        indicators=dense_function("indicators", every, [indicators]),
+        jump=dense_function("jump", [*every, fired], [after, now]),
     )
 
 

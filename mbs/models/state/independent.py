@@ -47,6 +47,7 @@ from mbs.models.state.events import (
     at_limits,
     contact_efforts,
     few_modes,
+    join_part_events,
     minimal_events,
     minimal_jump,
     standstill,
@@ -650,6 +651,7 @@ def _equations(
             point,
             lambda fired: minimal_jump(system, contact, motion, (s.x, fired), states),
         )
+    events = join_part_events(system, events, parts.events(), point)
     point[4], (rate, y) = few_modes(contact, system.p, [rate, y])
     return StateEquations(
         rhs=dense_function("rhs", point, [rate, y]),

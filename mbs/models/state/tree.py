@@ -31,7 +31,7 @@ from mbs.models.energy import energy
 from mbs.models.inverse_dynamics import bias
 from mbs.models.joint_wrenches import shown_outputs
 from mbs.models.state.drive import DriveInputs, TreeMotion, load_of, wrenches_of
-from mbs.models.state.events import MinimalEvents, few_modes, minimal_events
+from mbs.models.state.events import MinimalEvents, few_modes, join_part_events, minimal_events
 from mbs.models.state.independent import (
     Accelerations,
     Observe,
@@ -45,6 +45,7 @@ from mbs.models.state.independent import (
 )
 from mbs.models.state.signals import Prescribed
 from mbs.models.symbols import dense_function, outputs_of, part_equations, state_count
+from mbs.recursions.parts import PartsAt, after_events
 from mbs.solvers.linear import partial_ldl
 from mbs.solvers.problem import Passage
 
@@ -399,6 +400,7 @@ def tree_state(
         events = minimal_events(
             contact, motion, point, lambda fired: tree_jump(system, contact, X, fired)
         )
+    events = join_part_events(system, events, parts.events(), point)
     if drive.effort is not None or drive.device is not None:
         at = dense_function("motion", point, [q, v])
         sizes = (len(motors), system.u.numel())
@@ -511,22 +513,45 @@ def full_state(
         rhs=dense_function("rhs", [t, x, p], [rate]),
         project=dense_function("project", [t, x, p], moved) if keeps else None,
         observe=dense_function("observe", [t, x, p], observed),
-        events=_events(system, contact, [t, x, p], u) if contact else None,
+        events=_events(system, contact, parts, [t, x, p], u),
         passage=through,
         crossings=dense_function("crossings", [t, x, p], [crossed]) if crossed.numel() else None,
     )
 
 
 def _events(
-    system: System, contact: ContactEquations, txp: list[SX], u: SX
-) -> tuple[Function, Function]:
-    """The functions of `FullState.events`."""
-    fired = SX.sym("fired", contact.indicators.numel())
-    after, modes = tree_jump(system, contact, txp[1], fired)
-    indicators, after, modes = with_inputs(system, [contact.indicators, after, modes], u)
+    system: System,
+    contact: ContactEquations | None,
+    parts: PartsAt,
+    txp: list[SX],
+    u: SX,
+) -> tuple[Function, Function] | None:
+    """The functions of `FullState.events`; events of components come behind those of contacts."""
+    own = parts.events()
+    if contact is None and not own:
+        return None
+    x = txp[1]
+    count = contact.indicators.numel() if contact else 0
+    fired = SX.sym("fired", count + len(own))
+    indicators, after, modes = [SX(0, 1)], x, SX(0, 1)
+    if contact:
+        indicators.append(contact.indicators)
+        after, modes = tree_jump(system, contact, x, fired[:count])
+        if own:  # a jump of contacts moves what it need not where none of them asks for it
+            jumps = casadi.mmax(fired[:count])
+            after = casadi.if_else(jumps, after, x)
+            modes = casadi.if_else(jumps, modes, contact.values)
+    indicators += [event.when for event in own]
+    if own:
+        n = x.numel() - system.z.numel()
+        after = casadi.vertcat(after[:n], after_events(system, own, fired[count:]))
+    watched, after, modes = with_inputs(
+        system, [casadi.vertcat(*indicators), SX(after), SX(modes)], u
+    )
+    outputs = [after, modes] if contact else [after]
     return (
-        dense_function("indicators", txp, [indicators]),
-        dense_function("jump", [*txp, fired], [after, modes]),
+        dense_function("indicators", txp, [watched]),
+        dense_function("jump", [*txp, fired], outputs),
     )
 
 

@@ -48,11 +48,11 @@ class Lever:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What feeds an input: an output of a component, or a reading of a sensor.
+    """What feeds an input: an output or a state of a component, or a reading of a sensor.
 
     Attributes:
         owner: name of the component.
-        signal: its output, or the reading without the name of the sensor, such as "q" or "p.x".
+        signal: its output or state, or the reading without the name of the sensor, such as "q" or "p.x".
     """
 
     owner: str
@@ -329,7 +329,7 @@ def _wires(
     outputs = {
         f"{part.name}.{name}": Source(part.name, name)
         for part in parts_of(mechanism)
-        for name in part.output_names
+        for name in (*part.output_names, *part.state_names)
     }
     for attached in sensors:
         for column, _ in attached.columns:

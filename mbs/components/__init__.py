@@ -1,5 +1,17 @@
 """What a user composes: bodies, joints, the world, and the mechanism that connects them."""
 
+from mbs.components.blocks import (
+    PI,
+    PID,
+    Constant,
+    FirstOrder,
+    Gain,
+    Integrator,
+    Limiter,
+    RateLimiter,
+    SecondOrder,
+    Sum,
+)
 from mbs.components.bodies import Body, Box, Cylinder, KhalilBody, PointMass, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.constraints import (
@@ -12,6 +24,7 @@ from mbs.components.constraints import (
 from mbs.components.couplings import Coupling, Gear, RackAndPinion, Screw
 from mbs.components.custom import Custom, Flange
 from mbs.components.drives import (
+    BLDCMotor,
     DCMotor,
     ElasticGear,
     ElasticShaft,
@@ -34,6 +47,7 @@ from mbs.components.forces import (
     Spring,
     Torque,
 )
+from mbs.components.hydraulics import HydraulicCylinder, HydraulicValve
 from mbs.components.joints import (
     Cylindrical,
     Fixed,
@@ -62,10 +76,12 @@ from mbs.components.shapes import Shape
 __all__ = [
     "AbsoluteSensor",
     "Attraction",
+    "BLDCMotor",
     "Body",
     "Box",
     "Bushing",
     "Component",
+    "Constant",
     "ConstantVelocity",
     "CoulombFriction",
     "Coupling",
@@ -77,21 +93,29 @@ __all__ = [
     "DistanceSensor",
     "ElasticGear",
     "ElasticShaft",
+    "FirstOrder",
     "Fixed",
     "FixedTendon",
     "Flange",
     "Force",
     "ForceElement",
     "Free",
+    "Gain",
     "Gear",
+    "HydraulicCylinder",
+    "HydraulicValve",
     "IdealGear",
+    "Integrator",
     "Joint",
     "JointFriction",
     "JointSensor",
     "JointStop",
     "KhalilBody",
+    "Limiter",
     "Mechanism",
     "Note",
+    "PI",
+    "PID",
     "Placed",
     "Planar",
     "Point",
@@ -101,6 +125,7 @@ __all__ = [
     "PowerSensor",
     "Prismatic",
     "RackAndPinion",
+    "RateLimiter",
     "RelativeSensor",
     "Revolute",
     "RigidBody",
@@ -109,12 +134,14 @@ __all__ = [
     "RollingDisc",
     "Rotor",
     "Screw",
+    "SecondOrder",
     "Sensor",
     "ShaftDamper",
     "ShaftInertia",
     "Shape",
     "Spherical",
     "Spring",
+    "Sum",
     "Torque",
     "TorqueSource",
     "Universal",

@@ -104,7 +104,7 @@ def coordinate() -> Any:
 
 def parameter(
     unit: str = "1",
-    default: Scalar | None = None,
+    default: Scalar | None = REQUIRED,
     *,
     min: float | None = None,
     max: float | None = None,
@@ -114,13 +114,14 @@ def parameter(
 
     Args:
         unit: of its value.
-        default: where the component is made without it; it must be given when left out.
+        default: where the component is made without it, and it must be given when left out; with
+            None it may stay away, and at.of_it is None.
         min: the least value that is taken.
         max: the greatest.
         positive: take what is more than zero only.
     """
     low = MORE_THAN_ZERO if positive and min is None else min
-    return Declared("parameter", unit, REQUIRED if default is None else default, low, max)
+    return Declared("parameter", unit, default, low, max)
 
 
 def state(unit: str = "1", *, start: float = 0.0, nominal: float = 1.0) -> Any:
@@ -680,6 +681,8 @@ def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_parameter(component: Custom, name: str, what: Declared) -> None:
+    if getattr(component, name) is None and what.default is None:
+        return
     component._normalise(name)
     value = to_float(getattr(component, name))
     fault = "" if value is None else out_of_bounds(value, what.low, what.high)

@@ -121,6 +121,11 @@ class AttachedPart:
         """Speed of the flange of a drive for a unit velocity of its coordinate."""
         return self.levers[0].factor
 
+    @property
+    def binds_alone(self) -> bool:
+        """Whether rows are all that it has."""
+        return self.element.binds and not (self.element.acts or self.inputs or self.states)
+
     def _unit(self, name: str) -> str:
         unit = self.element.declared[name].unit
         return EFFORT_UNIT[self.levers[0].unit] if unit == EFFORT else unit

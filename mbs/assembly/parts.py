@@ -52,7 +52,8 @@ class Source:
 
     Attributes:
         owner: name of the component.
-        signal: its output or state, or the reading without the name of the sensor, such as "q" or "p.x".
+        signal: its output or state, or the reading without the name of the sensor, such as "q" or
+            "p.x".
     """
 
     owner: str

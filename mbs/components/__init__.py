@@ -74,6 +74,8 @@ from mbs.components.sensors import (
 from mbs.components.shapes import Shape
 
 __all__ = [
+    "PI",
+    "PID",
     "AbsoluteSensor",
     "Attraction",
     "BLDCMotor",
@@ -114,8 +116,6 @@ __all__ = [
     "Limiter",
     "Mechanism",
     "Note",
-    "PI",
-    "PID",
     "Placed",
     "Planar",
     "Point",

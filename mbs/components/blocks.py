@@ -1,13 +1,14 @@
 """Signal blocks: controllers, filters, limits and sums between sensors and what they drive.
 
-A block has inputs and outputs, which `Mechanism.wire` connects, and no place in the mechanism. All of
-them are continuous in time. Signals of blocks have the unit 1: a block does not know what it carries.
+A block has inputs and outputs, which `Mechanism.wire` connects, and no place in the mechanism. All
+of them are continuous in time. Signals of blocks have the unit 1: a block does not know what it
+carries.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import casadi
@@ -17,7 +18,7 @@ from mbs.components import custom
 from mbs.components.component import Component
 from mbs.components.custom import Custom
 from mbs.errors import DescriptionError
-from mbs.expressions import Scalar, expression, to_float, to_sx
+from mbs.expressions import expression, to_float, to_sx
 from mbs.text import quoted
 
 
@@ -25,15 +26,18 @@ from mbs.text import quoted
 class Block(Custom):
     """A component of signals alone."""
 
-    def _require_order(self, low: str = "low", high: str = "high") -> None:
-        """Refuse two limits that are numbers and out of order."""
-        ends = [getattr(self, name) for name in (low, high)]
-        values = [None if end is None else to_float(end) for end in ends]
-        if None not in values and values[0] >= values[1]:
+    def _require_order(self) -> None:
+        """Refuse limits that are numbers and out of order."""
+        below, above = (self._number(name) for name in ("low", "high"))
+        if below is not None and above is not None and below >= above:
             raise DescriptionError(
-                f"{self.name}: {low} is {values[0]:g} and {high} is {values[1]:g}; give them in"
-                " order"
+                f"{self.name}: low is {below:g} and high is {above:g}; give them in order"
             )
+
+    def _number(self, name: str) -> float | None:
+        """The value of a parameter that is a number."""
+        given = getattr(self, name)
+        return None if given is None else to_float(given)
 
 
 def limited(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
@@ -41,7 +45,8 @@ def limited(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
 
     Args:
         x: (1, 1).
-        low, high: (1, 1) each.
+        low: (1, 1).
+        high: (1, 1).
         width: (1, 1) over which the corners are rounded, zero for sharp ones.
     """
     if width.is_zero():
@@ -52,7 +57,7 @@ def limited(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
 
 
 def _ramp(x: SX, width: SX) -> SX:
-    """width log(1 + exp(x / width)), without overflow; fmax(x, 0) where the width is zero."""
+    """Width log(1 + exp(x / width)), without overflow; fmax(x, 0) where the width is zero."""
     return casadi.fmax(x, 0) + width * casadi.log1p(
         casadi.exp(-casadi.fabs(x) / (width + (width == 0)))
     )
@@ -288,23 +293,25 @@ class Controller(Block):
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
         self._require_order()
-        if self.low is None and self.high is None:
-            if self.tracking is not None:
+        low, high, tracking = (getattr(self, name) for name in ("low", "high", "tracking"))
+        if low is None and high is None:
+            if tracking is not None:
                 raise DescriptionError(
-                    f"{self.name}: tracking is {self.tracking}, but there are no limits; give low"
-                    " or high, or leave tracking out"
+                    f"{self.name}: tracking is {tracking}, but there are no limits; give low or"
+                    " high, or leave tracking out"
                 )
-        elif self.tracking is None:
+        elif tracking is None:
             self._require_ratio()
 
     def _require_ratio(self) -> None:
         """Refuse gains whose ratio is no time constant, where it is used as one."""
-        kp, ki = (to_float(getattr(self, gain)) for gain in ("kp", "ki"))
-        ratio = 1.0 if None in (kp, ki) else kp / ki if ki else 0.0
-        if kp == 0 or ki == 0 or ratio <= 0:
+        kp, ki = self._number("kp"), self._number("ki")
+        gains = [gain for gain in (kp, ki) if gain is not None]
+        if 0 in gains or (len(gains) == 2 and gains[0] * gains[1] < 0):
             raise DescriptionError(
-                f"{self.name}: kp is {self.kp} and ki is {self.ki}, whose ratio is no time constant"
-                " of the integral part at the limits; give tracking"
+                f"{self.name}: of the gains kp and ki {' and '.join(f'{g:g}' for g in gains)}"
+                " are given, whose ratio is no time constant of the integral part at the limits;"
+                " give tracking"
             )
 
     def rates(self, at: Any) -> Mapping[str, SX]:

@@ -494,7 +494,9 @@ class JointStop(JointForce):
     def energy(self, at: Any) -> SX:
         """What the stops store."""
         stiffness = to_sx(self.stiffness, at.symbols)
-        areas = (smooth_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols))
+        areas = (
+            smooth_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols)
+        )
         return stiffness * sum(areas, SX(0))
 
     def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:

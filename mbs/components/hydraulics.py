@@ -23,8 +23,9 @@ class HydraulicCylinder(Custom):
 
     With the distance L of the points and the stroke s = L - closed,
 
-        dp_a/dt = bulk / (dead_a + area_a s) (flow_a - area_a ds/dt - leakage (p_a - p_b))
-        dp_b/dt = bulk / (dead_b + area_b (stroke - s)) (flow_b + area_b ds/dt + leakage (p_a - p_b))
+        past = leakage (p_a - p_b)
+        dp_a/dt = bulk / (dead_a + area_a s) (flow_a - area_a ds/dt - past)
+        dp_b/dt = bulk / (dead_b + area_b (stroke - s)) (flow_b + area_b ds/dt + past)
         force = p_a area_a - p_b area_b - friction ds/dt + what the end stops push
 
     which drives the points apart. End stops at s = 0 and s = stroke are springs and dampers, whose
@@ -85,7 +86,7 @@ class HydraulicCylinder(Custom):
 
     def energy(self, at: Any) -> SX:
         """That of the end stops."""
-        return at.end_stiffness * sum((area for _, _, _, area in self._ends(at)), SX(0))
+        return SX(at.end_stiffness * sum((area for _, _, _, area in self._ends(at)), SX(0)))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The force."""
@@ -112,7 +113,7 @@ class HydraulicValve(Custom):
     The spool runs from -1 to 1. Above zero it opens the supply to a and b to the tank, below zero
     the supply to b and a to the tank, as far as it is moved; at zero all is closed. The flow
     through an edge is rated_flow |spool| sqrt(dp / rated_drop), with its sign, where dp is the
-    difference of pressures; below `transition` the root is smooth: dp / (dp^2 + transition^2)^(1/4).
+    difference of pressures; sqrt(dp) is dp / (dp^2 + transition^2)^(1/4), smooth at zero.
 
     Source: Merritt 1967 for orifices and spool valves.
 
@@ -150,4 +151,4 @@ class HydraulicValve(Custom):
     def _flow(at: Any, drop: SX) -> SX:
         """Through an edge that is open, at a difference of pressures."""
         root = drop / (drop**2 + at.transition**2) ** 0.25
-        return at.rated_flow * root / casadi.sqrt(at.rated_drop)
+        return SX(at.rated_flow * root / casadi.sqrt(at.rated_drop))

@@ -277,9 +277,9 @@ class Mechanism:
                 " which is no input; give an input of a component, such as motor.voltage"
             )
         for signal in (source, target):
-            if isinstance(signal, Signal):
-                if self.components.get(signal.owner.name) is not signal.owner:
-                    self.add(signal.owner)
+            owner = signal.owner if isinstance(signal, Signal) else None
+            if owner is not None and self.components.get(owner.name) is not owner:
+                self.add(owner)
         self.wires.append((str(source), target))
 
     def add_frame(self, name: str, point: Point | RigidBody) -> Point:

@@ -103,7 +103,9 @@ class PartsAt:
         # numbers
         for name in element.names_of("parameter"):
             given = getattr(element, name)
-            values[name] = partial(_same, None) if given is None else partial(to_sx, given, part.symbols)
+            values[name] = (
+                partial(_same, None) if given is None else partial(to_sx, given, part.symbols)
+            )
         for name, symbol in part.states.items():
             values[name] = partial(_same, symbol)
         return At(part.name, part.symbols, values)

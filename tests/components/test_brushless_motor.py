@@ -1,4 +1,4 @@
-"""Brushless motors in dq coordinates: their power, their steady state, control of their currents."""
+"""Brushless motors in dq coordinates: power, steady state, control of currents."""
 
 import numpy as np
 import pytest
@@ -92,7 +92,9 @@ def test_one_inductance_is_a_dc_motor_along_q():
     assert np.abs(result["motor.i_d"]).max() < 0.05 * i_q.max()
 
 
-@pytest.mark.parametrize("name", ["pole_pairs", "resistance", "inductance_d", "inductance_q", "flux"])
+@pytest.mark.parametrize(
+    "name", ["pole_pairs", "resistance", "inductance_d", "inductance_q", "flux"]
+)
 def test_numbers_that_are_refused(name):
     refused(
         DescriptionError, "motor", f"{name} is 0", "more than zero", by=lambda: spindle(**{name: 0})

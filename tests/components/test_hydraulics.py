@@ -114,9 +114,7 @@ class TestPair:
 
     def test_oil_is_kept(self):
         system = press(meters=True)
-        result = mbs.simulate.run(
-            system, 0.3, q0={"x": 0.4}, u={"valve": 0.8}, tolerance=1e-9
-        )
+        result = mbs.simulate.run(system, 0.3, q0={"x": 0.4}, u={"valve": 0.8}, tolerance=1e-9)
         s = result["x.q"] - 0.3
         for side, volume in (("a", 5e-5 + AREA_A * s), ("b", 4e-5 + AREA_B * (0.5 - s))):
             held = volume * np.exp(result[f"cyl.p_{side}"] / BULK)

@@ -305,13 +305,13 @@ class Controller(Block):
 
     def _require_ratio(self) -> None:
         """Refuse gains whose ratio is no time constant, where it is used as one."""
-        kp, ki = self._number("kp"), self._number("ki")
-        gains = [gain for gain in (kp, ki) if gain is not None]
-        if 0 in gains or (len(gains) == 2 and gains[0] * gains[1] < 0):
+        found = {name: self._number(name) for name in ("kp", "ki")}
+        known = {name: gain for name, gain in found.items() if gain is not None}
+        if 0 in known.values() or (len(known) == 2 and known["kp"] * known["ki"] < 0):
+            gains = " and ".join(f"{name} is {gain:g}" for name, gain in known.items())
             raise DescriptionError(
-                f"{self.name}: of the gains kp and ki {' and '.join(f'{g:g}' for g in gains)}"
-                " are given, whose ratio is no time constant of the integral part at the limits;"
-                " give tracking"
+                f"{self.name}: {gains}, so that kp / ki is no time constant of the integral part at"
+                " the limits; give tracking"
             )
 
     def rates(self, at: Any) -> Mapping[str, SX]:

@@ -205,8 +205,8 @@ class TestControllers:
         (lambda: Sum("s", weights=3.0), ["s", "weights are 3.0"]),
         (lambda: PI("c", 1.0, 1.0, low=1.0, high=0.0), ["c", "low is 1", "order"]),
         (lambda: PI("c", 1.0, 1.0, tracking=0.1), ["c", "tracking is 0.1", "no limits"]),
-        (lambda: PI("c", 1.0, 0.0, high=1.0), ["c", "1 and 0", "give tracking"]),
-        (lambda: PID("c", 0.0, 1.0, 1.0, 0.01, low=-1), ["c", "0 and 1", "give tracking"]),
+        (lambda: PI("c", 1.0, 0.0, high=1.0), ["c", "ki is 0", "give tracking"]),
+        (lambda: PID("c", 0.0, 1.0, 1.0, 0.01, low=-1), ["c", "kp is 0", "give tracking"]),
         (lambda: PID("c", 1.0, 1.0, 1.0, 0.0), ["c", "filter is 0 s"]),
     ],
 )

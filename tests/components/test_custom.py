@@ -664,6 +664,23 @@ class TestRowsInMotion:
         side = 3 * (4 * np.sin(w * t) + 4 * np.sin(w * t))
         assert np.abs(result["edge.side"] - side).max() < 1e-7 * 24
 
+    def test_the_joint_does_not_carry_what_the_edge_does(self):
+        m = mbs.Mechanism("sleigh", gravity=(4.0, 0, -9.81))
+        sleigh = m.add(Body("sleigh", mass=3.0, com=(0.2, 0, 0), inertia=(0.1, 0.1, 0.2)))
+        m.connect(m.world, Planar("p", axis="z", actuated=False), sleigh)
+        m.add(Edge("edge", sleigh.at(-0.1, 0.05)))
+        system = m.assemble()
+        q = [0.3, 0.2, 0.7]
+        # it turns about the point of the edge, which stands
+        R = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+        v = [*(-1.5 * R @ [-0.05, -0.1]), 1.5]
+        a, lam = mbs.models.direct_dynamics(system, coordinates="tree")(q, v, np.zeros(3))
+        F = np.array(mbs.models.joint_wrenches(system, "tree")(q, v, a, np.zeros(3)))[:, 0]
+        assert abs(float(lam)) > 1
+        # along x, along y and about z nothing is carried; the weight is
+        assert np.abs(F[[0, 1, 5]]).max() < 1e-12
+        assert F[2] == pytest.approx(3 * 9.81, rel=1e-13)
+
     def test_rolling_disc_as_the_built_in_one(self):
         ends = []
         for own in (True, False):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.everywhere import agree
 from support.messages import refused
 
 import mbs
@@ -57,6 +58,13 @@ def test_power_balance_at_an_instant():
     assert abs(power - 1.5 * 0.4 * np.sum(i**2) - stored - float(tau) * 70) < 1e-8
     assert float(tau) == pytest.approx(6 * (0.015 * -5 + (1.2e-3 - 2e-3) * 3 * -5), rel=1e-14)
     assert np.array(y)[:, 0] == pytest.approx([float(tau), 70.0, power])
+
+
+def test_everywhere(tmp_path):
+    m, _ = spindle(damping=2e-3)
+    shown = ["wheel.q", "motor.i_d", "motor.i_q", "motor.power"]
+    start = {"u": {"motor.v_d": -2.0, "motor.v_q": 9.0}, "z0": {"motor.i_q": 3.0}}
+    agree(m.assemble(), tmp_path, 0.1, shown, **start)
 
 
 def test_steady_state():

@@ -664,6 +664,27 @@ class TestRowsInMotion:
         side = 3 * (4 * np.sin(w * t) + 4 * np.sin(w * t))
         assert np.abs(result["edge.side"] - side).max() < 1e-7 * 24
 
+    @pytest.mark.parametrize("count", [1, 2])
+    def test_rows_that_always_hold(self, count):
+        class Flat(Custom):
+            """A point of a planar mechanism is in its plane."""
+
+            point = custom.frame()
+            push = custom.output("N")
+
+            def rows(self, at):
+                return {str(k): at.point.p[2] for k in range(count)}
+
+            def outputs(self, at):
+                return {"push": at.lam["0"]}
+
+        free, held = pendulum().assemble(), pendulum(lambda tip: Flat("flat", tip)).assemble()
+        assert held.closure.mobility == 1
+        one, two = (mbs.simulate.run(s, 0.3, tolerance=1e-10, quiet=True) for s in (free, held))
+        assert np.abs(one["j1.q"] - two["j1.q"]).max() < 1e-12
+        assert np.all(two["flat.push"] == 0)
+        assert mbs.models.dae(held, "index1").z.numel() == 1
+
     def test_the_joint_does_not_carry_what_the_edge_does(self):
         m = mbs.Mechanism("sleigh", gravity=(4.0, 0, -9.81))
         sleigh = m.add(Body("sleigh", mass=3.0, com=(0.2, 0, 0), inertia=(0.1, 0.1, 0.2)))

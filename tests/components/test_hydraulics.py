@@ -3,6 +3,7 @@
 import casadi
 import numpy as np
 import pytest
+from support.everywhere import agree
 from support.messages import refused
 
 import mbs
@@ -67,7 +68,7 @@ def press(meters=False, wired=True, **changed):
             meter = m.add(OilMeter(f"meter_{side}", BULK))
             m.wire(getattr(valve, f"flow_{side}"), meter.flow)
             m.wire(f"cyl.p_{side}", meter.p)
-    return m.assemble()
+    return m.assemble(guess={"x": 0.4})
 
 
 def steady(spool):
@@ -122,6 +123,11 @@ class TestPair:
             assert np.ptp(came) > 1e-5
             # 1e-9 of the tolerance on a state of 1e-4 m^3 whose errors count by its nominal size
             assert np.abs(held - held[0] - came).max() < 1e-7 * np.ptp(came)
+
+    def test_everywhere(self, tmp_path):
+        shown = ["x.q", "cyl.p_a", "cyl.force", "valve.flow_b"]
+        start = {"u": {"valve.spool": 0.6}, "z0": {"cyl.p_a": 5e6, "cyl.p_b": 1e6}}
+        agree(press(friction=2000.0, leakage=1e-12), tmp_path, 0.05, shown, **start)
 
     def test_closed_valve_holds_the_load(self):
         system = press()

@@ -266,6 +266,10 @@ class TestWhatIsAdded:
         m.add(Drag("d", Box("other", length=1.0, mass=1.0), c=1.0))
         refused(AssemblyError, "d", "'other'", by=m.assemble)
 
+    def test_a_coordinate_that_is_locked(self):
+        m = pendulum(lambda tip: Along("x", "j1"))
+        refused(DescriptionError, "m: x knows the coordinate j1", by=lambda: m.lock({"j1": 0.2}))
+
     def test_a_coordinate_that_is_not_there(self):
         m = pendulum(lambda tip: Along("x", "j2"))
         refused(AssemblyError, "x: there is no coordinate 'j2'", "j1", by=m.assemble)

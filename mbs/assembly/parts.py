@@ -52,7 +52,8 @@ class WireSource:
 
     Attributes:
         owner: name of the component.
-        signal: its output, or the reading without the name of the sensor, such as "q" or "p.x".
+        signal: its output or state, or the reading without the name of the sensor, such as "q" or
+            "p.x".
     """
 
     owner: str
@@ -120,6 +121,11 @@ class AttachedPart:
     def factor(self) -> SX:
         """Speed of the flange of a drive for a unit velocity of its coordinate."""
         return self.levers[0].factor
+
+    @property
+    def binds_alone(self) -> bool:
+        """Whether rows are all that it has."""
+        return self.element.binds and not (self.element.acts or self.inputs or self.states)
 
     def _unit(self, name: str) -> str:
         unit = self.element.declared[name].unit
@@ -329,7 +335,7 @@ def _wires(
     outputs = {
         f"{part.name}.{name}": WireSource(part.name, name)
         for part in parts_of(mechanism)
-        for name in part.output_names
+        for name in (*part.output_names, *part.state_names)
     }
     for attached in sensors:
         for column, _ in attached.columns:

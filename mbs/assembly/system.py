@@ -178,7 +178,11 @@ def _acting(system: System) -> list[str]:
     driving = {device.name for device in system.devices}
     return [
         *(row.sentence for row in system.shafts if row.name not in driving),
-        *(part.sentence for part in system.parts if not part.element.drives),
+        *(
+            part.sentence
+            for part in system.parts
+            if not part.element.drives and not part.binds_alone  # those stand among the loops
+        ),
         *(device.sentence for device in system.devices),
         *(sensor.sentence for sensor in system.sensors),
     ]

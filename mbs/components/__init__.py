@@ -1,5 +1,17 @@
 """What a user composes: bodies, joints, the world, and the mechanism that connects them."""
 
+from mbs.components.blocks import (
+    PI,
+    PID,
+    Constant,
+    FirstOrder,
+    Gain,
+    Integrator,
+    Limiter,
+    RateLimiter,
+    SecondOrder,
+    Sum,
+)
 from mbs.components.bodies import Body, Box, Cylinder, KhalilBody, PointMass, RigidBody, World
 from mbs.components.component import Component, Point
 from mbs.components.constraints import (
@@ -21,6 +33,7 @@ from mbs.components.contact import (
 from mbs.components.couplings import Coupling, Gear, Helical, RackAndPinion, Screw
 from mbs.components.custom import Custom, Flange
 from mbs.components.drives import (
+    BLDCMotor,
     DCMotor,
     ElasticGear,
     ElasticShaft,
@@ -43,6 +56,7 @@ from mbs.components.forces import (
     Spring,
     Torque,
 )
+from mbs.components.hydraulics import HydraulicCylinder, HydraulicValve
 from mbs.components.joints import (
     Cartesian,
     Cylindrical,
@@ -73,8 +87,11 @@ from mbs.components.sensors import (
 from mbs.components.shapes import Shape
 
 __all__ = [
+    "PI",
+    "PID",
     "AbsoluteSensor",
     "Attraction",
+    "BLDCMotor",
     "Body",
     "Box",
     "BoxPlaneContact",
@@ -82,6 +99,7 @@ __all__ = [
     "CapsulePlaneContact",
     "Cartesian",
     "Component",
+    "Constant",
     "ConstantVelocity",
     "Contact",
     "CoulombFriction",
@@ -94,22 +112,28 @@ __all__ = [
     "DistanceSensor",
     "ElasticGear",
     "ElasticShaft",
+    "FirstOrder",
     "Fixed",
     "FixedTendon",
     "Flange",
     "Force",
     "ForceElement",
     "Free",
+    "Gain",
     "Gear",
     "Gimbal",
     "HeightFieldContact",
     "Helical",
+    "HydraulicCylinder",
+    "HydraulicValve",
     "IdealGear",
+    "Integrator",
     "Joint",
     "JointFriction",
     "JointSensor",
     "JointStop",
     "KhalilBody",
+    "Limiter",
     "Mechanism",
     "MotionJoint",
     "Note",
@@ -123,6 +147,7 @@ __all__ = [
     "PowerSensor",
     "Prismatic",
     "RackAndPinion",
+    "RateLimiter",
     "RelativeSensor",
     "Revolute",
     "RigidBody",
@@ -131,6 +156,7 @@ __all__ = [
     "RollingDisc",
     "Rotor",
     "Screw",
+    "SecondOrder",
     "Sensor",
     "ShaftDamper",
     "ShaftInertia",
@@ -140,6 +166,7 @@ __all__ = [
     "SphereSphereContact",
     "Spherical",
     "Spring",
+    "Sum",
     "Torque",
     "TorqueSource",
     "Universal",

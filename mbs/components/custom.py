@@ -10,10 +10,11 @@ A class that derives from `Custom` declares what it has, and says by methods wha
 
         def loads(self, at):
             v = at.point.v
-            return {"point": custom.force(-at.c * casadi.norm_2(v) * v)}
+            return {"point": custom.force(-at.c * custom.regular_length(v) * v)}
 
         def dissipation(self, at):
-            return at.c * casadi.norm_2(at.point.v) ** 3
+            v = at.point.v
+            return at.c * custom.regular_length(v) * casadi.dot(v, v)
 
 Every method gets `at`, which has all that was declared under its name as CasADi expressions.
 Assembling a mechanism checks what they return and brings it into every model. Force elements,
@@ -44,7 +45,7 @@ from mbs.expressions import (
     to_float,
 )
 from mbs.expressions.expression import finite
-from mbs.spatial import zeros
+from mbs.spatial import vector, zeros
 from mbs.text import did_you_mean, quoted
 from mbs.units import UNITS
 
@@ -104,7 +105,7 @@ def coordinate() -> Any:
 
 def parameter(
     unit: str = "1",
-    default: Scalar | None = None,
+    default: Scalar | None = REQUIRED,
     *,
     min: float | None = None,
     max: float | None = None,
@@ -114,13 +115,14 @@ def parameter(
 
     Args:
         unit: of its value.
-        default: where the component is made without it; it must be given when left out.
+        default: where the component is made without it, and it must be given when left out; with
+            None it may stay away, and at.of_it is None.
         min: the least value that is taken.
         max: the greatest.
         positive: take what is more than zero only.
     """
     low = MORE_THAN_ZERO if positive and min is None else min
-    return Declared("parameter", unit, REQUIRED if default is None else default, low, max)
+    return Declared("parameter", unit, default, low, max)
 
 
 def state(unit: str = "1", *, start: float = 0.0, nominal: float = 1.0) -> Any:
@@ -240,12 +242,12 @@ def port_of_flange(name: str) -> str:
 
 
 SHORTEST = 1e-12
-"""Length [m] that is added to every distance as the root of a sum of squares."""
+"""Length that is added to every norm as the root of a sum of squares."""
 
 
-def regular_length(p: SX) -> SX:
-    """Length of a vector (3, 1), regular where it is zero."""
-    return casadi.sqrt(casadi.dot(p, p) + SHORTEST**2)
+def regular_length(x: SX) -> SX:
+    """Length of a vector, sqrt(x'x + 1e-24): unlike `casadi.norm_2` it has slopes where x is 0."""
+    return casadi.sqrt(casadi.dot(x, x) + SHORTEST**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -396,13 +398,23 @@ class FrameLoad:
 
 
 def force(value: Any, *, own_axes: bool = False) -> FrameLoad:
-    """A force (3, 1) [N] at the origin of a frame, in axes of the world or of the frame."""
-    return FrameLoad(SX(value), zeros(), own_axes)
+    """A force (3, 1) [N] at the origin of a frame, in axes of the world or of the frame.
+
+    Args:
+        value: (3, 1), or a list of three numbers and expressions.
+        own_axes: in the axes of the frame.
+    """
+    return FrameLoad(_column(value), zeros(), own_axes)
 
 
 def torque(value: Any, *, own_axes: bool = False) -> FrameLoad:
-    """A torque (3, 1) [N m] on a frame, in axes of the world or of the frame."""
-    return FrameLoad(zeros(), SX(value), own_axes)
+    """A torque (3, 1) [N m] on a frame, in axes of the world or of the frame, as `force`."""
+    return FrameLoad(zeros(), _column(value), own_axes)
+
+
+def _column(value: Any) -> SX:
+    """What a user gave: an expression, or a list of numbers and expressions."""
+    return vector(value) if isinstance(value, (list, tuple)) else SX(value)
 
 
 def between(
@@ -728,6 +740,8 @@ def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_parameter(component: Custom, name: str, what: Declared) -> None:
+    if getattr(component, name) is None and what.default is None:
+        return
     component._normalise(name)
     value = to_float(getattr(component, name))
     fault = "" if value is None else out_of_bounds(value, what.low, what.high)
@@ -772,6 +786,7 @@ __all__ = [
     "output",
     "parameter",
     "pull",
+    "regular_length",
     "state",
     "torque",
     "unknown",

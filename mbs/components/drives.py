@@ -214,6 +214,76 @@ class DCMotor(Device):
         return SX((at.voltage - at.constant * at.flange.speed) / at.resistance)
 
 
+class BLDCMotor(Device):
+    """A brushless motor with permanent magnets (synchronous, sinusoidal) in dq coordinates.
+
+    With pole pairs P and the speed w of the shaft,
+
+        L_d di_d/dt = v_d - R i_d + P w L_q i_q
+        L_q di_q/dt = v_q - R i_q - P w (L_d i_d + psi)
+        torque = 3/2 P (psi i_q + (L_d - L_q) i_d i_q)
+
+    for voltages and currents as large as the amplitudes of the phases. The electrical power is
+    3/2 (v_d i_d + v_q i_q): the copper loss 3/2 R (i_d^2 + i_q^2), the rate of the magnetic energy
+    3/4 (L_d i_d^2 + L_q i_q^2), and the mechanical power torque w.
+
+    Source: Krause et al. 2013.
+
+    Attributes:
+        pole_pairs: P, electrical turns for a turn of the shaft.
+        resistance: R of a phase [ohm].
+        inductance_d: L_d, along the magnets [H].
+        inductance_q: L_q, across them [H]; as much as L_d where left out.
+        flux: psi, flux linkage of the magnets [Wb].
+        inertia: of the rotor [kg m^2].
+    """
+
+    pole_pairs = custom.parameter("1", positive=True)
+    resistance = custom.parameter("ohm", positive=True)
+    inductance_d = custom.parameter("H", positive=True)
+    flux = custom.parameter("Wb", positive=True)
+    inductance_q = custom.parameter("H", None, positive=True)
+    inertia = custom.parameter("kg.m2", 0.0, min=0)
+    v_d = custom.input("V")
+    v_q = custom.input("V")
+    i_d = custom.state("A")
+    i_q = custom.state("A")
+    tau = custom.output("N.m")
+    w = custom.output("rad/s")
+    power = custom.output("W")
+
+    @property
+    def own_inertia(self) -> Expression:
+        """That of the rotor."""
+        return expression(self.inertia)
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Of the currents."""
+        L_d, L_q = self._inductances(at)
+        w = at.pole_pairs * at.flange.speed
+        return {
+            "i_d": (at.v_d - at.resistance * at.i_d + w * L_q * at.i_q) / L_d,
+            "i_q": (at.v_q - at.resistance * at.i_q - w * (L_d * at.i_d + at.flux)) / L_q,
+        }
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """Of the magnets, and of the difference of the inductances."""
+        return {"flange": self._torque(at)}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it delivers, how fast it turns, and the electrical power that it takes."""
+        power = 1.5 * (at.v_d * at.i_d + at.v_q * at.i_q)
+        return {"tau": self._torque(at), "w": at.flange.speed, "power": power}
+
+    def _torque(self, at: Any) -> SX:
+        L_d, L_q = self._inductances(at)
+        return SX(1.5 * at.pole_pairs * (at.flux * at.i_q + (L_d - L_q) * at.i_d * at.i_q))
+
+    @staticmethod
+    def _inductances(at: Any) -> tuple[SX, SX]:
+        return at.inductance_d, at.inductance_d if at.inductance_q is None else at.inductance_q
+
+
 # Elastic and damping parts of a drive line: forces on the coordinates of its shafts.
 
 

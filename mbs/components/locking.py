@@ -22,6 +22,7 @@ from mbs.components.component import (
 )
 from mbs.components.constraints import Constraint
 from mbs.components.couplings import Coupling
+from mbs.components.custom import Custom
 from mbs.components.forces import CoordinateForce
 from mbs.components.joints import Fixed, Free, Freedom, Joint, Motion
 from mbs.components.on_points import OnPoints
@@ -235,13 +236,18 @@ def _require_free_of_others(mechanism: Mechanism, locks: _Locks) -> None:
                 " before the joint is locked"
             )
     for component in mechanism.components.values():
-        if isinstance(component, CoordinateForce) and not _acts_on(component, locks.values):
-            names = [name for name, _ in component.levers]
+        if isinstance(component, Custom) and not _acts_on(component, locks.values):
+            names = [name for levers in component.coordinates.values() for name, _ in levers]
             locked = [name for name in names if name in locks.values]
-            if locked:
+            if locked and isinstance(component, CoordinateForce):
                 raise DescriptionError(
                     f"{mechanism.name}: {component.name} acts along {', '.join(names)} together;"
                     f" lock all of them, or take it away before {locked[0]} is locked"
+                )
+            if locked:
+                raise DescriptionError(
+                    f"{mechanism.name}: {component.name} knows the coordinate {locked[0]}, which is"
+                    " to be locked; take the component away first"
                 )
         if isinstance(component, OnJoint) and (
             component.joint in locks.positions or component.joint in locks.values

@@ -265,15 +265,17 @@ class Mechanism:
         self._weld(self._point(a), self._point(joint_or_point))
 
     def wire(self, source: Signal | str, target: Signal) -> None:
-        """Feed an input of a component from an output of another one, or from a sensor.
+        """Feed an input of a component from an output or state of another one, or from a sensor.
+
+        Components that are not in the mechanism yet are added.
 
         Args:
-            source: an output such as `controller.u`, or what a sensor reads, by its name in
-                results, such as "encoder.q".
+            source: an output such as `controller.u`; or a state or what a sensor reads, by its name
+                in results, such as "motor.i" or "encoder.q".
             target: an input such as `motor.voltage`.
 
         Raises:
-            DescriptionError: they are no output and no input.
+            DescriptionError: they are no output and no input, or a name of theirs is taken.
         """
         is_output = isinstance(source, Signal) and source.kind == "output"
         if not (isinstance(source, str) or is_output):
@@ -287,6 +289,10 @@ class Mechanism:
                 f"{self.name}: a wire leads to {_what(target)},"
                 " which is no input; give an input of a component, such as motor.voltage"
             )
+        for signal in (source, target):
+            owner = signal.owner if isinstance(signal, Signal) else None
+            if owner is not None and self.components.get(owner.name) is not owner:
+                self.add(owner)
         self.wires.append((str(source), target))
 
     def add_frame(self, name: str, point: Point | RigidBody) -> Point:

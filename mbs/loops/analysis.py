@@ -78,7 +78,7 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
         free=_free_positions(regular, kept, active),
         varies=_varies(regular, positions, kept),
         gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
-        residual=float(np.max(np.abs(Closing(system, p).rows(configuration)[0]))),
+        residual=float(np.max(np.abs(Closing(system, p).rows(configuration)[0]), initial=0.0)),
     )
     return replace(
         system,

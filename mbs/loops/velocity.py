@@ -137,6 +137,8 @@ def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
         q: (nq, 1) symbols of positions that close the loops.
         lam: (m, 1) efforts of all rows, those of rolling discs last.
     """
+    if not system.cuts:
+        return {}
     small = [SX.sym(cut.edge.joint.name, 6) for cut in system.cuts]
     moved = tuple(
         replace(cut, pose_b=cut.pose_b @ _displace(d))
@@ -145,9 +147,9 @@ def cut_wrenches(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
     rows = closure_rows(replace(system, cuts=moved, _cache={}), q)
     positions = rows.numel()
     work = casadi.dot(lam[:positions], rows)
-    every = casadi.vertcat(*small) if small else SX(0, 1)
+    every = casadi.vertcat(*small)
     slopes = casadi.substitute(casadi.gradient(work, every), every, SX.zeros(every.numel()))
-    parts = casadi.vertsplit(casadi.densify(slopes), 6) if small else []
+    parts = casadi.vertsplit(casadi.densify(slopes), 6)
     result = {
         cut.edge.joint.name: (part[:3], part[3:])
         for cut, part in zip(system.cuts, parts, strict=True)

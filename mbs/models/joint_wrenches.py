@@ -284,7 +284,8 @@ def closure_efforts(
     if closure.varies:
         return casadi.densify(lam)
     every = SX.zeros(constraint_jacobian(system).size1_out(0))
-    every[kept_rows(system)] = lam
+    if lam.numel():
+        every[kept_rows(system)] = lam
     return every
 
 

@@ -101,7 +101,10 @@ class PartsAt:
             values[port] = partial(self._coordinate, part, port)
         # numbers
         for name in element.names_of("parameter"):
-            values[name] = partial(to_sx, getattr(element, name), part.symbols)
+            given = getattr(element, name)
+            values[name] = (
+                partial(_same, None) if given is None else partial(to_sx, given, part.symbols)
+            )
         for name, symbol in part.states.items():
             values[name] = partial(_same, symbol)
         return At(part.name, part.symbols, values)
@@ -170,8 +173,10 @@ class PartsAt:
                     " alone, or take a wire away"
                 )
             return found
-        self._signals[source] = None
         part = next(part for part in self.parts if part.name == source.owner)
+        if source.signal in part.states:
+            return part.states[source.signal]
+        self._signals[source] = None
         outputs, placeholders = self._with_placeholders(part)
         value = outputs[source.signal]
         if part.element.binds and casadi.depends_on(value, self.effort_symbols):
@@ -430,7 +435,7 @@ class PartsAt:
         return casadi.vertcat(SX(0, 1), *order)
 
 
-def _same(value: SX) -> SX:
+def _same(value: Any) -> Any:
     return value
 
 

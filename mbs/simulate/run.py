@@ -199,7 +199,7 @@ def input_function(system: System, u: Effort) -> Function | None:
     Raises:
         ModelError: a name is unknown, or the inputs are not (nu, 1) numbers.
     """
-    if u is None:
+    if u is None or (isinstance(u, Mapping) and not u):
         return None
     signal = LawArgument("u", "inputs", [name for name, _ in system.inputs])
     if not system.inputs:

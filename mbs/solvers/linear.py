@@ -151,7 +151,7 @@ def solve_saddle(
         missing += corner * first[n:]
     second = solve(casadi.vertcat(SX.zeros(n), missing))
     found = first + second
-    return found[:n], -found[n:]
+    return found[:n, :], -found[n:, :]  # (0, 1) where there are no rows
 
 
 def elimination_order(pattern: Sparsity, n: int) -> list[int]:

@@ -104,7 +104,7 @@ def projected(
     J = SX(0, system.nv)
     if system.is_closed:
         loops = independent_closure(system, symbols)
-        measures = constraint_sizes(system)[kept_rows(system)]
+        measures = constraint_sizes(system)[kept_rows(system), :]  # (0, 1) where nothing is kept
         J = independent_constraint_rows(system, symbols)
     distance, place_off, still, slide_off = _touch(system, symbols, v, touch)
     r = casadi.vertcat(loops, norms, *places, distance)
@@ -216,6 +216,8 @@ def passage(
     q, v = SX.sym("q", nq), SX.sym("v", nv)
     J = casadi.sparsify(constraint_rows(system, q))
     moving = sorted(set(J.sparsity().row()))  # a row that nothing moves says nothing
+    if not moving:
+        return None
     J = J[moving, :]
     scale = DM(scales(system).rows[moving])
     bend = acceleration_bias(system, q, v, J)

@@ -1,0 +1,388 @@
+"""Signal blocks: controllers, filters, limits and sums between sensors and what they drive.
+
+A block has inputs and outputs, which `Mechanism.wire` connects, and no place in the mechanism. All
+of them are continuous in time. Signals of blocks have the unit 1: a block does not know what it
+carries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi
+from casadi import SX
+
+from mbs.components import custom
+from mbs.components.component import Component
+from mbs.components.custom import Custom
+from mbs.errors import DescriptionError
+from mbs.expressions import expression, to_float, to_sx
+from mbs.text import quoted
+
+
+@dataclass(frozen=True, slots=True)
+class Block(Custom):
+    """A component of signals alone."""
+
+    def _require_order(self) -> None:
+        """Refuse limits that are numbers and out of order."""
+        below, above = (self._number(name) for name in ("low", "high"))
+        if below is not None and above is not None and below >= above:
+            raise DescriptionError(
+                f"{self.name}: low is {below:g} and high is {above:g}; give them in order"
+            )
+
+    def _number(self, name: str) -> float | None:
+        """The value of a parameter that is a number."""
+        given = getattr(self, name)
+        return None if given is None else to_float(given)
+
+
+def limited(x: SX, low: SX | None, high: SX | None, width: SX) -> SX:
+    """A value between limits, each of which may be missing.
+
+    Args:
+        x: (1, 1).
+        low: (1, 1).
+        high: (1, 1).
+        width: (1, 1) over which the corners are rounded, zero for sharp ones.
+    """
+    if width.is_zero():
+        x = x if low is None else casadi.fmax(x, low)
+        return x if high is None else casadi.fmin(x, high)
+    beyond_high = SX(0) if high is None else _ramp(x - high, width)
+    return x - beyond_high if low is None else low + _ramp(x - low, width) - beyond_high
+
+
+def _ramp(x: SX, width: SX) -> SX:
+    """Width log(1 + exp(x / width)), without overflow; fmax(x, 0) where the width is zero."""
+    return casadi.fmax(x, 0) + width * casadi.log1p(
+        casadi.exp(-casadi.fabs(x) / (width + (width == 0)))
+    )
+
+
+# Without memory.
+
+
+class Constant(Block):
+    """y = value.
+
+    Attributes:
+        value: of the output.
+    """
+
+    value = custom.parameter()
+    y = custom.output()
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The value."""
+        return {"y": at.value}
+
+
+class Gain(Block):
+    """y = k u.
+
+    Attributes:
+        k: factor.
+    """
+
+    k = custom.parameter()
+    u = custom.input()
+    y = custom.output()
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The factor times the input."""
+        return {"y": at.k * at.u}
+
+
+@dataclass(frozen=True, slots=True)
+class Sum(Block):
+    """y = weights[0] u1 + weights[1] u2 + ..., of up to four inputs.
+
+    Attributes:
+        weights: one for each input; two inputs, one less the other, when left out.
+    """
+
+    weights: Any = (1.0, -1.0)
+
+    u1 = custom.input()
+    u2 = custom.input()
+    u3 = custom.input()
+    u4 = custom.input()
+    y = custom.output()
+
+    def __post_init__(self) -> None:
+        Component.__post_init__(self)
+        given = self.weights
+        count = len(given) if isinstance(given, (tuple, list)) else 0
+        if not 1 <= count <= 4:
+            raise DescriptionError(
+                f"{self.name}: weights are {quoted(given)}; give one to four numbers, such as"
+                " (1, -1)"
+            )
+        found = tuple(
+            expression(value, f"{self.name}, weight {number}")
+            for number, value in enumerate(given, start=1)
+        )
+        object.__setattr__(self, "weights", found)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """As many as there are weights."""
+        return ("u1", "u2", "u3", "u4")[: len(self.weights)]
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The sum."""
+        pairs = zip(self.weights, self.input_names, strict=True)
+        return {"y": sum((to_sx(w, at.symbols) * getattr(at, u) for w, u in pairs), SX(0))}
+
+
+class Limiter(Block):
+    """y = u between two limits, and the nearer limit beyond them.
+
+    With a width w the corners are rounded: fmax(x, 0) becomes w log(1 + exp(x / w)), which is more
+    by w log 2 at the corner and by w exp(-10) at a distance of 10 w. y stays between the limits.
+
+    Attributes:
+        low, high: the limits; one of them may be left out.
+        width: over which corners are rounded.
+    """
+
+    low = custom.parameter("1", None)
+    high = custom.parameter("1", None)
+    width = custom.parameter("1", 0.0, min=0)
+    u = custom.input()
+    y = custom.output()
+
+    def __post_init__(self) -> None:
+        Custom.__post_init__(self)
+        if self.low is None and self.high is None:
+            raise DescriptionError(
+                f"{self.name}: neither low nor high is given; give one limit or both"
+            )
+        self._require_order()
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The input between the limits."""
+        return {"y": limited(at.u, at.low, at.high, at.width)}
+
+
+# With states, but no limits.
+
+
+class Integrator(Block):
+    """y = x, dx/dt = k u.
+
+    Attributes:
+        k: factor [1/s].
+    """
+
+    k = custom.parameter("1/s", 1.0)
+    x = custom.state()
+    u = custom.input()
+    y = custom.output()
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """The factor times the input."""
+        return {"x": at.k * at.u}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The state."""
+        return {"y": at.x}
+
+
+class FirstOrder(Block):
+    """A first-order filter: y = x, time dx/dt = k u - x.
+
+    Attributes:
+        time: time constant [s].
+        k: gain at rest.
+    """
+
+    time = custom.parameter("s", positive=True)
+    k = custom.parameter("1", 1.0)
+    x = custom.state()
+    u = custom.input()
+    y = custom.output()
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Towards the input."""
+        return {"x": (at.k * at.u - at.x) / at.time}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The state."""
+        return {"y": at.x}
+
+
+class SecondOrder(Block):
+    """A second-order filter: y = x, x'' + 2 damping w x' + w^2 x = w^2 k u.
+
+    Attributes:
+        w: natural angular frequency [rad/s].
+        damping: ratio to critical damping.
+        k: gain at rest.
+    """
+
+    w = custom.parameter("rad/s", positive=True)
+    damping = custom.parameter("1", 1.0, min=0)
+    k = custom.parameter("1", 1.0)
+    x = custom.state()
+    v = custom.state("1/s")
+    u = custom.input()
+    y = custom.output()
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Of the output and of its rate."""
+        pull = at.w**2 * (at.k * at.u - at.x)
+        return {"x": at.v, "v": pull - 2 * at.damping * at.w * at.v}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The state."""
+        return {"y": at.x}
+
+
+class RateLimiter(Block):
+    """A signal that follows another one no faster than a rate: y = x, dx/dt = (u - x) / time.
+
+    The rate is cut off at `rising` and at `-falling`. Where it is not cut off, y is late by `time`.
+
+    Attributes:
+        rising: largest rate [1/s].
+        falling: largest rate downwards [1/s], as `rising` when left out.
+        time: time constant [s].
+        width: over which the corners of the rate are rounded [1/s], see `Limiter`.
+    """
+
+    rising = custom.parameter("1/s", positive=True)
+    time = custom.parameter("s", positive=True)
+    falling = custom.parameter("1/s", None, positive=True)
+    width = custom.parameter("1/s", 0.0, min=0)
+    x = custom.state()
+    u = custom.input()
+    y = custom.output()
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Towards the input, between the largest rates."""
+        down = at.rising if at.falling is None else at.falling
+        return {"x": limited((at.u - at.x) / at.time, -down, at.rising, at.width)}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The state."""
+        return {"y": at.x}
+
+
+# Controllers.
+
+
+class Controller(Block):
+    """What controllers have: the error e = target - measured, its integral, limits of the output.
+
+    The integral part is the state x, dx/dt = ki e + (u - u0) / tracking, where u0 is the output
+    before the limits: at a limit the integral part runs after the output instead of winding up
+    (back-calculation).
+
+    Source: Astrom & Hagglund 2006 for the form with tracking.
+    """
+
+    target = custom.input()
+    measured = custom.input()
+    u = custom.output()
+
+    def __post_init__(self) -> None:
+        Custom.__post_init__(self)
+        self._require_order()
+        low, high, tracking = (getattr(self, name) for name in ("low", "high", "tracking"))
+        if low is None and high is None:
+            if tracking is not None:
+                raise DescriptionError(
+                    f"{self.name}: tracking is {tracking}, but there are no limits; give low or"
+                    " high, or leave tracking out"
+                )
+        elif tracking is None:
+            self._require_ratio()
+
+    def _require_ratio(self) -> None:
+        """Refuse gains whose ratio is no time constant, where it is used as one."""
+        found = {name: self._number(name) for name in ("kp", "ki")}
+        known = {name: gain for name, gain in found.items() if gain is not None}
+        if 0 in known.values() or (len(known) == 2 and known["kp"] * known["ki"] < 0):
+            gains = " and ".join(f"{name} is {gain:g}" for name, gain in known.items())
+            raise DescriptionError(
+                f"{self.name}: {gains}, so that kp / ki is no time constant of the integral part at"
+                " the limits; give tracking"
+            )
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Of the integral part."""
+        rate = at.ki * (at.target - at.measured)
+        if at.low is not None or at.high is not None:
+            tracking = at.kp / at.ki if at.tracking is None else at.tracking
+            rate += (self._limited(at) - self._unlimited(at)) / tracking
+        return {"x": rate}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The sum of the parts, between the limits."""
+        return {"u": self._limited(at)}
+
+    def _limited(self, at: Any) -> SX:
+        return limited(self._unlimited(at), at.low, at.high, SX(0))
+
+    def _unlimited(self, at: Any) -> SX:
+        raise NotImplementedError
+
+
+class PI(Controller):
+    """A PI controller: u = kp e + x, dx/dt = ki e, e = target - measured.
+
+    Attributes:
+        kp: gain.
+        ki: gain of the integral part [1/s].
+        low, high: limits of the output; none when left out.
+        tracking: time constant of the integral part at a limit [s], kp / ki when left out.
+    """
+
+    kp = custom.parameter()
+    ki = custom.parameter("1/s")
+    low = custom.parameter("1", None)
+    high = custom.parameter("1", None)
+    tracking = custom.parameter("s", None, positive=True)
+    x = custom.state()
+
+    def _unlimited(self, at: Any) -> SX:
+        return SX(at.kp * (at.target - at.measured) + at.x)
+
+
+class PID(Controller):
+    """A PID controller: u = kp e + x + kd (e - f) / filter, dx/dt = ki e, filter df/dt = e - f.
+
+    f is the filtered error e = target - measured, so that (e - f) / filter is its filtered rate.
+
+    Attributes:
+        kp: gain.
+        ki: gain of the integral part [1/s].
+        kd: gain of the rate [s].
+        filter: time constant of the rate's filter [s].
+        low, high: limits of the output; none when left out.
+        tracking: time constant of the integral part at a limit [s], kp / ki when left out.
+    """
+
+    kp = custom.parameter()
+    ki = custom.parameter("1/s")
+    kd = custom.parameter("s")
+    filter = custom.parameter("s", positive=True)
+    low = custom.parameter("1", None)
+    high = custom.parameter("1", None)
+    tracking = custom.parameter("s", None, positive=True)
+    x = custom.state()
+    f = custom.state()
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Of the integral part and of the filtered error."""
+        error = at.target - at.measured
+        return {**Controller.rates(self, at), "f": (error - at.f) / at.filter}
+
+    def _unlimited(self, at: Any) -> SX:
+        error = at.target - at.measured
+        return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)

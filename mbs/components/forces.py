@@ -327,6 +327,58 @@ class Attraction(LineForce):
         return -to_sx(self.strength, symbols) / length
 
 
+class SpringDamperSeries(ForceElement):
+    """A spring in series with a damper between two points, a Maxwell element.
+
+    With the distance L of the points and the state z, the elongation of the damper, the tension is
+    T = stiffness (L - length - z), and damping dz/dt = T. A distance that is held relaxes within
+    the time damping / stiffness.
+
+    Source: Haug 1989 for translational springs and dampers.
+
+    Attributes:
+        a, b: the points, or bodies for their reference frames.
+        stiffness: of the spring [N/m].
+        damping: of the damper [N s/m].
+        length: free length of both together at z = 0 [m].
+        elongation: of the damper at the start [m].
+    """
+
+    a = custom.frame()
+    b = custom.frame()
+    stiffness = custom.parameter("N/m", positive=True)
+    damping = custom.parameter("N.s/m", positive=True)
+    length = custom.parameter("m", 0.0, min=0)
+    elongation = custom.state("m")
+    force = custom.output("N")
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Of the elongation of the damper."""
+        return {"elongation": self._tension(at) / at.damping}
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The tension of both, each point towards the other."""
+        return custom.pull(at.a, at.b, self._tension(at))
+
+    def energy(self, at: Any) -> SX:
+        """What the spring stores."""
+        return SX(0.5 * at.stiffness * self._stretch(at) ** 2)
+
+    def dissipation(self, at: Any) -> SX:
+        """What the damper takes."""
+        return SX(self._tension(at) ** 2 / at.damping)
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension."""
+        return {"force": self._tension(at)}
+
+    def _stretch(self, at: Any) -> SX:
+        return SX(at.a.to(at.b).length - at.length - at.elongation)
+
+    def _tension(self, at: Any) -> SX:
+        return SX(at.stiffness * self._stretch(at))
+
+
 # Bushings: elastic mounts between two frames.
 #
 # Source: Haug 1989 for forces between bodies; the angles are those of the unit quaternion.
@@ -487,14 +539,14 @@ class JointStop(JointForce):
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         total = SX(0)
         for sign, depth, width in self._sides(at.x.q, at.symbols):
-            share, ramp, _ = _ramp(depth, width)
-            total += sign * stiffness * ramp + damping * share * at.x.v
+            share, ramped, _ = ramp(depth, width)
+            total += sign * stiffness * ramped + damping * share * at.x.v
         return total
 
     def energy(self, at: Any) -> SX:
         """What the stops store."""
         stiffness = to_sx(self.stiffness, at.symbols)
-        areas = (_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols))
+        areas = (ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols))
         return stiffness * sum(areas, SX(0))
 
     def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
@@ -508,7 +560,7 @@ class JointStop(JointForce):
         return sides
 
 
-def _ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
+def ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
     """A slope that grows smoothly from 0 to 1 over a width, its integral, and that one's.
 
     With u = depth / width between 0 and 1 the slope is 3 u^2 - 2 u^3; the integral is
@@ -517,10 +569,10 @@ def _ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
     u = casadi.fmin(casadi.fmax(depth / width, 0), 1)
     beyond = casadi.fmax(depth - width, 0)
     slope = u**2 * (3 - 2 * u)
-    ramp = width * u**3 * (1 - u / 2) + beyond
+    ramped = width * u**3 * (1 - u / 2) + beyond
     # u^4 / 4 - u^5 / 10, the integral of the ramp u^3 - u^4 / 2
     area = width**2 * u**4 * (0.25 - 0.1 * u) + 0.5 * beyond * (beyond + width)
-    return slope, ramp, area
+    return slope, ramped, area
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

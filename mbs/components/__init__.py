@@ -10,11 +10,16 @@ from mbs.components.constraints import (
     RollingDisc,
 )
 from mbs.components.couplings import Coupling, Gear, RackAndPinion, Screw
+from mbs.components.curves import (
+    Cam,
+    PointOnCurve,
+)
 from mbs.components.custom import Custom, Flange
 from mbs.components.drives import (
     DCMotor,
     ElasticGear,
     ElasticShaft,
+    FixedFlange,
     IdealGear,
     ShaftDamper,
     ShaftInertia,
@@ -32,7 +37,18 @@ from mbs.components.forces import (
     JointStop,
     RigidStop,
     Spring,
+    SpringDamperSeries,
     Torque,
+)
+from mbs.components.given_forces import (
+    ForceInput,
+    ForceSource,
+    JointEffort,
+    LineForceInput,
+    PairForceInput,
+    PairTorqueInput,
+    ShaftTorqueInput,
+    TorqueInput,
 )
 from mbs.components.joints import (
     Cylindrical,
@@ -48,6 +64,20 @@ from mbs.components.joints import (
 )
 from mbs.components.mechanism import Mechanism, Placed
 from mbs.components.notes import Note
+from mbs.components.ropes import (
+    ElasticRope,
+    RopeOverPulleys,
+)
+from mbs.components.rotational import (
+    Brake,
+    Clutch,
+    ElastoBacklash,
+    LossyGear,
+    OneWayClutch,
+    PlanetaryGear,
+    QuadraticSpeedTorque,
+    ShaftSpringDamperSeries,
+)
 from mbs.components.sensors import (
     AbsoluteSensor,
     DistanceSensor,
@@ -58,13 +88,22 @@ from mbs.components.sensors import (
     WrenchSensor,
 )
 from mbs.components.shapes import Shape
+from mbs.components.translational import (
+    ElastoGap,
+    SlidingDamper,
+    SlidingMass,
+    SlidingSpring,
+)
 
 __all__ = [
     "AbsoluteSensor",
     "Attraction",
     "Body",
     "Box",
+    "Brake",
     "Bushing",
+    "Cam",
+    "Clutch",
     "Component",
     "ConstantVelocity",
     "CoulombFriction",
@@ -76,30 +115,45 @@ __all__ = [
     "Damper",
     "DistanceSensor",
     "ElasticGear",
+    "ElasticRope",
     "ElasticShaft",
+    "ElastoBacklash",
+    "ElastoGap",
     "Fixed",
+    "FixedFlange",
     "FixedTendon",
     "Flange",
     "Force",
     "ForceElement",
+    "ForceInput",
+    "ForceSource",
     "Free",
     "Gear",
     "IdealGear",
     "Joint",
+    "JointEffort",
     "JointFriction",
     "JointSensor",
     "JointStop",
     "KhalilBody",
+    "LineForceInput",
+    "LossyGear",
     "Mechanism",
     "Note",
+    "OneWayClutch",
+    "PairForceInput",
+    "PairTorqueInput",
     "Placed",
     "Planar",
+    "PlanetaryGear",
     "Point",
     "PointMass",
+    "PointOnCurve",
     "PointOnLine",
     "PointOnPlane",
     "PowerSensor",
     "Prismatic",
+    "QuadraticSpeedTorque",
     "RackAndPinion",
     "RelativeSensor",
     "Revolute",
@@ -107,15 +161,23 @@ __all__ = [
     "RigidStop",
     "Rod",
     "RollingDisc",
+    "RopeOverPulleys",
     "Rotor",
     "Screw",
     "Sensor",
     "ShaftDamper",
     "ShaftInertia",
+    "ShaftSpringDamperSeries",
+    "ShaftTorqueInput",
     "Shape",
+    "SlidingDamper",
+    "SlidingMass",
+    "SlidingSpring",
     "Spherical",
     "Spring",
+    "SpringDamperSeries",
     "Torque",
+    "TorqueInput",
     "TorqueSource",
     "Universal",
     "World",

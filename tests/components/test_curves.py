@@ -77,7 +77,7 @@ def test_a_bead_on_a_straight_wire_by_hand():
     result = run(system, 2.0)
     sine, cosine = np.array([1, 3]) / math.sqrt(10)
     np.testing.assert_allclose(result["wire.s.q"], 0.5 * G * sine * result.time**2, atol=1e-10)
-    # 19.6 / sqrt(10) = 6.2 m are beyond the end of 6.3 m for no row; the force is m g cos
+    # the force is m g cos, normal to the wire; the bead is at 6.2 m of 6.3 m at the end
     normal = 0.5 * G * cosine * np.array([sine, cosine])
     forces = np.array([result[f"wire.force_{axis}"] for axis in "xyz"])
     np.testing.assert_allclose(forces[:2], np.tile(normal[:, None], len(result.time)), atol=1e-10)
@@ -113,7 +113,7 @@ def test_a_bead_goes_round_and_round_a_closed_wire():
 
 
 def test_a_curve_on_a_body_that_moves():
-    """A bar on a ball with a curved slot, and a pin on a rail in it: momenta are nobody's; energy is."""
+    """A bar that swings, with a curved slot in it in which a pin slides."""
     m = mbs.Mechanism("slot", gravity=(0, 0, -G))
     bar = m.add(Body("bar", mass=2.0, com=(0.5, 0, 0), inertia=(0.02, 0.2, 0.2)))
     pin, carrier = m.add(PointMass("pin", 0.7)), m.add(Body("carrier", mass=0.0))
@@ -169,7 +169,7 @@ def test_a_cam_keeps_energy_over_turns_and_tells_its_effort():
 
 
 def test_the_projection_measures_lengths_by_the_mechanism_where_a_cam_dwells():
-    """Where the slope of the lift is 1e-18 it is no unit of length: it made the angle move alone."""
+    """A slope of 1e-18 is no unit of length, with which corrections would move the cam alone."""
     m = mbs.Mechanism("dwell", gravity=(0, -G, 0))
     wheel, follower = m.add(Body("wheel", 1.0, inertia=(1, 1, 0.1))), m.add(PointMass("f", 0.3))
     m.connect(m.world, Revolute("turn", axis="z"), wheel)
@@ -228,7 +228,7 @@ def lobe(**options):
         (wire(curve=SQUARE[:2], closed=True), ["3 rows of 3 numbers"]),
         (wire(curve=[*SQUARE, (1, 1, 0)]), ["c: point 2 of the curve is the same as the next"]),
         (wire(curve=[*SQUARE, (0, 0, 0)], closed=True), ["c: point 3 of the curve"]),
-        (wire(curve=[(0, 0, 0), (1, math.nan, 0)]), ["c: curve holds what is not finite"]),
+        (wire(curve=[(0, 0, 0), (1, math.nan, 0)]), ["c: curve holds a number that is not finite"]),
         (lobe(profile=[(0, 0), (1, 1)]), ["c: profile is", "3 rows of 2 numbers"]),
         (lobe(profile=[(0, 0), (2, 1), (1, 2)]), ["c: the driver is at 2 in row 1", "at 1"]),
         (lobe(profile=[(0, 0), (1, 1), (1, 2)]), ["c: the driver is at 1 in row 1"]),

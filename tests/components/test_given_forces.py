@@ -86,7 +86,7 @@ def test_a_torque_in_the_axes_of_the_world_and_of_the_body():
 
 
 def test_pairs_act_in_axes_of_a_and_react_on_it():
-    tip, R_tip, p_tip = at_frame("tip")
+    tip, _, p_tip = at_frame("tip")
     middle, R, p = at_frame("middle")
     force = efforts_of(lambda m, upper, lower: PairForceInput("f", upper.center, lower.right))
     torque = efforts_of(lambda m, upper, lower: PairTorqueInput("t", upper.center, lower.right))

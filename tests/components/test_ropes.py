@@ -173,3 +173,18 @@ def test_numbers_that_are_refused():
 def test_a_rope_on_the_ground_is_refused():
     m = weights(lambda path: RopeOverPulleys("rope", path[1:3], length=1.0))
     refused(AssemblyError, "rope", "does not move", "does nothing", by=m.assemble)
+
+
+def test_the_joint_of_a_bar_feels_the_rope():
+    system = hanging(RopeOverPulleys)
+    q = np.array(system.configuration)
+    a, lam = mbs.models.direct_dynamics(system, coordinates="tree")(q, [0, 0], [0, 0])
+    F = np.array(mbs.models.joint_wrenches(system, "tree")(q, [0, 0], a, [0, 0]))
+    c, s = np.cos(q[0]), np.sin(q[0])
+    pull = np.array([1.5 - c, 0, 2 + s])
+    pull *= -float(lam) / np.linalg.norm(pull)
+    centre = 0.5 * float(a[0]) * np.array([-s, 0, -c])
+    force = 2 * centre - pull + np.array([0, 0, 2 * G])
+    turned = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])  # of the bar about y
+    np.testing.assert_allclose(F[:3, 0], turned.T @ force, atol=1e-12)
+    np.testing.assert_allclose(F[[3, 4, 5], 0], 0, atol=1e-12)

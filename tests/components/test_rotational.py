@@ -302,3 +302,15 @@ LOSSY = {"ratio": 3.0, "stiffness": 10.0, "efficiency": 0.9, "efficiency_back": 
 )
 def test_descriptions_that_are_refused(make, parts):
     refused(DescriptionError, *parts, by=make)
+
+
+def test_models_of_a_planetary_gear_know_the_efforts_of_its_row():
+    system = planetary(ShaftInertia("ring", 0.3).flange_a)
+    T = -10 / (1 / 0.1 + 2.5**2 / 0.3 + 3.5**2 / 0.5)
+    devices = mbs.models.devices(system)
+    assert devices.name_in() == ["v", "z", "u", "row_efforts"]
+    tau, _, y = devices([1, 2, 3], [], [1.0], [T])
+    np.testing.assert_allclose(np.array(tau).ravel(), [1, 0, 0])
+    np.testing.assert_allclose(np.array(y).ravel(), [1, T, 2.5 * T, -3.5 * T], rtol=1e-14)
+    d = mbs.models.dae(system, "index1", inputs={"motor.tau": 1.0})
+    np.testing.assert_allclose(d.z0, [10 * (1 + T), 2.5 * T / 0.3, -3.5 * T / 0.5, T], rtol=1e-12)

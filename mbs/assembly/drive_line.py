@@ -14,8 +14,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 from casadi import SX
 
@@ -27,12 +26,13 @@ from mbs.components import (
     Joint,
     Mechanism,
     Point,
+    Prismatic,
     Revolute,
-    ShaftInertia,
 )
 from mbs.components.bodies import Mount
+from mbs.components.component import with_points
 from mbs.components.custom import Custom, Flange
-from mbs.components.drives import ElasticGear, ShaftForce
+from mbs.components.drives import RigidPart, ShaftForce
 from mbs.components.joints import Motion
 from mbs.errors import AssemblyError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -41,7 +41,7 @@ from mbs.expressions import Expression, Number, Scalar, expression, to_float, to
 
 
 def check_flanges(mechanism: Mechanism, parts: Sequence[Custom]) -> None:
-    """Refuse flanges that are connected to nothing, or to a joint that slides.
+    """Refuse flanges that are connected to nothing, or shafts that are connected to slides.
 
     Raises:
         AssemblyError: which flange, and what to connect.
@@ -52,7 +52,7 @@ def check_flanges(mechanism: Mechanism, parts: Sequence[Custom]) -> None:
         joined.setdefault(b, []).append(a)
     for part in parts:
         loose = [flange for flange in part.flanges if flange not in joined]
-        ends = isinstance(part, ShaftInertia) and len(loose) < len(part.flanges)
+        ends = isinstance(part, RigidPart) and len(loose) < len(part.flanges)
         if loose and not ends:
             raise AssemblyError(
                 f"{mechanism.name}: {loose[0]} of {type(part).__name__} {part.name!r} is connected"
@@ -63,9 +63,12 @@ def check_flanges(mechanism: Mechanism, parts: Sequence[Custom]) -> None:
             _check_sliding(mechanism, flange, joined)
 
 
-def _slides(flange: Flange) -> bool:
-    joint = flange.owner
-    return isinstance(joint, Joint) and joint.freedoms[0].motion is Motion.PRISMATIC
+def _slides(flange: Flange) -> bool | None:
+    """Whether a flange is a place on a slide; None where it may be either."""
+    owner = flange.owner
+    if isinstance(owner, Custom):
+        return owner.slides(flange)
+    return isinstance(owner, Joint) and owner.freedoms[0].motion is Motion.PRISMATIC
 
 
 def _check_sliding(mechanism: Mechanism, start: Flange, joined: dict[Flange, list[Flange]]) -> None:
@@ -75,15 +78,43 @@ def _check_sliding(mechanism: Mechanism, start: Flange, joined: dict[Flange, lis
         for other in joined[queue.popleft()]:
             if other in seen:
                 continue
-            geared = isinstance(other.owner, (IdealGear, ElasticGear)) and other.port == "b"
-            if not geared and not _slides(other):
+            if _slides(other) is False:
+                kind = "joint" if isinstance(start.owner, Joint) else type(start.owner).__name__
                 raise AssemblyError(
-                    f"{mechanism.name}: {other} turns but joint {start.owner.name!r} slides; put an"
-                    " IdealGear or ElasticGear between them, its flange_b on the joint and its"
+                    f"{mechanism.name}: {other} turns but {kind} {start.owner.name!r} slides; put"
+                    " an IdealGear or ElasticGear between them, its flange_b on what slides and its"
                     " ratio in rad for 1 m"
                 )
             seen.add(other)
             queue.append(other)
+
+
+def _held(
+    mechanism: Mechanism, parts: Iterable[Custom], ties: Mapping[Key, list[tuple[Key, Expression]]]
+) -> dict[Key, FlangeTurn]:
+    """The flanges that do not move, which are those of the housing.
+
+    Raises:
+        AssemblyError: a joint, an inertia, a gear or a motor is connected to one.
+    """
+    turns: dict[Key, FlangeTurn] = {}
+    for part in parts:
+        queue = deque([flange.key for flange in part.flanges] if part.held else [])
+        while queue:
+            key = queue.popleft()
+            if key in turns:
+                continue
+            owner = mechanism.components[key[0]]
+            idle = isinstance(owner, Custom) and (owner.drives or owner.lowered) and not owner.held
+            if idle or isinstance(owner, Joint):
+                raise AssemblyError(
+                    f"{mechanism.name}: {type(owner).__name__} {owner.name!r} is connected to the"
+                    f" {type(part).__name__} {part.name!r}, so that it cannot move; put a spring, a"
+                    " brake or another part with a force between them, or take one of them away"
+                )
+            turns[key] = FlangeTurn("", _ZERO)
+            queue.extend(other for other, _ in ties.get(key, ()))
+    return turns
 
 
 def ring_of_gears(
@@ -97,11 +128,12 @@ def ring_of_gears(
 
 
 def inertia_missing(mechanism: Mechanism, flanges: Sequence[Flange]) -> AssemblyError:
-    """Flanges that turn without any inertia."""
+    """Flanges that move without any inertia."""
     names = ", ".join(str(flange) for flange in flanges)
+    verb, part = ("slide", "SlidingMass") if _slides(flanges[0]) else ("turn", "ShaftInertia")
     return AssemblyError(
-        f"{mechanism.name}: {names} turn without any inertia and without a joint, so that their"
-        " acceleration is not determined; connect a ShaftInertia to them"
+        f"{mechanism.name}: {names} {verb} without any inertia and without a joint, so that their"
+        f" acceleration is not determined; connect a {part} to them"
     )
 
 
@@ -126,7 +158,7 @@ _GOLDEN = (5**0.5 - 1) / 2
 
 @dataclass(frozen=True, slots=True)
 class FlangeTurn:
-    """How a flange turns: `factor` times the coordinate."""
+    """How a flange turns: `factor` times the coordinate; without one it does not move."""
 
     coordinate: str
     factor: Expression
@@ -176,7 +208,7 @@ def _turns(
     ties = _ties(mechanism, parts)
     values = _generic(mechanism)
     leads: dict[str, Flange] = {}
-    turns: dict[Key, FlangeTurn] = {}
+    turns = _held(mechanism, parts, ties)
     for name, lead in _candidates(mechanism, parts):
         if lead.key in turns:
             continue
@@ -213,7 +245,7 @@ def _candidates(mechanism: Mechanism, parts: tuple[Custom, ...]) -> Iterator[tup
     for joint in sorted(joints, key=lambda joint: joint.actuated is False):
         yield joint.name, joint.flange
     for part in parts:
-        if isinstance(part, ShaftInertia) and part.own_inertia != _ZERO:
+        if isinstance(part, RigidPart) and part.own_inertia != _ZERO:
             yield part.name, part.flange_a
     for part in parts:
         if part.drives and part.own_inertia != _ZERO:
@@ -233,7 +265,7 @@ def _ties(
     for a, b in mechanism.shafts:
         tie(a, b, _ONE)
     for part in parts:
-        if isinstance(part, ShaftInertia):
+        if isinstance(part, RigidPart):
             tie(part.flange_a, part.flange_b, _ONE)
         elif isinstance(part, IdealGear):
             tie(part.flange_a, part.flange_b, expression(part.ratio))
@@ -273,7 +305,8 @@ def _driven(
         factor = turns[part.flanges[0].key].factor
         total = _plus(total, times(times(factor, factor), part.own_inertia))
     if not isinstance(lead.owner, Joint):
-        return Revolute(name, axis="z", actuated=bool(devices), Ia=total)
+        kind = Prismatic if _slides(lead) else Revolute
+        return kind(name, axis="z", actuated=bool(devices), Ia=total)
     joint = lead.owner
     if devices and joint.actuated is False:
         raise AssemblyError(
@@ -317,9 +350,7 @@ def _with_joints(mechanism: Mechanism, joints: Mapping[str, Joint]) -> Mechanism
     def component(old: Component) -> Component:
         if isinstance(old, Joint):
             return joints.get(old.name, old)
-        values = {f.name: getattr(old, f.name) for f in fields(old)}
-        moved: dict[str, Any] = {n: point(v) for n, v in values.items() if isinstance(v, Point)}
-        return replace(old, **moved) if moved else old
+        return with_points(old, point)
 
     result = copy(mechanism)
     result.components = {name: component(c) for name, c in mechanism.components.items()}
@@ -336,9 +367,10 @@ def _levers(
     for flange, share in part.shares:
         turn = turns[flange.key]
         levers.append((turn.coordinate, times(share, turn.factor)))
-    if len({coordinate for coordinate, _ in levers}) < len(levers):
+    moving = tuple(lever for lever in levers if lever[0])
+    if len({coordinate for coordinate, _ in levers}) < len(levers) or not moving:
         raise same_shaft(mechanism, part)
-    return tuple(levers)
+    return moving
 
 
 # The tables of drive lines: what every rigid part turns with, and the devices that drive.
@@ -350,11 +382,13 @@ class ShaftRow:
 
     Attributes:
         name: of the component.
-        kind: ShaftInertia, IdealGear, or DCMotor where its rotor has a coordinate of its own.
+        kind: ShaftInertia, SlidingMass, IdealGear, or DCMotor where its rotor has a coordinate of
+            its own.
         coordinate: the coordinate that it turns with.
         own: whether this coordinate is its own, and not that of a joint or another inertia.
         factor: its angle, of a gear that of flange_a, is factor times the coordinate; a number,
             or an expression where a symbol is in it.
+        slides: whether it is a mass on a slide.
     """
 
     name: str
@@ -362,6 +396,7 @@ class ShaftRow:
     coordinate: str
     own: bool
     factor: float | SX
+    slides: bool = False
 
     @property
     def sentence(self) -> str:
@@ -371,6 +406,10 @@ class ShaftRow:
         turns = f"turns {as_fast(self.factor, self.coordinate)}"
         if self.kind == IdealGear.__name__:
             return f"{self.kind} {self.name} is rigid: its flange_a {turns}."
+        if self.slides:
+            return (
+                f"{self.kind} {self.name} slides{turns.removeprefix('turns')}, which has its mass."
+            )
         return f"{self.kind} {self.name} {turns}, which has its inertia."
 
 
@@ -380,7 +419,9 @@ def shaft_rows(line: DriveLine, symbols: Mapping[str, SX]) -> tuple[ShaftRow, ..
     for part in line.parts:
         turn = line.turns[part.flanges[0].key]
         own = line.links.get(turn.coordinate) == part.name
-        if own or isinstance(part, (ShaftInertia, IdealGear)):
+        if own or isinstance(part, (RigidPart, IdealGear)):
             factor = number_or_sx(to_sx(turn.factor, symbols))
-            rows.append(ShaftRow(part.name, type(part).__name__, turn.coordinate, own, factor))
+            slides = _slides(part.flanges[0]) is True
+            kind = type(part).__name__
+            rows.append(ShaftRow(part.name, kind, turn.coordinate, own, factor, slides))
     return tuple(rows)

@@ -64,7 +64,7 @@ def open_system(mechanism: Mechanism, guessed: Collection[str] = ()) -> System:
     spanning = spanning_tree(
         mechanism.name,
         graph,
-        need=_owners(mechanism, (*coupled, *coordinates_needed(mechanism))),
+        need=_owners(mechanism, (*coupled, *coordinates_needed(mechanism, line.turns))),
         keep=_owners(mechanism, guessed),
         cut=mechanism.cuts,
         given_order=mechanism.keep_order,

@@ -17,7 +17,7 @@ from mbs.components.bodies import Mount
 from mbs.components.custom import EFFORT, port_of_flange
 from mbs.errors import AssemblyError
 from mbs.expressions import Scalar, to_sx
-from mbs.text import did_you_mean
+from mbs.text import did_you_mean, listed
 
 if TYPE_CHECKING:
     from mbs.assembly.drive_line import FlangeTurn
@@ -198,14 +198,21 @@ def guesses_of_unknowns(mechanism: Mechanism) -> dict[str, float]:
     }
 
 
-def coordinates_needed(mechanism: Mechanism) -> list[str]:
-    """The coordinates that components by their equations refer to."""
-    return [
-        name
-        for part in parts_of(mechanism)
-        for levers in part.coordinates.values()
-        for name, _ in levers
-    ] + list(guesses_of_unknowns(mechanism))
+def coordinates_needed(
+    mechanism: Mechanism, turns: Mapping[tuple[str, str], FlangeTurn]
+) -> list[str]:
+    """The coordinates that components by their equations refer to.
+
+    Args:
+        mechanism: without flanges.
+        turns: how flanges turn, by their keys.
+    """
+    found = list(guesses_of_unknowns(mechanism))
+    for part in parts_of(mechanism):
+        found += [name for levers in part.coordinates.values() for name, _ in levers]
+        shafts = [turns[part.name, port_of_flange(port)] for port in part.shaft_ports]
+        found += [turn.coordinate for turn in shafts if turn.coordinate]
+    return found
 
 
 def attached_parts(
@@ -256,7 +263,7 @@ def _attached(
     given: dict[str, Iterable[tuple[str, Scalar]]] = dict(part.coordinates)
     for name in part.shaft_ports:
         turn = turns[part.name, port_of_flange(name)]
-        given[name] = ((turn.coordinate, turn.factor),)
+        given[name] = ((turn.coordinate, turn.factor),) if turn.coordinate else ()
     given |= {name: ((f"{part.name}.{name}", 1.0),) for name in part.names_of("unknown")}
     coordinates = {
         port: tuple(_lever(part, name, to_sx(factor, symbols), tables) for name, factor in levers)
@@ -285,20 +292,22 @@ def _require_moving(
     coordinates: Mapping[str, tuple[Lever, ...]],
     names: Sequence[str],
 ) -> None:
-    """Refuse loads on what cannot move."""
+    """Refuse loads and rows on what cannot move."""
     links = {link for link, _ in frames}
-    if not part.acts or not frames or coordinates:
+    bodiless = not frames and not coordinates  # such as a capacitor, which only stores
+    if not (part.acts or part.binds) or bodiless or any(coordinates.values()):
         return
-    if links == {-1} or (len(links) == 1 and len(frames) > 1):
-        still = "does not move" if links == {-1} else "is one rigid body"
+    if links <= {-1} or (len(links) == 1 and len(frames) > 1):
+        still = "does not move" if links <= {-1} else "is one rigid body"
+        where = listed(names or ["a FixedFlange"])
         raise AssemblyError(
-            f"{part.name}: what it acts on, {' and '.join(names)}, {still}, so that the"
+            f"{part.name}: what it acts on, {where}, {still}, so that the"
             f" {type(part).__name__} does nothing; let it act on another body"
         )
 
 
 def _where(names: Sequence[str]) -> str:
-    return f"between {' and '.join(names)}" if len(names) > 1 else f"on {names[0]}"
+    return f"between {listed(names)}" if len(names) > 1 else f"on {names[0]}"
 
 
 def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]) -> Lever:

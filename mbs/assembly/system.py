@@ -37,7 +37,7 @@ from mbs.expressions import Parameter, out_of_bounds
 from mbs.files import PathLike
 from mbs.numbers import doubles
 from mbs.spatial import Pose
-from mbs.text import did_you_mean, quoted
+from mbs.text import did_you_mean, listed, quoted
 
 if TYPE_CHECKING:
     from mbs.view.diagram import Diagram
@@ -100,7 +100,11 @@ def report(system: System) -> str:
 
 def _tree(system: System) -> list[str]:
     links = system.tree.links
-    without = {row.coordinate: "a shaft of a drive line" for row in system.shafts if row.own}
+    without = {
+        row.coordinate: f"a {'slide' if row.slides else 'shaft'} of a drive line"
+        for row in system.shafts
+        if row.own
+    }
     lines = [
         f"{system.name}: {_count(len(links), 'moving link')} in a tree,"
         f" {_count(system.nq, 'position')} q and {_count(system.nv, 'velocity')} v."
@@ -134,7 +138,7 @@ def _loops(system: System) -> list[str]:
         kept = len(loop.rows) - len(loop.dropped)
         if loop.name in parts:
             lines.append(
-                f"{parts[loop.name]} {loop.name} binds {' and '.join(loop.joints)}: {kept} of"
+                f"{parts[loop.name]} {loop.name} binds {listed(loop.joints)}: {kept} of"
                 f" {_count(len(loop.rows), 'row')} {'is' if kept == 1 else 'are'} independent."
             )
             continue

@@ -31,12 +31,17 @@ from mbs.components.contact import (
     SphereSphereContact,
 )
 from mbs.components.couplings import Coupling, Gear, Helical, RackAndPinion, Screw
+from mbs.components.curves import (
+    Cam,
+    PointOnCurve,
+)
 from mbs.components.custom import Custom, Flange
 from mbs.components.drives import (
     BLDCMotor,
     DCMotor,
     ElasticGear,
     ElasticShaft,
+    FixedFlange,
     IdealGear,
     ShaftDamper,
     ShaftInertia,
@@ -54,7 +59,18 @@ from mbs.components.forces import (
     JointStop,
     RigidStop,
     Spring,
+    SpringDamperSeries,
     Torque,
+)
+from mbs.components.given_forces import (
+    ForceInput,
+    ForceSource,
+    JointEffort,
+    LineForceInput,
+    PairForceInput,
+    PairTorqueInput,
+    ShaftTorqueInput,
+    TorqueInput,
 )
 from mbs.components.hydraulics import HydraulicCylinder, HydraulicValve
 from mbs.components.joints import (
@@ -75,6 +91,20 @@ from mbs.components.joints import (
 from mbs.components.mechanism import Mechanism, Placed
 from mbs.components.motion_joint import MotionJoint
 from mbs.components.notes import Note
+from mbs.components.ropes import (
+    ElasticRope,
+    RopeOverPulleys,
+)
+from mbs.components.rotational import (
+    Brake,
+    Clutch,
+    ElastoBacklash,
+    LossyGear,
+    OneWayClutch,
+    PlanetaryGear,
+    QuadraticSpeedTorque,
+    ShaftSpringDamperSeries,
+)
 from mbs.components.sensors import (
     AbsoluteSensor,
     DistanceSensor,
@@ -85,6 +115,12 @@ from mbs.components.sensors import (
     WrenchSensor,
 )
 from mbs.components.shapes import Shape
+from mbs.components.translational import (
+    ElastoGap,
+    SlidingDamper,
+    SlidingMass,
+    SlidingSpring,
+)
 
 __all__ = [
     "PI",
@@ -95,9 +131,12 @@ __all__ = [
     "Body",
     "Box",
     "BoxPlaneContact",
+    "Brake",
     "Bushing",
+    "Cam",
     "CapsulePlaneContact",
     "Cartesian",
+    "Clutch",
     "Component",
     "Constant",
     "ConstantVelocity",
@@ -111,13 +150,19 @@ __all__ = [
     "Damper",
     "DistanceSensor",
     "ElasticGear",
+    "ElasticRope",
     "ElasticShaft",
+    "ElastoBacklash",
+    "ElastoGap",
     "FirstOrder",
     "Fixed",
+    "FixedFlange",
     "FixedTendon",
     "Flange",
     "Force",
     "ForceElement",
+    "ForceInput",
+    "ForceSource",
     "Free",
     "Gain",
     "Gear",
@@ -129,23 +174,32 @@ __all__ = [
     "IdealGear",
     "Integrator",
     "Joint",
+    "JointEffort",
     "JointFriction",
     "JointSensor",
     "JointStop",
     "KhalilBody",
     "Limiter",
+    "LineForceInput",
+    "LossyGear",
     "Mechanism",
     "MotionJoint",
     "Note",
+    "OneWayClutch",
+    "PairForceInput",
+    "PairTorqueInput",
     "PinSlot",
     "Placed",
     "Planar",
+    "PlanetaryGear",
     "Point",
     "PointMass",
+    "PointOnCurve",
     "PointOnLine",
     "PointOnPlane",
     "PowerSensor",
     "Prismatic",
+    "QuadraticSpeedTorque",
     "RackAndPinion",
     "RateLimiter",
     "RelativeSensor",
@@ -154,20 +208,28 @@ __all__ = [
     "RigidStop",
     "Rod",
     "RollingDisc",
+    "RopeOverPulleys",
     "Rotor",
     "Screw",
     "SecondOrder",
     "Sensor",
     "ShaftDamper",
     "ShaftInertia",
+    "ShaftSpringDamperSeries",
+    "ShaftTorqueInput",
     "Shape",
+    "SlidingDamper",
+    "SlidingMass",
+    "SlidingSpring",
     "SphereBoxContact",
     "SpherePlaneContact",
     "SphereSphereContact",
     "Spherical",
     "Spring",
+    "SpringDamperSeries",
     "Sum",
     "Torque",
+    "TorqueInput",
     "TorqueSource",
     "Universal",
     "World",

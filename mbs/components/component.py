@@ -338,6 +338,22 @@ def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
     return value
 
 
+def with_points(component: C, change: Callable[[Point], Point]) -> C:
+    """The component with each of its points changed, those in tuples too."""
+
+    def changed(value: Any) -> Any:
+        if isinstance(value, Point):
+            return change(value)
+        if isinstance(value, tuple) and any(isinstance(one, Point) for one in value):
+            return tuple(changed(one) for one in value)
+        return value
+
+    values = {f.name: getattr(component, f.name) for f in fields(component) if f.init}
+    new = {name: changed(value) for name, value in values.items()}
+    moved = {name: value for name, value in new.items() if value is not values[name]}
+    return replace(component, **moved) if moved else component
+
+
 # Coordinates with a number each, as users write them.
 
 

@@ -93,9 +93,14 @@ def frame() -> Any:
     return Declared("frame")
 
 
-def flange() -> Any:
-    """A port on a shaft: `m.connect(component.name_of_it, joint.flange)` connects it."""
-    return Declared("flange")
+def flange(*, slides: bool | None = False) -> Any:
+    """A port on a shaft: `m.connect(component.name_of_it, joint.flange)` connects it.
+
+    Args:
+        slides: it is a place on a slide, whose position is in m, and is connected to flanges of
+            prismatic joints; None where it may be either.
+    """
+    return Declared("flange", "1" if slides is None else "m" if slides else "rad")
 
 
 def coordinate() -> Any:
@@ -333,10 +338,12 @@ class CoordinateAt:
     Attributes:
         q: its position [rad or m]; None where it is none, as the rates of a spherical joint.
         v: its rate.
+        unit: of its position, that of the first one where it is a sum.
     """
 
     q: SX | None
     v: SX
+    unit: str = "rad"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -344,12 +351,17 @@ class FlangeAt:
     """A flange.
 
     Attributes:
-        angle: of its shaft [rad].
-        speed: its rate [rad/s].
+        angle: of its shaft [rad]; of a flange that slides its position [m].
+        speed: its rate [rad/s or m/s].
     """
 
     angle: SX
     speed: SX
+
+    @property
+    def position(self) -> SX:
+        """Of a flange that slides [m]."""
+        return self.angle
 
 
 class At:
@@ -505,6 +517,9 @@ class Custom(OnPoints):
     drives: ClassVar[bool] = False
     """Whether it is a motor on its flange: models of efforts leave what it delivers to tau."""
 
+    held: ClassVar[bool] = False
+    """Whether its flanges do not move."""
+
     lowered: ClassVar[bool] = False
     """Whether the assembly turns it into joints and couplings, so that nothing is left of it."""
 
@@ -553,9 +568,15 @@ class Custom(OnPoints):
         """All its flanges."""
         return tuple(getattr(self, name) for name in self.names_of("flange"))
 
+    def slides(self, flange: Flange) -> bool | None:
+        """Whether one of its flanges is a place on a slide; None where it may be either."""
+        declared = {port_of_flange(name): name for name in self.names_of("flange")}
+        unit = self.declared[declared[flange.port]].unit
+        return None if unit == "1" else unit == "m"
+
     @property
     def own_inertia(self) -> Expression:
-        """Inertia that it adds to its shaft [kg m^2]."""
+        """Inertia that it adds to its shaft [kg m^2], or mass to its slide [kg]."""
         return Number(0.0)
 
     @property

@@ -61,14 +61,19 @@ def flange_pair(where: str, *given: Any) -> tuple[Flange, Flange]:
 
 
 @dataclass(frozen=True, slots=True)
-class ShaftInertia(TwoFlanges):
+class RigidPart(TwoFlanges):
+    """An inertia or a mass; its two flanges are the two ends of one rigid part."""
+
+    lowered = True
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftInertia(RigidPart):
     """A rotating inertia; its two flanges are the two ends of one rigid shaft.
 
     Attributes:
         inertia: about the axis of the shaft [kg m^2].
     """
-
-    lowered = True
 
     inertia: Scalar
 
@@ -93,12 +98,27 @@ class IdealGear(TwoFlanges):
     """
 
     lowered = True
+
+    flange_b = custom.flange(slides=None)
+
     ratio: Scalar
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
         self._normalise("ratio")
         check_ratio(self.name, self.ratio)
+
+
+class FixedFlange(OneFlange):
+    """A flange that does not move: the housing, for shafts and for slides.
+
+    It holds what is connected to it at zero: the end of a spring, the ring of a planetary gear.
+    """
+
+    held = True
+    lowered = True
+
+    flange = custom.flange(slides=None)
 
 
 def check_inertia(name: str, inertia: Scalar) -> None:
@@ -366,6 +386,8 @@ class ElasticGear(ElasticShaft):
             prismatic joint, whose stiffness is then in N/m; less than zero when they turn in
             opposite ways.
     """
+
+    flange_b = custom.flange(slides=None)
 
     ratio: Scalar
 

@@ -327,6 +327,58 @@ class Attraction(LineForce):
         return -to_sx(self.strength, symbols) / length
 
 
+class SpringDamperSeries(ForceElement):
+    """A spring in series with a damper between two points, a Maxwell element.
+
+    With the distance L of the points and the state z, the elongation of the damper, the tension is
+    T = stiffness (L - length - z), and damping dz/dt = T. A distance that is held relaxes within
+    the time damping / stiffness.
+
+    Source: Haug 1989 for translational springs and dampers.
+
+    Attributes:
+        a, b: the points, or bodies for their reference frames.
+        stiffness: of the spring [N/m].
+        damping: of the damper [N s/m].
+        length: free length of both together at z = 0 [m].
+        elongation: of the damper at the start [m].
+    """
+
+    a = custom.frame()
+    b = custom.frame()
+    stiffness = custom.parameter("N/m", positive=True)
+    damping = custom.parameter("N.s/m", positive=True)
+    length = custom.parameter("m", 0.0, min=0)
+    elongation = custom.state("m")
+    force = custom.output("N")
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """Of the elongation of the damper."""
+        return {"elongation": self._tension(at) / at.damping}
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The tension of both, each point towards the other."""
+        return custom.pull(at.a, at.b, self._tension(at))
+
+    def energy(self, at: Any) -> SX:
+        """What the spring stores."""
+        return SX(0.5 * at.stiffness * self._stretch(at) ** 2)
+
+    def dissipation(self, at: Any) -> SX:
+        """What the damper takes."""
+        return SX(self._tension(at) ** 2 / at.damping)
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension."""
+        return {"force": self._tension(at)}
+
+    def _stretch(self, at: Any) -> SX:
+        return SX(at.a.to(at.b).length - at.length - at.elongation)
+
+    def _tension(self, at: Any) -> SX:
+        return SX(at.stiffness * self._stretch(at))
+
+
 # Bushings: elastic mounts between two frames.
 #
 # Source: Haug 1989 for forces between bodies; the angles are those of the unit quaternion.
@@ -519,10 +571,10 @@ def smooth_ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
     u = casadi.fmin(casadi.fmax(depth / width, 0), 1)
     beyond = casadi.fmax(depth - width, 0)
     slope = u**2 * (3 - 2 * u)
-    ramp = width * u**3 * (1 - u / 2) + beyond
+    ramped = width * u**3 * (1 - u / 2) + beyond
     # u^4 / 4 - u^5 / 10, the integral of the ramp u^3 - u^4 / 2
     area = width**2 * u**4 * (0.25 - 0.1 * u) + 0.5 * beyond * (beyond + width)
-    return slope, ramp, area
+    return slope, ramped, area
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

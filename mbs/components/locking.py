@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from mbs.components.component import (
     Translation,
     Turned,
     angle_expression,
+    with_points,
 )
 from mbs.components.constraints import Constraint
 from mbs.components.couplings import Coupling
@@ -260,15 +261,7 @@ def _require_free_of_others(mechanism: Mechanism, locks: _Locks) -> None:
 
 def _with_points(component: Component, moved: Any) -> Component:
     """The component with its points where they are now."""
-    if not isinstance(component, OnPoints):
-        return component
-    changed = {
-        f.name: moved(getattr(component, f.name))
-        for f in fields(component)
-        if isinstance(getattr(component, f.name), Point)
-    }
-    same = all(point is getattr(component, name) for name, point in changed.items())
-    return component if same else replace(component, **changed)
+    return with_points(component, moved) if isinstance(component, OnPoints) else component
 
 
 def _steps(mechanism: Mechanism, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:

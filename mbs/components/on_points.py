@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from mbs.components.bodies import RigidBody
-from mbs.components.component import Component, Point
+from mbs.components.component import Component, Point, with_points
 from mbs.errors import DescriptionError
 from mbs.text import quoted
 
@@ -24,18 +24,16 @@ class OnPoints(Component):
 
     def scoped(self: P, prefix: str) -> P:
         """The same component inside a mechanism that is placed in another one."""
-        inner = Component.scoped(self, prefix)
-        changed: dict[str, Any] = {}
-        for f in fields(self):
-            point = getattr(inner, f.name)
-            if isinstance(point, Point):
-                owner = Component(f"{prefix}.{getattr(self, f.name).owner.name}")
-                changed[f.name] = replace(point, owner=owner)
-        return replace(inner, **changed)
+        return with_points(
+            Component.scoped(self, prefix),
+            lambda point: replace(point, owner=Component(f"{prefix}.{point.owner.name}")),
+        )
 
     def _take_point(self, name: str) -> None:
         """Turn the body or point that a user gave into a point."""
-        value = getattr(self, name)
+        object.__setattr__(self, name, self._as_point(getattr(self, name), name))
+
+    def _as_point(self, value: Any, name: str) -> Point:
         if isinstance(value, RigidBody):
             value = value.frame
         if not isinstance(value, Point):
@@ -43,7 +41,7 @@ class OnPoints(Component):
                 f"{self.name}: {name} is {quoted(value)}; give a body, body.at(...) or"
                 " joint.frame_a"
             )
-        object.__setattr__(self, name, value)
+        return value
 
 
 @dataclass(frozen=True, slots=True)

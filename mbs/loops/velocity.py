@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.tree import position_rate
+from mbs.loops.closing import mechanism_size
 from mbs.loops.closure import (
     closure_rows,
     independent_closure,
@@ -231,6 +232,8 @@ def _against_slip(system: System, q: SX, lam: SX) -> dict[str, Wrench]:
 _VANISHING = 1e-9
 """Rows below this part of the usual one vanish as assembled, and are measured by the usual one:
 assembling leaves 1e-12, and nobody builds levers a thousand million times shorter than others."""
+_NO_LEVER = 1e-9
+"""Levers below this part of the size of the mechanism are rounding: they make no unit of length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -258,7 +261,12 @@ def scales(system: System) -> Scales:
         if J.size == 0 or not np.all(np.isfinite(J)):
             return Scales(np.ones(len(J)), 1.0)
         units = [speed.unit for speed in system.speeds]
-        length = _length(J, [unit for *_, unit in position_rows(system)], units)
+        lever = _largest_lever(J, [unit for *_, unit in position_rows(system)], units)
+        size = Function("size", [system.p], [mechanism_size(system)])(system.p_default)
+        # levers of a dwell of a cam, or at a dead centre, are rounding, or zero
+        length = 1.0 if lever is None else lever
+        if lever is not None and lever <= _NO_LEVER * float(size):
+            length = float(size)
         sizes = np.linalg.norm(J * Scales(np.ones(0), length).columns(units), axis=1)
         usual = float(np.median(sizes[sizes > 0])) if np.any(sizes > 0) else 1.0
         return Scales(1 / np.where(sizes > _VANISHING * usual, sizes, usual), length)
@@ -267,10 +275,9 @@ def scales(system: System) -> Scales:
     return found
 
 
-def _length(J: NDArray[np.float64], rows: list[str], units: list[str]) -> float:
-    """How far an angle moves the rows of positions, the largest of them."""
+def _largest_lever(J: NDArray[np.float64], rows: list[str], units: list[str]) -> float | None:
+    """How far an angle moves the rows of positions, the largest of them; None without angles."""
     turns = [k for k, unit in enumerate(units) if unit.startswith("rad")]
     places = [k for k, unit in enumerate(rows) if unit == "m"]
     moved = np.abs(J[np.ix_(places, turns)])
-    largest = float(np.max(moved, initial=0.0))
-    return largest if largest > 0 else 1.0
+    return float(np.max(moved)) if moved.size else None

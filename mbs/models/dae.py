@@ -601,8 +601,9 @@ def _start_algebraic(system: System, point: tuple[Array, ...], size: int) -> Arr
         q, v, tau, z, u, p = point
         if system.devices:
             found = devices(system)
-            no_lam = np.zeros(1)  # that is for outputs alone
-            at = {"q": q, "v": v, "z": z, "u": u, "p": p, "lam": no_lam}
+            at = {"q": q, "v": v, "z": z, "u": u, "p": p}
+            if "row_efforts" in found.name_in():  # outputs alone depend on them
+                at["row_efforts"] = np.zeros(found.numel_in("row_efforts"))
             tau = tau + np.array(found.call([at[name] for name in found.name_in()])[0]).ravel()
         ddm = direct_dynamics(system, coordinates="tree")
         at = {"q": q, "v": v, "tau": tau, "z": z, "u": u, "p": p}

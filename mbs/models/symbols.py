@@ -227,9 +227,10 @@ def devices(system: System) -> Function:
 
     Returns:
         Function of v (nv, 1) velocities of the tree, z (nz, 1) states and u (nu, 1) inputs, and of
-        q (nq, 1) before them where something depends on positions; tau (nv, 1) what drives deliver
-        at the coordinates [N m or N], zdot (nz, 1), y (ny, 1). Where outputs show efforts of rows,
-        these are the input lam (r, 1) after u.
+        q (nq, 1) before them where something depends on positions, and of row_efforts (r, 1) after
+        them where an output tells the efforts of rows of components, all of them in the order
+        of the components; tau (nv, 1) what drives deliver at the coordinates [N m or N],
+        zdot (nz, 1), y (ny, 1).
 
     Raises:
         ModelError: the system has no device.
@@ -250,7 +251,7 @@ def devices(system: System) -> Function:
         if casadi.depends_on(every, q):
             inputs.insert(0, ("q", q))
         if casadi.depends_on(every, parts.effort_symbols):
-            inputs.append(("lam", parts.effort_symbols))
+            inputs.append(("row_efforts", parts.effort_symbols))
         return inputs, [("tau", tau), ("zdot", zdot), ("y", y)]
 
     return model_function(system, ("devices",), build)

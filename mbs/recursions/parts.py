@@ -146,7 +146,7 @@ class PartsAt:
         if kind == "unknown":
             assert q is not None
             return q
-        return CoordinateAt(q, v)
+        return CoordinateAt(q, v, levers[0].unit.removesuffix("/s") if levers else "rad")
 
     # Signals.
 

@@ -1,0 +1,178 @@
+"""Curves through given points: a point that moves along one, and cams."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import field
+from itertools import pairwise
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from mbs.components import custom
+from mbs.components.custom import Custom, Row
+from mbs.components.splines import Spline, natural_spline, periodic_spline
+from mbs.errors import DescriptionError
+from mbs.text import quoted
+
+_APART = 1e-9
+"""Least distance of neighbours, in parts of the largest one: points that are nearer are the same
+one with other roundings, through which a spline would have any direction."""
+
+Rows = tuple[tuple[float, ...], ...]
+
+
+def _rows_of(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
+    """The rows of numbers that a user gave for a curve."""
+    try:
+        values: NDArray[np.float64] = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.ndim != 2 or values.shape[1] != columns or len(values) < least:
+        raise DescriptionError(
+            f"{name}: {what} is {quoted(given)}; give {least} rows of {columns} numbers or more,"
+            f" such as {example}"
+        )
+    if not np.all(np.isfinite(values)):
+        raise DescriptionError(
+            f"{name}: {what} holds a number that is not finite; give finite ones"
+        )
+    return tuple(tuple(float(x) for x in row) for row in values)
+
+
+class PointOnCurve(Custom):
+    """A point that stays on a curve: a bead on a wire, a pin in a slot, a car on rails.
+
+    The curve is the cubic spline through given points, over the sums of their distances, with two
+    continuous derivatives; it is fixed in the frame `ground`. Where it is open it goes on straight
+    beyond its ends. The three rows are the elements of p - c(s), p being the origin of `pin` in
+    `ground`; s, near the length along the curve, is an unknown, the coordinate NAME.s, so that two
+    rows bind the bodies. There is no friction.
+
+    Source: Haug 1989 for point followers; Boor 1978 for splines.
+
+    Attributes:
+        ground: the frame in which the curve is.
+        pin: the point that stays on it.
+        curve: its points, rows of x, y and z [m].
+        closed: whether it leads from the last point to the first.
+    """
+
+    ground = custom.frame()
+    pin = custom.frame()
+    curve: Any = field(kw_only=True)
+    closed: bool = field(kw_only=True, default=False)
+    s = custom.unknown("m")
+    force_x = custom.output("N")
+    force_y = custom.output("N")
+    force_z = custom.output("N")
+
+    def __post_init__(self) -> None:
+        Custom.__post_init__(self)
+        least = 3 if self.closed else 2
+        rows = _rows_of(self.name, "curve", self.curve, 3, least, "[(0, 0, 0), (1, 0.2, 0)]")
+        object.__setattr__(self, "curve", rows)
+        distances = self._distances()
+        near = [k for k, d in enumerate(distances) if d <= _APART * max(distances)]
+        if near:
+            raise DescriptionError(
+                f"{self.name}: point {near[0]} of the curve is the same as the next one; give it"
+                " once, and the first one of a closed curve not again at its end"
+            )
+
+    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+        """How far the point is from that of the curve, in axes of the ground."""
+        off = at.ground.to(at.pin).p - self.spline.at(at.s)
+        return dict(zip("xyz", casadi.vertsplit(off), strict=True))
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The force of the curve on the point, in axes of the ground."""
+        return {f"force_{axis}": at.lam[axis] for axis in "xyz"}
+
+    @property
+    def spline(self) -> Spline:
+        """The curve, over the sums of the distances of its points."""
+        d, points = self._distances(), np.array(self.curve)
+        t = np.concatenate([[0.0], np.cumsum(d)])
+        return periodic_spline(t[:-1], points, t[-1]) if self.closed else natural_spline(t, points)
+
+    def _distances(self) -> list[float]:
+        points = list(self.curve)
+        following = [*points[1:], points[0]] if self.closed else points[1:]
+        return [math.dist(a, b) for a, b in zip(points, following, strict=False)]
+
+
+class Cam(Custom):
+    """A cam: driven = lift(driver), a curve through given points with two continuous derivatives.
+
+    The lift is the cubic spline through the points; it repeats itself after `period`, or goes on
+    straight beyond its ends where there is none. It is one row on two coordinates, which may be
+    angles or displacements; it holds in both directions, as that of a grooved cam does: a follower
+    that is only pressed on leaves the cam where `effort`, on the driven coordinate, is below zero.
+
+    Source: Boor 1978 for splines.
+
+    Attributes:
+        driven: name of the coordinate of the follower.
+        driver: name of the coordinate of the cam.
+        profile: rows of a position of the driver and one of the driven coordinate, in order
+            [rad or m]; with a period they span less than one.
+        period: of the driver [rad or m], a whole turn if not given; None for a curve with ends.
+    """
+
+    driven = custom.coordinate()
+    driver = custom.coordinate()
+    profile: Any = field(kw_only=True)
+    period: float | None = field(kw_only=True, default=2 * math.pi)
+    effort = custom.output(custom.EFFORT)
+
+    @property
+    def needs_position(self) -> bool:
+        """A lift is one of positions."""
+        return True
+
+    def __post_init__(self) -> None:
+        Custom.__post_init__(self)
+        least = 2 if self.period is None else 3
+        rows = _rows_of(self.name, "profile", self.profile, 2, least, "[(0, 0), (2, 0.01), (4, 0)]")
+        object.__setattr__(self, "profile", rows)
+        period = self.period
+        if period is not None and not (isinstance(period, (int, float)) and 0 < period < math.inf):
+            raise DescriptionError(
+                f"{self.name}: period is {quoted(period)}; give a number above zero, or None for a"
+                " curve with ends"
+            )
+        t = [row[0] for row in rows]
+        span = t[-1] - t[0]
+        for k, (a, b) in enumerate(pairwise(t)):
+            if b - a <= _APART * span:
+                raise DescriptionError(
+                    f"{self.name}: the driver is at {a:g} in row {k} of profile and at {b:g} in"
+                    " the next one; give rows in which it grows"
+                )
+        if period is not None and span >= period * (1 - _APART):
+            raise DescriptionError(
+                f"{self.name}: profile spans {span:g} of the driver, and the period is"
+                f" {period:g}; leave the row out that repeats the first one"
+            )
+
+    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+        """What the driven coordinate is off the lift."""
+        lift = self.spline.at(at.driver.q)
+        return {"lift": Row(at.driven.q - lift, "m" if at.driven.unit == "m" else "1")}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What the cam does to the driven coordinate."""
+        return {"effort": at.lam["lift"]}
+
+    @property
+    def spline(self) -> Spline:
+        """The lift over the position of the driver."""
+        t, lift = np.array(self.profile).T
+        if self.period is None:
+            return natural_spline(t, lift[:, None])
+        return periodic_spline(t, lift[:, None], self.period)

@@ -1,0 +1,129 @@
+"""Ropes over pulleys: through any number of points, with one tension in all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+from casadi import SX
+
+from mbs.components import custom
+from mbs.components.component import Point
+from mbs.components.custom import Custom, FrameLoad, Load, Row
+from mbs.components.forces import smooth_ramp
+from mbs.errors import DescriptionError
+from mbs.text import quoted
+
+
+class _Rope(Custom):
+    """A massless rope along a path of points; pulleys on the way have no size and no friction."""
+
+    path: Any
+    length = custom.parameter("m", positive=True)
+    tension = custom.output("N")
+
+    def __post_init__(self) -> None:
+        Custom.__post_init__(self)
+        given = self.path
+        if not isinstance(given, (tuple, list)) or len(given) < 2:
+            raise DescriptionError(
+                f"{self.name}: path is {quoted(given)}; give the points along the rope, two or"
+                " more, such as (weight, world.at(0, 0, 2), load)"
+            )
+        points = tuple(self._as_point(one, f"path[{k}]") for k, one in enumerate(given))
+        object.__setattr__(self, "path", points)
+
+    @property
+    def frames(self) -> Mapping[str, Point]:
+        """The points along it: p0, p1, ..."""
+        return {f"p{k}": point for k, point in enumerate(self.path)}
+
+    def _segments(self, at: Any) -> list[tuple[Any, Any]]:
+        """The frames at both ends of every straight piece."""
+        ports = [getattr(at, port) for port in self.frames]
+        return list(pairwise(ports))
+
+    def _length(self, at: Any) -> SX:
+        return sum((a.to(b).length for a, b in self._segments(at)), SX(0))
+
+
+class RopeOverPulleys(_Rope):
+    """A rope that does not stretch: the distances of its points, one after the other, have a sum.
+
+    It is one row, the sum of the distances less the length, and the effort of this row is the
+    tension. The row holds in both directions: where the tension is below zero, a rope would have
+    become slack; `ElasticRope` does.
+
+    Source: Haug 1989 for rows on distances.
+
+    Attributes:
+        path: its points, from one end to the other: bodies, `body.at(...)` or points of the world.
+            The inner ones are pulleys.
+        length: of the rope [m].
+    """
+
+    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+        """What the path is longer than the rope."""
+        return {"length": self._length(at) - at.length}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension."""
+        return {"tension": -at.lam["length"]}
+
+
+class ElasticRope(_Rope):
+    """A rope that stretches, and is slack where its path is shorter than it is.
+
+    With the stretch x, the sum of the distances of its points less its length, the tension is
+    stiffness r(x) + damping s(x) dx/dt, with the ramp r and its slope s of a JointStop: over the
+    first `width` of the stretch the stiffness grows from zero to its full value, so that the
+    tension and two derivatives of it are continuous. The damper may push a rope that shortens fast.
+
+    Source: Haug 1989 for forces along distances.
+
+    Attributes:
+        path: its points, from one end to the other: bodies, `body.at(...)` or points of the world.
+            The inner ones are pulleys.
+        length: of the rope without tension [m].
+        stiffness: of the whole rope [N/m].
+        damping: likewise, while it is taut [N s/m].
+        width: over which the stiffness grows [m].
+    """
+
+    stiffness = custom.parameter("N/m", positive=True)
+    damping = custom.parameter("N.s/m", 0.0, min=0)
+    width = custom.parameter("m", 1e-3, positive=True)
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The tension draws every point towards its neighbours."""
+        T = self._tension(at)
+        total: dict[str, FrameLoad] = {}
+        for a, b in self._segments(at):
+            for port, load in custom.pull(a, b, T).items():
+                known = total.get(port)
+                force = load.force if known is None else known.force + load.force
+                total[port] = FrameLoad(force, load.moment, own_axes=True)
+        return total
+
+    def energy(self, at: Any) -> SX:
+        """What its stretch stores."""
+        return SX(at.stiffness * self._stretched(at)[2])
+
+    def dissipation(self, at: Any) -> SX:
+        """What the damper takes."""
+        return SX(at.damping * self._stretched(at)[0] * self._rate(at) ** 2)
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension."""
+        return {"tension": self._tension(at)}
+
+    def _stretched(self, at: Any) -> tuple[SX, SX, SX]:
+        return smooth_ramp(self._length(at) - at.length, at.width)
+
+    def _rate(self, at: Any) -> SX:
+        return sum((a.to(b).rate for a, b in self._segments(at)), SX(0))
+
+    def _tension(self, at: Any) -> SX:
+        slope, ramped, _ = self._stretched(at)
+        return SX(at.stiffness * ramped + at.damping * slope * self._rate(at))

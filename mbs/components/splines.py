@@ -1,0 +1,102 @@
+"""Cubic splines through given points, as expressions with two continuous derivatives.
+
+Which piece holds is a sum of steps, whose derivatives are zero: values and derivatives are those
+of one polynomial everywhere, at the knots too, where comparisons of neighbours would give half of
+one and half of the other.
+
+Source: Boor 1978.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spline:
+    """A curve of cubic pieces, each in the distance from its own knot.
+
+    Attributes:
+        knots: (m,) where the pieces begin; the first piece holds before them, too.
+        coefficients: (4, m, d) of the powers 0 .. 3.
+        period: after which everything repeats, None for a curve that goes on straight.
+    """
+
+    knots: Array
+    coefficients: Array
+    period: float | None
+
+    def at(self, t: SX) -> SX:
+        """(d, 1) the point at t, (1, 1)."""
+        if self.period is not None:
+            t = t - self.period * casadi.floor((t - self.knots[0]) / self.period)
+        steps = [t >= knot for knot in self.knots[1:]]
+        u = t - _chosen(self.knots, steps)
+        dimension = self.coefficients.shape[2]
+        return casadi.vertcat(*(self._element(k, u, steps) for k in range(dimension)))
+
+    def _element(self, k: int, u: SX, steps: Sequence[SX]) -> SX:
+        value = SX(0)
+        for power in (3, 2, 1, 0):
+            value = value * u + _chosen(self.coefficients[power, :, k], steps)
+        return value
+
+
+def _chosen(values: Array, steps: Sequence[SX]) -> SX:
+    """The value of the piece that holds."""
+    found = SX(float(values[0]))
+    for step, jump in zip(steps, np.diff(values), strict=True):
+        found += step * float(jump)
+    return found
+
+
+def natural_spline(t: Array, points: Array) -> Spline:
+    """The spline through points (n, d) at t (n,), straight before the first and after the last."""
+    h: Array = np.diff(t)
+    slopes: Array = np.diff(points, axis=0) / h[:, None]
+    # second derivatives: zero at the ends, where the straight lines begin
+    A = np.eye(len(t))
+    right = np.zeros_like(points)
+    for k in range(1, len(t) - 1):
+        A[k, k - 1 : k + 2] = h[k - 1], 2 * (h[k - 1] + h[k]), h[k]
+        right[k] = 6 * (slopes[k] - slopes[k - 1])
+    M: Array = np.linalg.solve(A, right).astype(np.float64)
+    pieces = _pieces(points, slopes, h, M)
+    # the lines at both ends: the first begins at the first knot, so that it is found before it
+    first = np.stack([points[0], pieces[1, 0], 0 * points[0], 0 * points[0]])[:, None]
+    end: Array = slopes[-1] + h[-1] * (M[-2] + 2 * M[-1]) / 6
+    last = np.stack([points[-1], end, 0 * end, 0 * end])[:, None]
+    knots = np.concatenate([t[:1], t])
+    return Spline(knots, np.concatenate([first, pieces, last], axis=1), None)
+
+
+def periodic_spline(t: Array, points: Array, period: float) -> Spline:
+    """The spline through points (n, d) at t (n,) that repeats itself after a period."""
+    n = len(t)
+    h: Array = np.diff(np.append(t, t[0] + period))
+    slopes = np.diff(np.concatenate([points, points[:1]]), axis=0) / h[:, None]
+    A = np.zeros((n, n))
+    for k in range(n):
+        A[k, k] += 2 * (h[k - 1] + h[k])
+        A[k, (k + 1) % n] += h[k]
+        A[k, k - 1] += h[k - 1]
+    right = 6 * (slopes - np.roll(slopes, 1, axis=0))
+    M: Array = np.linalg.solve(A, right).astype(np.float64)
+    ends: Array = np.concatenate([M, M[:1]])
+    pieces = _pieces(points, slopes, h, ends)
+    return Spline(t, pieces, period)
+
+
+def _pieces(points: Array, slopes: Array, h: Array, M: Array) -> Array:
+    """(4, m, d) coefficients from values, slopes of chords and second derivatives."""
+    h = h[:, None]
+    first = slopes - h * (2 * M[:-1] + M[1:]) / 6
+    return np.stack([points[: len(h)], first, M[:-1] / 2, np.diff(M, axis=0) / (6 * h)])

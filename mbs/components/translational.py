@@ -1,0 +1,152 @@
+"""Lines of parts that slide: masses, springs, dampers and gaps along one direction.
+
+Their flanges have a position, which is the same for all flanges that are connected, and a force,
+and the forces of connected flanges add up to zero. They are connected to each other and to
+`joint.flange` of prismatic joints; an IdealGear or ElasticGear leads from a shaft to a slide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from casadi import SX
+
+from mbs.components import custom
+from mbs.components.custom import Load
+from mbs.components.drives import RigidPart, TwoFlanges
+from mbs.components.forces import smooth_ramp
+from mbs.expressions import Expression, expression
+
+
+class SlidingMass(RigidPart):
+    """A mass on a slide; its two flanges are the two ends of one rigid body without length.
+
+    Gravity does not act on it, since a line of sliding parts has no direction in space.
+
+    Attributes:
+        mass: [kg].
+    """
+
+    flange_a = custom.flange(slides=True)
+    flange_b = custom.flange(slides=True)
+    mass = custom.parameter("kg", min=0)
+
+    @property
+    def own_inertia(self) -> Expression:
+        """All of it."""
+        return expression(self.mass)
+
+
+class _BetweenSlides(TwoFlanges):
+    """What acts on x = position_b - position_a by a force that draws the flanges together."""
+
+    flange_a = custom.flange(slides=True)
+    flange_b = custom.flange(slides=True)
+    force = custom.output("N")
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The tension, each flange towards the other."""
+        F = self._tension(at)
+        return {"flange_a": F, "flange_b": -F}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """The tension, less than zero where the flanges are pushed apart."""
+        return {"force": self._tension(at)}
+
+    def _tension(self, at: Any) -> SX:
+        raise NotImplementedError
+
+    def _extent(self, at: Any) -> SX:
+        return SX(at.flange_b.position - at.flange_a.position)
+
+    def _rate(self, at: Any) -> SX:
+        return SX(at.flange_b.speed - at.flange_a.speed)
+
+
+class SlidingSpring(_BetweenSlides):
+    """A spring, with a damper beside it: tension stiffness (x - length) + damping dx/dt.
+
+    x is the position of flange_b less that of flange_a.
+
+    Attributes:
+        stiffness: [N/m].
+        length: x at which it is relaxed [m].
+        damping: [N s/m].
+    """
+
+    stiffness = custom.parameter("N/m", min=0)
+    length = custom.parameter("m", 0.0)
+    damping = custom.parameter("N.s/m", 0.0, min=0)
+
+    def __post_init__(self) -> None:
+        TwoFlanges.__post_init__(self)
+        self._require_effect("stiffness", "damping")
+
+    def energy(self, at: Any) -> SX:
+        """What it stores."""
+        return SX(0.5 * at.stiffness * (self._extent(at) - at.length) ** 2)
+
+    def dissipation(self, at: Any) -> SX:
+        """What the damper takes."""
+        return SX(at.damping * self._rate(at) ** 2)
+
+    def _tension(self, at: Any) -> SX:
+        stretch = self._extent(at) - at.length
+        return SX(at.stiffness * stretch + at.damping * self._rate(at))
+
+
+class SlidingDamper(_BetweenSlides):
+    """A damper between two slides: tension damping dx/dt, x = position_b - position_a.
+
+    Attributes:
+        damping: [N s/m].
+    """
+
+    damping = custom.parameter("N.s/m", min=0)
+
+    def dissipation(self, at: Any) -> SX:
+        """All its power."""
+        return SX(at.damping * self._rate(at) ** 2)
+
+    def _tension(self, at: Any) -> SX:
+        return SX(at.damping * self._rate(at))
+
+
+class ElastoGap(_BetweenSlides):
+    """A spring and a damper that push where two slides touch, and nothing where they do not.
+
+    The slides touch where x = position_b - position_a is below `length`; with the depth
+    d = length - x they are pushed apart by stiffness r(d) - damping s(d) dx/dt, with the ramp r and
+    its slope s of a JointStop: over the first `width` the stiffness grows from zero to its full
+    value, so that the force and two derivatives of it are continuous. The damper may hold back
+    slides that part.
+
+    Source: Modelica Association 2023 for the element.
+
+    Attributes:
+        stiffness: [N/m].
+        length: x at which the slides touch [m].
+        damping: while they touch [N s/m].
+        width: over which the stiffness grows [m].
+    """
+
+    stiffness = custom.parameter("N/m", positive=True)
+    length = custom.parameter("m", 0.0)
+    damping = custom.parameter("N.s/m", 0.0, min=0)
+    width = custom.parameter("m", 1e-4, positive=True)
+
+    def energy(self, at: Any) -> SX:
+        """What is stored where they touch."""
+        return SX(at.stiffness * self._contact(at)[2])
+
+    def dissipation(self, at: Any) -> SX:
+        """What the damper takes."""
+        return SX(at.damping * self._contact(at)[0] * self._rate(at) ** 2)
+
+    def _tension(self, at: Any) -> SX:
+        slope, ramped, _ = self._contact(at)
+        return SX(-at.stiffness * ramped + at.damping * slope * self._rate(at))
+
+    def _contact(self, at: Any) -> tuple[SX, SX, SX]:
+        return smooth_ramp(at.length - self._extent(at), at.width)

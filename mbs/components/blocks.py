@@ -23,7 +23,7 @@ from mbs.text import quoted
 
 
 @dataclass(frozen=True, slots=True)
-class Block(Custom):
+class SignalBlock(Custom):
     """A component of signals alone."""
 
     def _require_order(self) -> None:
@@ -66,7 +66,7 @@ def _ramp(x: SX, width: SX) -> SX:
 # Without memory.
 
 
-class Constant(Block):
+class Constant(SignalBlock):
     """y = value.
 
     Attributes:
@@ -81,7 +81,7 @@ class Constant(Block):
         return {"y": at.value}
 
 
-class Gain(Block):
+class Gain(SignalBlock):
     """y = k u.
 
     Attributes:
@@ -98,7 +98,7 @@ class Gain(Block):
 
 
 @dataclass(frozen=True, slots=True)
-class Sum(Block):
+class Sum(SignalBlock):
     """y = weights[0] u1 + weights[1] u2 + ..., of up to four inputs.
 
     Attributes:
@@ -139,7 +139,7 @@ class Sum(Block):
         return {"y": sum((to_sx(w, at.symbols) * getattr(at, u) for w, u in pairs), SX(0))}
 
 
-class Limiter(Block):
+class Limiter(SignalBlock):
     """y = u between two limits, and the nearer limit beyond them.
 
     With a width w the corners are rounded: fmax(x, 0) becomes w log(1 + exp(x / w)), which is more
@@ -172,7 +172,7 @@ class Limiter(Block):
 # With states, but no limits.
 
 
-class Integrator(Block):
+class Integrator(SignalBlock):
     """y = x, dx/dt = k u.
 
     Attributes:
@@ -193,7 +193,7 @@ class Integrator(Block):
         return {"y": at.x}
 
 
-class FirstOrder(Block):
+class FirstOrder(SignalBlock):
     """A first-order filter: y = x, time dx/dt = k u - x.
 
     Attributes:
@@ -216,7 +216,7 @@ class FirstOrder(Block):
         return {"y": at.x}
 
 
-class SecondOrder(Block):
+class SecondOrder(SignalBlock):
     """A second-order filter: y = x, x'' + 2 damping w x' + w^2 x = w^2 k u.
 
     Attributes:
@@ -243,7 +243,7 @@ class SecondOrder(Block):
         return {"y": at.x}
 
 
-class RateLimiter(Block):
+class RateLimiter(SignalBlock):
     """A signal that follows another one no faster than a rate: y = x, dx/dt = (u - x) / time.
 
     The rate is cut off at `rising` and at `-falling`. Where it is not cut off, y is late by `time`.
@@ -276,7 +276,7 @@ class RateLimiter(Block):
 # Controllers.
 
 
-class Controller(Block):
+class ErrorController(SignalBlock):
     """What controllers have: the error e = target - measured, its integral, limits of the output.
 
     The integral part is the state x, dx/dt = ki e + (u - u0) / tracking, where u0 is the output
@@ -333,7 +333,7 @@ class Controller(Block):
         raise NotImplementedError
 
 
-class PI(Controller):
+class PI(ErrorController):
     """A PI controller: u = kp e + x, dx/dt = ki e, e = target - measured.
 
     Attributes:
@@ -354,7 +354,7 @@ class PI(Controller):
         return SX(at.kp * (at.target - at.measured) + at.x)
 
 
-class PID(Controller):
+class PID(ErrorController):
     """A PID controller: u = kp e + x + kd (e - f) / filter, dx/dt = ki e, filter df/dt = e - f.
 
     f is the filtered error e = target - measured, so that (e - f) / filter is its filtered rate.
@@ -381,7 +381,7 @@ class PID(Controller):
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Of the integral part and of the filtered error."""
         error = at.target - at.measured
-        return {**Controller.rates(self, at), "f": (error - at.f) / at.filter}
+        return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
     def _unlimited(self, at: Any) -> SX:
         error = at.target - at.measured

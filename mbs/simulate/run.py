@@ -40,7 +40,7 @@ from mbs.result import Result
 from mbs.simulate.arguments import count_steps, positive
 from mbs.solvers import EventMotion, Events, integrate_events
 from mbs.solvers.integrate import is_compilable
-from mbs.solvers.problem import Event, Passage, failed
+from mbs.solvers.problem import IntegrationEvent, Passage, failed
 from mbs.text import did_you_mean, quoted
 
 # Rigid stops and Coulomb friction in a simulation: how they start, and what a result tells of them.
@@ -63,7 +63,7 @@ class ContactMotion:
 
     first: Array
     modes: Array
-    events: tuple[Event, ...]
+    events: tuple[IntegrationEvent, ...]
 
 
 def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> None:
@@ -142,7 +142,7 @@ def every_effort(system: System, tau: Array, efforts: Array) -> Array:
 
 
 def list_events(
-    system: System, contact: ContactMotion | None, others: Sequence[Event] = ()
+    system: System, contact: ContactMotion | None, others: Sequence[IntegrationEvent] = ()
 ) -> tuple[tuple[float, str, str], ...]:
     """Time, name of the element or component and what it does, of every event.
 
@@ -166,7 +166,9 @@ def list_events(
     return tuple(happened)
 
 
-def _changes(contacts: Contacts, j: int, before: Array, event: Event) -> Iterator[tuple[str, str]]:
+def _changes(
+    contacts: Contacts, j: int, before: Array, event: IntegrationEvent
+) -> Iterator[tuple[str, str]]:
     k = len(contacts)
     stop, friction = contacts.stops[j], contacts.frictions[j]
     was, now = int(before[j]), int(event.modes[j])
@@ -340,7 +342,7 @@ class Leg:
     first_slope: Array | None = None
     driven: tuple[int, ...] = ()
     first_bias: Array | None = None
-    happened: tuple[Event, ...] = ()
+    happened: tuple[IntegrationEvent, ...] = ()
 
     @property
     def without_start(self) -> Leg:

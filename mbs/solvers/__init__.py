@@ -1,6 +1,6 @@
 """Numerical methods that know Functions and numbers, never mechanisms."""
 
 from mbs.solvers.integrate import integrate, integrate_events
-from mbs.solvers.problem import Event, EventMotion, Events
+from mbs.solvers.problem import EventMotion, Events, IntegrationEvent
 
-__all__ = ["Event", "EventMotion", "Events", "integrate", "integrate_events"]
+__all__ = ["EventMotion", "Events", "IntegrationEvent", "integrate", "integrate_events"]

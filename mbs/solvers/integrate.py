@@ -21,9 +21,9 @@ from mbs.native.compiler import flags_for
 from mbs.solvers.interpreted_run import run_interpreted
 from mbs.solvers.problem import (
     Equations,
-    Event,
     EventMotion,
     Events,
+    IntegrationEvent,
     IntegrationProblem,
     Passage,
     equations,
@@ -121,7 +121,7 @@ def run_compiled(
     x, times = problem.x0.copy(), problem.times
     table = np.empty((len(times), len(x)))
     done = ctypes.c_longlong(0)
-    log: list[Event] = []
+    log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
     first: Array | None = None
     with _opened(library, problem) as driver:
@@ -158,12 +158,14 @@ def run_compiled(
     return replace(problem.motion(table[: done.value], log, stop), first_slope=first)
 
 
-def _event(library: ctypes.CDLL, driver: ctypes.c_void_p, problem: IntegrationProblem) -> Event:
+def _event(
+    library: ctypes.CDLL, driver: ctypes.c_void_p, problem: IntegrationProblem
+) -> IntegrationEvent:
     assert problem.equations.indicators is not None
     fired = np.empty(problem.equations.indicators.numel_out(0))
     modes = np.empty(problem.modes)
     library.mbs_event(driver, _pointer(fired), _pointer(modes))
-    return Event(library.mbs_time(driver), fired_of(fired), modes)
+    return IntegrationEvent(library.mbs_time(driver), fired_of(fired), modes)
 
 
 @functools.cache

@@ -10,9 +10,9 @@ import numpy.typing as npt
 from mbs.errors import Interrupted, SolverError
 from mbs.solvers.dopri5 import Dopri5
 from mbs.solvers.problem import (
-    Event,
     EventMotion,
     Failure,
+    IntegrationEvent,
     IntegrationProblem,
     failed,
     fired_of,
@@ -305,7 +305,7 @@ def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> E
     p = problem.p.copy()
     solver = _stepper(problem, p)
     table = Table(problem.times, np.empty((len(problem.times), len(problem.x0))))
-    log: list[Event] = []
+    log: list[IntegrationEvent] = []
     stop: SolverError | Interrupted | None = None
     try:
         if solver.project is not None:
@@ -316,7 +316,7 @@ def run_interpreted(problem: IntegrationProblem, progress: Progress | None) -> E
                 solver.fill(table, _CHUNK)
             elif watched.fill(table, _CHUNK):
                 modes = p[len(p) - problem.modes :].copy()
-                log.append(Event(solver.t, fired_of(watched.fired), modes))
+                log.append(IntegrationEvent(solver.t, fired_of(watched.fired), modes))
             if progress is not None:
                 progress(solver.t)
     except SolverError as error:

@@ -69,7 +69,7 @@ class Events:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Event:
+class IntegrationEvent:
     """One event of a motion.
 
     Attributes:
@@ -99,7 +99,7 @@ class EventMotion:
 
     x: Array
     modes: Array
-    events: tuple[Event, ...]
+    events: tuple[IntegrationEvent, ...]
     stop: SolverError | Interrupted | None = None
     first_slope: Array | None = None
 
@@ -109,7 +109,7 @@ def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:
     return tuple(np.flatnonzero(flags).tolist())
 
 
-def modes_at(times: Array, first: Array, events: tuple[Event, ...]) -> Array:
+def modes_at(times: Array, first: Array, events: tuple[IntegrationEvent, ...]) -> Array:
     """(m, nm) modes at given times; at the time of an event, after it.
 
     Args:
@@ -192,7 +192,7 @@ class IntegrationProblem:
     max_step: float
 
     def motion(
-        self, x: Array, log: Sequence[Event], stop: SolverError | Interrupted | None
+        self, x: Array, log: Sequence[IntegrationEvent], stop: SolverError | Interrupted | None
     ) -> EventMotion:
         """What an integration came to.
 

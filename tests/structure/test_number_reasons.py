@@ -43,6 +43,8 @@ def field_defaults(described: ast.ClassDef) -> Iterator[tuple[str, ast.expr]]:
         match part:
             case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as default):
                 yield name, default
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call() as declared):
+                yield name, declared  # as components declare what they have
             case ast.FunctionDef(name="__init__"):
                 yield from argument_defaults(part)
 

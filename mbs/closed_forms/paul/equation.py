@@ -17,7 +17,7 @@ from mbs.closed_forms.paul.splits import (
     SIZE,
     Knowledge,
     Members,
-    Row,
+    SplitRow,
     Values,
     Variable,
     joint_basis,
@@ -82,7 +82,7 @@ class Equation:
         cost: of its coefficients, by estimate.
     """
 
-    row: Row
+    row: SplitRow
     variables: tuple[Variable, ...]
     parts: Mapping[Key, Part]
     patterns: frozenset[Members]
@@ -144,7 +144,7 @@ def _leading(table: Values) -> NDArray[np.float64]:
 
 
 def _equation(
-    row: Row,
+    row: SplitRow,
     terms: Mapping[Members, Values],
     prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
@@ -323,7 +323,7 @@ def _has_partner(
 def _mix(
     knowledge: Knowledge,
     matrices: RingMatrices,
-    row: Row,
+    row: SplitRow,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
 ) -> Factor:
     """G = X - i Y from all products of cosines and sines of the joints."""
@@ -340,7 +340,7 @@ def _mix(
 
 
 def _coefficient(
-    knowledge: Knowledge, matrices: RingMatrices, row: Row, chosen: Mapping[int, int]
+    knowledge: Knowledge, matrices: RingMatrices, row: SplitRow, chosen: Mapping[int, int]
 ) -> SX:
     """What stands with a product of the elementary functions of the joints.
 
@@ -358,7 +358,7 @@ def _coefficient(
     return SX(total)
 
 
-def _steps(row: Row, n: int, direction: int) -> Iterator[tuple[str, int]]:
+def _steps(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
     """The joints and the gaps between two frames, around the loop in one direction."""
     point = row.start
     while point != row.end:
@@ -370,7 +370,7 @@ def _steps(row: Row, n: int, direction: int) -> Iterator[tuple[str, int]]:
 def _along(
     knowledge: Knowledge,
     matrices: RingMatrices,
-    path: tuple[Row, list[tuple[str, int]], int],
+    path: tuple[SplitRow, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
     """The element of w at the end of a path."""

@@ -437,7 +437,7 @@ _MOST_JOINTS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class SplitRow:
     """Where an equation comes from: see `FrameSplit`.
 
     Attributes:
@@ -460,7 +460,7 @@ class Row:
 
 def simple_rows(
     split: FrameSplit, prismatic: frozenset[int], most: int
-) -> Iterator[tuple[Row, dict[Members, Values]]]:
+) -> Iterator[tuple[SplitRow, dict[Members, Values]]]:
     """The rows that may have few unknowns, and their terms.
 
     Args:
@@ -479,7 +479,7 @@ def simple_rows(
     variables, joints, long = counts
     few = (variables <= most) | ((variables <= MOST_VARIABLES) & (long == 0))
     for number in np.flatnonzero((joints > 0) & (joints <= _MOST_JOINTS) & few):
-        row = Row(split.start, split.end, split.seed, split.rows[number])
+        row = SplitRow(split.start, split.end, split.seed, split.rows[number])
         found = dict[Members, Values]()
         for side, table, mask, sign in zip(sides, tables, masks, (1, -1), strict=True):
             _collect(found, (side, table.terms, mask[number]), rows[number], sign)

@@ -9,6 +9,8 @@ from mbs.components.blocks import (
     Integrator,
     Limiter,
     RateLimiter,
+    SampledPID,
+    SampleHold,
     SecondOrder,
     Sum,
 )
@@ -210,6 +212,8 @@ __all__ = [
     "RollingDisc",
     "RopeOverPulleys",
     "Rotor",
+    "SampleHold",
+    "SampledPID",
     "Screw",
     "SecondOrder",
     "Sensor",

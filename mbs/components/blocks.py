@@ -1,8 +1,8 @@
 """Signal blocks: controllers, filters, limits and sums between sensors and what they drive.
 
-A block has inputs and outputs, which `Mechanism.wire` connects, and no place in the mechanism. All
-of them are continuous in time. Signals of blocks have the unit 1: a block does not know what it
-carries.
+A block has inputs and outputs, which `Mechanism.wire` connects, and no place in the mechanism. Most
+of them are continuous in time; sampled ones have events. Signals of blocks have the unit 1: a block
+does not know what it carries.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Component
-from mbs.components.custom import Custom
+from mbs.components.custom import Custom, Event
 from mbs.errors import DescriptionError
 from mbs.expressions import expression, to_float, to_sx
 from mbs.text import quoted
@@ -386,3 +386,93 @@ class PID(ErrorController):
     def _unlimited(self, at: Any) -> SX:
         error = at.target - at.measured
         return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)
+
+
+# Sampled blocks: what they give is constant between the instants at which they look.
+
+
+class SampledBlock(SignalBlock):
+    """What sampled blocks have: the time that is left until they look again, from the start on."""
+
+    left = custom.state("s")
+
+    def rates(self, at: Any) -> Mapping[str, SX]:
+        """The time that is left runs out."""
+        return {"left": SX(-1)}
+
+    def events(self, at: Any) -> Mapping[str, Event]:
+        """It looks again."""
+        return {"samples": Event(at.left, {"left": at.period, **self._sampled(at)})}
+
+    def _sampled(self, at: Any) -> Mapping[str, SX]:
+        """What its modes become."""
+        raise NotImplementedError
+
+
+class SampleHold(SampledBlock):
+    """Sample and hold: y is what u was at the last multiple of the period.
+
+    Attributes:
+        period: between two looks [s].
+    """
+
+    period = custom.parameter("s", positive=True)
+    u = custom.input()
+    y = custom.output()
+    sample = custom.mode()
+
+    def _sampled(self, at: Any) -> Mapping[str, SX]:
+        return {"sample": at.u}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it holds."""
+        return {"y": at.sample}
+
+
+class SampledPID(SampledBlock):
+    """A sampled PID controller: u = kp e + x + kd (e - e0) / T, x += ki e T, e = target - measured.
+
+    T is the period, e0 the error one period before, zero at the start. At a limit of the output
+    the integral part x stays as it is unless it leads away from the limit.
+
+    Source: Astrom & Hagglund 2006 for the sampled form and conditional integration.
+
+    Attributes:
+        period: between two looks [s].
+        kp: gain.
+        ki: gain of the integral part [1/s].
+        kd: gain of the rate [s].
+        low, high: limits of the output; none when left out.
+    """
+
+    period = custom.parameter("s", positive=True)
+    kp = custom.parameter()
+    ki = custom.parameter("1/s", 0.0)
+    kd = custom.parameter("s", 0.0)
+    low = custom.parameter("1", None)
+    high = custom.parameter("1", None)
+    target = custom.input()
+    measured = custom.input()
+    u = custom.output()
+    sample = custom.mode()
+    x = custom.mode()
+    error = custom.mode()
+
+    def __post_init__(self) -> None:
+        Custom.__post_init__(self)
+        self._require_order()
+
+    def _sampled(self, at: Any) -> Mapping[str, SX]:
+        error = at.target - at.measured
+        more = at.x + at.ki * error * at.period
+        given = at.kp * error + at.kd * (error - at.error) / at.period
+        whole = given + more
+        inside = limited(whole, at.low, at.high, SX(0))
+        # the integral part grows only where the output is not at a limit already
+        outwards = (whole - inside) * (more - at.x) > 0
+        x = casadi.if_else(outwards, at.x, more)
+        return {"sample": limited(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What it holds."""
+        return {"u": at.sample}

@@ -520,6 +520,9 @@ class Custom(OnPoints):
     held: ClassVar[bool] = False
     """Whether its flanges do not move."""
 
+    shape: ClassVar[str] = "bar"
+    """How pictures show it between its points, one after the other: "bar", "coil" or ""."""
+
     lowered: ClassVar[bool] = False
     """Whether the assembly turns it into joints and couplings, so that nothing is left of it."""
 

@@ -255,6 +255,8 @@ class Spring(LineForce):
         damping: c [N s/m].
     """
 
+    shape = "coil"
+
     stiffness: Scalar
     length: Scalar = 0.0
     damping: Scalar = 0.0
@@ -405,6 +407,8 @@ class Bushing(PairForce):
         angular_stiffness: K_phi about the axes of a [N m/rad], likewise.
         angular_damping: [N m s/rad], likewise.
     """
+
+    shape = "coil"
 
     force_x = custom.output("N")
     force_y = custom.output("N")

@@ -143,12 +143,14 @@ class SkeletonForce:
     Attributes:
         name: of the element.
         kind: of element, in lower case.
+        shape: "coil" or "bar", or nothing.
         links: numbers of the links that carry its ends, 0 for the base.
         points: columns in `points` of its ends.
     """
 
     name: str
     kind: str
+    shape: str
     links: tuple[int, int]
     points: tuple[int, int]
 
@@ -235,13 +237,15 @@ def _built(system: System) -> Skeleton:
     joints = tuple(_joint(marks, row) for row in system.joints)
     forces = tuple(
         SkeletonForce(
-            force.element.name,
-            type(force.element).__name__.lower(),
-            (force.frames[0][0] + 1, force.frames[1][0] + 1),
-            (marks.point(force.frames[0]), marks.point(force.frames[1])),
+            part.name,
+            type(part.element).__name__.lower(),
+            part.element.shape,
+            (a[0] + 1, b[0] + 1),
+            (marks.point(a), marks.point(b)),
         )
-        for force in system.parts
-        if len(force.frames) == 2
+        for part in system.parts
+        if part.element.shape
+        for a, b in itertools.pairwise(part.frames)
     )
     frames = tuple(_frame(marks, name) for name in _shown_frames(system))
     links = tuple(_link(marks, number, joints) for number in range(len(system.links) + 1))

@@ -38,8 +38,6 @@ from mbs.view.primitives import (
     link_colour,
 )
 
-_COILED = ("spring", "bushing")
-
 
 def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
     """Every joint: cylinders about axes, boxes along them, balls; and their names."""
@@ -181,7 +179,7 @@ def _element(
     force: SkeletonForce, ends: tuple[Vector, Vector], length: float, sizes: Measures
 ) -> SpringShape | SpanShape:
     # springs as wide as joints, other elements thin
-    if force.kind in _COILED:
+    if force.shape == "coil":
         nominal = max(length, 4 * sizes.joint)
         return SpringShape("force", force.links, "force", ends, 0.8 * sizes.joint, nominal)
     return SpanShape("force", force.links, "force", ends, 0.35 * sizes.bar)

@@ -20,6 +20,15 @@ from mbs.components.forces import ramp, smooth_sign
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 
+_FLANK = 1e-3
+"""Depth of a flank over which it becomes stiff [rad]: a twentieth of a degree, below usual play."""
+_CREEP = 1e-3
+"""Speed below which a brake counts as closed [rad/s], as of JointFriction: a turn in two hours."""
+_TURNS_BACK = 1e-2
+"""Speed over which losses of a gear change sign [rad/s]: a turn in ten minutes."""
+_UNLOADED = 1e-2
+"""Torque over which they do [N m]: that of a gear of a watch, or a hundredth of a small robot's."""
+
 # Springs and dampers between two shafts.
 
 
@@ -91,7 +100,7 @@ class ElastoBacklash(TwoFlanges):
     stiffness = custom.parameter("N.m/rad", positive=True)
     backlash = custom.parameter("rad", min=0)
     damping = custom.parameter("N.m.s/rad", 0.0, min=0)
-    width = custom.parameter("rad", 1e-3, positive=True)
+    width = custom.parameter("rad", _FLANK, positive=True)
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
@@ -199,8 +208,8 @@ class LossyGear(TwoFlanges):
     efficiency = custom.parameter(positive=True, max=1)
     efficiency_back = custom.parameter(min=0, max=1)
     damping = custom.parameter("N.m.s/rad", 0.0, min=0)
-    width = custom.parameter("rad/s", 1e-2, positive=True)
-    torque_width = custom.parameter("N.m", 1e-2, positive=True)
+    width = custom.parameter("rad/s", _TURNS_BACK, positive=True)
+    torque_width = custom.parameter("N.m", _UNLOADED, positive=True)
     torque = custom.output("N.m")
     loss = custom.output("W")
 
@@ -296,7 +305,7 @@ class Brake(OneFlange):
     """
 
     capacity = custom.parameter("N.m", min=0)
-    width = custom.parameter("rad/s", 1e-3, positive=True)
+    width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
     torque = custom.output("N.m")
 
@@ -331,7 +340,7 @@ class Clutch(TwoFlanges):
     """
 
     capacity = custom.parameter("N.m", min=0)
-    width = custom.parameter("rad/s", 1e-3, positive=True)
+    width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
     torque = custom.output("N.m")
 
@@ -375,7 +384,7 @@ class OneWayClutch(TwoFlanges):
     """
 
     damping = custom.parameter("N.m.s/rad", positive=True)
-    width = custom.parameter("rad/s", 1e-3, positive=True)
+    width = custom.parameter("rad/s", _CREEP, positive=True)
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:

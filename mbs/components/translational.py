@@ -18,6 +18,9 @@ from mbs.components.drives import RigidPart, TwoFlanges
 from mbs.components.forces import ramp
 from mbs.expressions import Expression, expression
 
+_TOUCH = 1e-4
+"""Depth over which surfaces that touch become stiff [m]: a tenth of a millimetre, as rough ones."""
+
 
 class SlidingMass(RigidPart):
     """A mass on a slide; its two flanges are the two ends of one rigid body without length.
@@ -134,7 +137,7 @@ class ElastoGap(_BetweenSlides):
     stiffness = custom.parameter("N/m", positive=True)
     length = custom.parameter("m", 0.0)
     damping = custom.parameter("N.s/m", 0.0, min=0)
-    width = custom.parameter("m", 1e-4, positive=True)
+    width = custom.parameter("m", _TOUCH, positive=True)
 
     def energy(self, at: Any) -> SX:
         """What is stored where they touch."""

@@ -48,6 +48,7 @@ from mbs.components.given_forces import (
     PairForceInput,
     PairTorqueInput,
     ShaftTorqueInput,
+    SlidingForceInput,
     TorqueInput,
 )
 from mbs.components.joints import (
@@ -90,6 +91,7 @@ from mbs.components.sensors import (
 from mbs.components.shapes import Shape
 from mbs.components.translational import (
     ElastoGap,
+    SlidingBrake,
     SlidingDamper,
     SlidingMass,
     SlidingSpring,
@@ -170,7 +172,9 @@ __all__ = [
     "ShaftSpringDamperSeries",
     "ShaftTorqueInput",
     "Shape",
+    "SlidingBrake",
     "SlidingDamper",
+    "SlidingForceInput",
     "SlidingMass",
     "SlidingSpring",
     "Spherical",

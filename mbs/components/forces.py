@@ -539,14 +539,16 @@ class JointStop(JointForce):
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         total = SX(0)
         for sign, depth, width in self._sides(at.x.q, at.symbols):
-            share, ramped, _ = ramp(depth, width)
-            total += sign * stiffness * ramped + damping * share * at.x.v
+            share, ramp, _ = smooth_ramp(depth, width)
+            total += sign * stiffness * ramp + damping * share * at.x.v
         return total
 
     def energy(self, at: Any) -> SX:
         """What the stops store."""
         stiffness = to_sx(self.stiffness, at.symbols)
-        areas = (ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols))
+        areas = (
+            smooth_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols)
+        )
         return stiffness * sum(areas, SX(0))
 
     def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
@@ -560,7 +562,7 @@ class JointStop(JointForce):
         return sides
 
 
-def ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
+def smooth_ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
     """A slope that grows smoothly from 0 to 1 over a width, its integral, and that one's.
 
     With u = depth / width between 0 and 1 the slope is 3 u^2 - 2 u^3; the integral is

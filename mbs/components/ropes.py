@@ -11,7 +11,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.component import Point
 from mbs.components.custom import Custom, FrameLoad, Load, Row
-from mbs.components.forces import ramp
+from mbs.components.forces import smooth_ramp
 from mbs.errors import DescriptionError
 from mbs.text import quoted
 
@@ -122,7 +122,7 @@ class ElasticRope(_Rope):
         return {"tension": self._tension(at)}
 
     def _stretched(self, at: Any) -> tuple[SX, SX, SX]:
-        return ramp(self._length(at) - at.length, at.width)
+        return smooth_ramp(self._length(at) - at.length, at.width)
 
     def _rate(self, at: Any) -> SX:
         return sum((a.to(b).rate for a, b in self._segments(at)), SX(0))

@@ -16,7 +16,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.custom import Load, Row
 from mbs.components.drives import OneFlange, TwoFlanges
-from mbs.components.forces import ramp, smooth_sign
+from mbs.components.forces import smooth_ramp, smooth_sign
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 
@@ -110,7 +110,9 @@ class ElastoBacklash(TwoFlanges):
 
     def energy(self, at: Any) -> SX:
         """What the flanks store."""
-        return SX(at.stiffness * sum((ramp(d, at.width)[2] for _, d in self._sides(at)), SX(0)))
+        return SX(
+            at.stiffness * sum((smooth_ramp(d, at.width)[2] for _, d in self._sides(at)), SX(0))
+        )
 
     def dissipation(self, at: Any) -> SX:
         """What the damper takes."""
@@ -124,7 +126,7 @@ class ElastoBacklash(TwoFlanges):
         """The torque of the spring, and that of the damper."""
         elastic, share = SX(0), SX(0)
         for sign, depth in self._sides(at):
-            slope, ramped, _ = ramp(depth, at.width)
+            slope, ramped, _ = smooth_ramp(depth, at.width)
             elastic += sign * at.stiffness * ramped
             share += slope
         return elastic, at.damping * share * self._rate(at)
@@ -322,7 +324,7 @@ class Brake(OneFlange):
         return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
-        return _friction(at, at.flange.speed)
+        return friction_of(at, at.flange.speed)
 
 
 class Clutch(TwoFlanges):
@@ -361,10 +363,10 @@ class Clutch(TwoFlanges):
         return SX(at.flange_a.speed - at.flange_b.speed)
 
     def _torque(self, at: Any) -> SX:
-        return _friction(at, self._slip(at))
+        return friction_of(at, self._slip(at))
 
 
-def _friction(at: Any, w: SX) -> SX:
+def friction_of(at: Any, w: SX) -> SX:
     """Coulomb friction of a brake or clutch at a speed, its sign smoothed."""
     return SX(at.capacity * casadi.fmax(at.engagement, 0) * smooth_sign(w, at.width))
 
@@ -404,4 +406,4 @@ class OneWayClutch(TwoFlanges):
         return SX(at.flange_a.speed - at.flange_b.speed)
 
     def _torque(self, at: Any) -> SX:
-        return SX(at.damping * ramp(self._slip(at), at.width)[1])
+        return SX(at.damping * smooth_ramp(self._slip(at), at.width)[1])

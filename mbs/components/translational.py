@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import casadi
 from casadi import SX
 
 from mbs.components import custom
 from mbs.components.custom import Load
 from mbs.components.drives import OneFlange, RigidPart, TwoFlanges
-from mbs.components.forces import ramp, smooth_sign
+from mbs.components.forces import smooth_ramp
+from mbs.components.rotational import friction_of
 from mbs.expressions import Expression, expression
 
 _TOUCH = 1e-4
@@ -155,7 +155,7 @@ class ElastoGap(_BetweenSlides):
         return SX(-at.stiffness * ramped + at.damping * slope * self._rate(at))
 
     def _contact(self, at: Any) -> tuple[SX, SX, SX]:
-        return ramp(at.length - self._extent(at), at.width)
+        return smooth_ramp(at.length - self._extent(at), at.width)
 
 
 class SlidingBrake(OneFlange):
@@ -191,5 +191,4 @@ class SlidingBrake(OneFlange):
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:
-        pressed = at.capacity * casadi.fmax(at.engagement, 0)
-        return SX(pressed * smooth_sign(at.flange.speed, at.width))
+        return friction_of(at, at.flange.speed)

@@ -72,6 +72,7 @@ from mbs.components.given_forces import (
     PairForceInput,
     PairTorqueInput,
     ShaftTorqueInput,
+    SlidingForceInput,
     TorqueInput,
 )
 from mbs.components.hydraulics import HydraulicCylinder, HydraulicValve
@@ -119,6 +120,7 @@ from mbs.components.sensors import (
 from mbs.components.shapes import Shape
 from mbs.components.translational import (
     ElastoGap,
+    SlidingBrake,
     SlidingDamper,
     SlidingMass,
     SlidingSpring,
@@ -222,7 +224,9 @@ __all__ = [
     "ShaftSpringDamperSeries",
     "ShaftTorqueInput",
     "Shape",
+    "SlidingBrake",
     "SlidingDamper",
+    "SlidingForceInput",
     "SlidingMass",
     "SlidingSpring",
     "SphereBoxContact",

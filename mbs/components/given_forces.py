@@ -168,6 +168,18 @@ class ShaftTorqueInput(TwoFlanges):
         return {"flange_a": -at.tau, "flange_b": at.tau}
 
 
+class SlidingForceInput(TwoFlanges):
+    """A force between two slides: the input `force` [N] on flange_b, the opposite on flange_a."""
+
+    flange_a = custom.flange(slides=True)
+    flange_b = custom.flange(slides=True)
+    force = custom.input("N")
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """The input on flange_b, its reaction on flange_a."""
+        return {"flange_a": -at.force, "flange_b": at.force}
+
+
 class ForceSource(Device):
     """A given force on a slide, as a motor: the input `force` [N].
 

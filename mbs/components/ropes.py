@@ -15,6 +15,9 @@ from mbs.components.forces import smooth_ramp
 from mbs.errors import DescriptionError
 from mbs.text import quoted
 
+_TAUT = 1e-3
+"""Stretch over which a rope becomes stiff [m]: a millimetre, within which its strands settle."""
+
 
 class _Rope(Custom):
     """A massless rope along a path of points; pulleys on the way have no size and no friction."""
@@ -93,7 +96,7 @@ class ElasticRope(_Rope):
 
     stiffness = custom.parameter("N/m", positive=True)
     damping = custom.parameter("N.s/m", 0.0, min=0)
-    width = custom.parameter("m", 1e-3, positive=True)
+    width = custom.parameter("m", _TAUT, positive=True)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
         """The tension draws every point towards its neighbours."""

@@ -20,6 +20,15 @@ from mbs.components.forces import smooth_ramp, smooth_sign
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 
+_FLANK = 1e-3
+"""Depth of a flank over which it becomes stiff [rad]: a twentieth of a degree, below usual play."""
+_CREEP = 1e-3
+"""Speed below which a brake counts as closed [rad/s], as of JointFriction: a turn in two hours."""
+_TURNS_BACK = 1e-2
+"""Speed over which losses of a gear change sign [rad/s]: a turn in ten minutes."""
+_UNLOADED = 1e-2
+"""Torque over which they do [N m]: that of a gear of a watch, or a hundredth of a small robot's."""
+
 # Springs and dampers between two shafts.
 
 
@@ -91,7 +100,7 @@ class ElastoBacklash(TwoFlanges):
     stiffness = custom.parameter("N.m/rad", positive=True)
     backlash = custom.parameter("rad", min=0)
     damping = custom.parameter("N.m.s/rad", 0.0, min=0)
-    width = custom.parameter("rad", 1e-3, positive=True)
+    width = custom.parameter("rad", _FLANK, positive=True)
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
@@ -201,8 +210,8 @@ class LossyGear(TwoFlanges):
     efficiency = custom.parameter(positive=True, max=1)
     efficiency_back = custom.parameter(min=0, max=1)
     damping = custom.parameter("N.m.s/rad", 0.0, min=0)
-    width = custom.parameter("rad/s", 1e-2, positive=True)
-    torque_width = custom.parameter("N.m", 1e-2, positive=True)
+    width = custom.parameter("rad/s", _TURNS_BACK, positive=True)
+    torque_width = custom.parameter("N.m", _UNLOADED, positive=True)
     torque = custom.output("N.m")
     loss = custom.output("W")
 
@@ -298,7 +307,7 @@ class Brake(OneFlange):
     """
 
     capacity = custom.parameter("N.m", min=0)
-    width = custom.parameter("rad/s", 1e-3, positive=True)
+    width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
     torque = custom.output("N.m")
 
@@ -315,7 +324,7 @@ class Brake(OneFlange):
         return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
-        return _friction(at, at.flange.speed)
+        return friction_of(at, at.flange.speed)
 
 
 class Clutch(TwoFlanges):
@@ -333,7 +342,7 @@ class Clutch(TwoFlanges):
     """
 
     capacity = custom.parameter("N.m", min=0)
-    width = custom.parameter("rad/s", 1e-3, positive=True)
+    width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
     torque = custom.output("N.m")
 
@@ -354,10 +363,10 @@ class Clutch(TwoFlanges):
         return SX(at.flange_a.speed - at.flange_b.speed)
 
     def _torque(self, at: Any) -> SX:
-        return _friction(at, self._slip(at))
+        return friction_of(at, self._slip(at))
 
 
-def _friction(at: Any, w: SX) -> SX:
+def friction_of(at: Any, w: SX) -> SX:
     """Coulomb friction of a brake or clutch at a speed, its sign smoothed."""
     return SX(at.capacity * casadi.fmax(at.engagement, 0) * smooth_sign(w, at.width))
 
@@ -377,7 +386,7 @@ class OneWayClutch(TwoFlanges):
     """
 
     damping = custom.parameter("N.m.s/rad", positive=True)
-    width = custom.parameter("rad/s", 1e-3, positive=True)
+    width = custom.parameter("rad/s", _CREEP, positive=True)
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:

@@ -14,9 +14,15 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.custom import Load
-from mbs.components.drives import RigidPart, TwoFlanges
+from mbs.components.drives import OneFlange, RigidPart, TwoFlanges
 from mbs.components.forces import smooth_ramp
+from mbs.components.rotational import friction_of
 from mbs.expressions import Expression, expression
+
+_TOUCH = 1e-4
+"""Depth over which surfaces that touch become stiff [m]: a tenth of a millimetre, as rough ones."""
+_CREEP = 1e-3
+"""Speed below which a brake counts as closed [m/s], that of JointFriction: four metres an hour."""
 
 
 class SlidingMass(RigidPart):
@@ -134,7 +140,7 @@ class ElastoGap(_BetweenSlides):
     stiffness = custom.parameter("N/m", positive=True)
     length = custom.parameter("m", 0.0)
     damping = custom.parameter("N.s/m", 0.0, min=0)
-    width = custom.parameter("m", 1e-4, positive=True)
+    width = custom.parameter("m", _TOUCH, positive=True)
 
     def energy(self, at: Any) -> SX:
         """What is stored where they touch."""
@@ -150,3 +156,39 @@ class ElastoGap(_BetweenSlides):
 
     def _contact(self, at: Any) -> tuple[SX, SX, SX]:
         return smooth_ramp(at.length - self._extent(at), at.width)
+
+
+class SlidingBrake(OneFlange):
+    """A brake between a slide and its rail: force -capacity engagement tanh(v / width).
+
+    The input `engagement` is the share of the normal force, from 0 for a brake that is released
+    to 1; below zero it counts as zero. The law is smooth and has no event of sticking: a load
+    below the capacity moves the slide at a speed below `width`.
+
+    Source: Modelica Association 2023 for the element.
+
+    Attributes:
+        capacity: force of the brake when it is fully engaged [N].
+        width: speed over which the friction changes sign [m/s].
+    """
+
+    flange = custom.flange(slides=True)
+    capacity = custom.parameter("N", min=0)
+    width = custom.parameter("m/s", _CREEP, positive=True)
+    engagement = custom.input()
+    force = custom.output("N")
+
+    def loads(self, at: Any) -> Mapping[str, Load]:
+        """Against the speed."""
+        return {"flange": -self._force(at)}
+
+    def dissipation(self, at: Any) -> SX:
+        """All its power."""
+        return SX(self._force(at) * at.flange.speed)
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """What the slide loses."""
+        return {"force": self._force(at)}
+
+    def _force(self, at: Any) -> SX:
+        return friction_of(at, at.flange.speed)

@@ -1,5 +1,7 @@
 """Play, losses, planetary gears, brakes and clutches: motions against hand formulas, heat."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.messages import refused
@@ -314,3 +316,33 @@ def test_models_of_a_planetary_gear_know_the_efforts_of_its_row():
     np.testing.assert_allclose(np.array(y).ravel(), [1, T, 2.5 * T, -3.5 * T], rtol=1e-14)
     d = mbs.models.dae(system, "index1", inputs={"motor.tau": 1.0})
     np.testing.assert_allclose(d.z0, [10 * (1 + T), 2.5 * T / 0.3, -3.5 * T / 0.5, T], rtol=1e-12)
+
+
+def test_every_number_may_be_a_symbol():
+    parts = [
+        ShaftSpringDamperSeries("p0", stiffness=40.0, damping=3.0),
+        ElastoBacklash("p1", stiffness=2e3, backlash=0.2, damping=3.0, width=5e-3),
+        LossyGear("p2", **LOSSY, damping=0.2),
+        Clutch("p3", capacity=6.0, width=0.05),
+        OneWayClutch("p4", damping=100.0, width=0.02),
+    ]
+
+    def chain(parts):
+        shafts = [ShaftInertia(f"s{k}", 0.1 * (k + 1)) for k in range(len(parts) + 1)]
+        pairs = []
+        for part, a, b in zip(parts, shafts, shafts[1:], strict=False):
+            pairs += [(a.flange_b, part.flange_a), (part.flange_b, b.flange_a)]
+        return mbs.models.inverse_dynamics(line(*pairs))
+
+    symbolic = []
+    for part in parts:
+        values = {name: getattr(part, name) for name in part.names_of("parameter")}
+        named = {n: mbs.Parameter(f"{part.name}_{n}", float(str(x))) for n, x in values.items()}
+        symbolic.append(replace(part, **named))
+    numbers, symbols = chain(parts), chain(symbolic)
+    rng = np.random.default_rng(2)
+    given = [*rng.uniform(-1, 1, (3, 6)), [0.1], [0.4]]
+    tau = np.array(numbers(*given))
+    assert np.all(tau != 0)
+    np.testing.assert_allclose(symbols(*given), tau, rtol=1e-12)
+    assert symbols.numel_in("p") == 2 + 4 + 7 + 2 + 2

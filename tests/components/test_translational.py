@@ -15,7 +15,9 @@ from mbs.components import (
     PointMass,
     Prismatic,
     ShaftInertia,
+    SlidingBrake,
     SlidingDamper,
+    SlidingForceInput,
     SlidingMass,
     SlidingSpring,
     TorqueSource,
@@ -107,6 +109,24 @@ def test_a_damped_spring_between_slides():
     np.testing.assert_allclose(stored(result, "spring"), 50 * 0.05**2, atol=1e-9)
 
 
+def test_a_brake_and_a_force_between_slides():
+    a, b, push = SlidingMass("a", mass=2.0), SlidingMass("b", mass=3.0), SlidingForceInput("push")
+    brake = metered(SlidingBrake)("brake", capacity=40.0, width=0.01)
+    m = line((a.flange_b, push.flange_a), (push.flange_b, b.flange_a), (brake.flange, b.flange_b))
+    system = asked(m)
+    result = run(system, 1.0, u={"push.force": 6.0})
+    np.testing.assert_allclose(result["a.v"], -3 * result.time, atol=1e-11)
+    np.testing.assert_allclose(result["b.v"], 2 * result.time, atol=1e-11)
+    u = {"brake.engagement": 0.3}
+    stopped = run(system, 2.0, v0={"b": 5.0}, u=u, method="rodas")
+    slides = stopped.time < 1.2
+    np.testing.assert_allclose(stopped["b.v"][slides], 5 - 4 * stopped.time[slides], atol=1e-8)
+    assert stopped["b.q"][-1] == pytest.approx(25 / 8, abs=1e-4)  # and what it creeps at the end
+    np.testing.assert_allclose(stored(stopped, "brake"), 37.5, atol=1e-7)
+    held = run(system, 2.0, u={**u, "push.force": 6.0}, method="rodas")
+    assert held["b.v"][-1] == pytest.approx(0.01 * np.arctanh(0.5), rel=1e-8)
+
+
 def test_a_gear_leads_from_a_shaft_to_a_slide():
     motor, rotor, rack = TorqueSource("motor"), ShaftInertia("rotor", 0.02), IdealGear("rack", 50)
     table = SlidingMass("table", mass=10.0)
@@ -173,6 +193,8 @@ def test_a_spring_that_turns_is_not_one_that_slides():
         (lambda: SlidingSpring("p", stiffness=-1), ["p: stiffness is -1 N/m"]),
         (lambda: SlidingSpring("p", stiffness=0), ["p: stiffness and damping are zero"]),
         (lambda: SlidingDamper("p", damping=-1), ["p: damping is -1 N.s/m"]),
+        (lambda: SlidingBrake("p", capacity=-1), ["p: capacity is -1 N"]),
+        (lambda: SlidingBrake("p", capacity=1, width=0), ["p: width is 0 m/s"]),
         (lambda: ElastoGap("p", stiffness=0), ["p: stiffness is 0 N/m"]),
         (lambda: ElastoGap("p", stiffness=1, width=-1), ["p: width is -1 m"]),
     ],

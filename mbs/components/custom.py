@@ -462,7 +462,7 @@ class Custom(OnPoints):
     - `velocity_rows(at)`: what must be zero, by label: linear in velocities.
     - `outputs(at)`: the value of every output, by name.
 
-    Source: Haug 1989 for forces and rows; Modelica Association 2023 for the equations that a
+    Source: Haug 1989 for forces and rows; Otter, Elmqvist & Mattsson 2003 for the equations that a
     connection stands for.
 
     Attributes:

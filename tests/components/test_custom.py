@@ -26,6 +26,7 @@ from mbs.components import (
     RollingDisc,
     Spherical,
     Spring,
+    WrenchSensor,
     custom,
 )
 from mbs.components.custom import At, Row, Signal
@@ -901,6 +902,28 @@ class TestModels:
         assert np.abs(three["a.force"] - ramp).max() < 1e-9
         four = mbs.simulate.run(system, 0.3, parameters={"T": 0.4}, u={"a": 0.0}, **options)
         assert np.abs(four["a.force"] - 2 * np.exp(-four.time / 0.4)).max() < 1e-9
+
+    def test_sweep_varies_states_and_inputs(self):
+        grid = {"a.force": [0.0, 5.0], "a.order": [1.0, 3.0], "T": [0.2, 0.4]}
+        study = mbs.simulate.sweep(driven(), grid, 0.1, tolerance=1e-9)
+        for case, result in study:
+            lag = np.exp(-0.1 / case["T"])
+            end = case["a.order"] + (case["a.force"] - case["a.order"]) * lag
+            assert abs(result["a.force"][-1] - end) < 1e-7
+
+    def test_forces_in_joints_know_them(self):
+        m = pendulum(lambda tip: Actuator("a", tip), lambda tip: Pusher("push", "j1"))
+        m.add(WrenchSensor("bearing", "j1"))
+        m.add(AbsoluteSensor("middle", m.components["bar"].center))
+        u = {"a.order": 7.0, "push.effort": 2.0}
+        result = mbs.simulate.run(m.assemble(), 0.3, u=u, quiet=True)
+        # m a = weight + force of the actuator + force of the joint, in axes of the world
+        f = np.array([result[f"bearing.f.{x}"] for x in "xy"])
+        c, s = np.cos(result["j1.q"]), np.sin(result["j1.q"])
+        world = np.array([c * f[0] - s * f[1], s * f[0] + c * f[1]])
+        a = np.array([result[f"middle.a.{x}"] for x in "xy"])
+        expected = 2 * a - [[0.0], [-2 * 9.81]] - np.array([0 * c, result["a.force"]])
+        assert np.abs(world - expected).max() < 1e-10
 
 
 class TestCopies:

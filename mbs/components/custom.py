@@ -495,7 +495,7 @@ class Custom(OnPoints):
     - `energy(at)`: what it stores [J]; of positions and states alone.
     - `dissipation(at)`: what it turns into heat [W], never negative.
     - `rates(at)`: the rate of every state, by name.
-    - `rows(at)`: what must be zero, by label: `Row`s of positions, unknowns and parameters.
+    - `rows(at)`: what must be zero, by label: each a `Row`, of positions, unknowns and parameters.
     - `positive(at)`: what must be positive where the rows are zero, by label: it tells which of the
       configurations that the rows allow is meant.
     - `velocity_rows(at)`: what must be zero, by label: linear in velocities.

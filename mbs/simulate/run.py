@@ -799,8 +799,8 @@ def sensor_columns(system: System, motion: Mapping[str, Array]) -> Iterator[tupl
 
     Args:
         system: with or without sensors.
-        motion: a column for each instant of q (nq, n), v, a and tau (nv, n) of the whole tree, and
-            of the parameters p (np, n).
+        motion: a column for each instant of q (nq, n), v, a and tau (nv, n) of the whole tree, of
+            states z and inputs u of components, and of the parameters p (np, n).
     """
     if not system.sensors:
         return
@@ -953,8 +953,9 @@ def _result(system: System, legs: Sequence[Leg], p: Sequence[float], stop: Stop)
     for name, unit, values in device_columns(system, u, x[:, system.nq + system.nv :], y):
         column(name, unit, values)
     motion = {"q": x[:, : system.nq].T, "v": x[:, system.nq : system.nq + system.nv].T}
+    motion |= {"z": x[:, system.nq + system.nv :].T, "u": u.T, "p": every}
     for name, unit, values in sensor_columns(
-        system, {**motion, "a": a.T, "tau": every_effort(system, tau, held).T, "p": every}
+        system, {**motion, "a": a.T, "tau": every_effort(system, tau, held).T}
     ):
         column(name, unit, values)
     contact = legs[0].contact

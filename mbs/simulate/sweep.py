@@ -488,8 +488,9 @@ def sweep(
         model: a system, simulated by `run`; or the path of an FMU, simulated by `fmu`.
         grid: name to its values, for every combination, the last name fastest; or a sequence with
             one dict of names to values for each case. Names of a system are parameters, positions
-            and velocities at the start such as `j1.q` and `j1.v`, and constant efforts such as
-            `j1.tau`; those of an FMU are parameters, inputs and start values.
+            and velocities at the start such as `j1.q` and `j1.v`, constant efforts such as
+            `j1.tau`, and of components states at the start such as `motor.i` and constant inputs
+            such as `motor.voltage`; those of an FMU are parameters, inputs and start values.
         duration: [s]; needed for a system.
         folder: where results are kept; one that lasts as long as the answer when left out.
         executor: any executor of `concurrent.futures`, also that of a cluster; this process when
@@ -621,6 +622,7 @@ def _simulation(model: object, cases: Sequence[Case]) -> _Run | _Fmu:
 def _system_names(system: System) -> set[str]:
     positions, speeds = (c.name for c in system.coordinates), [s.name for s in system.speeds]
     known = {*system.symbol_table, *(f"{name}.q" for name in positions)}
+    known = known.union(*_signals(system).values())
     return known | {f"{name}{ending}" for name in speeds for ending in (".v", ".tau")}
 
 
@@ -675,11 +677,22 @@ def _check_executor(model: object, executor: object, options: Mapping[str, Any])
 def _arguments(system: System, case: Case) -> dict[str, dict[str, float]]:
     """The arguments of `run` that the names of a case belong to."""
     given: dict[str, dict[str, float]] = {}
+    signals = _signals(system)
     for name, value in case.items():
-        known = name in system.symbol_table
+        signal = next((kind for kind, names in signals.items() if name in names), None)
+        known = name in system.symbol_table or signal is not None
         ending = "" if known else next((e for e in _START if name.endswith(e)), "")
-        given.setdefault(_START.get(ending, "parameters"), {})[name.removesuffix(ending)] = value
+        kind = signal or _START.get(ending, "parameters")
+        given.setdefault(kind, {})[name.removesuffix(ending)] = value
     return given
+
+
+def _signals(system: System) -> dict[str, list[str]]:
+    """States and inputs of components, by the argument of `run` that takes them."""
+    return {
+        "z0": [name for name, _ in system.states],
+        "u": [name for name, _ in system.inputs],
+    }
 
 
 def _merge(options: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:

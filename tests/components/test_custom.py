@@ -26,6 +26,7 @@ from mbs.components import (
     RollingDisc,
     Spherical,
     Spring,
+    WrenchSensor,
     custom,
 )
 from mbs.components.custom import At, Row, Signal
@@ -806,6 +807,31 @@ class TestModels:
         assert mbs.models.direct_dynamics(system).name_in() == ["q", "v", "tau", "z", "p"]
         assert mbs.models.inertia_matrix(system).name_in() == ["q", "p"]
 
+    def test_inputs_without_a_state_between(self):
+        m = pendulum(
+            lambda tip: Pusher("push", "j1"),
+            lambda tip: Actuator("a", tip),
+            lambda tip: Drag("d", tip, c="C"),
+            C=0.3,
+        )
+        system = m.assemble()
+        assert [name for name, _ in system.inputs] == ["push.effort", "a.order"]
+        idm, ddm = mbs.models.inverse_dynamics(system), mbs.models.direct_dynamics(system)
+        assert idm.name_in() == ["q", "v", "a", "z", "u", "p"]
+        assert ddm.name_in() == ["q", "v", "tau", "z", "u", "p"]
+        point = 0.3, 0.7, 1.1, 4.0
+        pushed, free = idm(*point, [2.5, 9.0], 0.3), idm(*point, [0.0, 0.0], 0.3)
+        assert float(pushed - free) == pytest.approx(-2.5, rel=1e-13)
+        assert float(ddm(0.3, 0.7, pushed, 4.0, [2.5, 0.0], 0.3)) == pytest.approx(1.1, rel=1e-13)
+        refused(ModelError, "u", by=lambda: idm(*point, [2.5], 0.3))
+        u = np.array([[2.5, 0.0], [-1.0, 0.0], [0.0, 3.0]])
+        rows = [np.full((3, 1), x) for x in point]
+        many = np.asarray(mbs.native.batch(idm)(*rows, u, np.full((3, 1), 0.3))).ravel()
+        assert many == pytest.approx(float(free) - u[:, 0], rel=1e-12)
+        fast = mbs.native.compiled(idm)
+        found = np.asarray(fast(*point, u[1], 0.3)).item()
+        assert found == pytest.approx(float(free) + 1.0, rel=1e-13)
+
     def test_values(self):
         system = driven()
         idm = mbs.models.inverse_dynamics(system)
@@ -877,6 +903,28 @@ class TestModels:
         four = mbs.simulate.run(system, 0.3, parameters={"T": 0.4}, u={"a": 0.0}, **options)
         assert np.abs(four["a.force"] - 2 * np.exp(-four.time / 0.4)).max() < 1e-9
 
+    def test_sweep_varies_states_and_inputs(self):
+        grid = {"a.force": [0.0, 5.0], "a.order": [1.0, 3.0], "T": [0.2, 0.4]}
+        study = mbs.simulate.sweep(driven(), grid, 0.1, tolerance=1e-9)
+        for case, result in study:
+            lag = np.exp(-0.1 / case["T"])
+            end = case["a.order"] + (case["a.force"] - case["a.order"]) * lag
+            assert abs(result["a.force"][-1] - end) < 1e-7
+
+    def test_forces_in_joints_know_them(self):
+        m = pendulum(lambda tip: Actuator("a", tip), lambda tip: Pusher("push", "j1"))
+        m.add(WrenchSensor("bearing", "j1"))
+        m.add(AbsoluteSensor("middle", m.components["bar"].center))
+        u = {"a.order": 7.0, "push.effort": 2.0}
+        result = mbs.simulate.run(m.assemble(), 0.3, u=u, quiet=True)
+        # m a = weight + force of the actuator + force of the joint, in axes of the world
+        f = np.array([result[f"bearing.f.{x}"] for x in "xy"])
+        c, s = np.cos(result["j1.q"]), np.sin(result["j1.q"])
+        world = np.array([c * f[0] - s * f[1], s * f[0] + c * f[1]])
+        a = np.array([result[f"middle.a.{x}"] for x in "xy"])
+        expected = 2 * a - [[0.0], [-2 * 9.81]] - np.array([0 * c, result["a.force"]])
+        assert np.abs(world - expected).max() < 1e-10
+
 
 class TestCopies:
     def test_pickled(self):
@@ -937,6 +985,29 @@ class TestCopies:
         for side, K in (("left", 30.0), ("right", 120.0)):
             swing = 0.1 * np.cos(np.sqrt(K / inertia) * result.time)
             assert np.abs(result[f"{side}.j.q"] - swing).max() < 1e-8
+
+    def test_wires_between_levels(self):
+        inner = mbs.Mechanism("axis", gravity=(0, 0, 0))
+        bar = inner.add(Box("bar", length=1.0, mass=2.0))
+        inner.connect(inner.world, Revolute("j", axis="z", actuated=False), bar.left)
+        inner.add(Actuator("a", bar.right, time=0.2, force=1.0))
+        follower = inner.add(Gain("k", 3.0))
+        inner.wire("a.force", follower.u)
+        m = mbs.Mechanism("outer", gravity=(0, 0, 0))
+        for side in ("left", "right"):
+            placed = m.add(inner, side)
+            m.connect(m.world, placed.base)
+            m.wire(mbs.components.Constant(f"{side}.order", 5.0).y, placed["a"].order)
+        m.wire("left.k.y", m.add(Gain("sum", 2.0)).u)
+        system = m.assemble()
+        assert system.inputs == ()
+        assert list(system.z_start) == [1.0, 1.0]
+        result = mbs.simulate.run(
+            system, 0.3, z0={"right.a.force": 0.0}, tolerance=1e-10, quiet=True
+        )
+        t = result.time
+        assert np.abs(result["sum.y"] - 6 * (5 - 4 * np.exp(-t / 0.2))).max() < 1e-8
+        assert np.abs(result["right.k.y"] - 3 * (5 - 5 * np.exp(-t / 0.2))).max() < 1e-8
 
 
 class Pusher(Custom):

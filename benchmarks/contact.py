@@ -66,7 +66,9 @@ class Ours:
 
     def __init__(self, system: Any, method: str) -> None:
         state = full_state(system)
-        self.x0 = np.concatenate([*configuration(system, start(HEIGHT), None, None), system.z_start])
+        self.x0 = np.concatenate(
+            [*configuration(system, start(HEIGHT), None, None), system.z_start]
+        )
         self.events, (rhs, project, _) = with_crossings(state, self.x0, 0.0, None, ())
         self.functions = equations(rhs, project, method, self.events)
         self.library = library_of(self.functions)
@@ -76,9 +78,7 @@ class Ours:
     def run(self, tolerance: float) -> Array:
         """(m, nx) states, the integration alone."""
         times, control = np.linspace(0, DURATION, ROWS + 1), step_tolerances(tolerance)
-        given = problem(
-            self.functions, self.x0, times, None, self.events.modes, control, np.inf
-        )
+        given = problem(self.functions, self.x0, times, None, self.events.modes, control, np.inf)
         motion = run_compiled(self.library, given, None)
         if motion.stop is not None:
             raise motion.stop

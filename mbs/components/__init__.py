@@ -2,6 +2,13 @@
 
 from mbs.components.bodies import Body, Box, Cylinder, KhalilBody, PointMass, RigidBody, World
 from mbs.components.component import Component, Point
+from mbs.components.constraints import (
+    ConstantVelocity,
+    PointOnLine,
+    PointOnPlane,
+    Rod,
+    RollingDisc,
+)
 from mbs.components.contact import (
     BoxPlaneContact,
     CapsulePlaneContact,
@@ -10,13 +17,6 @@ from mbs.components.contact import (
     SphereBoxContact,
     SpherePlaneContact,
     SphereSphereContact,
-)
-from mbs.components.constraints import (
-    ConstantVelocity,
-    PointOnLine,
-    PointOnPlane,
-    Rod,
-    RollingDisc,
 )
 from mbs.components.couplings import Coupling, Gear, RackAndPinion, Screw
 from mbs.components.custom import Custom, Flange

@@ -1,4 +1,4 @@
-"""Contact in motion: shapes that press on planes, on height fields and on each other, with friction.
+"""Contact in motion: shapes on planes, on height fields and on each other, with friction.
 
 The laws are smooth, without events: a force that grows with the depth by which two shapes overlap,
 and friction that follows the velocity with which they slide. A shape says where it touches, as
@@ -156,7 +156,9 @@ class Contact(ForceElement):
 
     def _settle_restitution(self) -> None:
         """Check what an impact leaves, which is given by two numbers or by the damping."""
-        given = [name for name in ("restitution", "impact_speed") if getattr(self, name) is not None]
+        given = [
+            name for name in ("restitution", "impact_speed") if getattr(self, name) is not None
+        ]
         if len(given) == 1 or (given and self.damping is not None):
             raise DescriptionError(
                 f"{self.name}: {' and '.join(given)} {'is' if len(given) == 1 else 'are'} given"
@@ -249,7 +251,7 @@ class Contact(ForceElement):
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """Sizes of the forces, the depth, and how fast it slides, at every spot."""
-        found = {}
+        found: dict[str, SX] = {}
         for label, touch in zip(self.labels, self._touches(at), strict=True):
             values = (
                 touch.normal,
@@ -301,9 +303,7 @@ class Contact(ForceElement):
             friction, bend = -limit * slip / casadi.sqrt(casadi.dot(slip, slip) + width**2), zeros()
         return _Touch(normal, elastic, along, rate, slip, friction, bend, spot)
 
-    def _bristles(
-        self, at: Any, label: str, spot: Spot, slip: SX, limit: SX
-    ) -> tuple[SX, SX]:
+    def _bristles(self, at: Any, label: str, spot: Spot, slip: SX, limit: SX) -> tuple[SX, SX]:
         """(3, 1) friction on the body, and (3, 1) rates of the bristles.
 
         With w the bend over that at the limit, w' = (v - s(w) |v| w) / bristle, s growing from 0
@@ -348,7 +348,7 @@ def damping_for(restitution: float, impact_speed: float) -> float:
 
 
 def _bend(x: float) -> float:
-    """x - ln(1 + x), to rounding where x is small."""
+    """X - ln(1 + x), to rounding where x is small."""
     if abs(x) > 0.1:
         return x - math.log1p(x)
     return sum((-x) ** k / k for k in range(2, 20))  # 0.1^20 is below rounding
@@ -373,7 +373,7 @@ class PlaneContact(Contact):
     """A shape made of spheres, on the ground z < 0 of a frame."""
 
     ports = ("body", "plane")
-    labels = ()
+    labels: ClassVar[tuple[str, ...]] = ()
     axes = "xy"
 
     body = custom.frame()
@@ -468,7 +468,9 @@ def _take_size(box: Any) -> None:
     for side in sides:
         value = to_float(side)
         if value is not None and value <= 0:
-            raise DescriptionError(f"{box.name}: size has the side {value:g} m; give more than zero")
+            raise DescriptionError(
+                f"{box.name}: size has the side {value:g} m; give more than zero"
+            )
     object.__setattr__(box, "size", sides)
 
 
@@ -596,5 +598,3 @@ class HeightFieldContact(Contact):
         slope = casadi.norm_2(fall)
         normal = fall / slope
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal, slope)]
-
-

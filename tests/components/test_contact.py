@@ -1,4 +1,4 @@
-"""Contacts: where they touch, how hard, and the balance of their power, by formulas of their own."""
+"""Contacts: where they touch, how hard, and the balance of their power, by other formulas."""
 
 import casadi
 import numpy as np
@@ -355,7 +355,10 @@ def test_wrong_numbers_are_refused(given, sentence):
     ("height", "sentence"),
     [
         (lambda x, y: np.floor(float(x)), "c: height is nan for symbols x and y"),
-        (lambda x, y: np.interp(x, [0, 1], [0, 1]), "c: height cannot be written with CasADi symbols"),
+        (
+            lambda x, y: np.interp(x, [0, 1], [0, 1]),
+            "c: height cannot be written with CasADi symbols",
+        ),
         (lambda x, y: casadi.vertcat(x, y), "c: height has the shape (2, 1); give one value"),
         (lambda x, y: x * SX.sym("s"), "c: height holds the symbols s; make it of x, y"),
     ],

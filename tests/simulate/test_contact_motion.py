@@ -282,9 +282,7 @@ def thrown():
     body = m.add(Body("b", mass=MASS, inertia=(2e-3, 2e-3, 2e-3)))
     m.connect(under, Revolute("turn", axis="y", actuated=False), body)
     law = {"stiffness": 1e5, "restitution": 0.7, "impact_speed": 2.0, "friction": 0.4}
-    m.add(
-        SpherePlaneContact("c", body, m.world, radius=RADIUS, friction_law="bristle", **law)
-    )
+    m.add(SpherePlaneContact("c", body, m.world, radius=RADIUS, friction_law="bristle", **law))
     return m.assemble()
 
 

@@ -14,7 +14,7 @@ from itertools import product
 from typing import Any, ClassVar
 
 import casadi
-from casadi import SX
+from casadi import SX, Function
 
 from mbs.components import custom
 from mbs.components.bodies import three
@@ -574,6 +574,12 @@ class HeightFieldContact(Contact):
         if value.shape != (1, 1):
             raise DescriptionError(
                 f"{self.name}: height has the shape {value.shape}; give one value for (x, y)"
+            )
+        graph = Function("height", [x, y], [value], {"allow_free": True})
+        if any(graph.instruction_id(k) == casadi.OP_CALL for k in range(graph.n_instructions())):
+            raise DescriptionError(
+                f"{self.name}: height calls another Function, such as an interpolant, which models"
+                " do not take; write it by operations, such as a sum over the points of a grid"
             )
         if value.is_constant() and not value.is_regular():
             raise DescriptionError(

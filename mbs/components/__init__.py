@@ -17,6 +17,7 @@ from mbs.components.contact import (
     SphereBoxContact,
     SpherePlaneContact,
     SphereSphereContact,
+    WheelPlaneContact,
 )
 from mbs.components.couplings import Coupling, Gear, RackAndPinion, Screw
 from mbs.components.custom import Custom, Flange
@@ -134,6 +135,7 @@ __all__ = [
     "Torque",
     "TorqueSource",
     "Universal",
+    "WheelPlaneContact",
     "World",
     "WrenchSensor",
 ]

@@ -19,6 +19,7 @@ from mbs.components import (
     SphereBoxContact,
     SpherePlaneContact,
     SphereSphereContact,
+    WheelPlaneContact,
     custom,
 )
 from mbs.components.contact import damping_for
@@ -39,6 +40,8 @@ SHAPES = {
     "sphere": lambda a, b, **law: SpherePlaneContact("c", a, b, radius=1.0, **law),
     "point": lambda a, b, **law: SpherePlaneContact("c", a, b, **law),
     "capsule": lambda a, b, **law: CapsulePlaneContact("c", a, b, radius=0.5, length=1.0, **law),
+    "wheel": lambda a, b, **law: WheelPlaneContact("c", a, b, radius=0.8, rim=0.1, **law),
+    "disc": lambda a, b, **law: WheelPlaneContact("c", a, b, radius=0.9, **law),
     "box": lambda a, b, **law: BoxPlaneContact("c", a, b, size=SIZE, **law),
     "spheres": lambda a, b, **law: SphereSphereContact(
         "c", a, b, radius_a=1.0, radius_b=0.5, **law

@@ -81,6 +81,13 @@ SMALL = {
         "Status": 0.5,
         "Difference from continuous control": 5e-3,
     },
+    "13_quadruped_drop": {
+        "Normal forces at the end / weight - cos(slope)": 1e-3,
+        "Largest friction / normal force": 0.6 + 1e-9,
+        "Fastest slip of a foot at the end": 1e-6,
+        "Trunk moves in the last second by": 1e-3,
+        "Energy that is gained": 1e-4,
+    },
 }
 """What each example prints, and how large it may be."""
 
@@ -97,6 +104,7 @@ FILES = {
     "10_quadruped_jump": ["quadruped.png"],
     "11_chain": ["chain.png"],
     "12_bare_c": ["crank/crank.h", "crank/four_bar_step.c"],
+    "13_quadruped_drop": ["quadruped_drop.png"],
 }
 
 

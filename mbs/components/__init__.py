@@ -31,6 +31,7 @@ from mbs.components.contact import (
     SphereBoxContact,
     SpherePlaneContact,
     SphereSphereContact,
+    WheelPlaneContact,
 )
 from mbs.components.couplings import Coupling, Gear, Helical, RackAndPinion, Screw
 from mbs.components.curves import (
@@ -240,6 +241,7 @@ __all__ = [
     "TorqueInput",
     "TorqueSource",
     "Universal",
+    "WheelPlaneContact",
     "World",
     "WrenchSensor",
 ]

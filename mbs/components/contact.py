@@ -1,4 +1,4 @@
-"""Contact in motion: shapes that press on planes, on height fields and on each other, with friction.
+"""Contact in motion: shapes on planes, on height fields and on each other, with friction.
 
 The laws are smooth, without events: a force that grows with the depth by which two shapes overlap,
 and friction that follows the velocity with which they slide. A shape says where it touches, as
@@ -14,7 +14,7 @@ from itertools import product
 from typing import Any, ClassVar
 
 import casadi
-from casadi import SX
+from casadi import SX, Function
 
 from mbs.components import custom
 from mbs.components.bodies import three
@@ -251,7 +251,7 @@ class Contact(ForceElement):
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """Sizes of the forces, the depth, and how fast it slides, at every spot."""
-        found = {}
+        found: dict[str, SX] = {}
         for label, touch in zip(self.labels, self._touches(at), strict=True):
             values = (
                 touch.normal,
@@ -373,14 +373,19 @@ class PlaneContact(Contact):
     """A shape made of spheres, on the ground z < 0 of a frame."""
 
     ports = ("body", "plane")
-    labels = ()
+    labels: ClassVar[tuple[str, ...]] = ()
     axes = "xy"
 
     body = custom.frame()
     plane = custom.frame()
 
-    def centres(self, at: Any) -> list[SX]:
-        """(3, 1) centres of the spheres, in the frame of the body [m]."""
+    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+        """(3, 1) centres of the spheres, in the frame of the body [m].
+
+        Args:
+            motion: of that frame, seen from the plane.
+            at: the parameters.
+        """
         return [zeros()]
 
     def reach(self, at: Any) -> SX:
@@ -390,7 +395,7 @@ class PlaneContact(Contact):
     def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
         """The lowest point of every sphere."""
         found, up = [], vector([SX(0), SX(0), SX(1)])
-        for centre in self.centres(at):
+        for centre in self.centres(motion, at):
             arm = casadi.mtimes(motion.R, centre)
             depth = self.reach(at) - (motion.p + arm)[2]
             found.append(Spot(depth, up, arm - (self.reach(at) - depth / 2) * up))
@@ -434,9 +439,37 @@ class CapsulePlaneContact(PlaneContact):
         """The radius."""
         return SX(at.radius)
 
-    def centres(self, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
         """The ends a, at z < 0, and b."""
         return [vector([SX(0), SX(0), side * at.length / 2]) for side in (-1, 1)]
+
+
+class WheelPlaneContact(PlaneContact):
+    """A wheel on a plane, by the lowest point of its rim, which may be round.
+
+    Flat on the plane it has no single lowest point; it then stands on one of its rim.
+
+    Attributes:
+        body: frame at the centre of the wheel, whose y is its axle.
+        plane: frame whose plane z = 0 is the ground, and its z the way out of it.
+        radius: of the circle in the middle of the rim [m].
+        rim: radius of the round of the rim [m]; a thin disc where it is zero.
+    """
+
+    labels = ("",)
+
+    radius = custom.parameter("m", positive=True)
+    rim = custom.parameter("m", 0.0, min=0)
+
+    def reach(self, at: Any) -> SX:
+        """That of the round of the rim."""
+        return SX(at.rim)
+
+    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+        """The lowest point of the circle: it is not one of the body, but its height moves alike."""
+        up = motion.R[2, :].T
+        across = vector([up[0], SX(0), up[2]])
+        return [-at.radius * across / custom.regular_length(across)]
 
 
 class BoxPlaneContact(PlaneContact):
@@ -456,7 +489,7 @@ class BoxPlaneContact(PlaneContact):
         _take_size(self)
         Contact.__post_init__(self)
 
-    def centres(self, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
         """The corners 1 to 8: x changes its sign first, then y, then z, all negative at first."""
         half = _half_size(self, at)
         return [half * vector(map(SX, signs[::-1])) for signs in product((-1, 1), repeat=3)]
@@ -574,6 +607,12 @@ class HeightFieldContact(Contact):
         if value.shape != (1, 1):
             raise DescriptionError(
                 f"{self.name}: height has the shape {value.shape}; give one value for (x, y)"
+            )
+        graph = Function("height", [x, y], [value], {"allow_free": True})
+        if any(graph.instruction_id(k) == casadi.OP_CALL for k in range(graph.n_instructions())):
+            raise DescriptionError(
+                f"{self.name}: height calls another Function, such as an interpolant, which models"
+                " do not take; write it by operations, such as a sum over the points of a grid"
             )
         if value.is_constant() and not value.is_regular():
             raise DescriptionError(

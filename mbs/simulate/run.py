@@ -536,8 +536,12 @@ def with_crossings(
     )
     passage = state.passage
     if passage is not None:
-        parts = {name: wide(getattr(passage, name)) for name in ("rows", "forces", "regularity")}
-        passage = replace(passage, **parts)
+        passage = replace(
+            passage,
+            rows=wide(passage.rows),
+            forces=wide(passage.forces),
+            regularity=wide(passage.regularity),
+        )
     project = None if state.project is None else wide(state.project)
     return watched, (wide(state.rhs), project, passage)
 

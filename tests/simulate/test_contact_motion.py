@@ -20,6 +20,7 @@ from mbs.components import (
     RollingDisc,
     SpherePlaneContact,
     SphereSphereContact,
+    WheelPlaneContact,
 )
 
 G = 9.81
@@ -233,6 +234,30 @@ def test_a_ball_rolls_up_a_ramp(law):
     heat = np.sum((result["c.friction_force"] * result["c.slip"])[1:]) * 1e-3
     assert E[0] - E[-1] == pytest.approx(heat, abs=2e-4)
     assert heat < 1e-3
+
+
+def test_a_leaning_wheel_rolls_as_a_rolling_disc():
+    def wheel(add):
+        m = mbs.Mechanism("wheel", gravity=(0, 0, -G))
+        body = m.add(Body("b", mass=1.0, inertia=(0.02, 0.04, 0.02)))
+        m.connect(m.world, Free("f"), body)
+        add(m, body)
+        return m.assemble(guess={"f.z": 0.3})
+
+    lean = 0.15
+    turn = {"f.qw": np.cos(lean / 2), "f.qx": np.sin(lean / 2), "f.z": 0.3 * np.cos(lean)}
+    speed = {"f.vx": 2.0, "f.vy": 0.0, "f.vz": 0.0, "f.wx": 0.0, "f.wy": 2 / 0.3, "f.wz": 0.0}
+    law = {"stiffness": 1e8, "damping": 2.0, "friction": 2.0, "friction_law": "bristle"}
+    law |= {"bristle": 1e-5, "bristle_time": 2e-3}
+    touching = wheel(lambda m, b: m.add(WheelPlaneContact("c", b, m.world, radius=0.3, **law)))
+    rolling = wheel(lambda m, b: m.connect(m.world, RollingDisc("c", radius=0.3), b))
+    free = {k: v for k, v in speed.items() if k in ("f.wx", "f.wy", "f.wz")}
+    options = {"q0": turn, "step": 0.1, "tolerance": 1e-8}
+    one = run(touching, 1.0, v0=speed, **options)
+    other = run(rolling, 1.0, v0=free, **options)
+    for name in ("f.x.q", "f.y.q", "f.z.q", "f.qx.q"):
+        np.testing.assert_allclose(one[name], other[name], rtol=0, atol=2e-3)
+    assert abs(other["f.y.q"][-1]) > 0.1  # it runs in a curve
 
 
 def test_a_point_in_a_bowl_keeps_its_energy():

@@ -275,3 +275,23 @@ def test_the_longest_step_is_positive():
     rhs, events = clock(2 - T)
     with pytest.raises(ModelError, match="longest step 0 must be a positive number"):
         integrate_events(rhs, [0, 0], [0, 1], events, max_step=0)
+
+
+@BOTH
+@METHODS
+def test_what_begins_at_an_event_and_is_short_needs_a_first_step(compiled, method):
+    # a wall of 1e-4 m, elastic, that is met at 10 m/s and cannot be passed
+    side, fired = ca.SX.sym("side"), ca.SX.sym("fired")
+    depth = X[0] - 1
+    inside = ca.fmin(ca.fmax(depth, 0), ca.fmax(1e-4 - depth, 0))
+    rhs = ca.Function("f", [T, X, side], [ca.vertcat(X[1], -1e11 * inside)])
+    g = ca.Function("g", [T, X, side], [side * depth])
+    j = ca.Function("j", [T, X, side, fired], [X, -side])
+    ends = []
+    for first in (0.0, 1e-9):
+        events = Events(g, j, [-1.0], first)
+        options = {"method": method, "rtol": 1e-8, "atol": 1e-8, "compiled": compiled}
+        ends.append(integrate_events(rhs, [0, 10], [0, 1], events, **options).x[-1, 1])
+    assert ends[1] == pytest.approx(-10, rel=1e-4)
+    if method == "dopri5":  # the other one looks at slopes where it begins
+        assert ends[0] == pytest.approx(10, rel=1e-4)

@@ -63,8 +63,8 @@ class HydraulicCylinder(Custom):
     end_stiffness = custom.parameter("N/m", 1e8, positive=True)
     end_damping = custom.parameter("N.s/m", 1e5, min=0)
     end_width = custom.parameter("m", 1e-4, positive=True)
-    p_a = custom.state("Pa", nominal=1e5)
-    p_b = custom.state("Pa", nominal=1e5)
+    p_a = custom.state("Pa", nominal=1e5)  # a bar: loads change pressures by as much
+    p_b = custom.state("Pa", nominal=1e5)  # likewise
     flow_a = custom.input("m3/s")
     flow_b = custom.input("m3/s")
     force = custom.output("N")

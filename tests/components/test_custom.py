@@ -519,6 +519,13 @@ class TestWires:
         m.wire("enc.q", gain.u)
         refused(AssemblyError, "k.u is wired to 'enc.q'", "no signal", by=m.assemble)
 
+    def test_a_component_that_was_taken_away(self):
+        m = pendulum()
+        m.add(JointSensor("enc", "j1"))
+        m.wire("enc.q", Gain("k", 2.0).u)
+        del m.components["k"]
+        refused(AssemblyError, "k.u, whose component is not in the mechanism", by=m.assemble)
+
     def test_two_sources(self):
         m = pendulum()
         gain, other = Gain("k", 2.0), Gain("other", 1.0)

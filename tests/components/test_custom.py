@@ -436,7 +436,7 @@ class TestRows:
 
     def test_unknowns_need_rows(self):
         refused_at_assembly(
-            "2 unknowns have 1 rows",
+            "the number of unknowns is 2 and that of rows 1",
             s=custom.unknown("m"),
             t=custom.unknown("m"),
             rows=lambda self, at: {"a": at.point.p[0] - at.s - at.t},

@@ -358,10 +358,15 @@ def _wires(
                 f" {did_you_mean(str(source), outputs)}"
             )
         known = mechanism.components.get(target.owner.name)
-        if not isinstance(known, Custom) or target.name not in known.input_names:
+        if not isinstance(known, Custom):
             raise AssemblyError(
-                f"{mechanism.name}: {str(source)!r} is wired to {target}, which is no input of a"
-                " component of the mechanism; add that component"
+                f"{mechanism.name}: {str(source)!r} is wired to {target}, whose component is not in"
+                " the mechanism; add it, or take the wire away"
+            )
+        if target.name not in known.input_names:
+            raise AssemblyError(
+                f"{mechanism.name}: {str(source)!r} is wired to {target}, which is no input;"
+                f" {did_you_mean(target.name, known.input_names)}"
             )
         if (known.name, target.name) in found:
             raise AssemblyError(

@@ -211,8 +211,8 @@ class _Check:
         unknowns = self.element.names_of("unknown")
         if len(unknowns) > count:
             raise AssemblyError(
-                f"{self._title}: {len(unknowns)} unknowns have {count} rows, which do not determine"
-                " them; give a row for each at least"
+                f"{self._title}: the number of unknowns is {len(unknowns)} and that of rows"
+                f" {count}, which do not determine them; give a row for each at least"
             )
 
     def _events(self, modes: Sequence[str]) -> None:

@@ -64,7 +64,8 @@ class TestWithoutMemory:
         assert [p.name for p in system.parameters] == ["K"]
         refused(
             AssemblyError,
-            "which is no input",
+            "two.u3, which is no input",
+            "u1, u2",
             by=wired(one := Sum("one"), wires=[(one.y, Sum("two").u3)]).assemble,
         )
 

@@ -436,7 +436,7 @@ class TestRows:
 
     def test_unknowns_need_rows(self):
         refused_at_assembly(
-            "2 unknowns have 1 rows",
+            "the number of unknowns is 2 and that of rows 1",
             s=custom.unknown("m"),
             t=custom.unknown("m"),
             rows=lambda self, at: {"a": at.point.p[0] - at.s - at.t},
@@ -518,6 +518,13 @@ class TestWires:
         gain = m.add(Gain("k", 2.0))
         m.wire("enc.q", gain.u)
         refused(AssemblyError, "k.u is wired to 'enc.q'", "no signal", by=m.assemble)
+
+    def test_a_component_that_was_taken_away(self):
+        m = pendulum()
+        m.add(JointSensor("enc", "j1"))
+        m.wire("enc.q", Gain("k", 2.0).u)
+        del m.components["k"]
+        refused(AssemblyError, "k.u, whose component is not in the mechanism", by=m.assemble)
 
     def test_two_sources(self):
         m = pendulum()

@@ -270,6 +270,22 @@ def test_bristles_stay_within_the_friction_cone():
     np.testing.assert_allclose(rate.ravel(), [-1e-4 / 5e-3, 0], rtol=1e-12)
 
 
+def test_bristles_along_a_normal_relax():
+    m = mbs.Mechanism("two", gravity=(0, 0, 0))
+    bodies = [m.add(Body(name, mass=1, inertia=(1, 1, 1))) for name in "ab"]
+    for body in bodies:
+        m.connect(m.world, Prismatic(f"x{body.name}", axis="x"), body)
+    law = {**LAW, "friction_law": "bristle", "bristle_time": 0.1}
+    m.add(SphereSphereContact("c", *bodies, radius_a=1.0, radius_b=1.0, **law))
+    system = m.assemble()
+    # the normal is x: what is left along it from an earlier normal relaxes, the rest stays
+    rate = seen(system, "rates")([0, 1.9], [0, 0], [2e-5, 1e-5, 0], []).full().ravel()
+    np.testing.assert_allclose(rate, [-2e-4, 0, 0], rtol=1e-9, atol=1e-15)
+    outputs = seen(system, "outputs")([0, 1.9], [0, 0], [2e-5, 0, 0], []).full().ravel()
+    assert outputs[0] > 1
+    assert outputs[1] < 1e-9  # it makes no friction
+
+
 def test_derivatives_are_finite_without_contact_and_at_rest():
     for shape in SHAPES:
         for law in ("regularised", "bristle"):

@@ -30,7 +30,7 @@ from mbs.recursions.newton_euler import (
     rotor_moments,
     spring_effort,
 )
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regressor import (
     PathTwist,
@@ -174,7 +174,7 @@ def _law_column(system: System, name: str, laws: Sequence[str]) -> Column:
             f"{system.name}: laws names {quoted(name)}; {did_you_mean(str(name), symbols)}"
         )
     s, symbol = symbols_of(system, "tree"), symbols[name]
-    acting = element_efforts(parts_at(system, s.q, s.v_tree), s.poses)
+    acting = element_efforts(PartsAt(system, s.q, s.v_tree), s.poses)
     slopes = casadi.jacobian(acting, symbol)
     elsewhere = [*values_of(system, columns_of(system)).nz, *spring_effort(system.tree, s.q).nz]
     placed = [frame.parameters for link in system.tree.links for frame in link.frames]
@@ -209,12 +209,12 @@ class LawColumns:
 
     def effort(self, column: Column) -> SX:
         """(nv, 1) efforts of the tree for a unit of the symbol."""
-        acting = element_efforts(parts_at(self.system, self.s.q, self.s.v_tree), self.s.poses)
+        acting = element_efforts(PartsAt(self.system, self.s.q, self.s.v_tree), self.s.poses)
         return casadi.densify(casadi.jacobian(acting, self.system.symbol_table[column.symbol]))
 
     def energy(self, column: Column) -> SX:
         """What the components store for a unit of it."""
-        stored, symbol = parts_at(self.system, self.s.q).energy(), column.symbol
+        stored, symbol = PartsAt(self.system, self.s.q).energy(), column.symbol
         slope = casadi.jacobian(stored, self.system.symbol_table[symbol])
         if casadi.depends_on(slope, self.system.symbol_table[symbol]):
             raise ModelError(
@@ -647,7 +647,7 @@ def known_efforts(
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
-        acting = element_efforts(parts_at(system, s.q, s.v_tree), s.poses)
+        acting = element_efforts(PartsAt(system, s.q, s.v_tree), s.poses)
         columns = LawColumns(system, s)
         for name in laws:
             column = _law_column(system, name, laws)

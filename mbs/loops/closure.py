@@ -22,7 +22,7 @@ from mbs.components import Fixed, RollingDisc
 from mbs.components.constraints import SLIPS
 from mbs.components.custom import Row
 from mbs.errors import ModelError
-from mbs.recursions.parts import part_rows, parts_at
+from mbs.recursions.parts import PartsAt, part_rows
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, cross
 
@@ -60,7 +60,7 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
         touching = disc.contact(pose, system.symbol_table).point
         slip = V + cross(w, touching)
         result.append((disc.name, casadi.jacobian(slip[:2], v)))
-    for name, rows in part_rows(parts_at(system, q, v), velocities=True):
+    for name, rows in part_rows(PartsAt(system, q, v), velocities=True):
         values = casadi.vertcat(*(row.value for _, row in rows))
         result.append((name, casadi.jacobian(values, v)))
     return result
@@ -165,7 +165,7 @@ def row_groups(system: System) -> tuple[RowGroup, ...]:
             disc.name: tuple((label, "m") for label in SLIPS) for _, disc in rolling_discs(system)
         }
         q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-        for name, rows in part_rows(parts_at(system, q, v), velocities=True):
+        for name, rows in part_rows(PartsAt(system, q, v), velocities=True):
             slips[name] = tuple((label, row.unit) for label, row in rows)
         groups = [
             RowGroup(name, tuple(rows), slips.pop(name, ()))
@@ -219,7 +219,7 @@ def _equations(system: System) -> _Equations:
             unit = "m" if system.coordinates[coupling.driven].unit == "m" else "1"
             value = q[coupling.driven] - coupling.value(q)
             loops.append((coupling.name, [("coordinate", Row(value, unit))]))
-        parts = parts_at(system, q)
+        parts = PartsAt(system, q)
         loops += part_rows(parts)
         for part in system.parts:
             if part.element.has("positive"):

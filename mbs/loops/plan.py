@@ -45,7 +45,7 @@ from mbs.components.constraints import Constraint
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import OPEN, Closing, Vector, closure_parameters, difference
 from mbs.recursions.chain import Ring, free_pose
-from mbs.recursions.parts import part_rows, parts_at
+from mbs.recursions.parts import PartsAt, part_rows
 from mbs.recursions.route import relative_pose
 from mbs.solvers.rank import null_space, rank
 from mbs.spatial import Pose
@@ -408,7 +408,7 @@ def _bound_by_part(work: _Work, number: int) -> str | None:
     binding = [part for part in work.system.parts if part.element.has("rows")]
     part = binding[number]
     q = SX.sym("q", work.system.nq)
-    rows = dict(part_rows(parts_at(work.system, q)))[part.name]
+    rows = dict(part_rows(PartsAt(work.system, q)))[part.name]
     depends = casadi.which_depends(casadi.vertcat(*(row.value for _, row in rows)), q, 1, False)
     if all(k in work.known for k, felt in enumerate(depends) if felt):
         return None

@@ -28,7 +28,7 @@ from mbs.loops.closure import (
     slip_rows,
 )
 from mbs.recursions.force_elements import sum_wrenches
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Pose, Wrench, add_wrenches, cross, skew, transform_wrench, vector
 
@@ -189,7 +189,7 @@ def part_wrenches(system: System, q: SX, lam: SX) -> dict[int, Wrench]:
     parts = {part.name: part for part in system.parts if part.element.binds}
     if not parts:
         return {}
-    still, moving = parts_at(system, q), parts_at(system, q, SX.sym("v", system.nv))
+    still, moving = PartsAt(system, q), PartsAt(system, q, SX.sym("v", system.nv))
     exerted: list[dict[int, Wrench]] = []
     first = 0
     for kind in ("positions", "velocities"):

@@ -43,7 +43,7 @@ from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.newton_euler import joint_efforts
 from mbs.recursions.newton_euler_derivatives import newton_euler_derivatives
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 from mbs.recursions.velocities import resting_base
 from mbs.text import quoted
 
@@ -71,7 +71,7 @@ def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks
     """The same by recursions of the derivatives, for trees."""
     tree = system.tree
     moving = newton_euler_derivatives(tree, s.poses, s.v, a, resting_base(tree.gravity))
-    acting = element_efforts(parts_at(system, s.q, s.v), s.poses)
+    acting = element_efforts(PartsAt(system, s.q, s.v), s.poses)
     joints = joint_efforts(tree, s.q, s.v, a) + acting
     blocks = {
         "q": moving.dq + _along_motion(system, s, joints),

@@ -9,7 +9,7 @@ from mbs.assembly.model_function import Named, model_function
 from mbs.models.symbols import configuration_check, symbols_of
 from mbs.recursions.energy import kinetic_energy, potential_energy
 from mbs.recursions.newton_euler import spring_energy
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 
 
 def energy(system: System, coordinates: str = "independent") -> Function:
@@ -32,7 +32,7 @@ def energy(system: System, coordinates: str = "independent") -> Function:
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         E = kinetic_energy(system.tree, s.poses, s.v_tree)
-        elastic = spring_energy(system.tree, s.q) + parts_at(system, s.q).energy()
+        elastic = spring_energy(system.tree, s.q) + PartsAt(system, s.q).energy()
         U = potential_energy(system.tree, s.poses) + elastic
         return [("q", s.q), ("v" + s.suffix, s.v)], [("E", E), ("U", U)]
 

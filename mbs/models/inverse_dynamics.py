@@ -19,7 +19,7 @@ from mbs.models.symbols import (
 from mbs.recursions.force_elements import element_efforts
 from mbs.recursions.names import newton_euler_names
 from mbs.recursions.newton_euler import Dynamics, joint_efforts, newton_euler, spring_effort
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 from mbs.recursions.velocities import resting_base
 
 
@@ -149,7 +149,7 @@ def tree_efforts(system: System, s: ModelSymbols, a: SX, around: Surroundings) -
 
 def own_efforts(system: System, s: ModelSymbols, a: SX) -> SX:
     """(nv, 1) what the joints need themselves: drives, friction, springs and stops."""
-    acting = parts_at(system, s.q, s.v_tree).efforts()
+    acting = PartsAt(system, s.q, s.v_tree).efforts()
     return joint_efforts(system.tree, s.q, s.v_tree, a) + acting
 
 
@@ -169,5 +169,5 @@ def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> 
 def static_efforts(system: System, s: ModelSymbols) -> SX:
     """(nv, 1) efforts of the tree that hold its springs, stops and sources at rest."""
     rest = SX.zeros(system.nv)
-    acting = element_efforts(parts_at(system, s.q, rest), s.poses)
+    acting = element_efforts(PartsAt(system, s.q, rest), s.poses)
     return spring_effort(system.tree, s.q) + acting

@@ -38,7 +38,7 @@ from mbs.recursions.force_elements import (
     transmitted_wrenches,
 )
 from mbs.recursions.newton_euler import inertial_wrench
-from mbs.recursions.parts import PartsAt, parts_at
+from mbs.recursions.parts import PartsAt
 from mbs.recursions.route import relative_pose
 from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.solvers.linear import solve_saddle, solve_square
@@ -74,7 +74,7 @@ def weld_wrench(
     motion = motions[link] if link >= 0 else around.base
     total = inertial_wrench(PseudoInertia.of(part.inertia), motion)
     total = add_wrenches(total, (zeros(), _spin(system, part, s.v_tree, a, motion)))
-    elements = element_wrenches(parts_at(system, s.q, s.v_tree), held=part.ports)
+    elements = element_wrenches(PartsAt(system, s.q, s.v_tree), held=part.ports)
     exerted = [elements.get(link), _outside(system, part, around).get(link)]
     exerted += [
         _on_joint(system, s.q, row, link, side, others[row.name])

@@ -14,7 +14,7 @@ from mbs.loops.examine import DETERMINED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
-from mbs.recursions.parts import PartsAt, parts_at
+from mbs.recursions.parts import PartsAt
 from mbs.recursions.poses import LinkPose, link_poses
 from mbs.recursions.velocities import Acceleration, moving_base, resting_base
 from mbs.spatial import Wrench, transform_wrench
@@ -183,7 +183,7 @@ def exerted(
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
     """
-    return sum_wrenches(around.external, element_wrenches(parts_at(system, q, v)))
+    return sum_wrenches(around.external, element_wrenches(PartsAt(system, q, v)))
 
 
 def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
@@ -272,5 +272,5 @@ def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, PartsAt]:
         q: (nq, 1) positions.
         v: (nv, 1) velocities of the tree.
     """
-    at = parts_at(system, q, v)
+    at = PartsAt(system, q, v)
     return at.delivered(), at.rates(), at

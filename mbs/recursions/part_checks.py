@@ -19,7 +19,7 @@ from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import At, Event, FlangeAt, FrameLoad, Row
 from mbs.errors import AssemblyError, MbsError
-from mbs.recursions.parts import PartsAt, parts_at
+from mbs.recursions.parts import PartsAt
 from mbs.text import did_you_mean, one_line, quoted
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def check_parts(system: System) -> None:
     if not system.parts:
         return
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    at = parts_at(system, q, v)
+    at = PartsAt(system, q, v)
     for part in system.parts:
         for given in part.inputs.values():
             if isinstance(given, WireSource):

@@ -6,7 +6,7 @@ its numbers. Signals run along wires, each output following from states, ports a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -16,8 +16,8 @@ from casadi import DM, SX
 
 from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
-from mbs.assembly.tables import AttachedSensor, Coordinate
-from mbs.assembly.tree import Frame, Tree
+from mbs.assembly.tables import AttachedSensor
+from mbs.assembly.tree import Frame
 from mbs.components.custom import (
     At,
     CoordinateAt,
@@ -42,35 +42,33 @@ class PartsAt:
     """The components of a system at positions and velocities of its tree.
 
     Args:
-        tree: the links.
-        parts: every component by its equations.
+        system: whose components they are.
         q: (nq, 1) positions.
         v: (nv, 1) velocities; at rest when left out.
-        sensors: what wires may come from.
-        coordinates: names of the elements of q and of v, for sensors on joints.
-        shifts: by how much the ports on coordinates are moved, by their names; not when left out.
+        shifts: by how much ports on coordinates are moved, by their names; not when left out.
+        twists: (6, 1) velocities that frames have beside those of the tree, by port, in their own
+            axes; none when left out.
     """
 
     def __init__(
         self,
-        tree: Tree,
-        parts: Sequence[AttachedPart],
+        system: System,
         q: SX,
         v: SX | None = None,
-        sensors: Iterable[AttachedSensor] = (),
-        coordinates: tuple[Sequence[Coordinate], Sequence[Coordinate]] = ((), ()),
+        *,
         shifts: Mapping[str, SX] | None = None,
+        twists: Mapping[str, SX] | None = None,
     ) -> None:
-        self.tree, self.parts, self.q, self.v = tree, parts, q, v
-        self._sensors = {attached.sensor.name: attached for attached in sensors}
-        self._coordinates = coordinates
-        self._shifts = shifts or {}
-        self._loads: dict[str, Mapping[str, Load]] = {}
+        self.system, self.q, self.v = system, q, v
+        self.tree, self.parts = system.tree, system.parts
+        self._shifts, self._twists = shifts or {}, twists or {}
         self._moving: list[Velocity] | None = None
-        self._twists: dict[str, SX] = {}
+        # by component: what it sees, what it does, symbols of its rows' efforts, its outputs
         self._found: dict[str, At] = {}
+        self._loads: dict[str, Mapping[str, Load]] = {}
         self._efforts: dict[str, dict[str, SX]] | None = None
         self._outputs: dict[str, tuple[Mapping[str, SX], Mapping[str, SX]]] = {}
+        # by source; None while it is being found
         self._signals: dict[WireSource, SX | None] = {}
 
     @property
@@ -160,8 +158,9 @@ class PartsAt:
         Raises:
             AssemblyError: it follows from itself, or from what equations of motion determine.
         """
-        if source.owner in self._sensors:
-            return self._reading(self._sensors[source.owner], source)
+        for attached in self.system.sensors:
+            if attached.sensor.name == source.owner:
+                return self._reading(attached, source)
         if source in self._signals:
             found = self._signals[source]
             if found is None:
@@ -231,7 +230,7 @@ class PartsAt:
 
     def _on_coordinate(self, name: str) -> Mapping[str, SX]:
         found = {}
-        q, v = self._coordinates
+        q, v = self.system.coordinates, self.system.speeds
         for number, row in enumerate(q):
             if row.name == name:
                 found["q"] = self.q[number]
@@ -272,7 +271,7 @@ class PartsAt:
             for (link, pose), d in zip(part.frames, small, strict=True)
         )
         shifts = {port: SX.sym("s") for port in part.coordinates}
-        moved = PartsAt(self.tree, self.parts, self.q, None, shifts=shifts)
+        moved = PartsAt(self.system, self.q, shifts=shifts)
         every = casadi.vertcat(SX(0, 1), *small, *shifts.values())
         found = value(moved.at(replace(part, frames=frames)))
         slopes = casadi.gradient(found, every)
@@ -304,10 +303,7 @@ class PartsAt:
             return [self._own_load(loads[port]) for port in part.element.frames]
         # the power of rows of velocities, where frames have twists beside those of the tree
         twists = {port: SX.sym("t", 6) for port in part.element.frames}
-        moved = PartsAt(
-            self.tree, self.parts, self.q, self.v, self._sensors.values(), self._coordinates
-        )
-        moved._twists = twists
+        moved = PartsAt(self.system, self.q, self.v, twists=twists)
         every = casadi.vertcat(*twists.values())
         slopes = casadi.densify(casadi.gradient(work(moved.at(part)), every))
         return [FrameLoad(t[:3], t[3:], own_axes=True) for t in casadi.vertsplit(slopes, 6)]
@@ -459,7 +455,7 @@ class PartEvent:
 def part_events(system: System) -> list[PartEvent]:
     """What happens at once in the components of a system, in their order."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    return parts_at(system, q, v).events()
+    return PartsAt(system, q, v).events()
 
 
 def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
@@ -475,12 +471,6 @@ def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
         for index, value in event.then.items():
             after[index] = casadi.if_else(fired[k], value, after[index])
     return after
-
-
-def parts_at(system: System, q: SX, v: SX | None = None) -> PartsAt:
-    """The components of a system at positions q (nq, 1) and velocities v (nv, 1), or at rest."""
-    tables = system.coordinates, system.speeds
-    return PartsAt(system.tree, system.parts, q, v, system.sensors, tables)
 
 
 # Rows by which components bind positions, unknowns and velocities.

@@ -26,7 +26,7 @@ from mbs.components import (
 )
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.recursions.part_checks import check_part
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 
 
 def wired(*blocks, wires=()):
@@ -42,7 +42,7 @@ def wired(*blocks, wires=()):
 
 def outputs(system, u):
     """Outputs by name at inputs by name."""
-    at = parts_at(system, casadi.SX.sym("q", system.nq), casadi.SX.sym("v", system.nv))
+    at = PartsAt(system, casadi.SX.sym("q", system.nq), casadi.SX.sym("v", system.nv))
     find = casadi.Function("find", [system.z, system.u, system.p], [at.outputs(), at.rates()])
     y, _ = find(system.z_start, [u.get(name, 0.0) for name, _ in system.inputs], 1.0)
     return dict(zip([name for name, _ in system.outputs], np.array(y)[:, 0], strict=True))
@@ -92,7 +92,7 @@ class TestWithoutMemory:
         m = wired(Limiter("soft", low=-1.0, high=2.0, width="W"))
         m.values["W"] = mbs.Parameter("W", 0.0)
         system = m.assemble()
-        at = parts_at(system, casadi.SX.sym("q", 1), casadi.SX.sym("v", 1))
+        at = PartsAt(system, casadi.SX.sym("q", 1), casadi.SX.sym("v", 1))
         find = casadi.Function("find", [system.u, system.p], [at.outputs()])
         slope = casadi.Function(
             "slope", [system.u, system.p], [casadi.jacobian(at.outputs(), system.u)]
@@ -235,7 +235,7 @@ def test_blocks_answer_the_questions_that_are_asked_of_others():
         PID("l", 1.0, 1.0, 1.0, 0.1, high=1.0),
     ]
     system = wired(*blocks).assemble()
-    at = parts_at(system, casadi.SX.sym("q", system.nq), casadi.SX.sym("v", system.nv))
+    at = PartsAt(system, casadi.SX.sym("q", system.nq), casadi.SX.sym("v", system.nv))
     for part in system.parts:
         check_part(system, part, at)
     assert len(system.parts) == len(blocks)

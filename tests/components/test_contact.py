@@ -25,7 +25,7 @@ from mbs.components import (
 from mbs.components.contact import damping_for
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.recursions.part_checks import check_part
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 
 K, C, MU = 1e3, 0.3, 0.6
 LAW = {"stiffness": K, "damping": C, "friction": MU}
@@ -65,7 +65,7 @@ def pair(shape, **law):
 def seen(system, *methods):
     """(q, v, z, p) -> what methods of the contact give, as vectors."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
-    at = parts_at(system, q, v)
+    at = PartsAt(system, q, v)
     (part,) = system.parts
     values = []
     for name in methods:
@@ -78,7 +78,7 @@ def seen(system, *methods):
 @pytest.mark.parametrize("shape", SHAPES)
 def test_forces_have_the_power_of_energy_and_heat(shape, friction_law):
     system = pair(shape, friction_law=friction_law)
-    at = parts_at(system, SX.sym("q", system.nq), SX.sym("v", system.nv))
+    at = PartsAt(system, SX.sym("q", system.nq), SX.sym("v", system.nv))
     (part,) = system.parts
     check_part(system, part, at)  # refuses what differs by 1e-8, where it touches or not
     rng = np.random.default_rng(3)

@@ -18,7 +18,7 @@ from mbs.components import (
 )
 from mbs.errors import DescriptionError
 from mbs.recursions.part_checks import check_part
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 
 AREA_A, AREA_B, BULK = 2e-3, 1.2e-3, 1.4e9
 RATED_FLOW, RATED_DROP, SUPPLY = 6e-4, 3.5e6, 1.6e7
@@ -153,7 +153,7 @@ class TestCylinder:
         # p Q = p A v at pressures that do not change: work of the force
         system = press(wired=False, leakage=1e-13)
         v, p_a, p_b = 0.1, 8e6, 8e6
-        at = parts_at(system, q := casadi.SX.sym("q"), w := casadi.SX.sym("v"))
+        at = PartsAt(system, q := casadi.SX.sym("q"), w := casadi.SX.sym("v"))
         find = casadi.Function("f", [q, w, system.z, system.u], [at.rates(), at.outputs()])
         leak = 0.0
         rates, force = find(0.5, v, [p_a, p_b], [AREA_A * v + leak, -AREA_B * v - leak])
@@ -180,14 +180,14 @@ class TestCylinder:
         m.connect(m.world, Prismatic("x", axis="x", actuated=False), ram)
         m.add(HydraulicCylinder("cyl", m.world, ram, **cylinder()))
         system = m.assemble()
-        at = parts_at(system, q := casadi.SX.sym("q"), v := casadi.SX.sym("v"))
+        at = PartsAt(system, q := casadi.SX.sym("q"), v := casadi.SX.sym("v"))
         f = casadi.Function("f", [q, v, system.z], [at.outputs(), casadi.gradient(at.energy(), q)])
         for x in (0.29995, 0.2995, 0.5, 0.80004, 0.801):
             force, slope = f(x, 0.0, [0.0, 0.0])
             assert float(force) == pytest.approx(-float(slope), rel=1e-12, abs=1e-12)
             assert (float(force) == 0) == (x == 0.5)
         for part in system.parts:
-            check_part(system, part, parts_at(system, q, v))
+            check_part(system, part, PartsAt(system, q, v))
 
 
 class TestValve:
@@ -196,7 +196,7 @@ class TestValve:
         m.connect(m.world, Prismatic("x"), m.add(Body("b", mass=1.0)))
         m.add(HydraulicValve("v", 1e-3, 1e6, 1e7, tank=1e5, transition=1.0))
         system = m.assemble()
-        at = parts_at(system, casadi.SX.sym("q"), casadi.SX.sym("v"))
+        at = PartsAt(system, casadi.SX.sym("q"), casadi.SX.sym("v"))
         f = casadi.Function("f", [system.u], [at.outputs()])
 
         def flows(*u):

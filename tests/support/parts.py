@@ -6,13 +6,13 @@ from casadi import SX
 import mbs
 from mbs.components import custom
 from mbs.recursions.part_checks import check_part
-from mbs.recursions.parts import parts_at
+from mbs.recursions.parts import PartsAt
 
 
 def asked(mechanism, **options):
     """The assembled system, each of whose components has answered all questions of assembling."""
     system = mechanism.assemble(**options)
-    at = parts_at(system, SX.sym("q", system.nq), SX.sym("v", system.nv))
+    at = PartsAt(system, SX.sym("q", system.nq), SX.sym("v", system.nv))
     for part in system.parts:
         check_part(system, part, at)
     return system

@@ -109,6 +109,8 @@ class Contact(ForceElement):
         bristle_time: of their damping, and in which they relax without contact [s].
     """
 
+    shape = ""
+
     ports: ClassVar[tuple[str, str]] = ("body", "ground")
     """The frame of what touches, and that in whose axes spots are given."""
 

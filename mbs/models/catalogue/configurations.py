@@ -101,7 +101,7 @@ def _general(system: System, frame: Frame, locked: Sequence[str]) -> str:
 
 def _characteristic(found: Function) -> str:
     """The equation that the characteristic matrices M0, M1, M2 stand for."""
-    joint, slides = found.joint, found.slides  # type: ignore[attr-defined]
+    joint, slides = found.joint, found.prismatic  # type: ignore[attr-defined]
     terms = [f"M{k}(T)" for k in range(found.n_out())]
     powers = ["", joint, f"{joint}^2"] if slides else ["", f"cos({joint})", f"sin({joint})"]
     parts = [f"{term} {power}".strip() for term, power in zip(terms, powers, strict=False)]

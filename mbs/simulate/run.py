@@ -477,13 +477,23 @@ def _motion(
 ) -> EventMotion:
     """The motion as far as it comes; its steps end where laws of components have bends."""
     rhs, project, passage = state.rhs, state.project, state.passage
-    own, count = events, 0
+    own, count, prepared = events, 0, state.prepared
     if state.crossings is not None:
         own, wrapped = with_crossings(state, x0, times[0], events, p)
         rhs, project, passage = wrapped
+        prepared = {}
         count = state.crossings.numel_out(0)
     motion = integrate_events(
-        rhs, x0, times, own, p=p, project=project, passage=passage, partial=True, **options
+        rhs,
+        x0,
+        times,
+        own,
+        p=p,
+        project=project,
+        passage=passage,
+        partial=True,
+        prepared=prepared,
+        **options,
     )
     return _without_crossings(motion, events, count) if count else motion
 
@@ -652,7 +662,7 @@ def _leg(
         Function("end", [t, x, pm, fired], [x, SX(1)]),
         [0.0],
     )
-    ending = replace(state, rhs=rhs, project=project, passage=None)
+    ending = replace(state, rhs=rhs, project=project, passage=None, prepared={})
     if state.crossings is not None:
         crossed = state.crossings(t, x, parameters)
         ending = replace(ending, crossings=Function("crossings", [t, x, pm], [crossed]))
@@ -907,7 +917,7 @@ def run(
     with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
         legs, stop = integrated(
             system,
-            lambda like: full_state(like, effort, inputs, motions),
+            lambda like: state_equation(like, effort, inputs, motions),
             x0,
             times,
             p,
@@ -917,14 +927,55 @@ def run(
             progress=reached,
         )
     if motions and legs[0].first_slope is not None:
-        point = [x0[: system.nq], x0[system.nq : system.nq + system.nv]]
-        H = np.array(bias(system, "tree")(*point, *([p] if system.parameters else [])))[:, 0]
+        H = _first_bias(system, x0, inputs, p)
         legs[0] = replace(legs[0], driven=tuple(m.velocity for m in motions), first_bias=H)
     result = _result(system, legs, p, stop)
     if stop is not None:
         stop.result = result
         raise stop
     return result
+
+
+_KEPT = 8
+"""State equations that a system keeps between runs: a few laws that a script takes in turn."""
+
+
+def state_equation(
+    system: System,
+    effort: Function | None,
+    inputs: Function | None,
+    motions: Sequence[Prescribed],
+) -> FullState:
+    """The state equation under some laws, kept with the system for the next run under the same.
+
+    Args:
+        system: open or closed.
+        effort: as of `full_state`, likewise the others.
+        inputs: likewise.
+        motions: likewise; with any, nothing is kept.
+    """
+    try:
+        key = tuple(law and law.serialize() for law in (effort, inputs))
+    except (RuntimeError, NotImplementedError):  # laws in machine code have no text
+        return full_state(system, effort, inputs, motions)
+    if motions:
+        return full_state(system, effort, inputs, motions)
+    kept: dict[Any, FullState] = system.cached("state equations", dict)
+    if key not in kept:
+        while len(kept) >= _KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = full_state(system, effort, inputs, motions)
+    return kept[key]
+
+
+def _first_bias(system: System, x0: Array, inputs: Function | None, p: Sequence[float]) -> Array:
+    """(nv,) efforts of gravity and velocities at the start."""
+    n = system.nq + system.nv
+    q, v = x0[: system.nq], x0[system.nq : n]
+    u = system.u_default if inputs is None else np.array(inputs(0, q, v, p)).ravel()
+    point = {"q": q, "v": v, "z": x0[n:], "u": u, "p": p}
+    found = bias(system, "tree")
+    return np.array(found(*(point[name] for name in found.name_in())))[:, 0]
 
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:

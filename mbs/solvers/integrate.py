@@ -292,6 +292,10 @@ def integrate(
     return motion.x
 
 
+Prepared = dict[tuple[str, bool], tuple[Equations, ctypes.CDLL | None]]
+"""Functions of an integration and their machine code, by method and whether it is compiled."""
+
+
 def integrate_events(
     rhs: casadi.Function,
     x0: npt.ArrayLike,
@@ -308,6 +312,7 @@ def integrate_events(
     progress: Progress | None = None,
     compiled: bool = True,
     partial: bool = False,
+    prepared: Prepared | None = None,
 ) -> EventMotion:
     """States and modes at given times of a system whose state or equations jump at events.
 
@@ -336,6 +341,8 @@ def integrate_events(
         compiled: False for the same algorithm in Python.
         partial: True for what was reached, with its `stop`, where the integration cannot go on or
             is interrupted by control-C; nothing is raised for that then.
+        prepared: what an earlier call made of the same functions and method, and what this one
+            makes is kept in; nothing is kept when left out.
 
     Returns:
         states, modes and the list of events.
@@ -347,17 +354,23 @@ def integrate_events(
         Interrupted: control-C was pressed.
         CompilerError: the compiler that CC names does not start.
     """
-    functions = equations(rhs, project, method, events, passage)
+    key = (method, compiled and compiler_found())
+    kept = {} if prepared is None else prepared
+    if key not in kept:
+        made = equations(rhs, project, method, events, passage)
+        kept[key] = made, library_of(made) if key[1] else None
+    functions, library = kept[key]
     modes = () if events is None else events.modes
     given = problem(functions, x0, times, p, modes, (rtol, atol), max_step)
-    motion = _run(given, progress, compiled)
+    motion = _run(given, library, progress)
     if motion.stop is not None and not partial:
         raise motion.stop
     return motion
 
 
-def _run(given: IntegrationProblem, progress: Progress | None, compiled: bool) -> EventMotion:
-    library = library_of(given.equations) if compiled and compiler_found() else None
+def _run(
+    given: IntegrationProblem, library: ctypes.CDLL | None, progress: Progress | None
+) -> EventMotion:
     if library is None:
         return run_interpreted(given, progress)
     return run_compiled(library, given, progress)

@@ -7,7 +7,8 @@ shows the same outputs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import casadi
 import numpy as np
@@ -459,6 +460,7 @@ class FullState:
         passage: for steps through singular configurations of the loops; None where there are none.
         crossings: `crossings(t, x, p)`, what passes through zero where the laws of components have
             bends; None where there are none.
+        prepared: what integrations keep between runs.
     """
 
     rhs: Function
@@ -467,6 +469,7 @@ class FullState:
     events: tuple[Function, Function] | None = None
     passage: Passage | None = None
     crossings: Function | None = None
+    prepared: dict[Any, Any] = field(default_factory=dict)
 
 
 def full_state(

@@ -108,13 +108,13 @@ class Tree:
 
     @property
     def nq(self) -> int:
-        """Number of positions."""
-        return sum(link.motion.nq for link in self.links)
+        """Number of positions; those of the last link end q."""
+        return self.links[-1].q.stop if self.links else 0
 
     @property
     def nv(self) -> int:
-        """Number of velocities."""
-        return sum(link.motion.nv for link in self.links)
+        """Number of velocities; those of the last link end v."""
+        return self.links[-1].v.stop if self.links else 0
 
     def path(self, j: int) -> list[int]:
         """The links from the base to link j, itself included; empty for the base (-1)."""

@@ -481,7 +481,7 @@ def _motion(
     if state.crossings is not None:
         own, wrapped = with_crossings(state, x0, times[0], events, p)
         rhs, project, passage = wrapped
-        prepared = {}
+        prepared = state.prepared.setdefault("runs with crossings", {})
         count = state.crossings.numel_out(0)
     motion = integrate_events(
         rhs,
@@ -515,10 +515,29 @@ def with_crossings(
     """
     assert state.crossings is not None
     modes = () if events is None else tuple(np.ravel(np.asarray(events.modes, dtype=float)))
-    count = state.crossings.numel_out(0)
-    n, n_p, first = len(x0), len(p) + len(modes), 0
-    if events is not None:
-        first = events.indicators.numel_out(0)
+    if "crossings" not in state.prepared:
+        state.prepared["crossings"] = _watch_crossings(state, events, len(x0), len(p), len(modes))
+    (indicators, jump), functions = state.prepared["crossings"]
+    start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
+    sides = np.where(start > 0, 1.0, -1.0)
+    return Events(indicators, jump, [*modes, *sides], _FIRST_STEP), functions
+
+
+def _watch_crossings(
+    state: FullState, events: Events | None, n: int, own: int, modes: int
+) -> tuple[tuple[Function, Function], tuple[Function, Function | None, Passage | None]]:
+    """Indicators and jump with the crossings behind those of others, and the functions.
+
+    Args:
+        state: with crossings.
+        events: others; None where there are none.
+        n: number of states.
+        own: number of parameters.
+        modes: number of the modes of the others.
+    """
+    assert state.crossings is not None
+    count, n_p = state.crossings.numel_out(0), own + modes
+    first = 0 if events is None else events.indicators.numel_out(0)
     t, x, pm, fired = (
         SX.sym(name, size)
         for name, size in (("t", 1), ("x", n), ("p", n_p + count), ("fired", first + count))
@@ -528,21 +547,17 @@ def with_crossings(
     def wide(function: Function) -> Function:
         return Function(function.name(), [t, x, pm], function.call(at))
 
-    crossed = state.crossings.call(at)[0]
-    indicators, moved, after = [sides * crossed], x, [SX(0, 1)]
+    indicators, moved, after = [sides * state.crossings.call(at)[0]], x, [SX(0, 1)]
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
         jumps = casadi.mmax(fired[:first])
-        there, changed = events.jump.call([*at, fired[:first]])
+        there, *changed = events.jump.call([*at, fired[:first]])  # modes where there are some
         moved = casadi.if_else(jumps, there, x)
-        after = [casadi.if_else(jumps, changed, pm[len(p) : n_p])]
+        after = [casadi.if_else(jumps, values, pm[own:n_p]) for values in changed]
     after.append(casadi.if_else(fired[first:] > 0, -sides, sides))
-    start = np.array(state.crossings(t0, x0, [*p, *modes]))[:, 0]
-    watched = Events(
+    watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
         Function("jump", [t, x, pm, fired], [moved, casadi.vertcat(*after)]),
-        [*modes, *np.where(start > 0, 1.0, -1.0)],
-        _FIRST_STEP,
     )
     passage = state.passage
     if passage is not None:

@@ -18,6 +18,7 @@ from mbs.components.custom import EFFORT, port_of_flange
 from mbs.errors import AssemblyError
 from mbs.expressions import Scalar, to_sx
 from mbs.text import did_you_mean, listed
+from mbs.units import UNITS
 
 if TYPE_CHECKING:
     from mbs.assembly.drive_line import FlangeTurn
@@ -339,17 +340,17 @@ def _wires(
     """The source of every input that is wired, by component and name.
 
     Raises:
-        AssemblyError: a wire comes from nothing that gives a signal.
+        AssemblyError: a wire comes from nothing that gives a signal, or its ends have other units.
     """
     outputs = {
-        f"{part.name}.{name}": WireSource(part.name, name)
+        f"{part.name}.{name}": (WireSource(part.name, name), part.declared[name].unit)
         for part in parts_of(mechanism)
         for name in (*part.output_names, *part.state_names)
     }
     for attached in sensors:
-        for column, _ in attached.columns:
+        for column, unit in attached.columns:
             name = attached.sensor.name
-            outputs[column] = WireSource(name, column.removeprefix(f"{name}."))
+            outputs[column] = WireSource(name, column.removeprefix(f"{name}.")), unit
     found: dict[tuple[str, str], WireSource] = {}
     for source, target in mechanism.wires:
         if str(source) not in outputs:
@@ -373,8 +374,26 @@ def _wires(
                 f"{mechanism.name}: {target} is wired to {found[known.name, target.name]} and to"
                 f" {source}; an input has one source, so take one wire away"
             )
-        found[known.name, target.name] = outputs[str(source)]
+        found[known.name, target.name], unit = outputs[str(source)]
+        wanted = known.declared[target.name].unit
+        if not _may_be_wired(unit, wanted):
+            raise AssemblyError(
+                f"{mechanism.name}: {str(source)!r} [{unit}] is wired to {target} [{wanted}], which"
+                " is another quantity; put a block between them, such as a Gain"
+            )
     return found
+
+
+def _may_be_wired(source: str, target: str) -> bool:
+    """Whether units may be those of the two ends of a wire: 1 is that of any signal."""
+    free = ("1", EFFORT)
+    if source in free or target in free:
+        return True
+    one, other = (
+        {base: n for base, n in UNITS[unit].exponents.items() if base != "rad"}
+        for unit in (source, target)
+    )
+    return one == other
 
 
 def symbols_in_order(symbols: Iterable[SX]) -> SX:

@@ -17,6 +17,7 @@ from mbs.components import (
     Component,
     Custom,
     Damper,
+    DCMotor,
     Gain,
     Integrator,
     JointSensor,
@@ -952,12 +953,13 @@ class TestCopies:
     def test_deep_copies(self):
         m = pendulum(lambda tip: Actuator("a", tip))
         m.add(JointSensor("enc", "j1"))
-        m.wire("enc.q", m.components["a"].order)
+        m.wire("enc.q", m.add(Gain("gain", 2.0)).u)
+        m.wire("gain.y", m.components["a"].order)
         n = copy.deepcopy(m)
         m.add(Drag("late", m.components["bar"].right, c=1.0))
         one, two = m.assemble(), n.assemble()
-        assert [p.name for p in two.parts] == ["a"]
-        assert [p.name for p in one.parts] == ["a", "late"]
+        assert [p.name for p in two.parts] == ["a", "gain"]
+        assert [p.name for p in one.parts] == ["a", "gain", "late"]
         assert two.inputs == ()
         third = copy.deepcopy(two)
         values = [mbs.models.direct_dynamics(s)(0.3, 0.2, 0.1, 4.0) for s in (two, third)]
@@ -1050,3 +1052,19 @@ def test_what_methods_see():
     assert seen["kinds"] == ("At", "a", "b")
     assert seen["shapes"] == [(3, 1), (3, 3), (3, 1), (3, 1)]
     assert [x.shape for x in seen["motion"]] == [(3, 1), (3, 3), (3, 1), (3, 1), (1, 1), (1, 1)]
+
+
+def test_ends_of_a_wire_have_one_unit():
+    m = mbs.Mechanism("servo")
+    bar, joint = m.add(Box("bar", length=1.0, mass=1.0)), Revolute("j", axis="z")
+    m.connect(m.world, joint, bar.left)
+    motor = m.add(DCMotor("motor", 1.0, 0.1, 0.2))
+    m.connect(motor.flange, joint.flange)
+    m.add(JointSensor("encoder", "j"))
+    m.wire("encoder.q", motor.voltage)
+    refused(AssemblyError, "[rad] is wired to motor.voltage [V]", "a Gain", by=m.assemble)
+    m.wires.clear()
+    gain = m.add(Gain("gain", 2.0))
+    m.wire("encoder.q", gain.u)
+    m.wire(gain.y, motor.voltage)
+    assert m.assemble().inputs == ()

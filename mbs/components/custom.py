@@ -40,6 +40,7 @@ from mbs.expressions import (
     MORE_THAN_ZERO,
     Expression,
     Number,
+    Parameter,
     Scalar,
     out_of_bounds,
     to_float,
@@ -767,7 +768,11 @@ def _check_parameter(component: Custom, name: str, what: Declared) -> None:
     if getattr(component, name) is None and what.default is None:
         return
     component._normalise(name)
-    value = to_float(getattr(component, name))
+    given = getattr(component, name)
+    if isinstance(given, Parameter) and given.default is None and given.unit == "1":
+        # a text says no unit: that of the declaration is meant
+        object.__setattr__(component, name, replace(given, unit=what.unit))
+    value = to_float(given)
     fault = "" if value is None else out_of_bounds(value, what.low, what.high)
     if fault:
         unit = "" if what.unit == "1" else f" {what.unit}"

@@ -451,7 +451,8 @@ class Mechanism:
             getattr(second, bound) if getattr(first, bound) is None else getattr(first, bound)
             for bound in ("min", "max")
         )
-        return replace(first, min=low, max=high)
+        unit = second.unit if first.unit == "1" else first.unit
+        return replace(first, unit=unit, min=low, max=high)
 
     def used_parameters(self) -> Iterator[Parameter]:
         """Every symbol of components and places, as often as it is used."""

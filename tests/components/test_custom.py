@@ -1068,3 +1068,15 @@ def test_ends_of_a_wire_have_one_unit():
     m.wire("encoder.q", gain.u)
     m.wire(gain.y, motor.voltage)
     assert m.assemble().inputs == ()
+
+
+def test_a_symbol_of_a_text_has_the_unit_of_its_declaration():
+    m = mbs.Mechanism("air", parameters={"c": 0.4, "L": 1.0})
+    bar = m.add(Box("bar", length="L", mass=1.0))
+    m.connect(m.world, Revolute("j", axis="z"), bar.left)
+    m.add(Drag("drag", bar.right, "c"))
+    system = m.assemble()
+    assert {p.name: (p.unit, p.default) for p in system.parameters} == {
+        "L": ("1", 1.0),
+        "c": ("kg/m", 0.4),
+    }

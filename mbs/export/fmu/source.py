@@ -139,8 +139,8 @@ def _jacobian(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> list[ca
     xdot = model.rhs.call(point)[0]
     J = casadi.densify(casadi.jacobian(xdot, x))
     if model.closure is not None:
-        moved = casadi.jacobian(model.closure.call([x, z, _own(model, p)])[0], x)
-        J += casadi.mtimes(casadi.jacobian(xdot, z), moved)
+        dz = casadi.jacobian(model.closure.call([x, z, _own(model, p)])[0], x)
+        J += casadi.mtimes(casadi.jacobian(xdot, z), dz)
     return [J, casadi.jacobian(xdot, t) + casadi.jtimes(xdot, u, du)]
 
 
@@ -172,7 +172,7 @@ def _tangent(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
 def _directions(
     model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]
 ) -> tuple[casadi.MX, casadi.MX, casadi.MX, casadi.MX]:
-    """dxdot, dy, dz and dg along a direction, the modes held.
+    """dxdot, dy, dz and dg along a direction, the modes constant.
 
     At a solution of the closure, the derivative of one Newton step z - J^-1 r is -J^-1 dr: that
     of the dependent coordinates themselves.

@@ -1,10 +1,10 @@
-"""Drive lines: which coordinate every flange turns with, and the mechanism that this leaves.
+"""Drive lines: which coordinate every flange rotates with, and the mechanism that this leaves.
 
-Flanges that are connected turn together, and rigid gears between them only multiply the angle: all
-of them have one coordinate. It is that of a joint, where one is among them, else the angle of an
-inertia, which becomes a revolute link on the base. Inertias are moved to the coordinate through
-the squares of the ratios, elastic parts become forces on coordinates. A rotor has the energy of
-its spin relative to its housing alone.
+Flanges that are connected rotate together, and rigid gears between them only multiply the angle:
+all of them have one coordinate. It is that of a joint, where one is among them, else the angle of
+an inertia, which becomes a revolute link on the base. Inertias are reflected to the coordinate
+through the squares of the ratios, elastic parts become forces on coordinates. A rotor has the
+energy of its spin relative to its housing alone.
 
 Source: Spong 1987, for this assumption.
 """
@@ -37,11 +37,11 @@ from mbs.components.joints import Motion
 from mbs.errors import AssemblyError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
 
-# What is refused in a drive line, and how it is said.
+# What is refused in a drive line, and the errors that say so.
 
 
 def check_flanges(mechanism: Mechanism, parts: Sequence[Custom]) -> None:
-    """Refuse flanges that are connected to nothing, or shafts that are connected to slides.
+    """Refuse flanges that are connected to nothing, or shafts that are connected to sliding parts.
 
     Raises:
         AssemblyError: which flange, and what to connect.
@@ -64,7 +64,7 @@ def check_flanges(mechanism: Mechanism, parts: Sequence[Custom]) -> None:
 
 
 def _slides(flange: Flange) -> bool | None:
-    """Whether a flange is a place on a slide; None where it may be either."""
+    """Whether a flange translates; None where it may also rotate."""
     owner = flange.owner
     if isinstance(owner, Custom):
         return owner.slides(flange)
@@ -89,10 +89,10 @@ def _check_sliding(mechanism: Mechanism, start: Flange, joined: dict[Flange, lis
             queue.append(other)
 
 
-def _held(
+def _fixed_flanges(
     mechanism: Mechanism, parts: Iterable[Custom], ties: Mapping[Key, list[tuple[Key, Expression]]]
 ) -> dict[Key, FlangeTurn]:
-    """The flanges that do not move, which are those of the housing.
+    """The flanges that are fixed, which are those of the housing.
 
     Raises:
         AssemblyError: a joint, an inertia, a gear or a motor is connected to one.
@@ -158,7 +158,7 @@ _GOLDEN = (5**0.5 - 1) / 2
 
 @dataclass(frozen=True, slots=True)
 class FlangeTurn:
-    """How a flange turns: `factor` times the coordinate; without one it does not move."""
+    """The rotation of a flange: `factor` times the coordinate; without one it is fixed."""
 
     coordinate: str
     factor: Expression
@@ -169,7 +169,7 @@ class DriveLine:
     """A mechanism without flanges, and what became of them.
 
     Attributes:
-        mechanism: with joints, couplings and forces in their place.
+        mechanism: with joints, couplings and forces in their stead.
         turns: of every flange.
         parts: of the drive line, in the order added.
         links: for each coordinate that is no joint's, the part whose angle it is.
@@ -192,29 +192,33 @@ def drive_line(mechanism: Mechanism) -> DriveLine:
     if not parts and not mechanism.shafts:
         return DriveLine(mechanism, {}, (), {})
     check_flanges(mechanism, parts)
-    leads, turns = _turns(mechanism, parts)
+    references, turns = _flange_rotations(mechanism, parts)
     changed: dict[str, Joint] = {}
-    for name, lead in leads.items():
-        mine = [part for part in parts if turns[part.flanges[0].key].coordinate == name]
-        changed[name] = _driven(mechanism, name, lead, mine, turns)
-    links = {n: lead.owner.name for n, lead in leads.items() if not isinstance(lead.owner, Joint)}
+    for name, reference in references.items():
+        members = [part for part in parts if turns[part.flanges[0].key].coordinate == name]
+        changed[name] = _group_joint(mechanism, name, reference, members, turns)
+    links = {
+        n: reference.owner.name
+        for n, reference in references.items()
+        if not isinstance(reference.owner, Joint)
+    }
     return DriveLine(_lower(mechanism, changed, turns), turns, parts, links)
 
 
-def _turns(
+def _flange_rotations(
     mechanism: Mechanism, parts: tuple[Custom, ...]
 ) -> tuple[dict[str, Flange], dict[Key, FlangeTurn]]:
-    """The flange that leads each rigid group, by the name of its coordinate, and all turns."""
+    """The reference flange of each rigid group, by its coordinate's name, and all rotations."""
     ties = _ties(mechanism, parts)
     values = _generic(mechanism)
-    leads: dict[str, Flange] = {}
-    turns = _held(mechanism, parts, ties)
-    for name, lead in _candidates(mechanism, parts):
-        if lead.key in turns:
+    references: dict[str, Flange] = {}
+    turns = _fixed_flanges(mechanism, parts, ties)
+    for name, reference in _candidates(mechanism, parts):
+        if reference.key in turns:
             continue
-        leads[name] = lead
-        turns[lead.key] = FlangeTurn(name, _ONE)
-        queue = deque([lead.key])
+        references[name] = reference
+        turns[reference.key] = FlangeTurn(name, _ONE)
+        queue = deque([reference.key])
         while queue:
             key = queue.popleft()
             for other, factor in ties.get(key, ()):
@@ -227,7 +231,7 @@ def _turns(
     loose = [flange for part in parts for flange in part.flanges if flange.key not in turns]
     if loose:
         raise inertia_missing(mechanism, loose)
-    return leads, turns
+    return references, turns
 
 
 def _generic(mechanism: Mechanism) -> dict[str, float]:
@@ -255,7 +259,7 @@ def _candidates(mechanism: Mechanism, parts: tuple[Custom, ...]) -> Iterator[tup
 def _ties(
     mechanism: Mechanism, parts: tuple[Custom, ...]
 ) -> dict[Key, list[tuple[Key, Expression]]]:
-    """For each flange those that turn with it, and how often for one turn of it."""
+    """For each flange those that rotate with it, and their angles per angle of it."""
     ties: dict[Key, list[tuple[Key, Expression]]] = {}
 
     def tie(a: Flange, b: Flange, ratio: Expression) -> None:
@@ -291,23 +295,23 @@ def _equal(a: Expression, b: Expression, values: Mapping[str, float]) -> bool:
     return abs(x - y) <= _ROUNDING * abs(x)
 
 
-def _driven(
+def _group_joint(
     mechanism: Mechanism,
     name: str,
-    lead: Flange,
+    reference: Flange,
     parts: Iterable[Custom],
     turns: Mapping[Key, FlangeTurn],
 ) -> Joint:
-    """The joint that leads a group, with the inertias and motors of the group."""
+    """The joint whose coordinate a group has, with the inertias and motors of the group."""
     devices = [part for part in parts if part.drives]
     total: Expression = _ZERO
     for part in parts:
         factor = turns[part.flanges[0].key].factor
         total = _plus(total, times(times(factor, factor), part.own_inertia))
-    if not isinstance(lead.owner, Joint):
-        kind = Prismatic if _slides(lead) else Revolute
+    if not isinstance(reference.owner, Joint):
+        kind = Prismatic if _slides(reference) else Revolute
         return kind(name, axis="z", actuated=bool(devices), Ia=total)
-    joint = lead.owner
+    joint = reference.owner
     if devices and joint.actuated is False:
         raise AssemblyError(
             f"{mechanism.name}: joint {name!r} is said to be actuated=False, but"
@@ -320,7 +324,7 @@ def _driven(
 def _lower(
     mechanism: Mechanism, changed: Mapping[str, Joint], turns: Mapping[Key, FlangeTurn]
 ) -> Mechanism:
-    """The mechanism with the joints that lead, couplings to the others, and forces."""
+    """The mechanism with the joints of the groups, couplings to the others, and forces."""
     result = _with_joints(mechanism, changed)
     joints = {joint.name: joint for joint in mechanism.joints()}
     for joint in joints.values():
@@ -373,22 +377,22 @@ def _levers(
     return moving
 
 
-# The tables of drive lines: what every rigid part turns with, and the devices that drive.
+# The tables of drive lines: what every rigid part rotates with, and the devices that drive.
 
 
 @dataclass(frozen=True, slots=True)
 class ShaftRow:
-    """An inertia or a rigid gear of a drive line, and what it turns with.
+    """An inertia or a rigid gear of a drive line, and the coordinate it rotates with.
 
     Attributes:
         name: of the component.
         kind: ShaftInertia, SlidingMass, IdealGear, or DCMotor where its rotor has a coordinate of
             its own.
-        coordinate: the coordinate that it turns with.
+        coordinate: the coordinate that it rotates with.
         own: whether this coordinate is its own, and not that of a joint or another inertia.
         factor: its angle, of a gear that of flange_a, is factor times the coordinate; a number,
             or an expression where a symbol is in it.
-        slides: whether it is a mass on a slide.
+        slides: whether it is a mass that translates.
     """
 
     name: str
@@ -400,7 +404,7 @@ class ShaftRow:
 
     @property
     def sentence(self) -> str:
-        """What it is and how it turns."""
+        """What it is and how it rotates."""
         if self.own:
             return f"{self.kind} {self.name} has a coordinate of its own, {self.coordinate}."
         turns = f"turns {as_fast(self.factor, self.coordinate)}"

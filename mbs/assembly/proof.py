@@ -22,7 +22,13 @@ from mbs.assembly.khalil_frames import Framed
 from mbs.assembly.tables import Places
 from mbs.assembly.tree import Frame, Tree
 from mbs.components import Mechanism
-from mbs.components.component import KhalilStep, Oriented, Placement, Translation, Turned
+from mbs.components.component import (
+    ElementaryRotation,
+    FixedRotation,
+    KhalilStep,
+    Placement,
+    Translation,
+)
 from mbs.components.joints import Freedom, Motion
 from mbs.errors import AssemblyError
 from mbs.expressions import Expression, Number, Operation, Parameter
@@ -62,7 +68,7 @@ def prove(
     rng = np.random.default_rng(_SEED)
     # of about one, so that no symbol drops out beside another, and none near zero
     some = rng.uniform(0.3, 1.7, len(symbols)) * rng.choice([-1.0, 1.0], len(symbols))
-    # the defaults, numbers of both signs, and the same with all signs the other way
+    # the defaults, numbers of both signs, and the same with all signs reversed
     rows = np.array(
         [[values[n] for n in symbols], *([some, -some] if symbols else [])], dtype=float
     )
@@ -72,12 +78,14 @@ def prove(
     frames = {**places, **free}
     with np.errstate(all="ignore"):  # an expression need not have a value everywhere
         described = _describe(mechanism, framed, known, q)
-        told = np.array([np.broadcast_to(described[port], (len(rows), 4, 4)) for port in frames])
+        expected = np.array(
+            [np.broadcast_to(described[port], (len(rows), 4, 4)) for port in frames]
+        )
         found = _assembled(framed.tree, list(frames.values()), symbols, rows, q)
-        off = np.abs(found - told)
-        off[..., :3, 3] /= float(np.nanmax(np.abs(told[..., :3, 3]), initial=0.0)) or 1.0
+        off = np.abs(found - expected)
+        off[..., :3, 3] /= float(np.nanmax(np.abs(expected[..., :3, 3]), initial=0.0)) or 1.0
     # where the description has no value, such as the root of a negative number, there is none
-    off = np.where(np.isfinite(told), np.where(np.isfinite(off), off, np.inf), 0.0)
+    off = np.where(np.isfinite(expected), np.where(np.isfinite(off), off, np.inf), 0.0)
     if np.max(off, initial=0.0) > _SAME:
         number, sample, *_ = np.unravel_index(int(np.argmax(off)), off.shape)
         name, port = list(frames)[number]
@@ -151,9 +159,9 @@ def _placement(placement: Placement, known: Mapping[str, Array]) -> Array:
         match step:
             case Translation(x=x, y=y, z=z):
                 T = T @ _shift(*(_number(value, known) for value in (x, y, z)))
-            case Turned(axis=axis, angle=angle):
+            case ElementaryRotation(axis=axis, angle=angle):
                 T = T @ _turn(axis, _number(angle, known))
-            case Oriented(rows=rows):
+            case FixedRotation(rows=rows):
                 R = np.eye(4)
                 R[:3, :3] = rows
                 T = T @ R
@@ -179,22 +187,22 @@ def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> A
     """Frame_b of a joint in its frame_a."""
     T: Array = np.eye(4)
     for freedom in freedoms:
-        T = T @ _moved(freedom, q[freedom.coordinate_of(name)])
+        T = T @ _elementary_motion(freedom, q[freedom.coordinate_of(name)])
     return T
 
 
 def _motion_back(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Frame_a in frame_b, where frame_b is nearer to the base; a quaternion turns the farther."""
+    """Frame_a in frame_b, where frame_b is nearer to the base; a quaternion rotates the farther."""
     T: Array = np.eye(4)
     for freedom in reversed(freedoms):
-        moved = _moved(freedom, q[freedom.coordinate_of(name)])
+        motion = _elementary_motion(freedom, q[freedom.coordinate_of(name)])
         free = freedom.motion in (Motion.SPHERICAL, Motion.FREE)
-        T = T @ (moved if free else _inverse(moved))
+        T = T @ (motion if free else _inverse(motion))
     return T
 
 
-def _moved(freedom: Freedom, q: Array) -> Array:
-    """(samples, 4, 4) what one elementary motion does; Rodrigues' formula for a turn."""
+def _elementary_motion(freedom: Freedom, q: Array) -> Array:
+    """(samples, 4, 4) what one elementary motion does; Rodrigues' formula for a rotation."""
     T = np.tile(np.eye(4), (len(q), 1, 1))
     x, y, z = freedom.axis
     match freedom.motion:
@@ -268,7 +276,7 @@ def _assembled(
         T = poses[link.antecedent + 1]
         for _ in link.frames:
             T = T @ next(placed)
-        poses.append(T @ _moved(Freedom(link.motion), q[link.name]))
+        poses.append(T @ _elementary_motion(Freedom(link.motion), q[link.name]))
     inside = _at_samples([pose.matrix for _, pose in frames], symbols, rows)
     return np.array(poses)[[link + 1 for link, _ in frames]] @ inside
 

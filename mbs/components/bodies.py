@@ -26,7 +26,7 @@ _LARGEST = 1e30
 """Of masses, lengths and moments in SI units: products of four of them stay finite."""
 _ZERO = 1e-12
 """Element of a tensor [kg m^2] that is the rounding of zero, as where a file of a symmetric tensor
-was turned: bodies that small are not described in kg and m."""
+was rotated: bodies that small are not described in kg and m."""
 
 
 def check_mass(name: str, mass: Scalar) -> None:
@@ -123,7 +123,7 @@ class RigidBody(Component):
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """The point (x, y, z) [m] of the reference frame, its axes turned by `rotation`."""
+        """The point (x, y, z) [m] of the reference frame, its axes rotated by `rotation`."""
         return self.frame.at(x, y, z, rotation=rotation)
 
     def at_khalil(self, **parameters: Scalar) -> Point:

@@ -57,25 +57,25 @@ class Translation:
 
 
 @dataclass(frozen=True, slots=True)
-class Turned:
+class ElementaryRotation:
     """A rotation by an angle [rad] about the axis "x", "y" or "z"."""
 
     axis: str
     angle: Expression
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """The turned frame seen from the one before."""
+        """The rotated frame seen from the one before."""
         return Pose.about(self.axis, to_sx(self.angle, symbols))
 
 
 @dataclass(frozen=True, slots=True)
-class Oriented:
+class FixedRotation:
     """A rotation given by its matrix, row by row."""
 
     rows: tuple[tuple[float, float, float], ...]
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """The turned frame seen from the one before."""
+        """The rotated frame seen from the one before."""
         return Pose.rotation(SX(DM(self.rows)))
 
 
@@ -99,7 +99,7 @@ class KhalilStep:
         return self.khalil(symbols).pose()
 
 
-Step = Translation | Turned | Oriented | KhalilStep
+Step = Translation | ElementaryRotation | FixedRotation | KhalilStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,13 +142,13 @@ def _scoped(step: Step, prefix: str) -> Step:
 
 
 Rotation = tuple[str, Scalar] | Sequence[tuple[str, Scalar]] | Sequence[Sequence[float]]
-"""("z", "pi/2 + A"), a sequence of such turns, or a (3, 3) matrix."""
+"""("z", "pi/2 + A"), a sequence of such rotations, or a (3, 3) matrix."""
 
 
 def displacement(
     where: str, x: Scalar, y: Scalar, z: Scalar, rotation: Rotation | None
 ) -> tuple[Step, ...]:
-    """The steps of "at (x, y, z), then turned by `rotation`"."""
+    """The steps of "at (x, y, z), then rotated by `rotation`"."""
     values = [
         expression(value, f"{where}, {name}") for name, value in zip("xyz", (x, y, z), strict=True)
     ]
@@ -162,9 +162,9 @@ def displacement(
 
 def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
     if _is_turn(rotation):
-        return [_turn(where, *rotation)]
+        return [_elementary_rotation(where, *rotation)]
     if isinstance(rotation, (list, tuple)) and all(map(_is_turn, rotation)):
-        return [_turn(where, *part) for part in rotation]
+        return [_elementary_rotation(where, *part) for part in rotation]
     try:
         R = np.asarray(rotation, dtype=float)
     except (TypeError, ValueError):
@@ -173,19 +173,19 @@ def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
     if R.shape != (3, 3) or not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
         raise DescriptionError(
             f"{where}: rotation {quoted(rotation)} is not a rotation; give ('z', angle), a sequence"
-            " of such turns, or an orthonormal right-handed (3, 3) matrix"
+            " of such rotations, or an orthonormal right-handed (3, 3) matrix"
         )
-    return [Oriented(nearest_rotation(R.tolist()))]
+    return [FixedRotation(nearest_rotation(R.tolist()))]
 
 
 def _is_turn(part: Any) -> bool:
     return isinstance(part, (list, tuple)) and len(part) == 2 and isinstance(part[0], str)
 
 
-def _turn(where: str, axis: str, angle: Scalar) -> Turned:
+def _elementary_rotation(where: str, axis: str, angle: Scalar) -> ElementaryRotation:
     if axis not in ("x", "y", "z"):
         raise DescriptionError(f"{where}: rotation axis {axis!r} is not 'x', 'y' or 'z'; use one")
-    return Turned(axis, angle_expression(angle, f"{where}, rotation about {axis}"))
+    return ElementaryRotation(axis, angle_expression(angle, f"{where}, rotation about {axis}"))
 
 
 def angle_expression(angle: Scalar, where: str) -> Expression:
@@ -229,7 +229,7 @@ class Point:
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """A point displaced by (x, y, z) [m] in this frame, then turned by `rotation`."""
+        """A point displaced by (x, y, z) [m] in this frame, then rotated by `rotation`."""
         steps = displacement(f"{self.owner.name}.at", x, y, z, rotation)
         return replace(self, placement=self.placement.then(*steps))
 
@@ -287,18 +287,18 @@ class Component:
         return frozenset(p.name for value in self.expressions() for p in parameters_of(value))
 
     def _normalise(self, *names: str) -> None:
-        """Turn fields that a user wrote as numbers or texts into expressions, checking each."""
+        """Convert fields that a user wrote as numbers or texts to expressions, checking each."""
         for name in names:
             value = expression(getattr(self, name), f"{self.name}, {name}")
             object.__setattr__(self, name, value)
 
     def scoped(self: C, prefix: str) -> C:
         """The same component inside a mechanism that is placed in another one."""
-        return self._changed(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
+        return self._change(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
 
     def without_defaults(self: C) -> C:
         """The same component, which knows no values of its parameters."""
-        return self._changed(without_defaults, self.name)
+        return self._change(without_defaults, self.name)
 
     def check_values(self, values: Mapping[str, float]) -> None:
         """Refuse values of parameters that the component itself would refuse as numbers.
@@ -306,11 +306,11 @@ class Component:
         Raises:
             DescriptionError: as in the constructor.
         """
-        self._changed(lambda value: with_values(value, values), self.name)
+        self._change(lambda value: with_values(value, values), self.name)
 
-    def _changed(self: C, change: Callable[[Expression], Expression], name: str) -> C:
+    def _change(self: C, change: Callable[[Expression], Expression], name: str) -> C:
         fresh: dict[str, Any] = {
-            f.name: _mapped(getattr(self, f.name), change) for f in fields(self) if f.init
+            f.name: _map(getattr(self, f.name), change) for f in fields(self) if f.init
         }
         return type(self)(**{**fresh, "name": name})
 
@@ -326,14 +326,14 @@ def _expressions(value: object) -> Iterator[Expression]:
             yield from _expressions(getattr(value, f.name))
 
 
-def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
+def _map(value: Any, change: Callable[[Expression], Expression]) -> Any:
     if isinstance(value, Expression):
         return change(value)
     if isinstance(value, tuple):
-        return tuple(_mapped(element, change) for element in value)
+        return tuple(_map(element, change) for element in value)
     if is_dataclass(value) and not isinstance(value, type):
         return replace(
-            value, **{f.name: _mapped(getattr(value, f.name), change) for f in fields(value)}
+            value, **{f.name: _map(getattr(value, f.name), change) for f in fields(value)}
         )
     return value
 
@@ -341,17 +341,17 @@ def _mapped(value: Any, change: Callable[[Expression], Expression]) -> Any:
 def with_points(component: C, change: Callable[[Point], Point]) -> C:
     """The component with each of its points changed, those in tuples too."""
 
-    def changed(value: Any) -> Any:
+    def change_points(value: Any) -> Any:
         if isinstance(value, Point):
             return change(value)
         if isinstance(value, tuple) and any(isinstance(one, Point) for one in value):
-            return tuple(changed(one) for one in value)
+            return tuple(change_points(one) for one in value)
         return value
 
     values = {f.name: getattr(component, f.name) for f in fields(component) if f.init}
-    new = {name: changed(value) for name, value in values.items()}
-    moved = {name: value for name, value in new.items() if value is not values[name]}
-    return replace(component, **moved) if moved else component
+    new = {name: change_points(value) for name, value in values.items()}
+    other = {name: value for name, value in new.items() if value is not values[name]}
+    return replace(component, **other) if other else component
 
 
 # Coordinates with a number each, as users write them.

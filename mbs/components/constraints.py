@@ -1,4 +1,4 @@
-"""Constraints: what keeps a distance, a line, a plane or a turn between two frames.
+"""Constraints: what keeps a distance, a line, a plane or an orientation between two frames.
 
 They connect as joints do but place nothing: no coordinate describes how one frame moves in the
 other, so the assembly always cuts them and only their rows remain (`mbs.loops.closure`).
@@ -53,10 +53,10 @@ class Constraint(Joint):
 
 @dataclass(frozen=True, slots=True)
 class Rod(Constraint):
-    """A massless rod with a ball at each end: the two origins keep their distance; 1 row.
+    """A massless rod between spherical joints: the two origins keep their distance; 1 row.
 
     Attributes:
-        length: from ball to ball [m].
+        length: between the two centres [m].
     """
 
     length: Scalar = field(kw_only=True)
@@ -111,13 +111,13 @@ class PointOnPlane(_AxisConstraint):
 
 @dataclass(frozen=True, slots=True)
 class ConstantVelocity(_AxisConstraint):
-    """A homokinetic joint: two shafts that meet at any angle turn by the same angle; 4 rows.
+    """A homokinetic joint: two shafts that meet at any angle rotate by the same angle; 4 rows.
 
     Its centre is the origin of both frames, and the axis is that of the shaft in each of them.
     """
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origins agree, and frame_b is turned about an axis in the plane x, y alone."""
+        """The origins agree, and frame_b is rotated about an axis in the plane x, y alone."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), orientation_rows(pose)[2]]
 

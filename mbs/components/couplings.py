@@ -111,8 +111,8 @@ class Gear(Transmission):
     """A pair of gears: the driven angle is `ratio` times the driving one.
 
     Attributes:
-        ratio: turns of driven for a turn of the driver; less than zero for wheels that mesh from
-            outside about parallel axes.
+        ratio: revolutions of driven per revolution of the driver; less than zero for wheels that
+            mesh from outside about parallel axes.
     """
 
     kinds = (Motion.REVOLUTE, Motion.REVOLUTE)
@@ -144,12 +144,12 @@ class RackAndPinion(Transmission):
 
 @dataclass(frozen=True, slots=True)
 class Screw(Transmission):
-    """A nut, the driven displacement, that moves by `pitch` for a turn of the driving angle.
+    """A nut, the driven displacement, that moves by `pitch` per revolution of the driving angle.
 
     On the coordinates `.s` and `.phi` of one Cylindrical joint it makes a screw joint.
 
     Attributes:
-        pitch: advance for a whole turn [m]; less than zero for a left-hand thread.
+        pitch: advance per revolution [m]; less than zero for a left-hand thread.
     """
 
     kinds = (Motion.PRISMATIC, Motion.REVOLUTE)
@@ -167,7 +167,7 @@ class Helical(Cylindrical):
     Connecting it adds the `Screw` NAME.thread between its two coordinates.
 
     Attributes:
-        pitch: advance for a whole turn [m]; less than zero for a left-hand thread.
+        pitch: advance per revolution [m]; less than zero for a left-hand thread.
     """
 
     pitch: Scalar = field(kw_only=True)

@@ -121,7 +121,8 @@ class Cam(Custom):
         driver: name of the coordinate of the cam.
         profile: rows of a position of the driver and one of the driven coordinate, in order
             [rad or m]; with a period they span less than one.
-        period: of the driver [rad or m], a whole turn if not given; None for a curve with ends.
+        period: of the driver [rad or m], a whole revolution if not given; None for a curve with
+            ends.
     """
 
     driven = custom.coordinate()

@@ -23,14 +23,14 @@ from mbs.text import quoted
 
 @dataclass(frozen=True, slots=True)
 class OneFlange(Custom):
-    """A part at one place of a shaft."""
+    """A part at one point of a shaft."""
 
     flange = custom.flange()
 
 
 @dataclass(frozen=True, slots=True)
 class TwoFlanges(Custom):
-    """A part between two shafts, or between the ends of one; of a gear a turns `ratio` times b."""
+    """A part between two shafts, or the ends of one; a gear has angle a = `ratio` * angle b."""
 
     flange_a = custom.flange()
     flange_b = custom.flange()
@@ -93,8 +93,8 @@ class IdealGear(TwoFlanges):
     """A rigid gear without losses: angle_a = ratio * angle_b, and torque_b = -ratio * torque_a.
 
     Attributes:
-        ratio: turns of flange_a for a turn of flange_b, or rad for 1 m where flange_b is on a
-            prismatic joint; less than zero when they turn in opposite ways.
+        ratio: revolutions of flange_a per revolution of flange_b, or rad for 1 m where flange_b is
+            on a prismatic joint; less than zero when they rotate in opposite directions.
     """
 
     lowered = True
@@ -110,9 +110,9 @@ class IdealGear(TwoFlanges):
 
 
 class FixedFlange(OneFlange):
-    """A flange that does not move: the housing, for shafts and for slides.
+    """A flange that is fixed: the housing, for shafts and for parts that slide.
 
-    It holds what is connected to it at zero: the end of a spring, the ring of a planetary gear.
+    It locks what is connected to it at zero: the end of a spring, the ring of a planetary gear.
     """
 
     held = True
@@ -132,8 +132,8 @@ def check_ratio(name: str, ratio: Scalar) -> None:
     """Refuse a gear that ties nothing."""
     if to_float(ratio) == 0:
         raise DescriptionError(
-            f"{name}: ratio is 0, which ties nothing; give the turns of flange_a for a turn of"
-            " flange_b, less than zero where they turn in opposite ways"
+            f"{name}: ratio is 0, which ties nothing; give the revolutions of flange_a per"
+            " revolution of flange_b, less than zero where they rotate in opposite directions"
         )
 
 
@@ -142,7 +142,7 @@ def check_ratio(name: str, ratio: Scalar) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Device(OneFlange):
-    """A motor: it turns its shaft, and the efforts tau of models have what it delivers.
+    """A motor: it drives its shaft, and the efforts tau of models have what it delivers.
 
     A class of a user's own drives a shaft where it derives from this one and its `loads` are
     those of the port "flange".
@@ -223,7 +223,7 @@ class DCMotor(Device):
         return {"flange": at.constant * self._current(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it delivers, and how fast it turns."""
+        """What it delivers, and how fast it rotates."""
         i = self._current(at)
         values = {"i": i, "tau": at.constant * i, "w": at.flange.speed}
         return {name: values[name] for name in self.output_names}
@@ -250,7 +250,7 @@ class BLDCMotor(Device):
     Source: Krause et al. 2013.
 
     Attributes:
-        pole_pairs: P, electrical turns for a turn of the shaft.
+        pole_pairs: P, electrical revolutions per revolution of the shaft.
         resistance: R of a phase [ohm].
         inductance_d: L_d, along the magnets [H].
         inductance_q: L_q, across them [H]; as much as L_d where left out.
@@ -291,7 +291,7 @@ class BLDCMotor(Device):
         return {"flange": self._torque(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it delivers, how fast it turns, and the electrical power that it takes."""
+        """What it delivers, how fast it rotates, and the electrical power that it takes."""
         power = 1.5 * (at.v_d * at.i_d + at.v_q * at.i_q)
         return {"tau": self._torque(at), "w": at.flange.speed, "power": power}
 
@@ -382,9 +382,9 @@ class ElasticGear(ElasticShaft):
     and flange_a the opposite of this divided by ratio.
 
     Attributes:
-        ratio: turns of flange_a for a turn of flange_b, or rad for 1 m where flange_b is on a
-            prismatic joint, whose stiffness is then in N/m; less than zero when they turn in
-            opposite ways.
+        ratio: revolutions of flange_a per revolution of flange_b, or rad for 1 m where flange_b is
+            on a prismatic joint, whose stiffness is then in N/m; less than zero when they rotate in
+            opposite directions.
     """
 
     flange_b = custom.flange(slides=None)

@@ -92,7 +92,7 @@ class JointForce(CoordinateForce):
         return ((self.joint, Number(1.0)),)
 
     def _take_limits(self) -> None:
-        """Turn the fields lower and upper of a stop into expressions, checking them."""
+        """Convert the fields lower and upper of a stop to expressions, checking them."""
         sides = [name for name in ("lower", "upper") if getattr(self, name) is not None]
         if not sides:
             raise DescriptionError(
@@ -133,7 +133,7 @@ class PointSource(ForceElement):
 
     @property
     def follows(self) -> bool:
-        """Whether its direction turns with the body."""
+        """Whether its direction rotates with the body."""
         raise NotImplementedError
 
     def _settle(self, name: str) -> None:
@@ -146,7 +146,7 @@ class PointSource(ForceElement):
         if axes not in _AXES:
             raise DescriptionError(
                 f"{self.name}: axes is {quoted(axes)}; use 'world', or 'body' for those of the"
-                " point, which turn with it"
+                " point, which rotate with it"
             )
 
 
@@ -156,7 +156,7 @@ class Force(PointSource):
 
     Attributes:
         force: its three components [N].
-        axes: "world" for a direction fixed in space, "body" for one that turns with the point.
+        axes: "world" for a direction fixed in space, "body" for one that rotates with the point.
     """
 
     force: Any
@@ -167,12 +167,12 @@ class Force(PointSource):
 
     @property
     def follows(self) -> bool:
-        """Whether its direction turns with the body."""
+        """Whether its direction rotates with the body."""
         return self.axes == "body"
 
     def loads(self, at: Any) -> Mapping[str, Load]:
         """The force, without a moment about its point."""
-        return {"point": custom.force(_turned(self.force, self.follows, at), own_axes=True)}
+        return {"point": custom.force(_in_point_axes(self.force, self.follows, at), own_axes=True)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +181,7 @@ class Torque(PointSource):
 
     Attributes:
         torque: its three components [N m].
-        axes: "world" for a direction fixed in space, "body" for one that turns with the point.
+        axes: "world" for a direction fixed in space, "body" for one that rotates with the point.
     """
 
     torque: Any
@@ -192,15 +192,17 @@ class Torque(PointSource):
 
     @property
     def follows(self) -> bool:
-        """Whether its direction turns with the body."""
+        """Whether its direction rotates with the body."""
         return self.axes == "body"
 
     def loads(self, at: Any) -> Mapping[str, Load]:
         """The torque alone."""
-        return {"point": custom.torque(_turned(self.torque, self.follows, at), own_axes=True)}
+        return {
+            "point": custom.torque(_in_point_axes(self.torque, self.follows, at), own_axes=True)
+        }
 
 
-def _turned(components: tuple[Expression, ...], follows: bool, at: Any) -> SX:
+def _in_point_axes(components: tuple[Expression, ...], follows: bool, at: Any) -> SX:
     value = vector(to_sx(component, at.symbols) for component in components)
     return value if follows else casadi.densify(casadi.mtimes(at.point.R.T, value))
 
@@ -333,7 +335,7 @@ class SpringDamperSeries(ForceElement):
     """A spring in series with a damper between two points, a Maxwell element.
 
     With the distance L of the points and the state z, the elongation of the damper, the tension is
-    T = stiffness (L - length - z), and damping dz/dt = T. A distance that is held relaxes within
+    T = stiffness (L - length - z), and damping dz/dt = T. A constant distance relaxes within
     the time damping / stiffness.
 
     Source: Haug 1989 for translational springs and dampers.
@@ -386,9 +388,9 @@ class SpringDamperSeries(ForceElement):
 # Source: Haug 1989 for forces between bodies; the angles are those of the unit quaternion.
 
 
-_HALF_TURN = 1e-12
-"""What 2 cos(theta / 2) is at least: at half a turn nothing is divided by zero, and off it the
-square, 1e-24, is rounding."""
+_HALF_REVOLUTION = 1e-12
+"""What 2 cos(theta / 2) is at least: at half a revolution nothing is divided by zero, and off it
+the square, 1e-24, is rounding."""
 _STRENGTHS = ("stiffness", "damping", "angular_stiffness", "angular_damping")
 
 
@@ -397,9 +399,9 @@ class Bushing(PairForce):
     """Springs and dampers along and about the three axes of frame a, at rest where a and b agree.
 
     The displacement is p, the origin of b in frame a; the angles are phi = 2 sin(theta / 2) u for
-    a turn by theta about u, which is the vector of small rotations where theta is small. Forces
-    and moments are exact derivatives of the energy p' K p / 2 + phi' K_phi phi / 2 for any turn
-    of less than half a turn.
+    a rotation by theta about u, which is the vector of small rotations where theta is small. Forces
+    and moments are exact derivatives of the energy p' K p / 2 + phi' K_phi phi / 2 for any
+    rotation of less than half a revolution.
 
     Attributes:
         stiffness: K along the axes of a [N/m], three numbers, or one for all.
@@ -433,7 +435,7 @@ class Bushing(PairForce):
         self._require_effect(*_STRENGTHS)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Force and moment at the origin of b, carried to the origin of a."""
+        """Force and moment at the origin of b, transformed to the origin of a."""
         motion, force, moment = self._at_b(at)
         on_a = custom.FrameLoad(force, moment + cross(motion.p, force))
         return custom.between(at.a, at.b, on_a, -moment)
@@ -472,7 +474,7 @@ class Bushing(PairForce):
 
 def _half_turn(R: SX) -> tuple[SX, SX]:
     """sin(theta / 2) u and cos(theta / 2) of a rotation by theta about u."""
-    cosine = 0.5 * casadi.sqrt(1 + casadi.trace(R) + _HALF_TURN**2)
+    cosine = 0.5 * casadi.sqrt(1 + casadi.trace(R) + _HALF_REVOLUTION**2)
     axis = vector([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return axis / (4 * cosine), cosine
 
@@ -617,19 +619,19 @@ class JointFriction(JointForce):
     def resistance(self, at: Any) -> SX:
         """Coulomb friction that falls from rest to sliding, and viscous friction."""
         v, symbols = at.x.v, at.symbols
-        dry = to_sx(self.coulomb, symbols)
+        coulomb = to_sx(self.coulomb, symbols)
         if self.stribeck != Number(0.0):
             falling = casadi.exp(-((v / to_sx(self.velocity, symbols)) ** 2))
-            dry = dry + to_sx(self.stribeck, symbols) * falling
+            coulomb = coulomb + to_sx(self.stribeck, symbols) * falling
         total: SX = to_sx(self.viscous, symbols) * v
-        return total + dry * smooth_sign(v, to_sx(self.width, symbols))
+        return total + coulomb * smooth_sign(v, to_sx(self.width, symbols))
 
     def dissipation(self, at: Any) -> SX:
         """All its power."""
         return SX(self.resistance(at) * at.x.v)
 
 
-# Tendons that are led over joints without a path in space.
+# Tendons that are routed over joints without a path in space.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -726,13 +728,13 @@ class FixedTendon(CoordinateForce):
 
 # Contacts along a coordinate of a joint: rigid stops and Coulomb friction that really sticks.
 #
-# They hold the coordinate at times and let it go at others. Simulations change between the two at
+# They lock the coordinate at times and release it at others. Simulations change between the two at
 # events; smooth models, such as the inverse dynamic one, leave contacts out.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointContact(JointForce):
-    """What may hold a coordinate of a joint at rest, in simulations alone."""
+    """What may lock a coordinate of a joint, in simulations alone."""
 
     @property
     def scope(self) -> str:
@@ -784,11 +786,11 @@ class RigidStop(JointContact):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoulombFriction(JointContact):
-    """Coulomb friction: it holds a coordinate at rest up to an effort, and brakes it beyond.
+    """Coulomb friction: the coordinate sticks up to an effort, and is braked beyond.
 
     Attributes:
         sliding: friction while it slides [N m or N].
-        sticking: the largest effort that holds it at rest, at least `sliding`, and as large when
+        sticking: the largest effort at which it sticks, at least `sliding`, and as large when
             left out [N m or N].
     """
 

@@ -29,7 +29,7 @@ class _GivenOnPoint(Custom):
         if self.axes not in _AXES:
             raise DescriptionError(
                 f"{self.name}: axes is {quoted(self.axes)}; use 'world', or 'body' for those of the"
-                " point, which turn with it"
+                " point, which rotate with it"
             )
 
 
@@ -39,7 +39,7 @@ class ForceInput(_GivenOnPoint):
     Attributes:
         point: of a body, or a body for its reference frame.
         axes: "world" for components along axes fixed in space, "body" for those of the point,
-            which turn with it.
+            which rotate with it.
     """
 
     x = custom.input("N")
@@ -58,7 +58,7 @@ class TorqueInput(_GivenOnPoint):
     Attributes:
         point: of a body, or a body for its reference frame.
         axes: "world" for components along axes fixed in space, "body" for those of the point,
-            which turn with it.
+            which rotate with it.
     """
 
     x = custom.input("N.m")
@@ -169,7 +169,7 @@ class ShaftTorqueInput(TwoFlanges):
 
 
 class SlidingForceInput(TwoFlanges):
-    """A force between two slides: the input `force` [N] on flange_b, the opposite on flange_a."""
+    """A force between flanges that slide: the input `force` [N] on flange_b, its opposite on a."""
 
     flange_a = custom.flange(slides=True)
     flange_b = custom.flange(slides=True)
@@ -181,7 +181,7 @@ class SlidingForceInput(TwoFlanges):
 
 
 class ForceSource(Device):
-    """A given force on a slide, as a motor: the input `force` [N].
+    """A given force on a flange that slides, as a motor: the input `force` [N].
 
     What it delivers is in the efforts tau of models, as that of a TorqueSource on a shaft is.
     """
@@ -195,5 +195,5 @@ class ForceSource(Device):
         return {"flange": at.force}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """The velocity of the slide."""
+        """The velocity of the flange."""
         return {"v": at.flange.speed}

@@ -111,7 +111,7 @@ class HydraulicValve(Custom):
     """A 4/3 spool valve between a supply, a tank and the two chambers of a cylinder.
 
     The spool runs from -1 to 1. Above zero it opens the supply to a and b to the tank, below zero
-    the supply to b and a to the tank, as far as it is moved; at zero all is closed. The flow
+    the supply to b and a to the tank, as far as it is shifted; at zero all is closed. The flow
     through an edge is rated_flow |spool| sqrt(dp / rated_drop), with its sign, where dp is the
     difference of pressures; sqrt(dp) is dp / (dp^2 + transition^2)^(1/4), smooth at zero.
 

@@ -88,7 +88,7 @@ def tilt_rows(pose: Pose) -> Rows:
 
 
 def orientation_rows(pose: Pose) -> Rows:
-    """Frame_b is not turned."""
+    """Frame_b is not rotated."""
     R = pose.R
     return [
         ("moment x", 0.5 * (R[2, 1] - R[1, 2])),
@@ -119,7 +119,7 @@ def diagonal(pose: Pose) -> list[SX]:
     return [pose.R[k, k] for k in range(3)]
 
 
-# Rotors of motors that turn with a joint, faster than it.
+# Rotors of motors that rotate with a joint, faster than it.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,8 +131,8 @@ class Rotor:
 
     Attributes:
         inertia: about its own axis [kg m^2].
-        ratio: turns of the rotor for a turn of the joint, or rad for 1 m of a prismatic one; less
-            than zero when it turns the other way.
+        ratio: revolutions of the rotor per revolution of the joint, or rad for 1 m of a prismatic
+            one; less than zero when it rotates in the opposite direction.
         axis: of the rotor, in frame_a, as a letter or three numbers; that of the joint when None.
     """
 
@@ -246,7 +246,7 @@ class Joint(Component):
         Fv: viscous friction [N m s/rad or N s/m].
         Fs: Coulomb friction [N m or N], which acts as Fs tanh(v / Fs_width).
         Fs_width: velocity over which Coulomb friction changes sign [rad/s or m/s]; zero for the
-            step Fs sign(v), which identification wants and integrators do not.
+            step Fs sign(v), which identification needs and integrators do not.
         Ia: inertia of the rotor seen at the joint [kg m^2 or kg], for what its spin does to the
             link that carries it see `rotor`.
         stiffness: of a spring between its two frames [N m/rad or N/m], of a joint of one degree
@@ -344,7 +344,7 @@ class Joint(Component):
 
     @property
     def flange(self) -> Flange:
-        """Where a drive line turns it, or pushes it where it is prismatic."""
+        """Where a drive line exerts a torque, or a force where it is prismatic."""
         if self.nv != 1 or len(self.freedoms) != 1:
             raise DescriptionError(
                 f"{self.name}: a {type(self).__name__} joint has no flange, since it has not one"
@@ -422,7 +422,7 @@ class Prismatic(_AxisJoint):
         return (Freedom(Motion.PRISMATIC, self.axis),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origin moves along the axis alone, and nothing turns."""
+        """The origin moves along the axis alone, and nothing rotates."""
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xy"), *orientation_rows(pose)]
 
@@ -649,7 +649,7 @@ class Fixed(Joint):
         return ()
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """The origins agree, and nothing turns."""
+        """The origins agree, and nothing rotates."""
         return weld_rows(pose)
 
     def facing(self, pose: Pose) -> list[SX]:

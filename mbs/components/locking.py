@@ -12,12 +12,12 @@ import numpy as np
 from mbs.components.bodies import RigidBody
 from mbs.components.component import (
     Component,
-    Oriented,
+    ElementaryRotation,
+    FixedRotation,
     Placement,
     Point,
     Step,
     Translation,
-    Turned,
     angle_expression,
     with_points,
 )
@@ -48,7 +48,7 @@ class _Locks:
         mechanism: whose joints they are.
         positions: of each of them, one for each element of q.
         values: of each coordinate.
-        gone: the couplings that hold among locked coordinates alone.
+        gone: the couplings among locked coordinates alone.
         changed: couplings of more than two coordinates, as they are among those that are left.
     """
 
@@ -90,7 +90,7 @@ class _Locks:
         return joints[name]
 
     def follow_couplings(self) -> None:
-        """Lock what follows a locked joint, or leads it."""
+        """Lock what a locked joint drives, or is driven by."""
         pending = list(self.mechanism.couplings())
         while True:
             touched = [c for c in pending if set(c.coordinates) & self.values.keys()]
@@ -118,23 +118,23 @@ class _Locks:
         first, *rest = coupling.coefficients or (0.0,)
         left = replace(coupling, coefficients=(first + offset, *rest), others=tuple(free))
         locked = self.values.get(left.driver)
-        if free and locked is not None:  # the next one leads
-            (leader, factor), *free = free
+        if free and locked is not None:  # the next one drives
+            (driver, factor), *free = free
             terms = (_polynomial(left, locked), factor)
-            left = replace(left, driver=leader, coefficients=terms, others=tuple(free))
+            left = replace(left, driver=driver, coefficients=terms, others=tuple(free))
         locked = self.values.get(left.driven)
-        if free and locked is not None:  # the one that led follows
+        if free and locked is not None:  # the driver becomes the driven one
             constant, factor = self._linear(left)
             shares = [(name, expression(value) * -1.0 / factor) for name, value in free]
-            (leader, share), *shares = shares
+            (driver, share), *shares = shares
             terms = ((locked - constant) / factor, share)
             left = replace(
-                left, driven=left.driver, driver=leader, coefficients=terms, others=tuple(shares)
+                left, driven=left.driver, driver=driver, coefficients=terms, others=tuple(shares)
             )
         return left
 
     def _linear(self, coupling: Coupling) -> tuple[Expression, Expression]:
-        """The two coefficients of a coupling that can be turned round."""
+        """The two coefficients of a coupling that can be inverted."""
         terms = [expression(c) for c in coupling.coefficients]
         offset, factor = (*terms, Number(0.0), Number(0.0))[:2]
         if len(terms) > 2 or to_float(factor) == 0:
@@ -193,7 +193,7 @@ def lock(mechanism: Mechanism, positions: Mapping[str, Any]) -> None:
     welds = {name: Fixed(name) for name in locks.positions}
     steps = {name: _steps(mechanism, name, values) for name, values in locks.positions.items()}
 
-    def moved(point: Point) -> Point:
+    def reattach(point: Point) -> Point:
         name = point.owner.name
         if name not in welds:
             return point
@@ -207,11 +207,11 @@ def lock(mechanism: Mechanism, positions: Mapping[str, Any]) -> None:
     for name, component in mechanism.components.items():
         if name in locks.gone or _acts_on(component, locks.values):
             continue
-        kept[name] = welds.get(name) or locks.changed.get(name) or _with_points(component, moved)
+        kept[name] = welds.get(name) or locks.changed.get(name) or _with_points(component, reattach)
     mechanism.components = kept
-    mechanism.connections = [(moved(a), moved(b)) for a, b in mechanism.connections]
-    mechanism.frames = {name: moved(point) for name, point in mechanism.frames.items()}
-    mechanism.shapes = [(moved(point), shape) for point, shape in mechanism.shapes]
+    mechanism.connections = [(reattach(a), reattach(b)) for a, b in mechanism.connections]
+    mechanism.frames = {name: reattach(point) for name, point in mechanism.frames.items()}
+    mechanism.shapes = [(reattach(point), shape) for point, shape in mechanism.shapes]
     mechanism.cuts = [name for name in mechanism.cuts if name not in welds]
     mechanism.guess = {
         name: value
@@ -228,12 +228,12 @@ def _acts_on(component: Component, coordinates: Mapping[str, Expression]) -> boo
 
 
 def _require_free_of_others(mechanism: Mechanism, locks: _Locks) -> None:
-    """Refuse to lock joints that sensors read, shafts turn, or tendons share with others."""
+    """Refuse to lock joints that sensors read, drive lines move, or tendons share with others."""
     driven = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     for name in locks.positions:
         if name in driven:
             raise DescriptionError(
-                f"{mechanism.name}: {name} is turned by a drive line; take the drive line away"
+                f"{mechanism.name}: {name} is driven by a drive line; take the drive line away"
                 " before the joint is locked"
             )
     for component in mechanism.components.values():
@@ -259,9 +259,9 @@ def _require_free_of_others(mechanism: Mechanism, locks: _Locks) -> None:
             )
 
 
-def _with_points(component: Component, moved: Any) -> Component:
+def _with_points(component: Component, reattach: Any) -> Component:
     """The component with its points where they are now."""
-    return with_points(component, moved) if isinstance(component, OnPoints) else component
+    return with_points(component, reattach) if isinstance(component, OnPoints) else component
 
 
 def _steps(mechanism: Mechanism, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:
@@ -284,23 +284,27 @@ def _freedom_steps(where: str, freedom: Freedom, values: Sequence[Expression]) -
                 Translation(*(values[0] * part if part else Number(0.0) for part in freedom.axis))
             ]
         case Motion.REVOLUTE:
-            return _turn(freedom.axis, angle_expression(values[0], where))
+            return _axis_rotation(freedom.axis, angle_expression(values[0], where))
         case Motion.SPHERICAL:
             return [_orientation(where, values)]
     return [Translation(*values[:3]), _orientation(where, values[3:])]
 
 
-def _turn(axis: Sequence[float], angle: Expression) -> list[Step]:
+def _axis_rotation(axis: Sequence[float], angle: Expression) -> list[Step]:
     for letter, part in zip("xyz", axis, strict=True):
         if abs(part) == 1:
-            return [Turned(letter, angle if part > 0 else -angle)]
-    turn = align_z((axis[0], axis[1], axis[2]))
-    R = [[float(turn[row, column]) for column in range(3)] for row in range(3)]
+            return [ElementaryRotation(letter, angle if part > 0 else -angle)]
+    R_axis = align_z((axis[0], axis[1], axis[2]))
+    R = [[float(R_axis[row, column]) for column in range(3)] for row in range(3)]
     back = [list(column) for column in zip(*R, strict=True)]
-    return [Oriented(nearest_rotation(R)), Turned("z", angle), Oriented(nearest_rotation(back))]
+    return [
+        FixedRotation(nearest_rotation(R)),
+        ElementaryRotation("z", angle),
+        FixedRotation(nearest_rotation(back)),
+    ]
 
 
-def _orientation(where: str, values: Sequence[Scalar]) -> Oriented:
+def _orientation(where: str, values: Sequence[Scalar]) -> FixedRotation:
     """The rotation of a unit quaternion w, x, y, z."""
     numbers = [to_float(expression(value)) for value in values]
     length = math.nan if None in numbers else math.hypot(*(n or 0.0 for n in numbers))
@@ -315,14 +319,14 @@ def _orientation(where: str, values: Sequence[Scalar]) -> Oriented:
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return Oriented(nearest_rotation(R))
+    return FixedRotation(nearest_rotation(R))
 
 
-# The root: what the world holds, by a weld or by a Free joint.
+# The root: what is connected to the world, by a weld or by a Free joint.
 
 
 Base = Literal["fixed", "free"]
-"""What holds the root: a weld to the world, or nothing."""
+"""What connects the root: a weld to the world, or nothing."""
 
 FREE_JOINT = "root_joint"
 """Name of the joint of a free root, as pinocchio has it; it has coordinates root_joint.x, .qw .."""
@@ -335,22 +339,22 @@ def free_root(mechanism: Mechanism) -> None:
         mechanism: changed.
 
     Raises:
-        DescriptionError: there is not one weld that holds the whole mechanism.
+        DescriptionError: there is not one weld that carries the whole mechanism.
     """
     if _free_joints(mechanism):
         return
     world = mechanism.world
-    held = [pair for pair in mechanism.connections if any(p.owner is world for p in pair)]
-    bodies = [point.owner for pair in held for point in pair if point.owner is not world]
-    if len(held) != 1 or not isinstance(bodies[0], RigidBody):
+    welds = [pair for pair in mechanism.connections if any(p.owner is world for p in pair)]
+    bodies = [point.owner for pair in welds for point in pair if point.owner is not world]
+    if len(welds) != 1 or not isinstance(bodies[0], RigidBody):
         what = ", ".join(body.name for body in bodies[:5]) or "nothing"
         raise DescriptionError(
             f"{mechanism.name}: its base cannot be free, since no body of its own is the only thing"
             f" that the world holds (it holds {what}); describe a body for the base, with its"
             " inertia, and weld it to the world"
         )
-    a, b = held[0] if held[0][0].owner is world else held[0][::-1]
-    mechanism.connections.remove(held[0])
+    a, b = welds[0] if welds[0][0].owner is world else welds[0][::-1]
+    mechanism.connections.remove(welds[0])
     mechanism.connect(a, Free(FREE_JOINT, actuated=False), b)
 
 
@@ -361,11 +365,11 @@ def fix_root(mechanism: Mechanism) -> None:
         names = ("x", "y", "z", "qw", "qx", "qy", "qz")
         zero = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         values = [mechanism.guess.get(f"{joint}.{k}", v) for k, v in zip(names, zero, strict=True)]
-        positions[joint] = values if forward else _reversed(values)
+        positions[joint] = values if forward else _inverse(values)
     lock(mechanism, positions)
 
 
-def _reversed(values: Sequence[float]) -> list[float]:
+def _inverse(values: Sequence[float]) -> list[float]:
     """Position and quaternion of the opposite displacement."""
     R = np.array(_orientation("", [Number(v) for v in values[3:]]).rows)
     p = -R.T @ np.array(values[:3])
@@ -380,15 +384,15 @@ def _free_joints(mechanism: Mechanism) -> list[tuple[str, bool]]:
         if all(isinstance(p.owner, (RigidBody, Fixed)) for p in (a, b)):
             neighbours.setdefault(a.owner.name, []).append(b.owner.name)
             neighbours.setdefault(b.owner.name, []).append(a.owner.name)
-    held, pending = {mechanism.world.name}, [mechanism.world.name]
+    grounded, pending = {mechanism.world.name}, [mechanism.world.name]
     while pending:
         for name in neighbours.get(pending.pop(), ()):
-            if name not in held:
-                held.add(name)
+            if name not in grounded:
+                grounded.add(name)
                 pending.append(name)
     found = {}
     for a, b in mechanism.connections:
         for point, other in ((a, b), (b, a)):
-            if isinstance(point.owner, Free) and other.owner.name in held:
+            if isinstance(point.owner, Free) and other.owner.name in grounded:
                 found[point.owner.name] = point.port == "a"
     return list(found.items())

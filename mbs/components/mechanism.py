@@ -94,7 +94,7 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
         else:
             placed[component.name] = outer.add(component.scoped(scope))
     outer.connections.extend(
-        (moved(a, placed, scope), moved(b, placed, scope)) for a, b in inner.connections
+        (on_placed(a, placed, scope), on_placed(b, placed, scope)) for a, b in inner.connections
     )
     outer.shafts.extend(
         (replace(a, owner=placed[a.owner.name]), replace(b, owner=placed[b.owner.name]))
@@ -105,8 +105,8 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
         for source, target in inner.wires
     )
     for frame, point in inner.frames.items():
-        outer.frames[f"{scope}.{frame}"] = moved(point, placed, scope)
-    outer.shapes.extend((moved(point, placed, scope), shape) for point, shape in inner.shapes)
+        outer.frames[f"{scope}.{frame}"] = on_placed(point, placed, scope)
+    outer.shapes.extend((on_placed(point, placed, scope), shape) for point, shape in inner.shapes)
     outer.cuts.extend(f"{scope}.{joint}" for joint in inner.cuts)
     outer.guess.update({f"{scope}.{name}": value for name, value in inner.guess.items()})
     used = {parameter.name for parameter in outer.used_parameters()}
@@ -116,7 +116,7 @@ def place(outer: Mechanism, inner: Mechanism, name: str) -> Placed:
     return Placed(outer, scope)
 
 
-def moved(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
+def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
     """A point of the inner mechanism on the component that was placed for its owner."""
     owner = placed[point.owner.name]
     return replace(point, owner=owner, placement=point.placement.scoped(scope))
@@ -225,7 +225,7 @@ class Mechanism:
 
         `connect(a, joint, b)` puts the joint's frame_a on a and its frame_b on b;
         `connect(a, b)` makes the two frames coincide. A frame of a joint is a point as well.
-        Flanges that are connected turn together; parts of drive lines need not be added first.
+        Flanges that are connected rotate together; parts of drive lines need not be added first.
 
         Raises:
             DescriptionError: a component is unknown here, or the joint is connected already.
@@ -425,7 +425,7 @@ class Mechanism:
         found: dict[str, Parameter] = {}
         for parameter in self.used_parameters():
             known = found.get(parameter.name)
-            found[parameter.name] = parameter if known is None else self._joined(known, parameter)
+            found[parameter.name] = parameter if known is None else self._merge(known, parameter)
         for name, value in self.values.items():
             if name not in found:
                 known_names = ", ".join(found) or "none"
@@ -436,7 +436,7 @@ class Mechanism:
             found[name] = replace(found[name], default=value.default)
         return tuple(found.values())
 
-    def _joined(self, known: Parameter, other: Parameter) -> Parameter:
+    def _merge(self, known: Parameter, other: Parameter) -> Parameter:
         """Two uses of one symbol: a value and bounds may stand at either, but not differ."""
         for what in ("default", "min", "max"):
             one, two = getattr(known, what), getattr(other, what)

@@ -25,11 +25,12 @@ class MotionJoint(Custom):
             phi = custom.unknown("rad")
 
             def motion(self, at):
-                return turned("z", at.phi) @ shifted(0, 0, at.lead * at.phi)
+                return rotation("z", at.phi) @ translation(0, 0, at.lead * at.phi)
 
-    It is connected as any joint, `m.connect(point_a, joint, point_b)`. Rows hold frame_b where the
-    motion has it, whether a loop closes there or not; the coordinates are named NAME.of_it. Motions
-    made of turns and slides one after the other are cheaper as `freedoms` of a `Joint`.
+    It is connected as any joint, `m.connect(point_a, joint, point_b)`. Rows keep frame_b where the
+    motion puts it, whether a loop closes there or not; the coordinates are named NAME.of_it.
+    Motions made of rotations and translations one after the other are cheaper as `freedoms` of a
+    `Joint`.
 
     Source: Haug 1989, chapter 9, for constraints between two frames.
     """
@@ -55,36 +56,36 @@ class MotionJoint(Custom):
         return replace(self, **points), Free(f"{self.name}.free")
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Frame_b is where the motion has it: origins agree, and nothing is turned."""
-        offset, turn = self._off(at)
+        """Frame_b is where the motion puts it: origins agree, and nothing is rotated."""
+        offset, R = self._displacement(at)
         p = casadi.vertsplit(casadi.densify(offset))
-        x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+        x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
         return {
             **{f"force {axis}": Row(value) for axis, value in zip("xyz", p, strict=True)},
             **{f"moment {a}": Row(0.5 * r, "1") for a, r in zip("xyz", (x, y, z), strict=True)},
         }
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """No axis is opposed to where the motion has it."""
-        _, turn = self._off(at)
-        return {f"axis {axis}": turn[k, k] for k, axis in enumerate("xyz")}
+        """No axis is opposed to where the motion puts it."""
+        _, R = self._displacement(at)
+        return {f"axis {axis}": R[k, k] for k, axis in enumerate("xyz")}
 
-    def _off(self, at: Any) -> tuple[SX, SX]:
-        """(3, 1) and (3, 3) frame_b seen from where the motion has it."""
-        seen, wanted = at.frame_a.to(at.frame_b), self.motion(at)
-        if not isinstance(wanted, Pose):
+    def _displacement(self, at: Any) -> tuple[SX, SX]:
+        """(3, 1) and (3, 3) frame_b seen from where the motion puts it."""
+        seen, target = at.frame_a.to(at.frame_b), self.motion(at)
+        if not isinstance(target, Pose):
             raise DescriptionError(
-                f"{self.name}: motion returns a {type(wanted).__name__}; return what turned(...)"
-                " and shifted(...) make, joined by @"
+                f"{self.name}: motion returns a {type(target).__name__}; return what rotation(...)"
+                " and translation(...) make, joined by @"
             )
-        return seen.p - wanted.p, casadi.mtimes(wanted.R.T, seen.R)
+        return seen.p - target.p, casadi.mtimes(target.R.T, seen.R)
 
 
-def turned(axis: str, angle: Any) -> Pose:
-    """A turn about "x", "y" or "z" by an angle [rad]."""
+def rotation(axis: str, angle: Any) -> Pose:
+    """A rotation about "x", "y" or "z" by an angle [rad]."""
     return Pose.about(axis, SX(angle))
 
 
-def shifted(x: Any = 0, y: Any = 0, z: Any = 0) -> Pose:
+def translation(x: Any = 0, y: Any = 0, z: Any = 0) -> Pose:
     """A displacement [m]."""
     return Pose.translation(vector([SX(x), SX(y), SX(z)]))

@@ -18,7 +18,7 @@ class Note:
             format requires was missing.
         element: such as "link 'base'".
         text: the rest of the sentence: what is written there, and what was made of it.
-        line: of the file; None where the format's own reader does not tell it.
+        line: of the file; None where the format's own reader does not report it.
     """
 
     kind: NoteKind
@@ -27,5 +27,5 @@ class Note:
     line: int | None = None
 
     def __str__(self) -> str:
-        place = "" if self.line is None else f"line {self.line}: "
-        return f"{place}{self.element}: {self.text}"
+        line = "" if self.line is None else f"line {self.line}: "
+        return f"{line}{self.element}: {self.text}"

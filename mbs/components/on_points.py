@@ -30,7 +30,7 @@ class OnPoints(Component):
         )
 
     def _take_point(self, name: str) -> None:
-        """Turn the body or point that a user gave into a point."""
+        """Convert the body or point that a user gave to a point."""
         object.__setattr__(self, name, self._as_point(getattr(self, name), name))
 
     def _as_point(self, value: Any, name: str) -> Point:

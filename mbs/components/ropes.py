@@ -20,7 +20,7 @@ _TAUT = 1e-3
 
 
 class _Rope(Custom):
-    """A massless rope along a path of points; pulleys on the way have no size and no friction."""
+    """A massless rope along a path of points; pulleys on the path have no size and no friction."""
 
     path: Any
     length = custom.parameter("m", positive=True)
@@ -111,22 +111,22 @@ class ElasticRope(_Rope):
 
     def energy(self, at: Any) -> SX:
         """What its stretch stores."""
-        return SX(at.stiffness * self._stretched(at)[2])
+        return SX(at.stiffness * self._stretch(at)[2])
 
     def dissipation(self, at: Any) -> SX:
         """What the damper takes."""
-        return SX(at.damping * self._stretched(at)[0] * self._rate(at) ** 2)
+        return SX(at.damping * self._stretch(at)[0] * self._rate(at) ** 2)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """The tension."""
         return {"tension": self._tension(at)}
 
-    def _stretched(self, at: Any) -> tuple[SX, SX, SX]:
+    def _stretch(self, at: Any) -> tuple[SX, SX, SX]:
         return smooth_ramp(self._length(at) - at.length, at.width)
 
     def _rate(self, at: Any) -> SX:
         return sum((a.to(b).rate for a, b in self._segments(at)), SX(0))
 
     def _tension(self, at: Any) -> SX:
-        slope, ramped, _ = self._stretched(at)
+        slope, ramped, _ = self._stretch(at)
         return SX(at.stiffness * ramped + at.damping * slope * self._rate(at))

@@ -1,8 +1,8 @@
 """Parts of drive lines with losses, play, friction and several shafts.
 
 The laws are smooth: they have no modes and no events, so that every model has them. A brake
-creeps where a real one sticks, at a speed below the width of its law, and a freewheel turns back
-by nothing but lets its shafts slip a little where it holds.
+creeps where a real one sticks, at a speed below the width of its law, and a freewheel rotates back
+by nothing but lets its shafts slip a little where it locks.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from mbs.expressions import to_float
 _FLANK = 1e-3
 """Depth of a flank over which it becomes stiff [rad]: a twentieth of a degree, below usual play."""
 _CREEP = 1e-3
-"""Speed below which a brake counts as closed [rad/s], as of JointFriction: a turn in two hours."""
-_TURNS_BACK = 1e-2
-"""Speed over which losses of a gear change sign [rad/s]: a turn in ten minutes."""
+"""Speed below which a brake counts as closed [rad/s], as of JointFriction: 2 pi in two hours."""
+_REVERSAL = 1e-2
+"""Speed over which losses of a gear change sign [rad/s]: 2 pi in ten minutes."""
 _UNLOADED = 1e-2
 """Torque over which they do [N m]: that of a gear of a watch, or a hundredth of a small robot's."""
 
@@ -147,7 +147,7 @@ class PlanetaryGear(custom.Custom):
     """An ideal planetary gear: (1 + ratio) angle_carrier = angle_sun + ratio angle_ring.
 
     It is a row on the three shafts, exact in positions and velocities, without inertia: every
-    shaft is a joint or has an inertia of its own, or is held by a FixedFlange. The torques on the
+    shaft is a joint or has an inertia of its own, or is locked by a FixedFlange. The torques on the
     shafts are in the ratios 1 : ratio : -(1 + ratio).
 
     Source: Modelica Association 2023 for the equation.
@@ -194,8 +194,8 @@ class LossyGear(TwoFlanges):
     Source: Modelica Association 2023 for the efficiencies.
 
     Attributes:
-        ratio: turns of flange_a for a turn of flange_b; less than zero when they turn in opposite
-            ways.
+        ratio: revolutions of flange_a per revolution of flange_b; less than zero when they rotate
+            in opposite directions.
         stiffness: at flange_b [N m/rad].
         efficiency: power at flange_b for the power at flange_a, where flange_a drives.
         efficiency_back: power at flange_a for that at flange_b, where flange_b drives; the gear
@@ -210,7 +210,7 @@ class LossyGear(TwoFlanges):
     efficiency = custom.parameter(positive=True, max=1)
     efficiency_back = custom.parameter(min=0, max=1)
     damping = custom.parameter("N.m.s/rad", 0.0, min=0)
-    width = custom.parameter("rad/s", _TURNS_BACK, positive=True)
+    width = custom.parameter("rad/s", _REVERSAL, positive=True)
     torque_width = custom.parameter("N.m", _UNLOADED, positive=True)
     torque = custom.output("N.m")
     loss = custom.output("W")
@@ -219,8 +219,8 @@ class LossyGear(TwoFlanges):
         TwoFlanges.__post_init__(self)
         if to_float(self.ratio) == 0:
             raise DescriptionError(
-                f"{self.name}: ratio is 0, which ties nothing; give the turns of flange_a for a"
-                " turn of flange_b, less than zero where they turn in opposite ways"
+                f"{self.name}: ratio is 0, which ties nothing; give the revolutions of flange_a per"
+                " revolution of flange_b, less than zero where they rotate in opposite directions"
             )
 
     def loads(self, at: Any) -> Mapping[str, Load]:
@@ -284,7 +284,7 @@ class QuadraticSpeedTorque(OneFlange):
         return SX(self._torque(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What it needs to be turned."""
+        """What it takes to rotate it."""
         return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
@@ -297,7 +297,7 @@ class Brake(OneFlange):
 
     The input `engagement` is the share of the normal force, from 0 for a brake that is released
     to 1; below zero it counts as zero. The law is smooth and has no event of sticking: a load
-    below the capacity turns the shaft at a speed below `width`.
+    below the capacity rotates the shaft at a speed below `width`.
 
     Source: Modelica Association 2023 for the element.
 
@@ -376,12 +376,12 @@ class OneWayClutch(TwoFlanges):
 
     The torque from a to b is damping r(w_a - w_b), with the ramp r of a JointStop over `width`:
     zero while b is faster, a stiff damper while a would be. The law is smooth and has no event of
-    locking: where it holds a torque T its shafts slip by T / damping + width / 2.
+    locking: where it locks against a torque T its shafts slip by T / damping + width / 2.
 
     Source: Modelica Association 2023 for the element.
 
     Attributes:
-        damping: where it holds [N m s/rad].
+        damping: where it locks [N m s/rad].
         width: slip over which the damper sets in [rad/s].
     """
 

@@ -80,8 +80,8 @@ class MotionSensor(Sensor):
     @property
     def measured(self) -> tuple[Quantity, ...]:
         """Those that were asked for."""
-        wanted = getattr(self, "quantities", ())
-        return tuple(quantity for quantity in _MOTION if quantity.name in wanted)
+        names = getattr(self, "quantities", ())
+        return tuple(quantity for quantity in _MOTION if quantity.name in names)
 
     def _check_quantities(self) -> None:
         given = getattr(self, "quantities", None)
@@ -124,7 +124,7 @@ class AbsoluteSensor(MotionSensor):
         Component.__post_init__(self)
         self._take_point("point")
         self._check_axes(
-            ("world", "body"), "'world', or 'body' for those of the point, which turn with it"
+            ("world", "body"), "'world', or 'body' for those of the point, which rotate with it"
         )
         self._check_quantities()
 
@@ -136,7 +136,7 @@ class AbsoluteSensor(MotionSensor):
 
 @dataclass(frozen=True, slots=True)
 class RelativeSensor(OnPair, MotionSensor):
-    """How a frame b moves for an observer who moves and turns with a frame a.
+    """How a frame b moves for an observer who moves and rotates with a frame a.
 
     Position p of b, velocity v and acceleration a as that observer sees them, angular velocity w
     and its rate wd for him, and orientation R, whose columns are the axes of b in a.

@@ -79,12 +79,12 @@ class Shape:
 
     def _is_possible(self, size: tuple[float, ...]) -> bool:
         """Whether a shape of the kind has these lengths."""
-        wanted = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(self.kind, 3)
-        if len(size) != wanted or not all(map(math.isfinite, size)):
+        expected = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(self.kind, 3)
+        if len(size) != expected or not all(map(math.isfinite, size)):
             return False
         if self.kind == "mesh":
             return all(size)
-        if self.kind == "capsule":  # a ball where it has no length
+        if self.kind == "capsule":  # a sphere where it has no length
             return size[0] > 0 and size[1] >= 0
         return all(length > 0 for length in size)
 

@@ -2,7 +2,8 @@
 
 Their flanges have a position, which is the same for all flanges that are connected, and a force,
 and the forces of connected flanges add up to zero. They are connected to each other and to
-`joint.flange` of prismatic joints; an IdealGear or ElasticGear leads from a shaft to a slide.
+`joint.flange` of prismatic joints; an IdealGear or ElasticGear leads from a shaft to a part that
+slides.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _CREEP = 1e-3
 
 
 class SlidingMass(RigidPart):
-    """A mass on a slide; its two flanges are the two ends of one rigid body without length.
+    """A mass that slides; its two flanges are the two ends of one rigid body without length.
 
     Gravity does not act on it, since a line of sliding parts has no direction in space.
 
@@ -103,7 +104,7 @@ class SlidingSpring(_BetweenSlides):
 
 
 class SlidingDamper(_BetweenSlides):
-    """A damper between two slides: tension damping dx/dt, x = position_b - position_a.
+    """A damper between two flanges that slide: tension damping dx/dt, x = position_b - position_a.
 
     Attributes:
         damping: [N s/m].
@@ -120,19 +121,19 @@ class SlidingDamper(_BetweenSlides):
 
 
 class ElastoGap(_BetweenSlides):
-    """A spring and a damper that push where two slides touch, and nothing where they do not.
+    """A spring and a damper that push where two parts touch, and nothing where they do not.
 
-    The slides touch where x = position_b - position_a is below `length`; with the depth
+    They touch where x = position_b - position_a is below `length`; with the depth
     d = length - x they are pushed apart by stiffness r(d) - damping s(d) dx/dt, with the ramp r and
     its slope s of a JointStop: over the first `width` the stiffness grows from zero to its full
     value, so that the force and two derivatives of it are continuous. The damper may hold back
-    slides that part.
+    parts that separate.
 
     Source: Modelica Association 2023 for the element.
 
     Attributes:
         stiffness: [N/m].
-        length: x at which the slides touch [m].
+        length: x at which they touch [m].
         damping: while they touch [N s/m].
         width: over which the stiffness grows [m].
     """
@@ -159,11 +160,11 @@ class ElastoGap(_BetweenSlides):
 
 
 class SlidingBrake(OneFlange):
-    """A brake between a slide and its rail: force -capacity engagement tanh(v / width).
+    """A brake between a sliding part and its rail: force -capacity engagement tanh(v / width).
 
     The input `engagement` is the share of the normal force, from 0 for a brake that is released
     to 1; below zero it counts as zero. The law is smooth and has no event of sticking: a load
-    below the capacity moves the slide at a speed below `width`.
+    below the capacity moves the part at a speed below `width`.
 
     Source: Modelica Association 2023 for the element.
 
@@ -187,7 +188,7 @@ class SlidingBrake(OneFlange):
         return SX(self._force(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """What the slide loses."""
+        """What the part loses."""
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:

@@ -126,7 +126,7 @@ def parameter_names(names: Iterable[str], taken: Iterable[str]) -> list[str]:
     What is no letter, digit or underscore of ASCII becomes an underscore.
 
     Args:
-        names: wanted.
+        names: desired.
         taken: names that mean something else there.
     """
     used = set(taken)
@@ -364,7 +364,7 @@ def _entries(
             raise ModelError(f"{where}: the name {quoted(name)} is not a text; give one")
         if names.count(name) > 1:
             raise ModelError(
-                f"{where}: two functions are named {name!r}; tell them apart by a dict, as in"
+                f"{where}: two functions are named {name!r}; name them by a dict, as in"
                 f" {{'{name}_left': left, '{name}_right': right}}"
             )
     check_function_names(names, where)
@@ -416,8 +416,8 @@ def _entry(name: str, model: Function, library: _Library) -> _Entry:
     taken = ["w", "k", "arg", "res", "iw", "mem", name, f"{name}_eval", f"{name.upper()}_SZ_W"]
     taken += ["status", "wrong", "holds", "answer", "failed", library.type]
     inputs = parameter_names(model.name_in(), taken)
-    wanted = [f"{out}_out" if out in model.name_in() else out for out in model.name_out()]
-    outputs = parameter_names(wanted, [*taken, *inputs])
+    desired = [f"{out}_out" if out in model.name_in() else out for out in model.name_out()]
+    outputs = parameter_names(desired, [*taken, *inputs])
     check = check_of(model, library.real) if library.checked else None
     statuses = check.statuses if check else ()
     return _Entry(name, model, _code(name, model, check), statuses, inputs, outputs)
@@ -502,11 +502,11 @@ def _wrapper(entry: _Entry, library: _Library) -> str:
         sz_iw=max(1, entry.code.sz_iw()),
         declared=declared,
         assignments="\n".join(lines),
-        body=_checked(entry, library, call) if library.checked else f"  {call}\n",
+        body=_checking_body(entry, library, call) if library.checked else f"  {call}\n",
     )
 
 
-def _checked(entry: _Entry, library: _Library, call: str) -> str:
+def _checking_body(entry: _Entry, library: _Library, call: str) -> str:
     model = entry.model
     inputs = [(name, model.numel_in(k)) for k, name in enumerate(entry.inputs)]
     outputs = [(name, model.numel_out(k)) for k, name in enumerate(entry.outputs)]

@@ -279,10 +279,10 @@ def _sizes(system: System, state: MinimalState, variables: _Variables, work: int
 
 def _quaternions(system: System, state: MinimalState) -> list[int]:
     """Where quaternions that are states as a whole begin in x."""
-    places = [state.positions.index(k) if k in state.positions else -1 for k in range(system.nq)]
+    indices = [state.positions.index(k) if k in state.positions else -1 for k in range(system.nq)]
     starts = []
     for part in quaternion_slices(system.tree):
-        own = places[part]
+        own = indices[part]
         if own[0] >= 0 and own == list(range(own[0], own[0] + len(own))):
             starts.append(own[0])
     return starts

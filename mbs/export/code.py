@@ -50,13 +50,13 @@ def code(
     require_function(function)
     if function.n_out() == 0:
         raise ModelError(f"{function.name()}: it has no output; there is nothing to write")
-    text = target.text(build(function, target, _checked(name or function.name())))
+    text = target.text(build(function, target, _check_name(name or function.name())))
     if path is not None:
         write_text(text, path)
     return text
 
 
-def _checked(name: str) -> str:
+def _check_name(name: str) -> str:
     if isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         return name
     raise ModelError(

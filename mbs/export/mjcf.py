@@ -42,7 +42,7 @@ than 1e-15."""
 _SAME = 1e-12
 """Distance [m or 1] from the identity of frames that are one but for rounding."""
 _APART = 0.1
-"""Distance [m] of the two points at which a revolute joint that closes a loop is held."""
+"""Distance [m] of the two points at which a revolute joint that closes a loop is anchored."""
 _TYPES = {
     Motion.REVOLUTE: "hinge",
     Motion.PRISMATIC: "slide",
@@ -194,12 +194,12 @@ class _Writer:
 
     def _add_link(self, number: int, link: Link) -> None:
         system = self.system
-        carried = [row.name for row in system.bodies if row.link == number]
+        bodies = [row.name for row in system.bodies if row.link == number]
         above, frame_above = self.bodies[link.antecedent + 1]
         is_free = link.motion is Motion.FREE
         # the body has the frame of the first body, and where q is a quaternion that of the link
         own = Pose.identity()
-        main = carried[0] if carried else None
+        main = bodies[0] if bodies else None
         if main is not None:
             pose = system.frames[main][1]
             if link.motion in (Motion.REVOLUTE, Motion.PRISMATIC) or self._is_identity(pose):
@@ -212,12 +212,12 @@ class _Writer:
                 f"{link.name}: in an MJCF file the position of a free joint is that in the world",
                 "connect the joint from the world's own frame",
             )
-        body = SubElement(above, "body", name=main or self._unused(f"{link.name}_link"))
+        body = SubElement(above, "body", name=main or self._unused_name(f"{link.name}_link"))
         body.attrib |= {} if is_free else self._place(at)
         self._add_inertia(body, link, own)
         self._add_joint(body, link, own)
         self.bodies.append((body, own))
-        for name in carried:
+        for name in bodies:
             if name != main:
                 pose = own.inverse() @ system.frames[name][1]
                 SubElement(body, "body", {"name": name, **self._place(pose)})
@@ -226,7 +226,7 @@ class _Writer:
         p, R = self._number(pose.p), self._number(pose.R)
         return bool(np.max(np.abs(p)) < _SAME and np.max(np.abs(R - np.eye(3))) < _SAME)
 
-    def _unused(self, name: str) -> str:
+    def _unused_name(self, name: str) -> str:
         found, number = name, 2
         while found in self._names:
             found, number = f"{name}{number}", number + 1
@@ -321,7 +321,7 @@ class _Writer:
 
     def _new_site(self, frame: Frame) -> str:
         self.sites += 1
-        return self._add_site(self._unused(f"point{self.sites}"), frame)
+        return self._add_site(self._unused_name(f"point{self.sites}"), frame)
 
     # Loops and couplings.
 
@@ -333,7 +333,9 @@ class _Writer:
         elif isinstance(joint, Spherical):
             self._equality(equalities, "connect", joint.name, frame_a, frame_b)
         elif isinstance(joint, Rod):
-            tendon = SubElement(self.tendons, "spatial", name=self._unused(f"{joint.name}_line"))
+            tendon = SubElement(
+                self.tendons, "spatial", name=self._unused_name(f"{joint.name}_line")
+            )
             for frame in cut.frames:
                 SubElement(tendon, "site", site=self._new_site(frame))
             # MuJoCo counts from the length at qpos = 0
@@ -351,7 +353,7 @@ class _Writer:
             for k, along in enumerate((-_APART / 2, _APART / 2)):
                 shift = Pose.translation(SX(DM(along * np.array(joint.axis))))
                 ends = [(number, pose @ shift) for number, pose in (frame_a, frame_b)]
-                name = joint.name if not k else self._unused(f"{joint.name}_axis")
+                name = joint.name if not k else self._unused_name(f"{joint.name}_axis")
                 self._equality(equalities, "connect", name, *ends)
         else:
             raise self._refuse(
@@ -389,7 +391,7 @@ class _Writer:
             constant, slope = (*terms, 0.0, 0.0)[:2]
             others = {number: -self._float(factor) for number, factor in coupling.others}
             levers = {coupling.driven: 1.0, coupling.driver: -slope, **others}
-            tendon = self._unused(f"{coupling.name}_sum")
+            tendon = self._unused_name(f"{coupling.name}_sum")
             self._fixed_tendon(tendon, {names[k]: c for k, c in levers.items()}, {})
             SubElement(
                 equalities,

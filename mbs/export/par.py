@@ -57,7 +57,7 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
 def robot_table(system: System, file: str = ".par") -> RobotTable:
     """The table of frames of a system: link j is frame j, its joint q<j>.
 
-    Fixed frames come before the link that they lead to, which moves its number; cuts are last.
+    Fixed frames come before the link whose path they are on, which moves its number; cuts are last.
 
     Args:
         system: as for `par`.

@@ -56,13 +56,13 @@ def sdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     effort of zero.
 
     Args:
-        system: of revolute, prismatic, ball and free motions; a Mechanism is assembled first.
+        system: of revolute, prismatic, spherical and free motions; a Mechanism is assembled first.
         path: of the .sdf file.
 
     Raises:
         ModelError: it is neither, it has rotors, force elements, a drive line, a free joint that
             is not on the world, couplings of a higher degree, a loop that closes by another joint
-            than a fixed, revolute, prismatic, ball or universal one, or a symbol has no value.
+            than a fixed, revolute, prismatic, spherical or universal one, or a symbol has no value.
         ExportError: the file cannot be written.
     """
     system = system_of(system)
@@ -71,22 +71,22 @@ def sdf(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
     write_xml(root, path)
 
 
-def _refused(system: System, what: str) -> ModelError:
+def _refusal(system: System, what: str) -> ModelError:
     return ModelError(f"{system.name}: {what}, which SDF cannot say; take it away first")
 
 
 def _check(system: System) -> None:
     """Refuse what the format cannot say."""
     if system.parts or system.shafts:
-        raise _refused(system, "it has force elements or a drive line")
+        raise _refusal(system, "it has force elements or a drive line")
     for link in system.tree.links:
         if link.motion is Motion.FREE and link.antecedent >= 0:
-            raise _refused(system, f"{link.name} is a free joint that is not on the world")
+            raise _refusal(system, f"{link.name} is a free joint that is not on the world")
         if link.rotor is not None:
-            raise _refused(system, f"{link.name} has a rotor with an axis of its own")
+            raise _refusal(system, f"{link.name} has a rotor with an axis of its own")
         acts = (link.Fv, link.Fs, link.Ia)
         if link.motion.nv > 1 and not all(value.is_zero() for value in acts):
-            raise _refused(system, f"{link.name} has friction or a rotor about several axes")
+            raise _refusal(system, f"{link.name} has friction or a rotor about several axes")
     _check_loops(system)
 
 
@@ -94,14 +94,14 @@ def _check_loops(system: System) -> None:
     driven = set()
     for coupling in system.couplings:
         if len(coupling.coefficients) > 2 or coupling.others:
-            raise _refused(system, f"{coupling.name} is not a line between two joints")
+            raise _refusal(system, f"{coupling.name} is not a line between two joints")
         if coupling.driven in driven:
-            raise _refused(system, f"{coupling.name} leads a joint that another coupling leads")
+            raise _refusal(system, f"{coupling.name} drives a joint that another coupling drives")
         driven.add(coupling.driven)
     for cut in system.cuts:
         joint = cut.edge.joint
         if not cut.welded and type(joint) not in _CLOSING:
-            raise _refused(system, f"a {type(joint).__name__} closes the loop at {joint.name}")
+            raise _refusal(system, f"a {type(joint).__name__} closes the loop at {joint.name}")
 
 
 @dataclass(slots=True)
@@ -141,17 +141,17 @@ class _SdfWriting:
         model = SubElement(place, "model", name=self._name(system.name))
         self.names.clear()
         self.frame[-1], self.drawn[-1] = ("world", np.eye(4)), np.eye(4)
-        places = {
+        frames_by_name = {
             name: (link, self.number(pose.matrix))
             for name, (link, pose) in system.frames.items()
             if name not in ("base", "world")
         }
         for j, link in enumerate(system.tree.links):
-            self._add_link(model, j, link, places)
+            self._add_link(model, j, link, frames_by_name)
         for cut in system.cuts:
             self._close(model, cut)
         self._couple()
-        self._add_frames(model, places)
+        self._add_frames(model, frames_by_name)
         return root
 
     def _name(self, name: str) -> str:
@@ -163,7 +163,7 @@ class _SdfWriting:
             self.names[name] = plain
         return self.names[name]
 
-    def _unused(self, name: str) -> str:
+    def _unused_name(self, name: str) -> str:
         """A name that nothing of the system has."""
         system = self.system
         while name in self.names or name in system.frames or name in self.names.values():
@@ -173,20 +173,22 @@ class _SdfWriting:
     # Links and the joints that move them.
 
     def _add_link(
-        self, model: Element, j: int, link: Link, places: Mapping[str, tuple[int, Array]]
+        self, model: Element, j: int, link: Link, frames_by_name: Mapping[str, tuple[int, Array]]
     ) -> None:
         system = self.system
-        bodies = [row.name for row in system.bodies if row.link == j + 1 and row.name in places]
+        bodies = [
+            row.name for row in system.bodies if row.link == j + 1 and row.name in frames_by_name
+        ]
         if bodies:
-            name, pose = self._name(bodies[0]), places[bodies[0]][1]
+            name, pose = self._name(bodies[0]), frames_by_name[bodies[0]][1]
         else:
-            name, pose = self._unused(f"{link.name.replace('.', '_')}_link"), np.eye(4)
+            name, pose = self._unused_name(f"{link.name.replace('.', '_')}_link"), np.eye(4)
         parent, before = self.frame[link.antecedent]
-        moved = self.number(link.pose().matrix) @ self._motion(link)
-        self.frame[j], self.drawn[j] = (name, pose), self.drawn[link.antecedent] @ moved
+        relative = self.number(link.pose().matrix) @ self._motion(link)
+        self.frame[j], self.drawn[j] = (name, pose), self.drawn[link.antecedent] @ relative
         element = SubElement(model, "link", name=name)
         above = {} if parent == "world" else {"relative_to": parent}
-        _pose(element, inverse(before) @ moved @ pose, above)
+        _pose(element, inverse(before) @ relative @ pose, above)
         _inertial(element, *inertia_of(system.name, link, pose, self.number))
         if link.motion is Motion.FREE:
             return
@@ -252,20 +254,20 @@ class _SdfWriting:
         (a, at_a), (b, at_b) = ends if ends[1][0] >= 0 else ends[::-1]
         parent, child = self.frame[a][0], self.frame[b][0]
         kind = "fixed" if cut.welded else _CLOSING[type(joint)]
-        name = self._unused(f"{joint.name}_weld") if cut.welded else self._name(joint.name)
+        name = self._unused_name(f"{joint.name}_weld") if cut.welded else self._name(joint.name)
         element = _joint(model, name, kind, parent, child)
         _pose(element, inverse(self.frame[b][1]) @ at_b, {})
         opening = inverse(self.drawn[a] @ at_a) @ self.drawn[b] @ at_b
         if cut.welded or kind in ("fixed", "ball"):
             if not cut.welded and joint.limits:
-                raise _refused(self.system, f"{joint.name} has limits")
+                raise _refusal(self.system, f"{joint.name} has limits")
         elif isinstance(joint, Universal):
             # the first axis is fixed on frame_a, the second on frame_b
             first, second = (np.array(axis, dtype=float) for axis in joint.axes)
             if ends[1][0] < 0:
                 first, second = second, first
             if joint.limits:
-                raise _refused(self.system, f"{joint.name} has limits and closes a loop")
+                raise _refusal(self.system, f"{joint.name} has limits and closes a loop")
             _say(SubElement(element, "axis"), "xyz", text_of(opening[:3, :3].T @ first))
             _say(SubElement(element, "axis2"), "xyz", text_of(second))
         else:
@@ -291,19 +293,19 @@ class _SdfWriting:
             for tag, value in (("multiplier", factor), ("offset", offset), ("reference", 0.0)):
                 _say(mimic, tag, value)
 
-    def _add_frames(self, model: Element, places: Mapping[str, tuple[int, Array]]) -> None:
+    def _add_frames(self, model: Element, frames_by_name: Mapping[str, tuple[int, Array]]) -> None:
         """Bodies that are no links of the file, and named frames."""
         written = {name for name, _ in self.frame.values()}
         ground = ""
-        for name, (number, pose) in places.items():
+        for name, (number, pose) in frames_by_name.items():
             if self._name(name) in written:
                 continue
             carrier, before = self.frame[number]
             if number < 0:  # no frame of a model is attached to the world but through a link
                 if not ground:
-                    ground = self._unused(_GROUND)
+                    ground = self._unused_name(_GROUND)
                     _inertial(SubElement(model, "link", name=ground), 1.0, np.zeros(3), np.eye(3))
-                    _joint(model, self._unused(f"{_GROUND}_joint"), "fixed", "world", ground)
+                    _joint(model, self._unused_name(f"{_GROUND}_joint"), "fixed", "world", ground)
                 carrier = ground
             frame = SubElement(model, "frame", name=self._name(name), attached_to=carrier)
             _pose(frame, inverse(before) @ pose, {})

@@ -326,14 +326,14 @@ def _describe(part: str, file: Path) -> Any:
 
 def _sources(files: Mapping[str, Path], contents: Mapping[str, bytes]) -> dict[str, str]:
     """The place of each FMU in the archive; equal files are there once."""
-    places: dict[bytes, str] = {}
+    paths: dict[bytes, str] = {}
     for part, file in files.items():
-        if contents[part] not in places:
+        if contents[part] not in paths:
             stem = re.sub(r"[^A-Za-z0-9_-]", "_", file.stem)
             plain = f"resources/{stem}.fmu"
-            taken = plain in places.values()
-            places[contents[part]] = f"resources/{stem}_{len(places)}.fmu" if taken else plain
-    return {part: places[contents[part]] for part in files}
+            taken = plain in paths.values()
+            paths[contents[part]] = f"resources/{stem}_{len(paths)}.fmu" if taken else plain
+    return {part: paths[contents[part]] for part in files}
 
 
 def _start_values(
@@ -408,8 +408,8 @@ def _connections(
     return links
 
 
-def _check_causality(address: str, variable: Any, wanted: str, rule: str) -> None:
-    if variable.causality != wanted:
+def _check_causality(address: str, variable: Any, expected: str, rule: str) -> None:
+    if variable.causality != expected:
         what = (
             "no input or output"
             if variable.causality == "local"
@@ -435,14 +435,14 @@ def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
 def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> None:
     """Refuse units of different kind or size; an end without one, or in 1, takes any."""
     ends = [(unit_of(variable), description) for _, variable, description in (source, target)]
-    (given, _), (wanted, _) = ends
-    if {given, wanted} & {None, "1"}:
+    (given, _), (expected, _) = ends
+    if {given, expected} & {None, "1"}:
         return
     defined = [unit_exponents(description, unit) for unit, description in ends if unit]
-    same = given == wanted if None in defined else defined[0] == defined[1]
+    same = given == expected if None in defined else defined[0] == defined[1]
     if not same:
         raise ExportError(
-            f"SSP: connection: {source[0]} is in {given} and {target[0]} in {wanted}; connect"
+            f"SSP: connection: {source[0]} is in {given} and {target[0]} in {expected}; connect"
             " variables of one unit"
         )
 

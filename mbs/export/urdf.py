@@ -119,28 +119,28 @@ class _Writing:
         if not np.array_equal(gravity, _DOWN):
             raise ModelError(
                 f"{system.name}: gravity is {quoted(gravity.tolist())}, but that of URDF is"
-                f" {_DOWN}; turn the robot instead"
+                f" {_DOWN}; rotate the robot instead"
             )
         root = Element("robot", name=system.name)
         SubElement(root, "link", name="world")
         self.frame[-1] = "world", np.eye(4)
-        places = {
+        frames_by_name = {
             name: (link, self.number(pose.matrix))
             for name, (link, pose) in system.frames.items()
             if name not in ("base", "world")
         }
         for j, link in enumerate(system.tree.links):
-            self._link(root, j, link, places)
+            self._link(root, j, link, frames_by_name)
         written = {name for name, _ in self.frame.values()}
-        for name, (number, pose) in places.items():
+        for name, (number, pose) in frames_by_name.items():
             if name not in written:
-                self._fixed(root, name, number, pose)
+                self._add_fixed_joint(root, name, number, pose)
         return root
 
     def _link(
-        self, root: Element, j: int, link: Link, places: Mapping[str, tuple[int, Array]]
+        self, root: Element, j: int, link: Link, frames_by_name: Mapping[str, tuple[int, Array]]
     ) -> None:
-        name, pose = self._carrier(j, link, places)
+        name, pose = self._carrier(j, link, frames_by_name)
         self.frame[j] = name, pose
         _inertial(
             SubElement(root, "link", name=name),
@@ -157,8 +157,8 @@ class _Writing:
         _origin(joint, inverse(before) @ self.number(link.pose().matrix) @ pose)
         friction = [float(self.number(value).item()) for value in (link.Fv, link.Fs)]
         if any(friction):
-            damping, dry = map(repr, friction)
-            SubElement(joint, "dynamics", damping=damping, friction=dry)
+            damping, coulomb = map(repr, friction)
+            SubElement(joint, "dynamics", damping=damping, friction=coulomb)
         if kind == "floating":
             return
         SubElement(joint, "axis", xyz=text_of(pose[2, :3]))
@@ -173,18 +173,18 @@ class _Writing:
             _rotor(root, link.name, Ia)
 
     def _carrier(
-        self, j: int, link: Link, places: Mapping[str, tuple[int, Array]]
+        self, j: int, link: Link, frames_by_name: Mapping[str, tuple[int, Array]]
     ) -> tuple[str, Array]:
         """The frame of a link of the file: a body on the axis of its joint, or one of its own."""
         bodies = [body.name for body in self.system.bodies]
-        for name, (number, pose) in places.items():
+        for name, (number, pose) in frames_by_name.items():
             away = pose[:2, 3] if link.motion is Motion.REVOLUTE else np.zeros(2)
             if link.motion is Motion.FREE:
                 away = (pose - np.eye(4)).ravel()
             if number == j and name in bodies and np.all(np.abs(away) <= _ON_AXIS):
                 return name, pose
         own = f"{link.name}_axis"
-        while own in places:
+        while own in frames_by_name:
             own += "_"
         return own, np.eye(4)
 
@@ -201,7 +201,7 @@ class _Writing:
                     offset=repr(offset),
                 )
 
-    def _fixed(self, root: Element, name: str, number: int, pose: Array) -> None:
+    def _add_fixed_joint(self, root: Element, name: str, number: int, pose: Array) -> None:
         """A body or a named frame that is fixed on a link."""
         parent, before = self.frame[number]
         SubElement(root, "link", name=name)
@@ -275,7 +275,7 @@ def _origin(element: Element, pose: Array) -> None:
 
 
 def angles(R: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of a rotation, to the last digits also where the pitch is a quarter turn.
+    """Roll, pitch and yaw of a rotation, to the last digits also where the pitch is +-pi/2.
 
     Any yaw is right where the other two are taken for it.
     """

@@ -32,7 +32,7 @@ def constrained_accelerations(
     a_p: SX | None = None,
     acting: SX | None = None,
 ) -> tuple[SX, SX, SX]:
-    """Accelerations of the tree, and the efforts of what constrains them; massless links may be.
+    """Accelerations of the tree, and the efforts of what constrains them; links may be massless.
 
     A a + H = tau + J' lam + E' tau_p with J a + psi = 0 and E a = a_p, where the rows of E are
     those of the unit matrix.
@@ -42,7 +42,7 @@ def constrained_accelerations(
         s: its symbols, in tree coordinates.
         tau: (nv, 1) joint efforts.
         around: what acts from outside.
-        prescribed: numbers of the velocities whose accelerations are given.
+        prescribed: indices of the velocities whose accelerations are given.
         a_p: (k, 1) these accelerations.
         acting: (k, 1) 1 where an acceleration is given, 0 where it is free after all and the
             effort is zero; all are given when left out.
@@ -72,7 +72,7 @@ def constrained(
         s: its symbols.
         left: A (nv, nv) inertia matrix of the tree, J (r, nv) independent rows.
         right: b, d and e.
-        prescribed: numbers of the velocities whose unit rows are those of E.
+        prescribed: indices of the velocities whose unit rows are those of E.
         acting: as of `constrained_accelerations`.
     """
     (A, J), (b, d, e) = left, right

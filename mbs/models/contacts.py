@@ -1,7 +1,8 @@
-"""Coordinates that rigid stops and Coulomb friction may hold: modes, accelerations, impacts.
+"""Coordinates with rigid stops and Coulomb friction: modes, accelerations, impacts.
 
-A mode is constant between events. Every such coordinate has two: its place, -1 at the lower limit,
-1 at the upper one, 0 between them; and the direction in which it slides, 0 where friction holds it.
+A mode is constant between events. Every such coordinate has two: the limit that it is at, -1 for
+the lower one, 1 for the upper one, 0 between them; and the direction in which it slides, 0 where it
+sticks.
 
 Source: Pfeiffer and Glocker 1996, chapters 4 and 5, for the laws of contact.
 """
@@ -37,8 +38,8 @@ _BEYOND = 1e-9
 _ADHESION = 1e-9
 """Acceleration that a contact may pull with before it opens [rad/s^2 or m/s^2]."""
 KINDS = ("lower", "upper", "pulled", "pushed", "stopped")
-"""Indicators of a coordinate: it meets a limit; the effort that holds it is too far below zero, or
-above; it stops sliding."""
+"""Indicators of a coordinate: it meets a limit; the effort that constrains it is too far below
+zero, or above; it stops sliding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,14 +47,15 @@ class Modes:
     """What the contacts do.
 
     Attributes:
-        place: (k, 1) -1 at the lower limit, 1 at the upper one, 0 between.
+        limit: (k, 1) -1 at the lower limit, 1 at the upper one, 0 between.
         slide: (k, 1) direction of sliding against Coulomb friction, 0 for none.
-        held: (k, 1) 1 where the coordinate is held at rest, 0 where it moves.
+        stuck: (k, 1) 1 where the coordinate is at rest, at a limit or by friction; 0 where it
+            moves.
     """
 
-    place: SX
+    limit: SX
     slide: SX
-    held: SX
+    stuck: SX
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,9 +102,9 @@ class Contacts:
 
     def modes(self, values: SX) -> Modes:
         """The modes from one vector of them, (2 k, 1)."""
-        place, slide = values[: len(self)], values[len(self) :]
+        limit, slide = values[: len(self)], values[len(self) :]
         sticks = self.has_friction * (slide == 0)
-        return Modes(place, slide, casadi.fmax(place**2, sticks))
+        return Modes(limit, slide, casadi.fmax(limit**2, sticks))
 
     def first(self, q: SX, v: SX) -> tuple[SX, SX]:
         """Modes at a start: what rests at a limit touches it, what moves slides.
@@ -116,32 +118,32 @@ class Contacts:
             above the upper ones, by more than rounding where positive.
         """
         x, speed = self.position(q), self.velocity(v)
-        way = casadi.if_else(casadi.fabs(speed) > CREEP, casadi.sign(speed), 0)
-        place, beyond = SX.zeros(len(self)), []
+        direction = casadi.if_else(casadi.fabs(speed) > CREEP, casadi.sign(speed), 0)
+        at_limit, beyond = SX.zeros(len(self)), []
         for side, limit, given in (
             (-1, self.bounds[0], self.has_lower),
             (1, self.bounds[1], self.has_upper),
         ):
             outside, slack = side * (x - limit), _BEYOND * casadi.fmax(1, casadi.fabs(limit))
-            rests = given * (outside >= -slack) * (way == 0)
-            place = casadi.if_else(rests, side, place)
+            rests = given * (outside >= -slack) * (direction == 0)
+            at_limit = casadi.if_else(rests, side, at_limit)
             beyond.append(casadi.if_else(given, outside - slack, -1))
-        return casadi.vertcat(place, way * self.has_friction), casadi.vertcat(*beyond)
+        return casadi.vertcat(at_limit, direction * self.has_friction), casadi.vertcat(*beyond)
 
-    def distance(self, q: SX, place: SX) -> SX:
+    def distance(self, q: SX, limit: SX) -> SX:
         """(k, 1) how far a coordinate is from the limit that it is at, zero between limits."""
         x = self.position(q)
-        return casadi.if_else(place == 0, 0, x - casadi.if_else(place < 0, *self.bounds))
+        return casadi.if_else(limit == 0, 0, x - casadi.if_else(limit < 0, *self.bounds))
 
     def efforts(self, modes: Modes, y: SX) -> tuple[SX, SX]:
-        """(k, 1) efforts of stops and of friction where y holds the coordinates.
+        """(k, 1) efforts of stops and of friction where y constrains the coordinates.
 
-        Friction takes what it can; which part it takes of what a stop could take as well, rigid
-        bodies do not tell.
+        Friction takes what it can: how a stop and friction share an effort is not determined for
+        rigid bodies.
         """
-        caught = casadi.fmax(casadi.fmin(y, self.sticking), -self.sticking)
-        friction = casadi.if_else(modes.held, caught, -modes.slide * self.sliding)
-        return modes.held * (y - caught), friction
+        taken = casadi.fmax(casadi.fmin(y, self.sticking), -self.sticking)
+        friction = casadi.if_else(modes.stuck, taken, -modes.slide * self.sliding)
+        return modes.stuck * (y - taken), friction
 
     def indicators(self, q: SX, v: SX, modes: Modes, y: SX, inertia: SX) -> SX:
         """(5 k, 1) in the order of KINDS, positive between events.
@@ -150,17 +152,17 @@ class Contacts:
             q: (nq, 1) positions.
             v: (nv, 1) velocities.
             modes: present.
-            y: (k, 1) efforts that hold the coordinates.
+            y: (k, 1) efforts that constrain the coordinates.
             inertia: (k, 1) diagonal elements of the inertia matrix.
         """
-        x, place = self.position(q), modes.place
+        x, limit = self.position(q), modes.limit
         bears = self.sticking + _ADHESION * inertia
-        free, held = place == 0, modes.held
+        free, stuck = limit == 0, modes.stuck
         return casadi.vertcat(
             casadi.if_else(free * self.has_lower, x - self.bounds[0], 1),
             casadi.if_else(free * self.has_upper, self.bounds[1] - x, 1),
-            casadi.if_else(held * (place < 1), bears + y, 1),
-            casadi.if_else(held * (place > -1), bears - y, 1),
+            casadi.if_else(stuck * (limit < 1), bears + y, 1),
+            casadi.if_else(stuck * (limit > -1), bears - y, 1),
             casadi.if_else(modes.slide != 0, modes.slide * self.velocity(v) + CREEP, 1),
         )
 
@@ -202,7 +204,7 @@ def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) 
     Args:
         system: open or closed.
         contacts: its contacts.
-        driven: numbers of the velocities whose motion is prescribed.
+        driven: indices of the velocities whose motion is prescribed.
 
     Raises:
         ModelError: which, and the remedy.
@@ -294,15 +296,15 @@ def _given(elements: _Elements, name: str) -> DM:
     return DM([float(_field(force, name) is not None) for force in elements])
 
 
-# Accelerations of a system some of whose coordinates contacts hold.
+# Accelerations of a system some of whose coordinates contacts constrain.
 
 
-def held_dynamics(system: System, prescribed: tuple[int, ...]) -> Function:
-    """``held(q, v, tau, a_p, acting) -> a, tau_p, inertia``: hybrid dynamics with switches.
+def switched_dynamics(system: System, prescribed: tuple[int, ...]) -> Function:
+    """``switched_dynamics(q, v, tau, a_p, acting) -> a, tau_p, inertia``: hybrid, with switches.
 
     Args:
         system: open or closed; all coordinates are those of the tree.
-        prescribed: numbers of velocities.
+        prescribed: indices of velocities.
 
     Returns:
         Function of q (nq, 1), v and tau (nv, 1), the accelerations a_p (k, 1) and acting (k, 1), 1
@@ -323,7 +325,7 @@ def held_dynamics(system: System, prescribed: tuple[int, ...]) -> Function:
         inputs: Named = [("q", s.q), ("v", s.v), ("tau", tau), ("a_p", a_p), ("acting", acting)]
         return inputs, [("a", a), ("tau_p", tau_p), ("inertia", inertia)]
 
-    return model_function(system, ("held_dynamics", prescribed), build)
+    return model_function(system, ("switched_dynamics", prescribed), build)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -335,7 +337,7 @@ class ContactEquations:
         values: (2 k, 1) symbols of their modes.
         modes: the same by name.
         a: (nv, 1) accelerations.
-        driven: numbers of the m velocities that drives move.
+        driven: indices of the m velocities that drives move.
         drives: (m, 1) efforts that do so, in their order.
         tau: (nv, 1) joint efforts, those of drives included and those of contacts left out.
         efforts: (2 k, 1) of the stops, then of friction.
@@ -378,9 +380,9 @@ def contact_equations(
         braked[number] -= modes.slide[j] * contacts.sliding[j]
     numbers, m = (*driven, *contacts.velocities), len(driven)
     given = casadi.vertcat(*driven.values(), SX.zeros(len(contacts)))
-    acting = casadi.vertcat(SX.ones(m), modes.held)
+    acting = casadi.vertcat(SX.ones(m), modes.stuck)
     a, made, inertia = outputs_of(
-        system, held_dynamics(system, numbers), q, v, braked, given, acting
+        system, switched_dynamics(system, numbers), q, v, braked, given, acting
     )
     for row, number in enumerate(driven):
         every[number] += made[row]
@@ -410,7 +412,7 @@ def impact(system: System, prescribed: tuple[int, ...]) -> Function:
 
     Args:
         system: open or closed.
-        prescribed: numbers of velocities.
+        prescribed: indices of velocities.
 
     Returns:
         Function of q (nq, 1), dv_p and acting (k, 1); dv (nv, 1) and P (k, 1) [N m s or N s].
@@ -453,7 +455,7 @@ def jump(
 ) -> tuple[SX, SX]:
     """Velocities and modes after an event.
 
-    An impact comes before all else: each stop that is met turns its velocity round, those that are
+    An impact comes before all else: each stop that is met reverses its velocity, those that are
     touched stay touched, both unless they would have to pull. Friction is finite and has no part
     in it: what slides afterwards, slides. Otherwise contacts open, stick or slide as their
     indicators say.
@@ -464,7 +466,7 @@ def jump(
         modes: before the event.
         motion: q (nq, 1) and v (nv, 1), before it; and fired (5 k, 1), 1 for each indicator that
             is not positive.
-        driven: numbers of velocities that drives keep.
+        driven: indices of velocities that drives keep.
 
     Returns:
         v (nv, 1) and modes (2 k, 1).
@@ -476,29 +478,29 @@ def jump(
     met = wall**2 * (speed >= 0)
     back = contacts.restitution * speed
     back = casadi.if_else(back > contacts.rest_speed, back, 0)
-    wall = casadi.if_else(met, wall, modes.place)
+    wall = casadi.if_else(met, wall, modes.limit)
     change = casadi.if_else(met, -wall * back, 0) - contacts.velocity(v)
     dv, touches = _unilateral(system, contacts, (q, v), (wall, change), driven)
     impact_now = casadi.mmax(met)
     after = v + impact_now * dv
     left = contacts.velocity(after)
     slides = casadi.if_else(casadi.fabs(left) > CREEP, casadi.sign(left), 0)
-    place = casadi.if_else(
+    limit = casadi.if_else(
         impact_now,
         touches * wall * (1 - met * (back > 0)),
-        modes.place * (1 - pulled) * (1 - pushed),
+        modes.limit * (1 - pulled) * (1 - pushed),
     )
-    free = (place == 0) * contacts.has_friction
-    turned = casadi.if_else(pulled, 1, casadi.if_else(pushed, -1, (1 - stopped) * modes.slide))
-    slide = free * casadi.if_else(impact_now, slides, turned)
-    return after, casadi.vertcat(place, slide)
+    free = (limit == 0) * contacts.has_friction
+    direction = casadi.if_else(pulled, 1, casadi.if_else(pushed, -1, (1 - stopped) * modes.slide))
+    slide = free * casadi.if_else(impact_now, slides, direction)
+    return after, casadi.vertcat(limit, slide)
 
 
 def _unilateral(
     system: System,
     contacts: Contacts,
     motion: tuple[SX, SX],
-    asked: tuple[SX, SX],
+    targets: tuple[SX, SX],
     driven: tuple[int, ...],
 ) -> tuple[SX, SX]:
     """Velocities that impulses of walls change, and the walls that take part.
@@ -513,14 +515,14 @@ def _unilateral(
         system: open or closed.
         contacts: its contacts.
         motion: q (nq, 1) and v (nv, 1).
-        asked: (k, 1) -1 for a wall below, 1 for one above, 0 for none; and (k, 1) the changes of
+        targets: (k, 1) -1 for a wall below, 1 for one above, 0 for none; and (k, 1) the changes of
             the velocities at walls.
-        driven: numbers of velocities that do not change.
+        driven: indices of velocities that do not change.
 
     Returns:
         dv (nv, 1); (k, 1) 1 for each wall that takes part.
     """
-    (q, v), (wall, change), m = motion, asked, len(driven)
+    (q, v), (wall, change), m = motion, targets, len(driven)
     function = impact(system, (*driven, *contacts.velocities))
 
     def after(acting: SX) -> tuple[SX, SX]:

@@ -41,7 +41,7 @@ _Pointer = ctypes.c_void_p
 class _Shape(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_longlong) for name in ("rows", "columns", "stored")),
-        ("places", _Pointer),
+        ("indices", _Pointer),
     )
 
 
@@ -86,8 +86,8 @@ def array_builtin(function: Function, library: Path, finite: bool) -> ArrayCall 
         return None
     if hasattr(code, f"{name}_incref"):
         code[f"{name}_incref"]()
-    places = [None if pattern.is_dense() else _places(pattern) for pattern in outputs]
-    stored = sum(rows.size for rows in places if rows is not None)
+    indices = [None if pattern.is_dense() else _indices(pattern) for pattern in outputs]
+    stored = sum(rows.size for rows in indices if rows is not None)
     new = [_arguments_of_empty(pattern) for pattern in outputs]
     description = _Function(
         *(_address(code, f"{name}{end}") for end in ("", "_checkout", "_release")),
@@ -95,20 +95,20 @@ def array_builtin(function: Function, library: Path, finite: bool) -> ArrayCall 
         (_Pointer * _MOST)(*map(id, new)),
         *(len(inputs), len(outputs), finite, integers, reals + stored),
         (_Shape * _MOST)(*(_shape(pattern, None) for pattern in inputs)),
-        (_Shape * _MOST)(*map(_shape, outputs, places)),
+        (_Shape * _MOST)(*map(_shape, outputs, indices)),
     )
     builtin: ArrayCall = caller(ctypes.byref(description))
     return builtin
 
 
-def _places(pattern: Sparsity) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _indices(pattern: Sparsity) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Where the stored elements of a sparse matrix stand in the dense one, column after column."""
     return np.array(pattern.find(), dtype=np.int64)
 
 
-def _shape(pattern: Sparsity, places: Any) -> _Shape:
+def _shape(pattern: Sparsity, indices: Any) -> _Shape:
     rows, columns = pattern.shape
-    return _Shape(rows, columns, pattern.nnz(), None if places is None else places.ctypes.data)
+    return _Shape(rows, columns, pattern.nnz(), None if indices is None else indices.ctypes.data)
 
 
 def _arguments_of_empty(pattern: Sparsity) -> tuple[Any, ...]:

@@ -65,7 +65,7 @@ class Count:
 
     @property
     def price(self) -> int:
-        """What decides between two ways: multiplications, additions, and twice the divisions.
+        """What decides between two forms: multiplications, additions, and twice the divisions.
 
         Ways to one result have the same sines, cosines and roots.
         """

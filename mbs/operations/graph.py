@@ -146,7 +146,7 @@ def _scalar(function: Function) -> Function:
     if calls:
         raise ModelError(
             f"{function.name()}: it is not made of scalar operations; give a Function that"
-            " expand() can turn into SX without calls of other Functions, such as integrators or"
+            " expand() can convert to SX without calls of other Functions, such as integrators or"
             " the iterations that close loops of no known closed form"
         )
     return scalar
@@ -186,7 +186,7 @@ def _value(node: Node, values: Sequence[SX], elements: list[list[SX]]) -> SX:
     return SX(SX.binary(node.op, first, *second) if second else SX.unary(node.op, first))
 
 
-# Graphs written node by node: nothing twice, constants folded, signs moved outwards.
+# Graphs written node by node: nothing twice, constants folded, signs taken outwards.
 
 
 COMMUTATIVE = {
@@ -206,7 +206,7 @@ class Builder:
     """The nodes of a graph in the making.
 
     Every method returns the number of the node that holds the value asked for: an old one where
-    there is one. A sign is a node of its own, moved outwards through sums, products and odd
+    there is one. A sign is a node of its own, taken outwards through sums, products and odd
     functions, so that x - y and y - x, or sin(x) and sin(-x), are one value.
 
     Attributes:
@@ -434,7 +434,7 @@ class Builder:
         return node.op == casadi.OP_CONST or all(self.fixed[a] for a in node.args)
 
 
-def rebuilt(graph: Graph, builder: Builder) -> Graph:
+def rebuild(graph: Graph, builder: Builder) -> Graph:
     """The live nodes of a graph added to a builder, one by one."""
     numbers = [-1] * len(graph.nodes)
     for number, alive in enumerate(graph.live()):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import casadi
 
 from mbs.operations.counts import count_graph
-from mbs.operations.graph import COMMUTATIVE, Builder, Graph, Node, drop, rebuilt
+from mbs.operations.graph import COMMUTATIVE, Builder, Graph, Node, drop, rebuild
 from mbs.operations.polynomials import (
     Algebra,
     Group,
@@ -43,10 +43,10 @@ def angles(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     Rotations of vectors, one after the other, are joined too. Each pair of angles is tried by
     itself and stays joined if the graph got cheaper.
     """
-    return improved(graph, parameters, _joined, lambda pair: pair[0] != pair[1])
+    return improved(graph, parameters, _join_angles, lambda pair: pair[0] != pair[1])
 
 
-def _joined(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
     """Two angles joined wherever both of their terms are there; itself if they never are."""
     opened = multiplied_out(algebra, polynomial, pair)
     meetings: dict[Monomial, dict[tuple[int, int], _Meeting]] = {}
@@ -114,7 +114,7 @@ def factor(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
 
 def _opened_first(algebra: Algebra, polynomial: Polynomial) -> int:
-    """The cheapest way to write a polynomial; of equals the one with its products opened."""
+    """The cheapest form of a polynomial; of equals the one with its products opened."""
     return algebra.cheapest(reversed(_ways(algebra, polynomial)))
 
 
@@ -123,14 +123,14 @@ def _opened_last(algebra: Algebra, polynomial: Polynomial) -> int:
 
 
 def _ways(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
-    ways = [partial(_factor, algebra, polynomial)]
-    opened = _opened(algebra, polynomial)
+    forms = [partial(_factor, algebra, polynomial)]
+    opened = _open_products(algebra, polynomial)
     if opened != polynomial:
-        ways.append(partial(_factor, algebra, opened))
-    return ways
+        forms.append(partial(_factor, algebra, opened))
+    return forms
 
 
-def _opened(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+def _open_products(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
     """The same polynomial, no factor of which is a product."""
     total: Polynomial = {}
     for monomial, coefficient in polynomial.items():
@@ -204,27 +204,29 @@ def _quotient(
 
 
 def fold(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Constants computed, 0 and 1 removed, signs moved outwards, one node for equal nodes.
+    """Constants computed, 0 and 1 removed, signs taken outwards, one node for equal nodes.
 
     A sign that is left goes into a difference that nothing else uses: -(x - y) is y - x.
     """
-    return drop(_rotate(drop(rebuilt(graph, Builder(graph, parameters)))))
+    return drop(_reverse_differences(drop(rebuild(graph, Builder(graph, parameters)))))
 
 
-def _rotate(graph: Graph) -> Graph:
-    """Differences of which the negatives alone are used, turned round."""
+def _reverse_differences(graph: Graph) -> Graph:
+    """Differences of which the negatives alone are used, reversed."""
     negated = {n.args[0] for n in graph.nodes if n.op == casadi.OP_NEG}
     plain = {number for result in graph.results for number in result}
     for number, node in enumerate(graph.nodes):
         if node.op != casadi.OP_NEG:
             plain.update(graph.operands(number))
-    turned = {number for number in negated - plain if graph.nodes[number].op == casadi.OP_SUB}
+    reversed_nodes = {
+        number for number in negated - plain if graph.nodes[number].op == casadi.OP_SUB
+    }
     nodes = list(graph.nodes)
-    for number in turned:
+    for number in reversed_nodes:
         a, b = nodes[number].args
         nodes[number] = Node(casadi.OP_SUB, (b, a))
     for number, node in enumerate(nodes):
-        if node.op == casadi.OP_NEG and node.args[0] in turned:
+        if node.op == casadi.OP_NEG and node.args[0] in reversed_nodes:
             nodes[number] = Node(casadi.OP_ASSIGN, node.args)
     return _without_assignments(graph.with_nodes(nodes, graph.results))
 
@@ -252,7 +254,7 @@ _Rank = Callable[[int], tuple[int, ...]]
 def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     """The same nodes, outputs one after the other and operands in the order that needs less room.
 
-    Where an operation is commutative its operands change places, so that a walk from the outputs
+    Where an operation is commutative its operands are exchanged, so that a walk from the outputs
     to the inputs, as CasADi makes it, finds this order.
     Source: Sethi & Ullman 1970, with shared nodes counted where they are met first.
     """
@@ -341,8 +343,8 @@ def parameters(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
 def _gather(algebra: Algebra, polynomial: Polynomial) -> int:
     opened = _opened_parameters(algebra, polynomial)
-    ways = [polynomial] if opened == polynomial else [polynomial, opened]
-    return algebra.cheapest([partial(algebra.plain, way) for way in ways])
+    forms = [polynomial] if opened == polynomial else [polynomial, opened]
+    return algebra.cheapest([partial(algebra.plain, form) for form in forms])
 
 
 def _opened_parameters(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
@@ -363,7 +365,7 @@ def pythagoras(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     """Squares of sines and cosines reduced: s s x + c c x is x, x - s s x is c c x.
 
     With other coefficients p1 s s x + p2 c c x is p1 x + (p2 - p1) c c x.
-    A vector turned to and fro is itself again. Each angle is tried by itself and stays so if the
+    A vector rotated to and fro is itself again. Each angle is tried by itself and stays so if the
     graph got cheaper.
     """
     return improved(graph, parameters, _reduce, lambda pair: pair[0] == pair[1])
@@ -383,7 +385,7 @@ def _reduce(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
 def _reduced_rest(
     algebra: Algebra, polynomial: Polynomial, number: int, rest: Monomial
 ) -> Polynomial:
-    """The cheapest of the ways to write the terms with rest, c c rest and s s rest."""
+    """The cheapest of the forms of the terms with rest, c c rest and s s rest."""
     builder = algebra.builder
     argument = builder.nodes[number].args[0]
     squares = [
@@ -391,15 +393,15 @@ def _reduced_rest(
         for op in (casadi.OP_COS, casadi.OP_SIN)
     ]
     minus = builder.constant(-1.0)
-    ways = [polynomial]
+    forms = [polynomial]
     for gone, other in (squares, squares[::-1]):
         if gone in polynomial:
-            way = dict(polynomial)
-            coefficient = way.pop(gone)
+            form = dict(polynomial)
+            coefficient = form.pop(gone)
             opposite = builder.product(minus, coefficient)
-            algebra.accumulate(way, [(rest, coefficient), (other, opposite)])
-            ways.append(way)
-    return min(ways, key=algebra.cost)
+            algebra.accumulate(form, [(rest, coefficient), (other, opposite)])
+            forms.append(form)
+    return min(forms, key=algebra.cost)
 
 
 # Share common parts of sums and products.
@@ -414,7 +416,7 @@ def share(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     """Sums and products associated so that parts of several of them are computed once.
 
     Sums and products are opened to sets of signed terms and of factors; the pair that most sets
-    hold becomes a node, until no pair is held twice.
+    hold becomes a node, until no pair occurs twice.
     Source: Breuer 1969, generation of optimal code for expressions via factorization.
     """
     names = tuple(parameters)

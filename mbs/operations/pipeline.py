@@ -24,7 +24,7 @@ from mbs.text import did_you_mean, quoted
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """A way to make a graph cheaper.
+    """A transformation that makes a graph cheaper.
 
     Attributes:
         name: what it is called by.
@@ -138,8 +138,8 @@ def simplification(
 ) -> Simplification:
     """What `simplify` does, with the operations that each pass saved.
 
-    The passes are made in turn until none saves anything more. Each result is compared with the
-    given Function at random points, and undone if it takes more operations.
+    The passes are made one after the other until none saves anything more. Each result is compared
+    with the given Function at random points, and undone if it takes more operations.
     """
     chosen, names = _choose(passes), tuple(parameters)
     graph, steps = graph_of(function), list[Step]()
@@ -161,10 +161,10 @@ def simplification(
 def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
     if passes is None:
         return PASSES
-    wanted, known = set(passes), [p.name for p in PASSES]
-    for name in wanted - set(known):
+    chosen, known = set(passes), [p.name for p in PASSES]
+    for name in chosen - set(known):
         raise ModelError(f"there is no pass {quoted(name)}; {did_you_mean(name, known)}")
-    return [p for p in PASSES if p.name in wanted]
+    return [p for p in PASSES if p.name in chosen]
 
 
 def _make(
@@ -285,14 +285,14 @@ def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph
 
 def _renumber(graph: Graph, names: list[str]) -> tuple[Node, ...]:
     """The nodes with inputs counted among these names; others are left as they are."""
-    place = {k: names.index(p.name) for k, p in enumerate(graph.inputs) if p.name in names}
+    index = {k: names.index(p.name) for k, p in enumerate(graph.inputs) if p.name in names}
 
-    def moved(node: Node) -> Node:
-        if node.op != casadi.OP_INPUT or node.args[0] not in place:
+    def renumber(node: Node) -> Node:
+        if node.op != casadi.OP_INPUT or node.args[0] not in index:
             return node
-        return Node(node.op, (place[node.args[0]], node.args[1]))
+        return Node(node.op, (index[node.args[0]], node.args[1]))
 
-    return tuple(moved(node) for node in graph.nodes)
+    return tuple(renumber(node) for node in graph.nodes)
 
 
 # The named scalars of a Function found again in an equal one that computes them otherwise.
@@ -318,10 +318,10 @@ def names_found(function: Function, named: Function) -> Function:
     """
     graph, count = graph_of(function), function.n_out()
     points = witness(named).points
-    wanted = np.array([_scalars(named, point, count) for point in points]).T
+    target = np.array([_scalars(named, point, count) for point in points]).T
     computed = _values(graph, points)
-    same = _find(graph, wanted, computed)
-    others = _find(graph, -wanted, computed)
+    same = _find(graph, target, computed)
+    others = _find(graph, -target, computed)
     known = set(same.values())
     nodes, named_nodes = list(graph.nodes), dict(same)
     for k, number in others.items():
@@ -354,13 +354,13 @@ def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]
 
 
 def _find(
-    graph: Graph, wanted: NDArray[np.float64], computed: NDArray[np.float64]
+    graph: Graph, target: NDArray[np.float64], computed: NDArray[np.float64]
 ) -> dict[int, int]:
     """For named scalars that vary, where there is one, the first node that has their values.
 
     Args:
         graph: its operations that an output needs are looked through.
-        wanted: (names, points) values of the named scalars.
+        target: (names, points) values of the named scalars.
         computed: (nodes, points) values of the nodes.
     """
     alive = graph.live()
@@ -369,7 +369,7 @@ def _find(
     order = np.array(sorted(numbers, key=lambda n: computed[n, 0]), dtype=int)
     keys = computed[order, 0]
     found: dict[int, int] = {}
-    for k, values in enumerate(wanted):
+    for k, values in enumerate(target):
         margin = _SAME * np.abs(values)
         if not np.all(np.isfinite(values)) or np.ptp(values) <= margin.max():
             continue

@@ -129,13 +129,13 @@ class Algebra:
         product = self.monomial(monomial)
         return product if coefficient == self.one else self.builder.product(coefficient, product)
 
-    def cheapest(self, ways: Iterable[Callable[[], int]]) -> int:
-        """The number that the way with the fewest new operations gives; the first of equals."""
+    def cheapest(self, forms: Iterable[Callable[[], int]]) -> int:
+        """The number that the form with the fewest new operations gives; the first of equals."""
         start = len(self.builder.nodes)
         tried = []
-        for way in ways:
-            way()
-            tried.append((self.builder.cost_since(start), way))
+        for form in forms:
+            form()
+            tried.append((self.builder.cost_since(start), form))
             self._forget_since(start)
         return min(tried, key=lambda trial: trial[0])[1]()
 
@@ -369,18 +369,18 @@ def improved(
     """
     names, met = tuple(parameters), Counter[Pair]()
 
-    def noted(algebra: Algebra, polynomial: Polynomial) -> int:
+    def note(algebra: Algebra, polynomial: Polynomial) -> int:
         for pair in angles_met(algebra, polynomial):
             if pairs(pair) and reshape(pair, algebra, polynomial) != polynomial:
                 met[pair] += 1
         return algebra.plain(polynomial)
 
-    rewritten(graph, names, noted)
+    rewritten(graph, names, note)
     most = [partial(reshape, pair) for pair, _ in met.most_common(_MOST_PAIRS)]
     best = count_graph(graph, names).total
     trials = max(2, _MOST_WORK // max(1, len(graph.nodes)))
-    for way, allowance in islice(product(most, _ALLOWANCES), trials):
-        trial = rewritten(graph, names, _writer(way, allowance))
+    for form, allowance in islice(product(most, _ALLOWANCES), trials):
+        trial = rewritten(graph, names, _writer(form, allowance))
         total = count_graph(trial, names).total
         if total < best:
             graph, best = trial, total
@@ -402,12 +402,12 @@ def _factor_with(algebra: Algebra, monomial: Monomial, pair: Pair, opens_sums: b
     if len(monomial) > _LONGEST_MONOMIAL:
         return None
     present = angles_in(algebra, monomial)
-    wanted = {b for a, b in (pair, pair[::-1]) if a in present}
+    partners = {b for a, b in (pair, pair[::-1]) if a in present}
     for factor in monomial:
         inside = algebra.written.get(factor, {})
         if len(inside) == 1 or (inside and opens_sums):
             within = _within(algebra, factor)
-            if within & wanted or (len(inside) == 1 and within & set(pair)):
+            if within & partners or (len(inside) == 1 and within & set(pair)):
                 return factor
     return None
 
@@ -459,8 +459,8 @@ _LONGEST = 48
 def extract_pairs(groups: dict[int, Group], first_name: int) -> None:
     """Make what several groups have in common an element of theirs, in place.
 
-    The pair that is held most often, up to a common sign, becomes a group of its own, again and
-    again until no pair is held twice. Of a long group the first elements alone take part, so that
+    The pair that occurs most often, up to a common sign, becomes a group of its own, again and
+    again until no pair occurs twice. Of a long group the first elements alone take part, so that
     the work grows with the number of elements.
 
     Args:
@@ -486,18 +486,18 @@ class _Extraction:
         heapq.heapify(self._queue)
 
     def most_common(self) -> _Pair | None:
-        """A pair that no other is held more often than; None when none is held twice."""
+        """A most frequent pair; None when none occurs twice."""
         while self._queue:
             count, pair = heapq.heappop(self._queue)
-            held = len(self._holders.get(pair, ()))
-            if held == -count:
+            occurrences = len(self._holders.get(pair, ()))
+            if occurrences == -count:
                 return pair
-            if held > 1:
-                heapq.heappush(self._queue, (-held, pair))
+            if occurrences > 1:
+                heapq.heappush(self._queue, (-occurrences, pair))
         return None
 
     def replace(self, pair: _Pair, name: int) -> None:
-        """Make a group of a pair and an element of those that hold it."""
+        """Make a group of a pair and an element of those that contain it."""
         a, b, sign = pair
         for holder in list(self._holders.pop(pair)):
             group = self._groups[holder]

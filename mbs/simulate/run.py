@@ -43,7 +43,7 @@ from mbs.solvers.integrate import is_compilable
 from mbs.solvers.problem import IntegrationEvent, Passage, failed
 from mbs.text import did_you_mean, quoted
 
-# Rigid stops and Coulomb friction in a simulation: how they start, and what a result tells of them.
+# Rigid stops and Coulomb friction in a simulation: how they start, and what a result says of them.
 
 
 Array = NDArray[np.float64]
@@ -179,8 +179,8 @@ def _changes(
                 yield stop.element.name, f"{'rests at' if rests else 'bounces off'} {name}"
         if was and not now:
             yield stop.element.name, f"leaves {_LIMITS[was]}"
-    slid, slides = before[k + j], event.modes[k + j]
-    if friction is not None and slid != slides:
+    slide_before, slides = before[k + j], event.modes[k + j]
+    if friction is not None and slide_before != slides:
         yield friction.element.name, "slides" if slides else "sticks"
 
 
@@ -299,7 +299,7 @@ def _numbers(system: System, what: str, values: Any) -> list[float]:
 # Integration in one leg, or in several: over-constrained loops whose independent rows change.
 #
 # In a loop such as Bennett's, which rows of the closing joint are independent changes with the
-# configuration: no choice holds all the way round. Steps in local tangent coordinates use all
+# configuration: no choice holds over a whole revolution. Steps in local tangent coordinates use all
 # rows, and need no choice. Where there are none, as for laws that CasADi cannot write as C, a leg
 # ends where its rows have lost most of their independence, and the next one begins there with
 # rows that are chosen for that configuration.
@@ -365,7 +365,8 @@ class Leg:
     def _correct_first(self, a: Array, tau: Array, p: Array) -> None:
         """Accelerations of the branch at a singular start, and what they ask of drives.
 
-        One drive gives the power that inertia and forces take; shares of several are not told.
+        One drive gives the power that inertia and forces take; shares of several are not
+        determined.
         """
         assert self.state.passage is not None
         assert self.first_slope is not None
@@ -547,17 +548,17 @@ def _watch_crossings(
     def wide(function: Function) -> Function:
         return Function(function.name(), [t, x, pm], function.call(at))
 
-    indicators, moved, after = [sides * state.crossings.call(at)[0]], x, [SX(0, 1)]
+    indicators, state_after, after = [sides * state.crossings.call(at)[0]], x, [SX(0, 1)]
     if events is not None:
         indicators.insert(0, events.indicators.call(at)[0])
         jumps = casadi.mmax(fired[:first])
         there, *changed = events.jump.call([*at, fired[:first]])  # modes where there are some
-        moved = casadi.if_else(jumps, there, x)
+        state_after = casadi.if_else(jumps, there, x)
         after = [casadi.if_else(jumps, values, pm[own:n_p]) for values in changed]
     after.append(casadi.if_else(fired[first:] > 0, -sides, sides))
     watched = (
         Function("indicators", [t, x, pm], [casadi.vertcat(*indicators)]),
-        Function("jump", [t, x, pm, fired], [moved, casadi.vertcat(*after)]),
+        Function("jump", [t, x, pm, fired], [state_after, casadi.vertcat(*after)]),
     )
     passage = state.passage
     if passage is not None:
@@ -575,12 +576,12 @@ def _without_crossings(motion: EventMotion, events: Events | None, count: int) -
     """The motion with the modes and events of others alone."""
     first = 0 if events is None else events.indicators.numel_out(0)
     kept = motion.modes.shape[1] - count
-    told = tuple(
+    reported = tuple(
         replace(event, fired=others, modes=event.modes[:kept])
         for event in motion.events
         if (others := tuple(k for k in event.fired if k < first))
     )
-    return replace(motion, modes=motion.modes[:, :kept], events=told)
+    return replace(motion, modes=motion.modes[:, :kept], events=reported)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -663,13 +664,12 @@ def _leg(
     n, n_p = len(x0), len(p)
     t, x, pm, fired = (SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", 1)))
     parameters, ended = pm[:n_p], pm[n_p]
-    rate = casadi.if_else(
-        ended, 0, state.rhs(t, x, parameters)
-    )  # what has no value there is let be
+    # a rate that has no value at the end is left out
+    rate = casadi.if_else(ended, 0, state.rhs(t, x, parameters))
     rhs = Function("rhs", [t, x, pm], [rate])
     assert state.project is not None
-    moved, residual = state.project(t, x, parameters)
-    kept = [casadi.if_else(ended, x, moved), casadi.if_else(ended, 0, residual)]
+    corrected, residual = state.project(t, x, parameters)
+    kept = [casadi.if_else(ended, x, corrected), casadi.if_else(ended, 0, residual)]
     project = Function("project", [t, x, pm], kept)
     left = limit.measure(x[: system.nq], parameters) - limit.level
     events = Events(
@@ -752,9 +752,9 @@ def started(
             )
     positions, velocities = dict(q0 or {}), dict(v0 or {})  # type: ignore[arg-type]
     for one in motions:
-        place, speed, _ = (float(value) for value in one.law(SX(0)))
+        position, speed, _ = (float(value) for value in one.law(SX(0)))
         if one.position is not None:
-            _put(system, positions, one.name, place, "q0")
+            _put(system, positions, one.name, position, "q0")
         if one.holds_speed:
             _put(system, velocities, one.name, speed, "v0")
     return positions, velocities
@@ -906,7 +906,7 @@ def run(
         `kinetic_energy`, `potential_energy`, `closure_residual`; for every device its input, its
         states and its outputs, such as `motor.voltage`, `motor.i`, `motor.tau`, `motor.w`; and
         what every sensor reads, such as `tip.p.x`. A rigid stop or Coulomb friction has `name.mode`
-        and `name.effort`, and `events` tells when they change.
+        and `name.effort`, and `events` says when they change.
 
     Raises:
         ModelError: `system` is no System, a name is unknown or has no motor, or an argument has the
@@ -995,8 +995,8 @@ def _first_bias(system: System, x0: Array, inputs: Function | None, p: Sequence[
 
 def step_tolerances(tolerance: float) -> tuple[float, float]:
     """Relative and absolute tolerance of a step for that of a motion, kept above rounding."""
-    # errors of steps add up, and angles that count turns make no room for larger ones; below some
-    # ten roundings steps would only become shorter
+    # errors of steps add up, and angles that count revolutions make no room for larger ones;
+    # below some ten roundings steps would only become shorter
     return max(1e-3 * tolerance, 1e-14), max(0.04 * tolerance, 1e-13)
 
 
@@ -1004,7 +1004,7 @@ def _result(system: System, legs: Sequence[Leg], p: Sequence[float], stop: Stop)
     times, x = np.concatenate([leg.times for leg in legs]), np.vstack([leg.x for leg in legs])
     every = np.repeat(np.array(p, dtype=float).reshape(-1, 1), len(times), axis=1)
     parts = [leg.observed(p) for leg in legs]
-    a, tau, u, y, held, *scalars = (np.vstack(rows) for rows in zip(*parts, strict=True))
+    a, tau, u, y, contact_efforts, *scalars = (np.vstack(rows) for rows in zip(*parts, strict=True))
     units: dict[str, str] = {}
     columns: list[Array] = []
 
@@ -1025,11 +1025,11 @@ def _result(system: System, legs: Sequence[Leg], p: Sequence[float], stop: Stop)
     motion = {"q": x[:, : system.nq].T, "v": x[:, system.nq : system.nq + system.nv].T}
     motion |= {"z": x[:, system.nq + system.nv :].T, "u": u.T, "p": every}
     for name, unit, values in sensor_columns(
-        system, {**motion, "a": a.T, "tau": every_effort(system, tau, held).T}
+        system, {**motion, "a": a.T, "tau": every_effort(system, tau, contact_efforts).T}
     ):
         column(name, unit, values)
     contact = legs[0].contact
-    for name, unit, values in contact_columns(system, contact, held):
+    for name, unit, values in contact_columns(system, contact, contact_efforts):
         column(name, unit, values)
     values = np.column_stack(columns)
     events = list_events(system, contact, legs[0].happened)

@@ -195,15 +195,15 @@ def study_of(
         ModelError: there is no such FMU.
     """
     name, content = _system(model) if isinstance(model, System) else _fmu(model)
-    told = {option: _told(value) for option, value in sorted(options.items())}
+    described = {option: _describe(value) for option, value in sorted(options.items())}
     digest = hashlib.sha256(content).hexdigest()
-    return {"model": name, "content": digest, "cases": list(cases), "options": told}
+    return {"model": name, "content": digest, "cases": list(cases), "options": described}
 
 
 def _system(system: System) -> tuple[str, bytes]:
-    """Its name, and all that it holds; numbers inside expressions are told to six digits."""
-    held = [getattr(system, part.name) for part in fields(system) if part.name[0] != "_"]
-    return system.name, _ADDRESS.sub("", repr(held)).encode()
+    """Its name, and all that it holds; numbers inside expressions are written to six digits."""
+    values = [getattr(system, part.name) for part in fields(system) if part.name[0] != "_"]
+    return system.name, _ADDRESS.sub("", repr(values)).encode()
 
 
 def _fmu(path: object) -> tuple[str, bytes]:
@@ -218,12 +218,12 @@ def _fmu(path: object) -> tuple[str, bytes]:
         ) from error
 
 
-def _told(value: object) -> str:
+def _describe(value: object) -> str:
     """A text that is the same the next time."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key!r}: {_told(value[key])}" for key in value) + "}"
+        return "{" + ", ".join(f"{key!r}: {_describe(value[key])}" for key in value) + "}"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_told(part) for part in value) + "]"
+        return "[" + ", ".join(_describe(part) for part in value) + "]"
     if isinstance(value, np.ndarray):
         return f"array {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
     return getattr(value, "__qualname__", None) or _ADDRESS.sub("", repr(value))
@@ -278,7 +278,7 @@ class Sweep:
         return cls(name, cases, place, {}, tuple(range(len(cases)))).as_found()
 
     def as_found(self) -> Sweep:
-        """The same study, with the failures that its folder tells of now."""
+        """The same study, with the failures that its folder records now."""
         missing = self.folder.missing(len(self.cases))
         return replace(self, failures={k: self.folder.complained(k) for k in missing})
 
@@ -482,7 +482,7 @@ def sweep(
     Each result is written as soon as it is there. A study that was interrupted goes on where it
     stopped when it is started again with the same folder; cases that failed are tried again. It is
     the same study when the cases, the options and the content of the model are the same; functions
-    among the options are told apart by their names alone.
+    among the options are distinguished by their names alone.
 
     Args:
         model: a system, simulated by `run`; or the path of an FMU, simulated by `fmu`.
@@ -741,5 +741,5 @@ def _answer(future: Future[Answer]) -> Answer:
         return future.result()
     except BrokenExecutor:
         raise
-    except Exception as error:  # lost on the way, such as a worker of a cluster
+    except Exception as error:  # lost in transit, such as a worker of a cluster
         return Answer(None, _say(error))

@@ -59,7 +59,7 @@ class Connections:
 
     Attributes:
         nodes: by number of the link.
-        children: for each link the joints of the tree that lead away from the base.
+        children: for each link the joints of the tree that go away from the base.
         cuts: the joints that close loops.
         remarks: couplings of coordinates, in sentences.
     """
@@ -82,8 +82,10 @@ def connections(system: System) -> Connections:
             if here in edge.ends and not edge.cut:
                 there = sum(edge.ends) - here
                 if there not in reached:
-                    turned = ConnectionEdge(edge.name, edge.kind, edge.driven, False, (here, there))
-                    children[here] += (turned,)
+                    directed = ConnectionEdge(
+                        edge.name, edge.kind, edge.driven, False, (here, there)
+                    )
+                    children[here] += (directed,)
                     reached.add(there)
                     waiting.append(there)
     nodes = {number: ConnectionNode(number, _names(system, number)) for number in numbers}
@@ -203,8 +205,8 @@ def _hang(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
         a, b = edge.ends
         owner = min((a, b), key=lambda n: (bool(n == 0), count[n], -depth[n]))
         other = b if owner == a else a
-        turned = ConnectionEdge(edge.name, edge.kind, edge.driven, True, (owner, other))
-        hung[owner] += (turned,)
+        directed = ConnectionEdge(edge.name, edge.kind, edge.driven, True, (owner, other))
+        hung[owner] += (directed,)
     return hung
 
 
@@ -505,24 +507,24 @@ def _round(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
     )
 
 
-def _across(pill: PlacedEdge, other: PlacedNode, turn: int, placed: Layout) -> str:
+def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> str:
     """Down from a joint and over to the bottom of a link, or to its side if others hang there."""
     foot = pill.y + PILL / 2
     busy = any(edge.edge.ends[0] == other.node.number for edge in (*placed.tree, *placed.cuts))
     if busy:
-        way = 1 if pill.x > other.x else -1
-        x, y = other.x + way * other.width / 2, other.y
-        start, lane = pill.x - way * pill.width / 2, pill.x - way * (pill.width / 2 + 9)
-        up, bend = (1 if y < pill.y else -1), 6 * way
+        sign = 1 if pill.x > other.x else -1
+        x, y = other.x + sign * other.width / 2, other.y
+        start, lane = pill.x - sign * pill.width / 2, pill.x - sign * (pill.width / 2 + 9)
+        up, bend = (1 if y < pill.y else -1), 6 * sign
         return (
             f"M{start:.1f} {pill.y:.1f}H{lane + bend:.1f}q{-bend} 0 {-bend} {-6 * up}"
             f"V{y + 6 * up:.1f}q0 {-6 * up} {-bend} {-6 * up}H{x:.1f}"
         )
     # several lines enter a box left and right of its middle, 7 px apart, and not at its corners
-    side = -1 if turn % 2 else 1
-    x = other.x + side * min(7.0 * (turn // 2), 0.42 * other.width)
+    side = -1 if order % 2 else 1
+    x = other.x + side * min(7.0 * (order // 2), 0.42 * other.width)
     y = other.y + other.height / 2
-    low = max(foot, y) + 30 + 4 * turn
+    low = max(foot, y) + 30 + 4 * order
     return f"M{pill.x:.1f} {foot:.1f}C{pill.x:.1f} {low:.1f} {x:.1f} {low:.1f} {x:.1f} {y:.1f}"
 
 

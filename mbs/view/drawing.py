@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mbs.assembly import System
-from mbs.view.mesh import BOX_CORNERS, BOX_FACES, turned_to
+from mbs.view.mesh import BOX_CORNERS, BOX_FACES, rotation_onto
 from mbs.view.posed import Array, PosedLinks, plane_normal, pose_links
 from mbs.view.primitives import (
     AxisShape,
@@ -125,7 +125,7 @@ class _Eye:
         """(..., 3) points of the base frame: right, up, near."""
         return np.array(self.scale * (points @ self.axes.T))
 
-    def moved(self, link: int, points: Sequence[Vector] | Vector | Array) -> Array:
+    def project(self, link: int, points: Sequence[Vector] | Vector | Array) -> Array:
         """(..., 3) points in the frame of a link: right, up, near."""
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return self.seen(np.array(points) @ R.T + p)
@@ -168,13 +168,13 @@ def drawing(
 def _eye(at: PosedLinks, iso: Array) -> _Eye:
     """Into the plane in which everything moves where there is one, right and up positive."""
     normal = plane_normal(at)
-    slides = [
+    prismatic_axes = [
         at.directions[axis.direction]
         for joint in at.parts.joints
         for axis in joint.axes
         if axis.motion == "prismatic"
     ]
-    if normal is None or any(abs(float(slide @ normal)) > _PARALLEL for slide in slides):
+    if normal is None or any(abs(float(along @ normal)) > _PARALLEL for along in prismatic_axes):
         right = np.cross(at.up, iso) / np.linalg.norm(np.cross(at.up, iso))
         axes = np.array([right, np.cross(iso, right), iso])
         return _Eye(axes, "seen from above at an angle", at.poses)
@@ -203,17 +203,17 @@ def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
 def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
     """The strokes of a shape, and how near its middle is."""
     if isinstance(item, (SpanShape, SpringShape)):
-        start, end = (eye.moved(k, at) for k, at in zip(item.links, item.ends, strict=True))
+        start, end = (eye.project(k, at) for k, at in zip(item.links, item.ends, strict=True))
         middle = float((start + end)[2]) / 2
         if isinstance(item, SpringShape):
             return [_coil(item, start, end, eye.scale * item.radius)], middle
         return [_area(item, _capsule([start, end], eye.scale * item.radius))], middle
     if isinstance(item, BarShape):
-        ends = list(eye.moved(item.link, (item.a, item.b)))
+        ends = list(eye.project(item.link, (item.a, item.b)))
         area = _area(item, _capsule(ends, eye.scale * item.radius))
         return [area], float((ends[0] + ends[1])[2]) / 2
     if isinstance(item, BallShape):
-        center = eye.moved(item.link, item.at)
+        center = eye.project(item.link, item.at)
         ring = center[:2] + eye.scale * item.radius * _CIRCLE[:, :2]
         return [_area(item, ring)], float(center[2])
     if isinstance(item, CylinderShape):
@@ -221,18 +221,18 @@ def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
     if isinstance(item, BoxShape):
         return _box(item, eye)
     if isinstance(item, PlateShape):
-        corners = eye.moved(item.link, item.points)
+        corners = eye.project(item.link, item.points)
         return [_area(item, corners[:, :2], item.opacity)], float(corners[:, 2].mean()) - _SIZE
     if isinstance(item, RingShape):
-        around = item.radius * _CIRCLE @ turned_to(np.array(item.axis)).T + np.array(item.at)
-        points = eye.moved(item.link, around)
+        around = item.radius * _CIRCLE @ rotation_onto(np.array(item.axis)).T + np.array(item.at)
+        points = eye.project(item.link, around)
         tube = 2 * eye.scale * item.tube
         line = Stroke(item.role, item.colour, _path(points), closed=True, width=tube)
         return [line], float(points[:, 2].mean())
     if isinstance(item, FrameShape):
         return _tripod(item, eye)
     assert isinstance(item, AxisShape), f"{type(item).__name__} has no strokes"
-    ends = list(eye.moved(item.link, (item.a, item.b)))
+    ends = list(eye.project(item.link, (item.a, item.b)))
     # thin, and none of an axis that is seen end on, in units of the drawing
     line = Stroke(item.role, item.colour, _path(np.array(ends)), width=0.3)
     long = math.dist(*line.points) > 0.01 * _SIZE
@@ -251,17 +251,17 @@ def _capsule(ends: Sequence[Array], radius: float) -> Array:
 def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
     """Its outline, the end that is seen, and the bore there."""
     a, b = np.array(item.a), np.array(item.b)
-    across = _CIRCLE @ turned_to(b - a).T
-    rings = [eye.moved(item.link, end + item.radius * across) for end in (a, b)]
+    across = _CIRCLE @ rotation_onto(b - a).T
+    rings = [eye.project(item.link, end + item.radius * across) for end in (a, b)]
     heads = [ring[:, 2].mean() for ring in rings]
     near = int(heads[1] > heads[0])
-    # one end is seen unless they are turned from the eye to 3 degrees; it is lighter than the
+    # one end is seen unless they are rotated from the eye to 3 degrees; it is lighter than the
     # outline
     parts = [_area(item, hull(np.vstack(rings)[:, :2]))]
     if abs(heads[1] - heads[0]) > 0.05 * eye.scale * np.linalg.norm(b - a):
         parts.append(_area(item, rings[near][:, :2], bright=1.12))
         if item.bore > 0:
-            bore = eye.moved(item.link, (a, b)[near] + item.bore * across)
+            bore = eye.project(item.link, (a, b)[near] + item.bore * across)
             parts.append(_area(item, bore[:, :2], bright=0.5))
     return parts, float(sum(heads)) / 2
 
@@ -270,7 +270,7 @@ def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
     """The sides that are seen."""
     pose = np.array(item.pose).reshape(3, 4)
     local = BOX_CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
-    corners = eye.moved(item.link, local)
+    corners = eye.project(item.link, local)
     parts = []
     # a side that is seen edge on is left out; others are a tenth darker than bars,
     # and lighter by the light on them
@@ -287,7 +287,7 @@ def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
     """Its three axes, but one that points at the eye."""
     pose = np.array(item.pose).reshape(3, 4)
     ends = pose[:, 3] + item.length * pose[:, :3].T
-    points = eye.moved(item.link, np.vstack([pose[:, 3], ends]))
+    points = eye.project(item.link, np.vstack([pose[:, 3], ends]))
     # an axis that points at the eye to 3 degrees would be a dot
     lines = [
         Stroke(item.role, f"{item.colour}.{k}", _path(points[[0, k + 1]]), width=0.6)
@@ -301,7 +301,7 @@ def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
     """A zigzag; a line where its ends are one place on the drawing."""
     start, along = start[:2], (end - start)[:2]
     length = float(np.linalg.norm(along))
-    # no length but rounding, in hundredths of the drawing; straight ends of 3/20, eight turns
+    # no length but rounding, in hundredths of the drawing; straight ends of 3/20, eight coils
     # between
     if length < 1e-9:
         return Stroke(item.role, item.colour, _path(np.array([start, end[:2]])), width=0.8)

@@ -61,14 +61,14 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
     if isinstance(item, (BarShape, CylinderShape)):
         yield Faces(_round(item), item.colour)
     elif isinstance(item, BallShape):
-        turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
-        profile = item.radius * np.column_stack([np.cos(turn), np.sin(turn)])
-        yield Faces(revolved(profile) + np.array(item.at), item.colour)
+        angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
+        profile = item.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        yield Faces(revolve(profile) + np.array(item.at), item.colour)
     elif isinstance(item, RingShape):
-        turn = np.linspace(0, 2 * np.pi, 9)
-        profile = item.tube * np.column_stack([np.cos(turn), np.sin(turn)]) + [item.radius, 0]
-        R = turned_to(np.array(item.axis))
-        yield Faces(revolved(profile, 48) @ R.T + np.array(item.at), item.colour)
+        angle = np.linspace(0, 2 * np.pi, 9)
+        profile = item.tube * np.column_stack([np.cos(angle), np.sin(angle)]) + [item.radius, 0]
+        R = rotation_onto(np.array(item.axis))
+        yield Faces(revolve(profile, 48) @ R.T + np.array(item.at), item.colour)
     elif isinstance(item, BoxShape):
         yield Faces(_pose(_cuboid(np.array(item.size)), item.pose), item.colour)
     elif isinstance(item, MeshShape):
@@ -79,13 +79,13 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
         yield Faces(_fan(np.array(item.points)), item.colour, "open", item.opacity)
     elif isinstance(item, FrameShape):
         for k in range(3):
-            arrow = _arrow(item.length) @ turned_to(np.eye(3)[k]).T
+            arrow = _arrow(item.length) @ rotation_onto(np.eye(3)[k]).T
             yield Faces(_pose(arrow, item.pose), f"axes.{k}")
     elif isinstance(item, AxisShape):
         yield Faces(_dashes(np.array(item.a), np.array(item.b), size), item.colour, "line")
 
 
-def stretched(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
+def stretch(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
     """Faces of what lies between two points of the base frame."""
     if isinstance(item, SpanShape):
         bar = _round(CylinderShape(item.role, 0, item.colour, tuple(a), tuple(b), item.radius))
@@ -95,14 +95,14 @@ def stretched(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
     angle = 2 * np.pi * _TURNS * t
     length = float(np.linalg.norm(b - a))
     wire = np.column_stack([grown * np.cos(angle), grown * np.sin(angle), length * t])
-    path = wire @ turned_to(b - a).T + a
+    path = wire @ rotation_onto(b - a).T + a
     return Faces(np.stack([path[:-1], path[:-1], path[1:], path[1:]], axis=1), item.colour, "line")
 
 
-def revolved(profile: Array, sides: int = _SIDES) -> Array:
-    """(n, 4, 3) faces of a profile (k, 2) of radius and height, turned about z."""
-    turn = np.linspace(0, 2 * np.pi, sides + 1)
-    round_ = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+def revolve(profile: Array, sides: int = _SIDES) -> Array:
+    """(n, 4, 3) faces of a profile (k, 2) of radius and height, revolved about z."""
+    angle = np.linspace(0, 2 * np.pi, sides + 1)
+    round_ = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = np.concatenate(
         [
             profile[:, None, :1] * round_[None],
@@ -115,7 +115,7 @@ def revolved(profile: Array, sides: int = _SIDES) -> Array:
     return faces.reshape(-1, 4, 3)
 
 
-def turned_to(direction: Array) -> Array:
+def rotation_onto(direction: Array) -> Array:
     """A rotation whose z axis is a direction; none where that has no length."""
     length = float(np.linalg.norm(direction))
     if length == 0:
@@ -131,15 +131,15 @@ def _round(item: BarShape | CylinderShape) -> Array:
     length, r = float(np.linalg.norm(b - a)), item.radius
     along = np.column_stack([np.full(_PIECES + 1, r), np.linspace(0, length, _PIECES + 1)])
     if isinstance(item, BarShape):
-        turn = np.linspace(0, np.pi / 2, 4)
-        foot = r * np.column_stack([np.sin(turn), -np.cos(turn)])
-        head = r * np.column_stack([np.cos(turn), np.sin(turn)]) + [0, length]
+        angle = np.linspace(0, np.pi / 2, 4)
+        foot = r * np.column_stack([np.sin(angle), -np.cos(angle)])
+        head = r * np.column_stack([np.cos(angle), np.sin(angle)]) + [0, length]
         profile = np.vstack([foot, along[1:-1], head])
     else:
         profile = np.vstack([[item.bore, 0], along, [item.bore, length]])
         if item.bore > 0:
             profile = np.vstack([profile, [item.bore, 0]])
-    faces: Array = revolved(profile) @ turned_to(b - a).T + a
+    faces: Array = revolve(profile) @ rotation_onto(b - a).T + a
     return faces
 
 
@@ -160,7 +160,7 @@ def _cuboid(size: Array) -> Array:
 def _arrow(length: float) -> Array:
     # in parts of the length: a shaft of three hundredths, a head of a fifth
     profile = [[0, 0], [0.03, 0], [0.03, 0.4], [0.03, 0.8], [0.08, 0.8], [0, 1]]
-    return revolved(length * np.array(profile), 8)
+    return revolve(length * np.array(profile), 8)
 
 
 def _pose(faces: Array, rows: tuple[float, ...]) -> Array:

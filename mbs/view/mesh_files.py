@@ -90,7 +90,7 @@ def _read(path: str, stamp: int) -> Mesh:
             f"{shortened(path)}: the mesh has {len(triangles)} triangles, or corners that are not"
             f" finite; give one of up to {_MOST_READ}"
         )
-    return thinned(points, triangles)
+    return thin(points, triangles)
 
 
 def _module(name: str, path: str) -> Any:
@@ -113,9 +113,9 @@ def _join(scene: Any) -> tuple[Array, NDArray[np.int64]]:
             continue  # lines and clouds of points
         corners, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
         points.append(corners @ pose[:3, :3].T + pose[:3, 3])
-        # a mirrored mesh is turned inside out
-        turned = faces[:, ::-1] if np.linalg.det(pose[:3, :3]) < 0 else faces
-        triangles.append(turned.astype(np.int64) + count)
+        # the faces of a mirrored mesh are reversed
+        oriented = faces[:, ::-1] if np.linalg.det(pose[:3, :3]) < 0 else faces
+        triangles.append(oriented.astype(np.int64) + count)
         count += len(corners)
     return np.vstack(points), np.vstack(triangles)
 
@@ -144,7 +144,7 @@ def _unit(content: bytes) -> float:
     return unit
 
 
-def thinned(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES) -> Mesh:
+def thin(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES) -> Mesh:
     """The mesh with at most so many triangles: corners in one cell of a grid become one.
 
     Source: Rossignac & Borrel 1993, vertices clustered in cells, each at their mean.

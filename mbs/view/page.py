@@ -129,7 +129,7 @@ def page(
     return "\n".join(lines) + "\n"
 
 
-def framed(text: str) -> str:
+def iframe(text: str) -> str:
     """An HTML file as a part of another page, such as a notebook."""
     source = html.escape(text, quote=True)
     look = f"width: 100%; height: {_HEIGHT}px; border: 0; border-radius: 6px"

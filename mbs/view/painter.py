@@ -18,7 +18,7 @@ from mbs.files import PathLike, whole_file
 from mbs.progress import progress
 from mbs.result import optional_module
 from mbs.text import did_you_mean
-from mbs.view.mesh import Faces, faces_of, stretched
+from mbs.view.mesh import Faces, faces_of, stretch
 from mbs.view.posed import Array
 from mbs.view.primitives import PALETTE, LabelShape, SpanShape, SpringShape, Theme, rgb
 from mbs.view.scene import Scene
@@ -65,7 +65,7 @@ def camera(scene: Scene, view: str) -> Camera:
     out, up = np.array(scene.views[view]), np.array(scene.up)
     right = np.cross(up, out)
     right = right / np.linalg.norm(right)
-    # the ball around the mechanism, and a little room, fill the height
+    # the sphere around the mechanism, and a little room, fill the height
     away = 1.06 * scene.bounds.radius / float(np.sin(FIELD / 2))
     axes = np.vstack([right, np.cross(out, right), out])
     return Camera(np.array(scene.bounds.center) + away * out, axes, away)
@@ -107,7 +107,7 @@ class Painter:
     def paint(self, poses: Sequence[float] | Array) -> Any:
         """Paint the scene at poses (12 links,), as `Scene.poses` gives them; the Figure."""
         matplotlib = optional_module("matplotlib.collections", "plot")
-        axes, places = self.axes, np.reshape(poses, (-1, 3, 4))
+        axes, link_poses = self.axes, np.reshape(poses, (-1, 3, 4))
         axes.clear()
         axes.set_axis_off()
         axes.set_aspect("equal")
@@ -119,7 +119,7 @@ class Painter:
         axes.add_collection(
             matplotlib.LineCollection(segments, colors=tints, linewidths=0.6, zorder=0)
         )
-        corners, colours, widths, shadow = self._faces(places)
+        corners, colours, widths, shadow = self._faces(link_poses)
         dark = self._mix(self._colour("background"), np.zeros(3), self._number("shadow"))
         axes.add_collection(
             matplotlib.PolyCollection(
@@ -131,19 +131,22 @@ class Painter:
                 corners, facecolors=colours, edgecolors=colours, linewidths=widths, zorder=2
             )
         )
-        self._labels(places)
+        self._labels(link_poses)
         return self.figure
 
-    def _faces(self, places: Array) -> tuple[Array, Array, Array, Array]:
+    def _faces(self, link_poses: Array) -> tuple[Array, Array, Array, Array]:
         """Corners on the picture, colours, widths of edges: far ones first; and the shadow."""
-        every = [(self._moved(faces, places[link]), faces) for link, faces in self.solid]
+        every = [
+            (self._transformed_corners(faces, link_poses[link]), faces)
+            for link, faces in self.solid
+        ]
         for item in self.scene.primitives:
             if isinstance(item, (SpanShape, SpringShape)) and item.role in self.shown:
                 a, b = (
-                    places[k, :, :3] @ np.array(end) + places[k, :, 3]
+                    link_poses[k, :, :3] @ np.array(end) + link_poses[k, :, 3]
                     for k, end in zip(item.links, item.ends, strict=True)
                 )
-                faces = stretched(item, a, b)
+                faces = stretch(item, a, b)
                 every.append((faces.corners, faces))
         parts = [self._light(corners, faces) for corners, faces in every if len(corners)]
         corners, colours, widths = (np.concatenate(rows) for rows in zip(*parts, strict=True))
@@ -151,7 +154,7 @@ class Painter:
         order = np.argsort(depth.mean(axis=1), kind="stable")
         return flat[order], colours[order], widths[order], self._shadow(corners)
 
-    def _moved(self, faces: Faces, pose: Array) -> Array:
+    def _transformed_corners(self, faces: Faces, pose: Array) -> Array:
         return np.array(faces.corners @ pose[:, :3].T + pose[:, 3])
 
     def _light(self, corners: Array, faces: Faces) -> tuple[Array, Array, Array]:
@@ -208,13 +211,13 @@ class Painter:
         far, near_colour = self._colour("background"), self._colour("grid")
         return flat[kept], far + part[:, None] * (near_colour - far)
 
-    def _labels(self, places: Array) -> None:
+    def _labels(self, link_poses: Array) -> None:
         effects = optional_module("matplotlib.patheffects", "plot")
         # in points, then in half heights of the picture: beside the point, one above the other
         halo = [effects.withStroke(linewidth=2.5, foreground=self._colour("background"))]
         for item in self.scene.primitives:
             if isinstance(item, LabelShape) and item.role in self.shown:
-                at = places[item.link, :, :3] @ np.array(item.at) + places[item.link, :, 3]
+                at = link_poses[item.link, :, :3] @ np.array(item.at) + link_poses[item.link, :, 3]
                 (x, y), _ = self.eye.seen(at)
                 look = {"color": self._colour("text"), "fontsize": 9, "path_effects": halo}
                 y += 0.02 + 0.05 * item.row

@@ -15,7 +15,7 @@ from mbs.files import PathLike, path_of, write_text
 from mbs.loops.configuration import solve
 from mbs.result import Result
 from mbs.text import quoted
-from mbs.view.page import Look, framed, look_of, page
+from mbs.view.page import Look, iframe, look_of, page
 from mbs.view.painter import Painter, painter, save_gif, save_mp4, save_still
 from mbs.view.posed import Array, Values
 from mbs.view.primitives import Theme
@@ -58,7 +58,7 @@ class Picture:
         return f"<Picture of {self.scene.system.name}{moving}>"
 
     def _repr_html_(self) -> str:
-        return framed(self.html)
+        return iframe(self.html)
 
     def save(self, path: PathLike) -> None:
         """Write a file in the format that its ending names.

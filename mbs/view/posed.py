@@ -23,7 +23,7 @@ Values = Mapping[str, float] | Sequence[float] | None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedLinks:
-    """A system whose links have places.
+    """A system whose links have poses.
 
     Attributes:
         system: the mechanism.
@@ -54,9 +54,9 @@ class PosedLinks:
 
     def local_pose(self, link: int, R: Array, p: Array) -> Rows:
         """The pose (R, p) in the base frame, seen from a link."""
-        turned = self.poses[link, :, :3].T @ R
+        R_link = self.poses[link, :, :3].T @ R
         place = np.array(self.local(link, p)).reshape(3, 1)
-        return rows(np.hstack([turned, place]))
+        return rows(np.hstack([R_link, place]))
 
 
 def three(values: Array) -> Vector:
@@ -123,11 +123,11 @@ def _pose_function(system: System) -> Function:
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
         chain = link_poses(system.tree, normalised(system.tree, q))
-        moved = [
+        poses_of_links = [
             casadi.vec(casadi.horzcat(pose.R, pose.p).T) for pose in base_poses(system.tree, chain)
         ]
         base = SX([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0])
-        return [("q", q)], [("poses", casadi.vertcat(base, *moved))]
+        return [("q", q)], [("poses", casadi.vertcat(base, *poses_of_links))]
 
     return model_function(system, ("link_poses",), build)
 
@@ -170,8 +170,8 @@ class Measures:
 
 
 @dataclass(frozen=True, slots=True)
-class BoundingBall:
-    """A ball that holds the mechanism: center and radius [m], in the base frame."""
+class BoundingSphere:
+    """A sphere that contains the mechanism: center and radius [m], in the base frame."""
 
     center: Vector
     radius: float
@@ -221,15 +221,15 @@ def _gyration(scene: PosedLinks) -> float:
     return found or 1.0
 
 
-def bounds_of(points: Array, margin: float) -> BoundingBall:
-    """The ball about a cuboid that holds points (n, 3), a margin wider [m]."""
+def bounds_of(points: Array, margin: float) -> BoundingSphere:
+    """The sphere about a cuboid that contains points (n, 3), a margin wider [m]."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle = three((low + high) / 2)
     reach = float(np.linalg.norm(points - (low + high) / 2, axis=1).max())
-    return BoundingBall(middle, reach + margin)
+    return BoundingSphere(middle, reach + margin)
 
 
-def floor_of(points: Array, up: Array, bounds: BoundingBall, gap: float = 0.0) -> Floor:
+def floor_of(points: Array, up: Array, bounds: BoundingSphere, gap: float = 0.0) -> Floor:
     """A ground that is a gap [m] below points (n, 3) and below the base frame."""
     lowest = min(0.0, float((points @ up).min())) - gap
     center = np.array(bounds.center)
@@ -292,7 +292,7 @@ def plane_normal(scene: PosedLinks) -> Array | None:
     kinds = {joint.kind for joint in scene.parts.joints}
     if not axes or kinds & {"free", "spherical"}:
         return None
-    # parallel to a thousandth of a radian, as a drawing tells
+    # parallel to a thousandth of a radian, as a drawing shows
     same = all(abs(float(axis @ axes[0])) > 1 - 1e-6 for axis in axes)
     return np.array(axes[0]) if same else None
 

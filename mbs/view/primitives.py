@@ -1,4 +1,4 @@
-"""What a scene is made of: simple shapes in the frames of links, free of any way to draw them.
+"""What a scene is made of: simple shapes in the frames of links, free of how they are drawn.
 
 Every primitive has a role, by which a viewer shows and hides it, and the name of a colour, or
 "#rrggbb".
@@ -46,7 +46,7 @@ class CylinderShape:
 
 @dataclass(frozen=True, slots=True)
 class BallShape:
-    """A ball at a point [m]."""
+    """A sphere at a point [m]."""
 
     role: str
     link: int
@@ -190,7 +190,7 @@ Theme = Literal["light", "dark"]
 Colours = Mapping[str, str | float | list[str]]
 
 LINK_COLOURS = ("link0", "link1", "link2", "link3", "link4", "link5")
-"""Links take these in turn."""
+"""Links take these one after the other."""
 
 _LIGHT: Colours = {
     "background": "#f6f7f9",

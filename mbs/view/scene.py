@@ -13,7 +13,7 @@ from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.view.posed import (
     Array,
-    BoundingBall,
+    BoundingSphere,
     Floor,
     Values,
     bounds_of,
@@ -67,7 +67,7 @@ class Scene:
         links: names of the base and the links.
         up: unit vector against gravity.
         size: of the mechanism [m].
-        bounds: a ball that holds it at the configuration q.
+        bounds: a sphere that contains it at the configuration q.
         floor: the ground grid.
         views: unit vectors towards who looks: iso, front, side, top.
         q: (nq,) configuration that it was made at.
@@ -80,7 +80,7 @@ class Scene:
     links: tuple[str, ...]
     up: Vector
     size: float
-    bounds: BoundingBall
+    bounds: BoundingSphere
     floor: Floor
     views: Mapping[str, Vector]
     q: tuple[float, ...]
@@ -91,7 +91,7 @@ class Scene:
         """Roles that are not shown until asked for.
 
         Args:
-            left_out: roles that nobody wants to see; without "visual" the mechanism is its joints
+            left_out: roles that are not to be shown; without "visual" the mechanism is its joints
                 and bars again.
         """
         visual = any(item.role == "visual" for item in self.primitives)

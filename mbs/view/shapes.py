@@ -17,7 +17,7 @@ from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint, SkeletonLink, link_outline
 from mbs.text import shortened
-from mbs.view.mesh import revolved, turned_to
+from mbs.view.mesh import revolve, rotation_onto
 from mbs.view.mesh_files import read_mesh
 from mbs.view.posed import SAME_POINT, Array, Measures, PosedLinks, rows, three
 from mbs.view.primitives import (
@@ -40,7 +40,7 @@ from mbs.view.primitives import (
 
 
 def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
-    """Every joint: cylinders about axes, boxes along them, balls; and their names."""
+    """Every joint: cylinders about axes, boxes along them, spheres; and their names."""
     for joint in _shown(scene):
         if joint.kind == "rollingdisc":
             yield from _wheel(scene, joint, sizes)
@@ -78,14 +78,14 @@ def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
 
 
 def _join(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
-    """A bar between frames that are not one place, balls where a joint has no axes."""
+    """A bar between frames that do not coincide, spheres where a joint has no axes."""
     role, colour = _look(scene, joint)
     a, b = (scene.points[k] for k in joint.points)
     ends = scene.local(joint.links[0], a), scene.local(joint.links[1], b)
-    # thinner than links, balls a little larger than joints with axes
-    slides = any(axis.motion == "prismatic" for axis in joint.axes)
-    if slides or np.linalg.norm(a - b) > SAME_POINT * sizes.size or joint.cut:
-        paint = colour if joint.cut or not slides else "joint"
+    # thinner than links, spheres a little larger than joints with axes
+    is_prismatic = any(axis.motion == "prismatic" for axis in joint.axes)
+    if is_prismatic or np.linalg.norm(a - b) > SAME_POINT * sizes.size or joint.cut:
+        paint = colour if joint.cut or not is_prismatic else "joint"
         yield SpanShape(role, joint.links, paint, ends, 0.45 * sizes.bar)
     if not joint.axes:
         for link, end in dict(zip(joint.links, ends, strict=True)).items():
@@ -96,7 +96,7 @@ def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[
     role, colour = _look(scene, joint)
     carriers = _carriers(scene, joint)
     # in radii of a joint: where there are several axes each is smaller, so that all are seen; a
-    # slide is a box of about the volume of the cylinder of a revolute joint
+    # prismatic joint is a box of about the volume of the cylinder of a revolute joint
     shrink = 1.0 if len(joint.axes) == 1 else 0.8
     for (link, column), axis in zip(carriers, joint.axes, strict=True):
         direction, center = scene.directions[axis.direction], scene.points[column]
@@ -107,7 +107,7 @@ def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[
         else:
             side = 1.9 * radius
             seat = _seat(scene, joint, direction, 1.5 * side)
-            pose = scene.local_pose(link, turned_to(direction), center + seat)
+            pose = scene.local_pose(link, rotation_onto(direction), center + seat)
             yield BoxShape(role, link, colour, pose, (side, side, 1.5 * side))
         a, b = _around(scene, link, center, 4.5 * sizes.joint * direction)
         yield AxisShape("axis", link, a, b)
@@ -131,10 +131,10 @@ def _around(scene: PosedLinks, link: int, center: Array, half: Array) -> tuple[V
 
 
 def _seat(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: float) -> Array:
-    """Where a slide sits, seen from frame_b: beside a ball that is there too."""
+    """Where a prismatic joint sits, seen from frame_b: beside a sphere that is there too."""
     a, b = (scene.points[k] for k in joint.points)
     back = float((a - b) @ direction)
-    # in lengths of the box: on the way to frame_a where that is far, beside a ball that is near
+    # in lengths of the box: towards frame_a where that is far, beside a sphere that is near
     if abs(back) > 2.5 * length:
         return np.array(np.sign(back) * 1.1 * length * direction)
     crowded = any(
@@ -294,8 +294,8 @@ def _surface(
 
 
 def _unit_ball() -> tuple[Array, NDArray[np.int64]]:
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
-    faces = revolved(np.column_stack([np.cos(turn), np.sin(turn)]))
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
+    faces = revolve(np.column_stack([np.cos(angle), np.sin(angle)]))
     numbers = np.arange(4 * len(faces)).reshape(-1, 4)
     return faces.reshape(-1, 3), np.vstack([numbers[:, :3], numbers[:, [0, 2, 3]]])
 
@@ -322,7 +322,7 @@ def corners(scene: PosedLinks, solid: Visual) -> Array:
 def link_shapes(
     scene: PosedLinks, sizes: Measures, solids: list[BoxShape | CylinderShape], seen: set[int]
 ) -> Iterator[Primitive]:
-    """Bars from joint to joint, polygons filled, balls where a link is nothing but a point.
+    """Bars from joint to joint, polygons filled, spheres where a link is nothing but a point.
 
     Args:
         scene: where it is.
@@ -375,21 +375,21 @@ def _plate(scene: PosedLinks, link: SkeletonLink) -> Iterator[PlateShape]:
 def _point_link(
     scene: PosedLinks, link: SkeletonLink, sizes: Measures
 ) -> Iterator[BallShape | BarShape]:
-    """A link without extent: a ball where only a mass is, a flange where a joint carries it."""
+    """A link without extent: a sphere where only a mass is, a flange where a joint carries it."""
     number, colour = link.number, link_colour(link.number)
-    held = [
+    joints = [
         scene.points[point]
         for joint in scene.parts.joints
         for side, point in zip(joint.links, joint.points, strict=True)
         if side == number and joint.kind != "free"
     ]
     frames = [f for f in scene.parts.frames if f.link == number]
-    # a ball for a body that nothing holds, a stub that is seen beside the one joint
-    if link.mass_centre is not None and not held:
+    # a sphere for a body without joints, a stub that is seen beside the one joint
+    if link.mass_centre is not None and not joints:
         at = scene.local(number, scene.points[link.mass_centre])
         yield BallShape("link", number, colour, at, 2.5 * sizes.bar)
-    elif held and (frames or len(held) == 1):
-        a = scene.local(number, held[0])
+    elif joints and (frames or len(joints) == 1):
+        a = scene.local(number, joints[0])
         yield BarShape("link", number, colour, a, (a[0], a[1], a[2] + 2.2 * sizes.joint), sizes.bar)
 
 
@@ -412,12 +412,12 @@ def _base_bars(
     ]
     if not points:
         return
-    held = np.array(points)
+    ends = np.array(points)
     # somewhat thicker than links; a column where all joints are at one point, but for rounding
-    for a, b in link_outline(held, len(held)):
-        yield BarShape("base", 0, "base", three(held[a]), three(held[b]), 1.1 * sizes.bar)
-    if np.ptp(held, axis=0).max() <= 1e-9 * sizes.size:
-        yield from _column(scene, sizes, held[0], floor)
+    for a, b in link_outline(ends, len(ends)):
+        yield BarShape("base", 0, "base", three(ends[a]), three(ends[b]), 1.1 * sizes.bar)
+    if np.ptp(ends, axis=0).max() <= 1e-9 * sizes.size:
+        yield from _column(scene, sizes, ends[0], floor)
 
 
 def _column(

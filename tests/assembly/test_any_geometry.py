@@ -10,7 +10,7 @@ import mbs.assembly.open_system
 import mbs.models
 from mbs.assembly import symbolic
 from mbs.components import Body, Box, Prismatic, Revolute
-from mbs.components.component import Turned, angle_expression
+from mbs.components.component import ElementaryRotation, angle_expression
 from mbs.errors import AssemblyError
 from mbs.export.languages.header import tables
 from mbs.expressions import Number
@@ -229,7 +229,7 @@ def test_a_quarter_turn_that_a_file_wrote_in_digits(written, read):
     assert value.value == read
     point = Body("b").at(rotation=("x", written))
     (step,) = point.placement.steps
-    assert isinstance(step, Turned)
+    assert isinstance(step, ElementaryRotation)
     assert step.angle.value == read
     placed = Body("b").at_khalil(alpha=written, d=written).placement.steps[0]
     assert (placed.alpha.value, placed.d.value) == (read, written)

@@ -26,7 +26,7 @@ from mbs.components import (
 )
 from mbs.components.constraints import Constraint
 from mbs.components.joints import Freedom, Motion
-from mbs.components.motion_joint import shifted, turned
+from mbs.components.motion_joint import rotation, translation
 from mbs.errors import DescriptionError
 
 PITCH = 0.4
@@ -39,7 +39,7 @@ class Corkscrew(MotionJoint):
     phi = custom.unknown("rad")
 
     def motion(self, at):
-        return turned("z", at.phi) @ shifted(0, 0, at.pitch * at.phi / (2 * np.pi))
+        return rotation("z", at.phi) @ translation(0, 0, at.pitch * at.phi / (2 * np.pi))
 
 
 class Wave(MotionJoint):
@@ -48,7 +48,7 @@ class Wave(MotionJoint):
     s = custom.unknown("m")
 
     def motion(self, at):
-        return shifted(at.s, 0, 0.1 * casadi.sin(5 * at.s))
+        return translation(at.s, 0, 0.1 * casadi.sin(5 * at.s))
 
 
 class Hinge(MotionJoint):
@@ -57,7 +57,7 @@ class Hinge(MotionJoint):
     phi = custom.unknown("rad")
 
     def motion(self, at):
-        return turned("z", at.phi)
+        return rotation("z", at.phi)
 
 
 class Own(Revolute):
@@ -65,7 +65,7 @@ class Own(Revolute):
 
 
 class Twice(Joint):
-    """A turn, then a slide along the turned x: a user's own chain of freedoms."""
+    """A rotation, then a translation along the rotated x: a user's own chain of freedoms."""
 
     @property
     def freedoms(self):

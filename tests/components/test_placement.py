@@ -7,7 +7,7 @@ from support.messages import refused
 from support.random_trees import random_rotation
 
 from mbs.components import Body
-from mbs.components.component import KhalilStep, Oriented, Translation, Turned
+from mbs.components.component import ElementaryRotation, FixedRotation, KhalilStep, Translation
 from mbs.errors import DescriptionError
 
 B = Body("b")
@@ -30,7 +30,10 @@ def test_position():
     assert T[:3, 3].tolist() == [0.5, 2, -3]
     assert T[:3, :3].tolist() == np.eye(3).tolist()
     assert B.at().placement.steps == ()
-    assert [type(s) for s in B.at(1, rotation=("z", 2)).placement.steps] == [Translation, Turned]
+    assert [type(s) for s in B.at(1, rotation=("z", 2)).placement.steps] == [
+        Translation,
+        ElementaryRotation,
+    ]
 
 
 @pytest.mark.parametrize("axis", "xyz")
@@ -59,7 +62,7 @@ def test_matrix():
     R = random_rotation(np.random.default_rng(0))
     for given in (R, R.tolist(), tuple(map(tuple, R))):
         np.testing.assert_allclose(matrix(B.at(rotation=given))[:3, :3], R, atol=1e-15)
-    assert isinstance(B.at(rotation=np.eye(3)).placement.steps[0], Oriented)
+    assert isinstance(B.at(rotation=np.eye(3)).placement.steps[0], FixedRotation)
 
 
 def test_matrix_with_few_digits_is_put_right():

@@ -9,7 +9,7 @@ from casadi import SX, Function
 from export.code_text import idm, lines
 
 import mbs
-from mbs.export.languages.build import turned
+from mbs.export.languages.build import negate_nodes
 from mbs.operations import count, simplify
 from mbs.operations.graph import function_of, graph_of
 
@@ -61,7 +61,7 @@ def test_a_scalar_is_computed_with_the_sign_of_its_name(value, opposite):
     function = Function("f", [x], [y], ["x"], ["y"])
     graph = graph_of(function)
     number = next(n for n in range(len(graph.nodes)) if graph.operands(n))
-    other, _ = turned(graph, [number])
+    other, _ = negate_nodes(graph, [number])
     made = function_of(other)
     assert float(made([0.3, 0.7])) == pytest.approx(float(function([0.3, 0.7])), rel=1e-15)
     assert count(made) == count(function)

@@ -11,7 +11,7 @@ import pytest
 
 import mbs
 from mbs.errors import ExportError
-from mbs.view.mesh import faces_of, revolved, stretched, turned_to
+from mbs.view.mesh import faces_of, revolve, rotation_onto, stretch
 from mbs.view.painter import camera
 from mbs.view.primitives import (
     BallShape,
@@ -60,16 +60,16 @@ def test_a_frame_has_three_arrows_of_its_length():
 
 def test_a_turn_takes_z_to_a_direction():
     for direction in np.random.default_rng(1).normal(size=(5, 3)):
-        R = turned_to(direction)
+        R = rotation_onto(direction)
         assert np.abs(R @ R.T - np.eye(3)).max() < 1e-14
         assert np.abs(R[:, 2] - direction / np.linalg.norm(direction)).max() < 1e-14
-    assert np.array_equal(turned_to(np.zeros(3)), np.eye(3))
-    assert revolved(np.array([[1.0, 0.0], [1.0, 1.0]]), 6).shape == (6, 4, 3)
+    assert np.array_equal(rotation_onto(np.zeros(3)), np.eye(3))
+    assert revolve(np.array([[1.0, 0.0], [1.0, 1.0]]), 6).shape == (6, 4, 3)
 
 
 def test_what_is_stretched_reaches_from_end_to_end():
     a, b = np.array([1.0, 0, 0]), np.array([1.0, 2.0, 0])
-    corners = stretched(
+    corners = stretch(
         SpanShape("joint", (0, 1), "joint", ((0, 0, 0), (0, 0, 0)), 0.1), a, b
     ).corners
     assert np.allclose(corners[..., 1].min(), 0)

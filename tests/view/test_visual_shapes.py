@@ -10,7 +10,7 @@ import mbs
 from mbs.components import Body, Mechanism, Revolute, Shape
 from mbs.errors import ModelError
 from mbs.view.drawing import drawing
-from mbs.view.mesh_files import MOST_TRIANGLES, read_mesh, thinned
+from mbs.view.mesh_files import MOST_TRIANGLES, read_mesh, thin
 from mbs.view.primitives import BallShape, BarShape, BoxShape, CylinderShape, MeshShape, rgb
 
 TURN = [("z", 0.3), ("x", 0.4)]
@@ -142,7 +142,7 @@ def test_shapes_are_painted_and_can_be_left_out(tmp_path):
 
 def test_many_triangles_are_thinned_out():
     points, triangles = ball(120)
-    mesh = thinned(points, triangles)
+    mesh = thin(points, triangles)
     assert mesh.of == len(triangles) > 10 * MOST_TRIANGLES
     assert MOST_TRIANGLES / 3 < len(mesh.triangles) <= MOST_TRIANGLES
     radii = np.linalg.norm(mesh.points[np.unique(mesh.triangles)], axis=1)
@@ -150,7 +150,7 @@ def test_many_triangles_are_thinned_out():
     a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
     outwards = np.sum(np.cross(b - a, c - a) * (a + b + c), axis=1)
     assert (outwards > 0).mean() > 0.99
-    few = thinned(points[:4], np.array([[0, 1, 2], [0, 2, 3]]))
+    few = thin(points[:4], np.array([[0, 1, 2], [0, 2, 3]]))
     assert len(few.triangles) == few.of == 2
 
 

@@ -72,15 +72,15 @@ def in_arrays(model: FmuModel, groups: Iterable[Group]) -> FmuModel:
     for group in groups:
         if not group.size:
             continue
-        variables, places = changed[group.kind], range(group.first, group.first + group.size)
-        owners = ", ".join(variables[k].name.rpartition(".")[0] for k in places)
+        variables, indices = changed[group.kind], range(group.first, group.first + group.size)
+        owners = ", ".join(variables[k].name.rpartition(".")[0] for k in indices)
         words, first = f"{group.text} {owners}", model.first(group.kind) + group.first
         arrays.append(Array(group.name, first, group.size, words))
         if group.kind == "state":
             rates = model.first("derivative") + group.first
             words = f"derivatives of the {words}"
             arrays.append(Array(f"der({group.name})", rates, group.size, words))
-        for number, k in enumerate(places, 1):
+        for number, k in enumerate(indices, 1):
             variables[k] = replace(variables[k], name=f"{group.name}[{number}]")
     if model.slots:
         n, text = len(model.slots), "states of the model"
@@ -98,7 +98,7 @@ def in_arrays(model: FmuModel, groups: Iterable[Group]) -> FmuModel:
     )
 
 
-def listed(model: FmuModel) -> list[Listed]:
+def list_variables(model: FmuModel) -> list[Listed]:
     """The variables of a model, arrays as one, in the order of the value references."""
     entries, arrays = model.entries, {array.first: array for array in model.arrays}
     found, place = [], 0

@@ -328,8 +328,8 @@ def _of_function(system: System, law: Function, sources: Sources) -> Controller:
     sizes = [law.numel_in(k) for k in further]
     point = _symbols(system, law, sum(sizes))
     t, q, v, w, _ = point
-    places = [sum(sizes[:k]) for k in range(len(sizes) + 1)]
-    values = law.call([t, q, v, *(w[a:b] for a, b in pairwise(places))])
+    offsets = [sum(sizes[:k]) for k in range(len(sizes) + 1)]
+    values = law.call([t, q, v, *(w[a:b] for a, b in pairwise(offsets))])
     made = {
         name: Function(kind, point, [casadi.densify(casadi.vec(values[outputs[name]]))])
         for name, kind in (("tau", "effort"), ("u", "device"))
@@ -347,11 +347,11 @@ def _symbols(system: System, law: Function, nw: int) -> list[Any]:
 
 def _check_inputs(system: System, law: Function) -> None:
     sizes = [law.numel_in(k) for k in range(min(3, law.n_in()))]
-    wanted = [1, system.nq, system.nv]
-    if sizes != wanted:
+    expected = [1, system.nq, system.nv]
+    if sizes != expected:
         raise ExportError(
             f"{system.name}: the controller {law.name()} starts with inputs of sizes {sizes}; give"
-            f" t, q and v of sizes {wanted}, then further inputs"
+            f" t, q and v of sizes {expected}, then further inputs"
         )
     names = law.name_in()
     if any(name in _POINT and name != _POINT[k] for k, name in enumerate(names[:3])):
@@ -375,22 +375,22 @@ def _check_inputs(system: System, law: Function) -> None:
 def _outputs(system: System, law: Function) -> dict[str, int]:
     """Which output gives the efforts, and which the inputs of the devices."""
     names = law.name_out()
-    places = {name: k for k, name in enumerate(names)}
+    columns = {name: k for k, name in enumerate(names)}
     if len(names) == 1 and names != ["u"]:
-        places = {"tau": 0}
+        columns = {"tau": 0}
     sizes = {"tau": system.nv, "u": system.u.numel()}
-    if not set(places) <= set(sizes):
+    if not set(columns) <= set(sizes):
         raise ExportError(
             f"{system.name}: the controller {law.name()} has outputs {', '.join(names)}; call them"
             " tau for efforts of joints, and u for inputs of devices"
         )
-    for name, k in places.items():
+    for name, k in columns.items():
         if law.numel_out(k) != sizes[name] or not sizes[name]:
             raise ExportError(
                 f"{system.name}: the controller {law.name()} gives {law.numel_out(k)} values of"
                 f" {name}, the system has {sizes[name]}"
             )
-    return places
+    return columns
 
 
 def _inputs(law: Function) -> Iterator[FmuVariable]:

@@ -215,7 +215,7 @@ def once(system: System, what: str, names: Sequence[str]) -> list[str]:
     return given
 
 
-def structured(name: str) -> str:
+def structured_name(name: str) -> str:
     """A name as the naming convention `structured` of FMI has it, such as `'left-arm'.q`.
 
     A path of identifiers stays as it is. A part between two dots that is no identifier is put in
@@ -272,7 +272,7 @@ class FmuVariable:
 
     Attributes:
         name: as other tools show it; a part that is no identifier gets quotes, as
-            `mbs.export.fmu.description.structured` has it.
+            `mbs.export.fmu.description.structured_name` has it.
         unit: a name of `mbs.units.UNITS`.
         start: value at the start; of a dependent coordinate, a guess that chooses the
             configuration.
@@ -296,7 +296,7 @@ class FmuVariable:
     guess: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", structured(self.name))
+        object.__setattr__(self, "name", structured_name(self.name))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -355,7 +355,7 @@ class Member:
     kind: Literal["signal", "inflow", "outflow"] = "signal"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "variable", structured(self.variable))
+        object.__setattr__(self, "variable", structured_name(self.variable))
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,7 +377,7 @@ class Terminal:
     description: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", structured(self.name))
+        object.__setattr__(self, "name", structured_name(self.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -456,7 +456,7 @@ class FmuModel:
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
             absolute closure row at z; None when there is no z.
         slopes: `slopes(x, z, p) -> J`, how the equations of the closure change with z; the signs of
-            the determinants of its diagonal blocks tell on which side of a singular configuration
+            the determinants of its diagonal blocks show on which side of a singular configuration
             z is. None when nothing watches them.
         passive: the first output that is a velocity of a dependent joint, the first that is an
             acceleration of one, and how many of each there are.

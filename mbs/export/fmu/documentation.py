@@ -249,12 +249,12 @@ def _geometry(system: System) -> PageTable:
         ("link", "moved by", "on", "γ [rad]", "b [m]", "α [rad]", "d [m]", "θ [rad]", "r [m]"),
         tuple(placement for row in system.links for placement in _placements(system, row)),
         "Parameters of Khalil and Kleinfinger at the zero of the coordinate, which is added to θ"
-        " or r. A fixed frame on the way to link 4 is numbered 4.1.",
+        " or r. A fixed frame on the path to link 4 is numbered 4.1.",
     )
 
 
 def _placements(system: System, row: LinkRow) -> Iterator[tuple[str, ...]]:
-    """The fixed frames that lead to a link, then the link."""
+    """The fixed frames on the path to a link, then the link."""
     before = _place(row.antecedent - 1)
     for number, fixed in enumerate(row.via, 1):
         name = f"{row.number}.{number}"

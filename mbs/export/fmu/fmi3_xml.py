@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
-from mbs.export.fmu.arrays import dependencies_of_arrays, listed, of_arrays
+from mbs.export.fmu.arrays import dependencies_of_arrays, list_variables, of_arrays
 from mbs.export.fmu.description import TIME, FmuModel
 from mbs.export.fmu.xml import (
     TOOL,
@@ -106,7 +106,7 @@ def _interface(root: Element, tag: str, model: FmuModel) -> None:
 def _variables(root: Element, model: FmuModel, found: ModelStructure) -> None:
     variables, derived = SubElement(root, "ModelVariables"), model.derived
     reset = of_arrays(model, found.reset)
-    for shown in listed(model):
+    for shown in list_variables(model):
         reference, entry = shown.reference, shown.entry
         attributes = variable_attributes(reference, entry)
         if entry.kind == "mode":

@@ -13,7 +13,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import Frame
 from mbs.errors import ModelError
 from mbs.export.fmu.controller import Controller
-from mbs.export.fmu.description import FmuVariable, Member, Terminal, once, structured
+from mbs.export.fmu.description import FmuVariable, Member, Terminal, once, structured_name
 from mbs.export.fmu.variables import POSE, WRENCH, frame_text, pose
 from mbs.loops.closure import closure_rows
 from mbs.models.energy import energy
@@ -130,25 +130,26 @@ def terminals(
     joints = (
         _joint(speed.name, speed.unit, names)
         for speed in system.speeds
-        if structured(f"{speed.name}.tau") in names and (speed.actuated or speed.name in driven)
+        if structured_name(f"{speed.name}.tau") in names
+        and (speed.actuated or speed.name in driven)
     )
     return (*joints, *(_flange(label) for label in interface.flanges))
 
 
 def _joint(name: str, unit: str, names: set[str]) -> Terminal:
-    turns = unit == "rad/s"
+    is_rotational = unit == "rad/s"
     suffixes = {
-        "angle" if turns else "position": "q",
+        "angle" if is_rotational else "position": "q",
         "velocity": "v",
         "acceleration": "a",
-        "torque" if turns else "force": "tau",
+        "torque" if is_rotational else "force": "tau",
     }
     members = tuple(
         Member(member, f"{name}.{suffix}", "inflow" if suffix == "tau" else "signal")
         for member, suffix in suffixes.items()
-        if structured(f"{name}.{suffix}") in names
+        if structured_name(f"{name}.{suffix}") in names
     )
-    kind = "mbs.revolute" if turns else "mbs.prismatic"
+    kind = "mbs.revolute" if is_rotational else "mbs.prismatic"
     return Terminal(name, kind, members, description=f"drive of {name}")
 
 
@@ -186,7 +187,7 @@ Request = Mapping[str, Labels]
 """Labels of every kind of `KINDS`, each once."""
 
 
-def requested(system: System, names: Sequence[str], flanges: Labels = ()) -> Request:
+def make_request(system: System, names: Sequence[str], flanges: Labels = ()) -> Request:
     """What is shown on request, each once.
 
     Args:
@@ -197,23 +198,23 @@ def requested(system: System, names: Sequence[str], flanges: Labels = ()) -> Req
     Raises:
         ModelError: there is nothing of that name, or it is given twice.
     """
-    wanted: dict[str, dict[str, None]] = {kind: {} for kind in KINDS}
+    labels_by_kind: dict[str, dict[str, None]] = {kind: {} for kind in KINDS}
     groups = {shown.group: kind for kind, shown in KINDS.items() if shown.group}
     for name in once(system, "outputs", names):
         kind, _, label = name.partition(":")
         if name in groups:
-            wanted[groups[name]] |= dict.fromkeys(_all(system, groups[name]))
+            labels_by_kind[groups[name]] |= dict.fromkeys(_all(system, groups[name]))
         elif label and kind in KINDS and _has(system, kind, label):
-            wanted[kind][label] = None
+            labels_by_kind[kind][label] = None
         else:
             raise ModelError(
                 f"{system.name}: the FMU has no outputs {name!r};"
                 f" {did_you_mean(name, [*groups, *_single(system)])}"
             )
     for kind in ("pose", "motion"):
-        wanted[kind] |= dict.fromkeys(flanges)
-    wanted["pose"].pop("tool", None)  # always shown
-    return {kind: list(labels) for kind, labels in wanted.items() if labels}
+        labels_by_kind[kind] |= dict.fromkeys(flanges)
+    labels_by_kind["pose"].pop("tool", None)  # always shown
+    return {kind: list(labels) for kind, labels in labels_by_kind.items() if labels}
 
 
 def observed_variables(system: System, request: Request) -> tuple[FmuVariable, ...]:
@@ -374,7 +375,7 @@ def _wrench_values(system: System, seen: Seen, labels: Labels) -> list[SX]:
 
 
 def _check_weld(system: System, seen: Seen, number: int) -> None:
-    """Refuse the wrench of a Fixed joint where it is not told on which side a wrench acts."""
+    """Refuse the wrench of a Fixed joint where it is not known on which side a wrench acts."""
     joint = system.joints[number]
     if joint.part is not None and joint.frame_b[0] in seen.external:
         raise ModelError(

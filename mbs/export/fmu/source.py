@@ -139,8 +139,8 @@ def _jacobian(model: FmuModel, point: list[casadi.MX], du: casadi.MX) -> list[ca
     xdot = model.rhs.call(point)[0]
     J = casadi.densify(casadi.jacobian(xdot, x))
     if model.closure is not None:
-        moved = casadi.jacobian(model.closure.call([x, z, _own(model, p)])[0], x)
-        J += casadi.mtimes(casadi.jacobian(xdot, z), moved)
+        dz = casadi.jacobian(model.closure.call([x, z, _own(model, p)])[0], x)
+        J += casadi.mtimes(casadi.jacobian(xdot, z), dz)
     return [J, casadi.jacobian(xdot, t) + casadi.jtimes(xdot, u, du)]
 
 
@@ -172,7 +172,7 @@ def _tangent(model: FmuModel, point: list[casadi.MX]) -> casadi.Function:
 def _directions(
     model: FmuModel, point: list[casadi.MX], seeds: list[casadi.MX]
 ) -> tuple[casadi.MX, casadi.MX, casadi.MX, casadi.MX]:
-    """dxdot, dy, dz and dg along a direction, the modes held.
+    """dxdot, dy, dz and dg along a direction, the modes constant.
 
     At a solution of the closure, the derivative of one Newton step z - J^-1 r is -J^-1 dr: that
     of the dependent coordinates themselves.
@@ -434,7 +434,7 @@ def _tree_sizes(model: FmuModel, tree: TreeState) -> str:
         f"#define MODEL_TREE_INSIDE {int(model.solver != 'rk4')} /* co-simulation has them */\n"
         f"#define MODEL_TREE_OUTSIDE {int(model.charted)} /* model exchange has charts of them */\n"
         f"#define MODEL_PASSAGE {{{sizes}}}\n"
-        f"#define N_HELD {len(tree.held)}\n"
+        f"#define N_HELD {len(tree.independent)}\n"
         f"#define MODEL_REGULARITY {tree.passage.typical!r}\n"
         "/* where states, dependents and velocities of dependent joints stand in it, and the\n"
         " * independent joints among its velocities; typical sizes of these */\n"
@@ -452,7 +452,7 @@ def _tree_tables(model: FmuModel) -> list[str]:
         _table("const int MODEL_TREE_STATES", map(str, tree.states)),
         _table("const int MODEL_TREE_DEPENDENTS", map(str, tree.dependents)),
         _table("const int MODEL_TREE_PASSIVE", map(str, tree.passive)),
-        _table("const int MODEL_TREE_HELD", map(str, tree.held)),
+        _table("const int MODEL_TREE_HELD", map(str, tree.independent)),
         _numbers("MODEL_TREE_UNITS", (1 / unit for unit in tree.units)),
     ]
 

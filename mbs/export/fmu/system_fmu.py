@@ -21,9 +21,9 @@ from mbs.export.fmu.description import FmuModel, Origin, Rules, Solver
 from mbs.export.fmu.documentation import about
 from mbs.export.fmu.interface import (
     interface_of,
+    make_request,
     observed_values,
     observed_variables,
-    requested,
     terminals,
 )
 from mbs.export.fmu.pack import require_version, require_writable, write_fmu
@@ -64,7 +64,7 @@ def fmu(
     """Write a mechanism as an FMU for Model Exchange and Co-Simulation.
 
     Inputs are the efforts of the actuated joints, `name.tau`, or where the motor or torque of a
-    drive line turns one its own input, such as `motor.voltage`. Outputs are positions, velocities
+    drive line drives one its own input, such as `motor.voltage`. Outputs are positions, velocities
     and accelerations of all joints, `name.q`, `name.v`, `name.a`, the terminal frame in the base,
     `tool.x`, `tool.y`, `tool.z` and the rotation matrix `tool.R11` .. `tool.R33`, and efforts and
     modes of rigid stops and Coulomb friction, `stop.effort`, `stop.mode`. States are the
@@ -195,7 +195,7 @@ def fmu_model(
         system = symbolic(system, wished.parameters)
     system.parameter_values()
     interface = interface_of(system, wished.inputs, wished.flanges)
-    request = requested(system, wished.outputs, interface.flanges)
+    request = make_request(system, wished.outputs, interface.flanges)
     controller = controller_of(system, wished.controller, read_sources(wished.sources))
     state = minimal_state(
         system,

@@ -247,7 +247,7 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
     for number, name in enumerate(element_names(contacts_of(system))):
         text = "place: -1 at the lower limit, 1 at the upper one, 0 between them"
         if number >= len(stops):
-            text = "direction of sliding, -1 or 1, and 0 where friction holds"
+            text = "direction of sliding, -1 or 1, and 0 where it sticks"
         described = f"of {name}, {text}"
         modes.append(FmuVariable(name=f"{name}.mode", min=-1, max=1, description=described))
     return Jumps(

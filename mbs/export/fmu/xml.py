@@ -39,7 +39,7 @@ def linearity(
     """What every element of every output depends on, and how.
 
     An input that enters by a factor is as "constant", "fixed", "tunable" or "discrete" as the
-    factor; in every other way it is "dependent". Where the function is no graph of scalars, all
+    factor; otherwise it is "dependent". Where the function is no graph of scalars, all
     that the sparsity shows is "dependent".
 
     Args:
@@ -337,8 +337,8 @@ def structure(model: FmuModel) -> ModelStructure:
     """The structure of a model."""
     found = dependencies(model)
     modes = range(model.first("mode"), model.first("dependent"))
-    places = enumerate(model.parameters, start=model.first("parameter"))
-    frozen = {*modes, *(ref for ref, parameter in places if parameter.fixed)}
+    numbered = enumerate(model.parameters, start=model.first("parameter"))
+    frozen = {*modes, *(ref for ref, parameter in numbered if parameter.fixed)}
     running: dict[int, Known] = {
         ref: _without(frozen, known) for ref, known in found.running.items()
     }

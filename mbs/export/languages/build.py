@@ -18,7 +18,7 @@ from mbs.export.languages.header import (
     tables,
 )
 from mbs.export.languages.language import Argument, CodeUnit, Expr, Language, Load, Store
-from mbs.export.languages.plan import LEAVES, LinePlan, arranged, plan_of
+from mbs.export.languages.plan import LEAVES, LinePlan, arrange, plan_of
 from mbs.export.languages.symbolic import SympyWriter, number_of, symbol
 from mbs.operations.graph import Graph, Node, Port, graph_of
 
@@ -59,8 +59,8 @@ def spelled_names(
     Args:
         graph: arranged.
         language: takes the names.
-        lines: wanted name of every line, by node.
-        elements: wanted names of the elements of every input, then of every output.
+        lines: desired name of every line, by node.
+        elements: desired names of the elements of every input, then of every output.
     """
     inside = [port.name for port in graph.inputs]
     outside = [f"{p.name}_out" if p.name in inside else p.name for p in graph.outputs]
@@ -125,7 +125,7 @@ def _pairs(
 # Scalars computed with the opposite sign, where it is the opposite that has a name.
 
 
-TURNED = frozenset(
+NEGATABLE = frozenset(
     {
         *(casadi.OP_ADD, casadi.OP_SUB, casadi.OP_TWICE),
         *(casadi.OP_MUL, casadi.OP_DIV),
@@ -134,12 +134,12 @@ TURNED = frozenset(
 """Operations whose opposite takes the same operations and signs, which are free."""
 
 
-def turned(graph: Graph, numbers: Iterable[int]) -> tuple[Graph, dict[int, int]]:
+def negate_nodes(graph: Graph, numbers: Iterable[int]) -> tuple[Graph, dict[int, int]]:
     """The same results, some nodes computed with the opposite sign.
 
     Args:
         graph: any.
-        numbers: nodes whose opposites are to be computed, all of operations in `TURNED`.
+        numbers: nodes whose opposites are to be computed, all of operations in `NEGATABLE`.
 
     Returns:
         the graph, in which the sign that such a node lost stands in front of it wherever it is
@@ -150,7 +150,7 @@ def turned(graph: Graph, numbers: Iterable[int]) -> tuple[Graph, dict[int, int]]
     value: list[int] = []
     known: dict[int, int] = {}
 
-    def added(node: Node) -> int:
+    def add(node: Node) -> int:
         nodes.append(node)
         return len(nodes) - 1
 
@@ -158,17 +158,17 @@ def turned(graph: Graph, numbers: Iterable[int]) -> tuple[Graph, dict[int, int]]
         operands = tuple(value[k] for k in graph.operands(number))
         node = Node(node.op, operands or node.args, node.value)
         if number not in wanted:
-            known[number] = added(node)
+            known[number] = add(node)
             value.append(known[number])
             continue
         if node.op == casadi.OP_SUB:
             opposite = Node(casadi.OP_SUB, operands[::-1])
         else:
-            first = added(Node(casadi.OP_NEG, operands[:1]))
+            first = add(Node(casadi.OP_NEG, operands[:1]))
             op = casadi.OP_SUB if node.op == casadi.OP_ADD else node.op
             opposite = Node(op, (first, *operands[1:]))
-        known[number] = added(opposite)
-        value.append(added(Node(casadi.OP_NEG, (known[number],))))
+        known[number] = add(opposite)
+        value.append(add(Node(casadi.OP_NEG, (known[number],))))
     return graph.with_nodes(nodes, [[value[k] for k in r] for r in graph.results]), known
 
 
@@ -184,7 +184,7 @@ def build(function: Function, language: Language, name: str) -> CodeUnit:
     )
     alive = graph.live()
     angles = {n: name for n, name in angle_names(graph, inputs).items() if alive[n]}
-    graph, new = arranged(graph, [*angles, *given])
+    graph, new = arrange(graph, [*angles, *given])
     wanted: dict[int, str] = {}
     for number, name in [*given.items(), *angles.items()]:
         wanted.setdefault(new[number], name)
@@ -230,7 +230,7 @@ def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str], set[st
 
 
 def _named(graph: Graph, pairs: Sequence[tuple[int, str]]) -> tuple[Graph, dict[int, str]]:
-    """The graph and its nodes that have a name, those of opposite sign turned."""
+    """The graph and its nodes that have a name, those of opposite sign negated."""
     alive = graph.live()
     given: dict[int, str] = {}
     opposite: dict[int, str] = {}
@@ -243,9 +243,9 @@ def _named(graph: Graph, pairs: Sequence[tuple[int, str]]) -> tuple[Graph, dict[
     opposite = {
         number: name
         for number, name in opposite.items()
-        if number not in given and graph.nodes[number].op in TURNED
+        if number not in given and graph.nodes[number].op in NEGATABLE
     }
-    graph, new = turned(graph, opposite)
+    graph, new = negate_nodes(graph, opposite)
     return graph, {new[number]: name for number, name in (given | opposite).items()}
 
 

@@ -15,7 +15,7 @@ from mbs.export.languages.language import (
     kept_inside,
     sections,
     value_text,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 from mbs.text import in_c_comment
@@ -52,14 +52,14 @@ class C(Language):
         yield from (" */", "#include <math.h>", "")
         arguments = [f"const double *{argument.name}" for argument in unit.inputs]
         arguments += [f"double *{argument.name}" for argument in unit.outputs]
-        yield from wrapped(f"void {unit.name}({', '.join(arguments) or 'void'})")
+        yield from wrap(f"void {unit.name}({', '.join(arguments) or 'void'})")
         yield "{"
         yield from (f"    const double {load};" for load in self.loads(unit))
         for title, lines in sections(unit):
             if title:
                 yield f"\n    /* {title} */"
             for line in lines:
-                yield from wrapped(
+                yield from wrap(
                     f"const double {line.name} = {value_text(line, printer, _CHOICE)};", "    "
                 )
         yield from self._stores(unit, printer)

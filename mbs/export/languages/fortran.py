@@ -12,9 +12,9 @@ from mbs.export.languages.language import (
     CodeUnit,
     Language,
     branches,
-    commented,
+    comment_lines,
     sections,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 
@@ -65,7 +65,7 @@ class Fortran(Language):
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from commented(unit.header, "!")
+        yield from comment_lines(unit.header, "!")
         arguments = [*unit.inputs, *unit.outputs]
         names = ", ".join(argument.name for argument in arguments)
         yield from _title(unit.name, names)
@@ -101,7 +101,7 @@ def _number(value: float) -> str:
 
 
 def _statement(text: str, indent: str = "  ") -> list[str]:
-    return wrapped(text, indent, _CONTINUED, _COLUMNS)
+    return wrap(text, indent, _CONTINUED, _COLUMNS)
 
 
 def _title(name: str, arguments: str) -> list[str]:

@@ -253,7 +253,7 @@ def _paragraph(text: str) -> list[str]:
 def tables(function: Function) -> tuple[str, ...]:
     """The geometric parameters of the links, as the classic output lists them.
 
-    A fixed frame that leads to link 4 is numbered 4.1 and has sigma 2.
+    A fixed frame on the path to link 4 is numbered 4.1 and has sigma 2.
     """
     system = getattr(function, "system", None)
     if system is None:

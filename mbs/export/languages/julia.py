@@ -11,11 +11,11 @@ from mbs.export.languages.language import (
     Argument,
     CodeUnit,
     Language,
-    commented,
+    comment_lines,
     grid_texts,
     sections,
     value_text,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 
@@ -57,15 +57,15 @@ class Julia(Language):
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from commented(unit.header, "#")
+        yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
-        yield from wrapped(f"function {unit.name}({arguments})")
+        yield from wrap(f"function {unit.name}({arguments})")
         yield from (f"    {load}" for load in self.loads(unit))
         for title, lines in sections(unit):
             if title:
                 yield f"\n    # {title}"
             for line in lines:
-                yield from wrapped(f"{line.name} = {value_text(line, printer, _CHOICE)}", "    ")
+                yield from wrap(f"{line.name} = {value_text(line, printer, _CHOICE)}", "    ")
         yield ""
         for out in unit.outputs:
             yield from _output(unit, out, printer)
@@ -81,7 +81,7 @@ def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
         if grid[0][0] != out.name:
             yield f"    {out.name} = {grid[0][0]}"
     elif out.is_vector:
-        yield from wrapped(f"{out.name} = [{', '.join(row[0] for row in grid)}]", "    ")
+        yield from wrap(f"{out.name} = [{', '.join(row[0] for row in grid)}]", "    ")
     else:
         yield f"    {out.name} = ["
         yield from (f"        {' '.join(row)}" for row in grid)

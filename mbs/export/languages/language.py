@@ -237,13 +237,13 @@ def plain_number(value: float) -> str:
     return repr(value).removesuffix(".0")
 
 
-def wrapped(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> list[str]:
+def wrap(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> list[str]:
     """A statement broken after operators, its continuation indented.
 
     Args:
         text: the statement.
         indent: before its first line.
-        mark: what the language wants at the end of a line that goes on.
+        mark: what the language needs at the end of a line that goes on.
         width: columns.
     """
     lines, line = [], indent
@@ -255,7 +255,7 @@ def wrapped(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> 
     return [*lines, line.rstrip()]
 
 
-def commented(header: Sequence[str], mark: str) -> Iterator[str]:
+def comment_lines(header: Sequence[str], mark: str) -> Iterator[str]:
     """A header as comments to the end of the line."""
     yield from (f"{mark} {line}".rstrip() for line in kept_inside(header, in_line_comment))
 

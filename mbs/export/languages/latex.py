@@ -12,7 +12,7 @@ from mbs.export.languages.language import (
     CodeLine,
     CodeUnit,
     Language,
-    commented,
+    comment_lines,
     plain_number,
     sections,
 )
@@ -73,7 +73,7 @@ class Latex(Language):
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from commented(unit.header, "%")
+        yield from comment_lines(unit.header, "%")
         yield from (r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks")
         yield r"\begin{document}"
         names = {line.name for line in (*unit.fixed, *unit.changing)}

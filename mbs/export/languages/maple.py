@@ -11,12 +11,12 @@ from mbs.export.languages.language import (
     Argument,
     CodeUnit,
     Language,
-    commented,
+    comment_lines,
     grid_texts,
     plain_number,
     sections,
     value_text,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 
@@ -65,17 +65,17 @@ class Maple(Language):
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
-        yield from commented(unit.header, "#")
+        yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
-        yield from wrapped(f"{unit.name} := proc({arguments})")
+        yield from wrap(f"{unit.name} := proc({arguments})")
         outputs = [argument.name for argument in unit.outputs]
-        yield from wrapped(f"local {', '.join([*unit.locals, *outputs])};", "  ")
+        yield from wrap(f"local {', '.join([*unit.locals, *outputs])};", "  ")
         yield from (f"  {load.replace(' = ', ' := ', 1)};" for load in self.loads(unit))
         for title, lines in sections(unit):
             if title:
                 yield f"\n  # {title}"
             for line in lines:
-                yield from wrapped(f"{line.name} := {value_text(line, printer, _CHOICE)};", "  ")
+                yield from wrap(f"{line.name} := {value_text(line, printer, _CHOICE)};", "  ")
         yield ""
         for out in unit.outputs:
             yield from _output(unit, out, printer)
@@ -95,4 +95,4 @@ def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
         rows = ", ".join(f"[{', '.join(row)}]" for row in grid)
         value = f"Matrix([{rows}])"
     if value != out.name:
-        yield from wrapped(f"{out.name} := {value};", "  ")
+        yield from wrap(f"{out.name} := {value};", "  ")

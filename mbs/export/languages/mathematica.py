@@ -17,7 +17,7 @@ from mbs.export.languages.language import (
     plain_number,
     sections,
     value_text,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 from mbs.text import in_wolfram_comment
@@ -74,17 +74,17 @@ class Mathematica(Language):
         yield "*)"
         arguments = ", ".join(f"{argument.name}_" for argument in unit.inputs)
         names = ", ".join(unit.locals)
-        yield from wrapped(f"{unit.name}[{arguments}] := Module[{{{names}}},")
+        yield from wrap(f"{unit.name}[{arguments}] := Module[{{{names}}},")
         yield from (f"  {load};" for load in self.loads(unit))
         for title, lines in sections(unit):
             if title:
                 yield f"\n  (* {title} *)"
             for line in lines:
-                yield from wrapped(f"{line.name} = {value_text(line, printer, _CHOICE)};", "  ")
+                yield from wrap(f"{line.name} = {value_text(line, printer, _CHOICE)};", "  ")
         yield ""
         outputs = [_output(unit, out, printer) for out in unit.outputs]
         result = outputs[0] if len(outputs) == 1 else f"{{{', '.join(outputs)}}}"
-        yield from wrapped(result, "  ")
+        yield from wrap(result, "  ")
         yield "]"
 
 

@@ -11,10 +11,10 @@ from mbs.export.languages.language import (
     CodeUnit,
     Language,
     branches,
-    commented,
+    comment_lines,
     plain_number,
     sections,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 
@@ -61,8 +61,8 @@ class Matlab(Language):
         inside = ", ".join(argument.name for argument in unit.inputs)
         outside = ", ".join(argument.name for argument in unit.outputs)
         outside = outside if len(unit.outputs) == 1 else f"[{outside}]"
-        yield from wrapped(f"function {outside} = {unit.name}({inside})", mark=_CONTINUED)
-        yield from commented(unit.header, "%")
+        yield from wrap(f"function {outside} = {unit.name}({inside})", mark=_CONTINUED)
+        yield from comment_lines(unit.header, "%")
         yield ""
         yield from (f"  {load};" for load in self.loads(unit))
         for title, lines in sections(unit):
@@ -82,4 +82,4 @@ class Matlab(Language):
 
 
 def _statement(text: str, indent: str = "  ") -> list[str]:
-    return wrapped(text, indent, _CONTINUED)
+    return wrap(text, indent, _CONTINUED)

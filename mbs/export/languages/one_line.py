@@ -8,7 +8,7 @@ import casadi
 from sympy.printing.pycode import PythonCodePrinter
 
 from mbs.export.languages.language import plain_number
-from mbs.export.languages.plan import LinePlan, arranged
+from mbs.export.languages.plan import LinePlan, arrange
 from mbs.export.languages.symbolic import SympyWriter, printer_of
 from mbs.operations.graph import Graph
 
@@ -21,7 +21,7 @@ _FORMS = {
 
 def one_line(graph: Graph, names: Sequence[str]) -> str:
     """The only result of a graph; names are those of the elements of its only input."""
-    graph, _ = arranged(graph)
+    graph, _ = arrange(graph)
     inputs = {
         number: names[node.args[1]]
         for number, node in enumerate(graph.nodes)

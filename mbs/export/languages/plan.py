@@ -57,8 +57,8 @@ class LinePlan:
     choices: Mapping[int, Choice]
 
 
-def arranged(graph: Graph, first: Iterable[int] = ()) -> tuple[Graph, dict[int, int]]:
-    """The same results from nodes that differ, in the order in which they are wanted.
+def arrange(graph: Graph, first: Iterable[int] = ()) -> tuple[Graph, dict[int, int]]:
+    """The same results from nodes that differ, in the order in which they are needed.
 
     Args:
         graph: any.

@@ -15,7 +15,7 @@ from mbs.export.languages.language import (
     plain_number,
     sections,
     value_text,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 from mbs.text import in_docstring
@@ -64,7 +64,7 @@ class Python(Language):
             yield ""
         yield from ("import numpy as np", "", "")
         arguments = ", ".join(argument.name for argument in unit.inputs)
-        yield from wrapped(f"def {unit.name}({arguments}):")
+        yield from wrap(f"def {unit.name}({arguments}):")
         first, *others = kept_inside(unit.header, in_docstring)
         yield f'    """{first}'
         yield from (f"    {line}".rstrip() for line in others)
@@ -99,7 +99,7 @@ class Python(Language):
 
 
 def _statement(name: str, value: str) -> list[str]:
-    lines = wrapped(f"{name} = {value}", "    ")
+    lines = wrap(f"{name} = {value}", "    ")
     if len(lines) == 1:
         return lines
-    return [f"    {name} = (", *wrapped(value, "        "), "    )"]
+    return [f"    {name} = (", *wrap(value, "        "), "    )"]

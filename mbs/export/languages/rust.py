@@ -11,10 +11,10 @@ from mbs.export.languages.language import (
     Argument,
     CodeUnit,
     Language,
-    commented,
+    comment_lines,
     sections,
     value_text,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 
@@ -62,17 +62,17 @@ class Rust(Language):
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """The text of a function, line by line."""
         # No `///`: examples in the documentation of Rust are compiled and run by its tests.
-        yield from commented(unit.header, "//")
+        yield from comment_lines(unit.header, "//")
         arguments = [f"{argument.name}: &[f64]" for argument in unit.inputs]
         arguments += [f"{argument.name}: &mut [f64]" for argument in unit.outputs]
         yield f"#[allow({_LINTS})]"
-        yield from wrapped(f"pub fn {unit.name}({', '.join(arguments)}) {{")
+        yield from wrap(f"pub fn {unit.name}({', '.join(arguments)}) {{")
         yield from (f"    let {load};" for load in self.loads(unit))
         for title, lines in sections(unit):
             if title:
                 yield f"\n    // {title}"
             for line in lines:
-                yield from wrapped(
+                yield from wrap(
                     f"let {line.name}: f64 = {value_text(line, printer, _CHOICE)};", "    "
                 )
         for out in unit.outputs:

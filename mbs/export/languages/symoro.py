@@ -14,7 +14,7 @@ from mbs.export.languages.language import (
     plain_number,
     sections,
     value_text,
-    wrapped,
+    wrap,
 )
 from mbs.export.languages.symbolic import printer_of
 from mbs.text import in_bracket_comment
@@ -58,7 +58,7 @@ class Symoro(Language):
         yield from ("", "Equations:", "")
         for _, lines in sections(unit):
             for line in lines:
-                yield from wrapped(f"{line.name} = {value_text(line, printer, _CHOICE)};")
+                yield from wrap(f"{line.name} = {value_text(line, printer, _CHOICE)};")
         names = {line.name for line in (*unit.fixed, *unit.changing)}
         for out in unit.outputs:
             for store in unit.stores_of(out):

@@ -156,13 +156,13 @@ def _further(system: System, name: str, law: object, size: int) -> int:
         raise ModelError(
             f"{system.name}: {name} is {quoted(law)}; give a casadi.Function of (t, q, v, w, p)"
         )
-    wanted = [1, system.nq, system.nv, len(system.parameters)]
+    expected = [1, system.nq, system.nv, len(system.parameters)]
     found = [law.numel_in(k) for k in range(law.n_in())]
-    if law.n_in() != 5 or [*found[:3], found[4]] != wanted or law.n_out() != 1:
+    if law.n_in() != 5 or [*found[:3], found[4]] != expected or law.n_out() != 1:
         raise ModelError(
             f"{system.name}: {name} has inputs of sizes {found} and {law.n_out()} outputs; give a"
-            f" Function of (t, q, v, w, p) with {wanted[1]} positions, {wanted[2]} velocities and"
-            f" {wanted[3]} parameters, and one output"
+            f" Function of (t, q, v, w, p) with {expected[1]} positions, {expected[2]} velocities"
+            f" and {expected[3]} parameters, and one output"
         )
     if law.numel_out(0) != size:
         raise ModelError(

@@ -1,7 +1,8 @@
 """Rigid stops and Coulomb friction in the state equation of the independent joints.
 
-Only what the elements need is a mode or an indicator: a stop has its place, friction its direction
-of sliding, and a limit that is not given is not watched.
+Only what the elements need is a mode or an indicator: a stop has the limit that it is at, friction
+    its
+direction of sliding, and a limit that is not given is not watched.
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from mbs.models.symbols import dense_function, outputs_of
 from mbs.numbers import NONZERO
 from mbs.recursions.parts import PartEvent, after_events
 
-# What keeps dependent joints at rest that rigid stops or Coulomb friction hold.
+# What keeps dependent joints at rest that rigid stops or Coulomb friction constrain.
 #
-# A state equation of the independent joints is integrated without any projection. What it holds
-# of these stays where it is; a dependent joint would creep by the errors of the steps.
+# A state equation of the independent joints is integrated without any projection. Those of
+# its own that are stuck stay where they are; a dependent joint would creep by the errors of the
+# steps.
 
 
 RETURN_RATE = 20.0
-"""How fast what is held returns to where it should be [1/s]."""
+"""How fast a stuck coordinate returns to where it should be [1/s]."""
 _SHARED = 1e-6
 """Square that is added to rows: they may depend on others, or vanish."""
 
@@ -38,20 +40,20 @@ def standstill(
     system: System,
     contacts: Contacts,
     motion: TreeMotion,
-    wanted: tuple[SX, SX],
-    moved: Sequence[int],
+    required: tuple[SX, SX],
+    prescribed: Sequence[int],
 ) -> SX:
-    """A small change of the independent coordinates that changes dependent ones as wanted.
+    """A small change of the independent coordinates that changes dependent ones as required.
 
-    Independent coordinates that are held do not change, nor do those whose motion is prescribed.
+    Independent coordinates that are stuck do not change, nor do those whose motion is prescribed.
 
     Args:
         system: open or closed.
         contacts: the k coordinates.
         motion: of the tree.
-        wanted: (k, 1) 1 where a coordinate is held, 0 elsewhere; and (k, 1) the changes of what is
-            held.
-        moved: numbers of the velocities whose motion is prescribed.
+        required: (k, 1) 1 where a coordinate is stuck, 0 elsewhere; and (k, 1) the changes of those
+            that are stuck.
+        prescribed: indices of the velocities whose motion is prescribed.
 
     Returns:
         (m, 1) in the order of the independent velocities; changes of positions or of rates.
@@ -60,18 +62,18 @@ def standstill(
     rows = [j for j, number in enumerate(contacts.velocities) if number not in active]
     if not rows or motion.G is None:
         return SX.zeros(len(active))
-    held, change = wanted
+    stuck, change = required
     may_move = SX.ones(len(active))
     for k, number in enumerate(active):
-        if number in moved:
+        if number in prescribed:
             may_move[k] = 0
         elif number in contacts.velocities:
-            may_move[k] = 1 - held[contacts.velocities.index(number)]
+            may_move[k] = 1 - stuck[contacts.velocities.index(number)]
     G = motion.G[[contacts.velocities[j] for j in rows], :]
-    R = casadi.mtimes(casadi.diag(held[rows]), casadi.mtimes(G, casadi.diag(may_move)))
-    S = casadi.mtimes(R, R.T) + casadi.diag(1 - held[rows]) + _SHARED * SX(DM.eye(len(rows)))
+    R = casadi.mtimes(casadi.diag(stuck[rows]), casadi.mtimes(G, casadi.diag(may_move)))
+    S = casadi.mtimes(R, R.T) + casadi.diag(1 - stuck[rows]) + _SHARED * SX(DM.eye(len(rows)))
     D, LT, order = casadi.ldl(casadi.densify(S))
-    shares = casadi.ldl_solve(held[rows] * change[rows], D, LT, order)
+    shares = casadi.ldl_solve(stuck[rows] * change[rows], D, LT, order)
     return casadi.densify(casadi.mtimes(R.T, shares))
 
 
@@ -92,7 +94,8 @@ def minimal_jump(
     """The state and the modes after an event.
 
     What meets a limit is put there with the velocity that it had there, since an importer may
-    locate events coarsely: an impact neither drifts nor gains energy. What is held has no velocity.
+    locate events coarsely: an impact neither drifts nor gains energy. A stuck coordinate has no
+        velocity.
 
     Args:
         system: open or closed.
@@ -109,25 +112,25 @@ def minimal_jump(
     wall = (upper - lower) * ((upper - lower) * contacts.velocity(motion.v) >= 0)
     v, modes = _after(system, contact, motion, (_at_impact(contact, motion, wall), fired))
     now = contacts.modes(modes)
-    at = casadi.if_else(now.place == 0, wall, now.place)
-    at = casadi.if_else(at == 0, contact.modes.place, at)
+    at = casadi.if_else(now.limit == 0, wall, now.limit)
+    at = casadi.if_else(at == 0, contact.modes.limit, at)
     shift = to_limits(system, contact, motion, at)
     x = _shift(system, motion.q, x, shift, states[0])
-    return _write(contacts, (x, v), (at, now.held), states), modes
+    return _write(contacts, (x, v), (at, now.stuck), states), modes
 
 
-def to_limits(system: System, contact: ContactEquations, motion: TreeMotion, place: SX) -> SX:
+def to_limits(system: System, contact: ContactEquations, motion: TreeMotion, limit: SX) -> SX:
     """(m, 1) changes of independent positions that bring dependent ones to their limits.
 
     Args:
         system: open or closed.
         contact: its equations of contact.
         motion: of the tree.
-        place: (k, 1) -1 for the lower limit, 1 for the upper one, 0 for none.
+        limit: (k, 1) -1 for the lower limit, 1 for the upper one, 0 for none.
     """
     contacts = contact.contacts
-    wanted = place**2, -contacts.distance(motion.q, place)
-    return standstill(system, contacts, motion, wanted, contact.driven)
+    required = limit**2, -contacts.distance(motion.q, limit)
+    return standstill(system, contacts, motion, required, contact.driven)
 
 
 def _at_impact(contact: ContactEquations, motion: TreeMotion, wall: SX) -> SX:
@@ -153,15 +156,15 @@ def _at_impact(contact: ContactEquations, motion: TreeMotion, wall: SX) -> SX:
 def _after(
     system: System, contact: ContactEquations, motion: TreeMotion, before: tuple[SX, SX]
 ) -> tuple[SX, SX]:
-    """(nv, 1) velocities after an event, those of what is held zero, and the modes."""
+    """(nv, 1) velocities after an event, those of stuck coordinates zero, and the modes."""
     contacts, (speed, fired) = contact.contacts, before
     v, modes = jump(system, contacts, contact.modes, (motion.q, speed, fired), contact.driven)
-    held, m = contacts.modes(modes).held, len(contact.driven)
-    still = casadi.vertcat(SX.zeros(m), -held * contacts.velocity(v))
-    acting = casadi.vertcat(SX.ones(m), held)
+    stuck, m = contacts.modes(modes).stuck, len(contact.driven)
+    still = casadi.vertcat(SX.zeros(m), -stuck * contacts.velocity(v))
+    acting = casadi.vertcat(SX.ones(m), stuck)
     numbers = (*contact.driven, *contacts.velocities)
     dv = outputs_of(system, impact(system, numbers), motion.q, still, acting)[0]
-    return v + casadi.mmax(held) * dv, modes
+    return v + casadi.mmax(stuck) * dv, modes
 
 
 def _shift(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) -> SX:
@@ -175,21 +178,21 @@ def _shift(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) ->
 
 
 def _write(contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], states: States) -> SX:
-    """The state x with velocities v: what is held stands still, what is at a limit is just there.
+    """The state x with velocities v: stuck coordinates at rest, those at a limit just there.
 
     Args:
         contacts: the k coordinates.
         motion: x and v (nv, 1).
-        acting: (k, 1) the limits where coordinates are, as -1 and 1; (k, 1) 1 for what is held.
+        acting: (k, 1) the limits where coordinates are, as -1 and 1; (k, 1) 1 where one is stuck.
         states: what x begins with.
     """
-    (positions, velocities), (x, v), (at, held) = states, motion, acting
+    (positions, velocities), (x, v), (at, stuck) = states, motion, acting
     after = SX(x)
     after[len(positions) : len(positions) + len(velocities)] = v[list(velocities)]
     for j, (q, number) in enumerate(zip(contacts.positions, contacts.velocities, strict=True)):
         if number in velocities:
             row = len(positions) + list(velocities).index(number)
-            after[row] = casadi.if_else(held[j], 0, after[row])
+            after[row] = casadi.if_else(stuck[j], 0, after[row])
         if q is not None and q in positions:
             row = list(positions).index(q)
             limit = casadi.if_else(at[j] < 0, contacts.bounds[0][j], contacts.bounds[1][j])
@@ -354,16 +357,16 @@ def at_limits(system: System, contact: ContactEquations | None, motion: TreeMoti
     """(m, 1) rates of independent positions that bring dependent ones at limits back to them."""
     if contact is None:
         return SX.zeros(len(system.active))
-    return RETURN_RATE * to_limits(system, contact, motion, contact.modes.place)
+    return RETURN_RATE * to_limits(system, contact, motion, contact.modes.limit)
 
 
 def _watch(contacts: Contacts) -> list[tuple[int, str]]:
     """Number among the 5 k indicators, and name, of those that can fall to zero."""
-    lower, upper, dry = (
+    lower, upper, friction = (
         np.array(flags)[:, 0] > 0
         for flags in (contacts.has_lower, contacts.has_upper, contacts.has_friction)
     )
-    acting = (lower, upper, lower | dry, upper | dry, dry)
+    acting = (lower, upper, lower | friction, upper | friction, friction)
     return [
         (kind * len(contacts) + j, _name(contacts, j, word))
         for kind, word in enumerate(KINDS)
@@ -374,19 +377,19 @@ def _watch(contacts: Contacts) -> list[tuple[int, str]]:
 
 def _name(contacts: Contacts, j: int, word: str) -> str:
     stop, friction = contacts.stops[j], contacts.frictions[j]
-    limit, way = {"pulled": ("lower", "up"), "pushed": ("upper", "down")}.get(word, ("", ""))
+    limit, direction = {"pulled": ("lower", "up"), "pushed": ("upper", "down")}.get(word, ("", ""))
     parts = []
     if stop is not None and word in ("lower", "upper"):
         parts.append(f"{stop.element.name} {word}")
     if stop is not None and limit and getattr(stop.element, limit) is not None:
         parts.append(f"{stop.element.name} leaves {limit}")
     if friction is not None and word not in ("lower", "upper"):
-        parts.append(f"{friction.element.name} {f'slides {way}' if way else 'stops'}")
+        parts.append(f"{friction.element.name} {f'slides {direction}' if direction else 'stops'}")
     return " or ".join(parts)
 
 
-def _spread(values: SX, places: Sequence[int], size: int) -> SX:
-    """(size, 1) values at their places, zero elsewhere."""
+def _spread(values: SX, indices: Sequence[int], size: int) -> SX:
+    """(size, 1) values at their indices, zero elsewhere."""
     every = SX.zeros(size)
-    every[list(places)] = values
+    every[list(indices)] = values
     return every

@@ -63,10 +63,10 @@ from mbs.spatial import Wrench, quaternion_rate, quaternion_rotation
 # of the quaternion of a spherical joint stands for that spin. The quaternion as a whole is then a
 # state,
 # and a second one, on the loops, is solved for with the other dependent positions: of all
-# quaternions that close the loops the one that is not turned from the state about the independent
+# quaternions that close the loops the one that is not rotated from the state about the independent
 # axes.
 #
-# The state turns with the same angular velocity in space as the solved quaternion, so that what
+# The state rotates with the same angular velocity in space as the solved quaternion, so that what
 # is solved moves with exactly the velocities of the joint, and decays to it.
 
 
@@ -99,7 +99,7 @@ class Orientation:
 
     @property
     def quaternion(self) -> slice:
-        """Where its quaternion stands in q."""
+        """Indices of its quaternion in q."""
         return slice(self.link.q.stop - 4, self.link.q.stop)
 
 
@@ -125,7 +125,7 @@ def with_unit_length(joints: Sequence[Orientation], q: SX) -> SX:
 
 
 def tie_orientations(system: System, joints: Sequence[Orientation], raw: SX, q: SX) -> SX:
-    """(k, 1) zero where q is moved from the state by none of the independent velocities.
+    """(k, 1) zero where q differs from the state by none of the independent velocities.
 
     Args:
         system: with closed loops.
@@ -222,15 +222,15 @@ class MinimalLayout:
     contacts: tuple[ContactEffort, ...]
 
 
-def motors_of(system: System, moved: Sequence[int] = ()) -> tuple[int, ...]:
+def motors_of(system: System, prescribed: Sequence[int] = ()) -> tuple[int, ...]:
     """Numbers of the velocities that motors drive, the independent ones first.
 
     Args:
         system: open or closed.
-        moved: velocities whose motion is prescribed; they and those of devices are left out.
+        prescribed: velocities whose motion is prescribed; they and those of devices are left out.
     """
     others = [k for k in range(system.nv) if k not in system.active]
-    taken = [*moved, *(device.velocity for device in system.devices)]
+    taken = [*prescribed, *(device.velocity for device in system.devices)]
     return tuple(
         k for k in (*system.active, *others) if system.speeds[k].actuated and k not in taken
     )
@@ -248,12 +248,12 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
     """
     motions, extra = motions_of(system, drive), further_inputs(system, drive)
     inputs_q = [motion.position for motion in motions]
-    moved = [motion.velocity for motion in motions]
+    prescribed = [motion.velocity for motion in motions]
     without_states = [motion.velocity for motion in motions if motion.kind == "q"]
     orientations = orientations_of(system) if system.is_closed else ()
     solved = [k for joint in orientations if not joint.whole for k in joint.positions]
     free = _free_positions(system, orientations)
-    motors = motors_of(system, moved)
+    motors = motors_of(system, prescribed)
     return MinimalLayout(
         positions=tuple(k for k in free if k not in inputs_q),
         orientations=orientations,
@@ -266,9 +266,9 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
         frames=frames_of(system, drive),
         motions=motions,
         extra=extra,
-        accelerations=tuple(k for k in system.active if k not in moved),
+        accelerations=tuple(k for k in system.active if k not in prescribed),
         passive=system.closure.passive if system.closure else (),
-        efforts=(*(motors if drive.effort else ()), *moved),
+        efforts=(*(motors if drive.effort else ()), *prescribed),
         contacts=contact_efforts(system, contacts_of(system)),
     )
 
@@ -317,7 +317,8 @@ def minimal_accelerations(
 ) -> Accelerations:
     """Accelerations of a tree whose loops stay closed.
 
-    What is given, and what contacts hold, is exact in a_a, since nothing projects the motion later.
+    What is given, and what contacts constrain, is exact in a_a, since nothing projects the motion
+    later.
 
     Args:
         system: open or closed.
@@ -332,13 +333,13 @@ def minimal_accelerations(
         (a_a,) = outputs_of(system, independent_dynamics(system), motion.q, motion.v_a, pushed)
         return Accelerations(a_a, motion.tree_acceleration(a_a), tau, None)
     if contact is not None:
-        a, drives = _held(system, contact, motion), contact.drives
+        a, drives = _stuck_accelerations(system, contact, motion), contact.drives
     elif system.is_closed:
         a, drives = _reduced_hybrid(system, motion, motion.reduced_effort(tau + load), given)
     else:
         hybrid = hybrid_dynamics(system, [system.speeds[k].name for k in given])
-        wanted = casadi.vertcat(*given.values())
-        a, drives = outputs_of(system, hybrid, motion.q, motion.v, tau + load, wanted)
+        prescribed = casadi.vertcat(*given.values())
+        a, drives = outputs_of(system, hybrid, motion.q, motion.v, tau + load, prescribed)
     every = SX(tau)
     for row, (number, value) in enumerate(given.items()):
         a[number] = value
@@ -347,13 +348,13 @@ def minimal_accelerations(
     return Accelerations(a_a, motion.tree_acceleration(a_a), every, contact)
 
 
-def _held(system: System, contact: ContactEquations, motion: TreeMotion) -> SX:
-    """(nv, 1) accelerations under contacts, those of independent joints that are held exact."""
-    a, contacts, held = SX(contact.a), contact.contacts, contact.modes.held
+def _stuck_accelerations(system: System, contact: ContactEquations, motion: TreeMotion) -> SX:
+    """(nv, 1) accelerations under contacts, exact for independent joints that are stuck."""
+    a, contacts, stuck = SX(contact.a), contact.contacts, contact.modes.stuck
     back = -RETURN_RATE * contacts.velocity(motion.v)
-    a[list(system.active)] += standstill(system, contacts, motion, (held, back), contact.driven)
+    a[list(system.active)] += standstill(system, contacts, motion, (stuck, back), contact.driven)
     for j, number in enumerate(contacts.velocities):
-        a[number] = casadi.if_else(held[j], back[j], a[number])
+        a[number] = casadi.if_else(stuck[j], back[j], a[number])
     return a
 
 
@@ -533,7 +534,7 @@ Observe = Callable[[Seen], Sequence[SX]]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MinimalState(MinimalLayout):
-    """A state equation; what stands where in x, z, u and y tells `MinimalLayout`.
+    """A state equation; `MinimalLayout` says what stands where in x, z, u and y.
 
     Attributes:
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`; p are the parameters, here and in `events` with the
@@ -634,15 +635,15 @@ def _equations(
     external = wrenches_of(system, motion.q, layout.frames, s.wrenches)
     given = {m.velocity: law[2] for m, law in zip(layout.motions, laws, strict=True)}
     load = load_of(system, motion.q, external)
-    moved = minimal_accelerations(system, motion, tau, load, given)
-    rate = _rate(system, layout, motion, moved, rates)
-    shown = shown_outputs(system, parts, moved.a, moved.every_effort + load)
-    y = outputs_vector(system, layout, motion, moved, shown)
+    response = minimal_accelerations(system, motion, tau, load, given)
+    rate = _rate(system, layout, motion, response, rates)
+    shown = shown_outputs(system, parts, response.a, response.every_effort + load)
+    y = outputs_vector(system, layout, motion, response, shown)
     if observe is not None:
-        vectors = motion.q, motion.v, moved.a, motion.v_a, moved.a_a, moved.every_effort
+        vectors = motion.q, motion.v, response.a, motion.v_a, response.a_a, response.every_effort
         y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *vectors, external)))
     point = [s.t, s.x, s.z, s.u, system.p]
-    contact, states = moved.contact, (layout.positions, layout.velocities)
+    contact, states = response.contact, (layout.positions, layout.velocities)
     events = None
     if contact:
         events = minimal_events(
@@ -685,16 +686,18 @@ def positions_of(system: System, layout: MinimalLayout, s: StatePoint) -> tuple[
 
 
 def _rate(
-    system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, devices: SX
+    system: System, layout: MinimalLayout, motion: TreeMotion, response: Accelerations, devices: SX
 ) -> SX:
     """The rate of x; quaternions are drawn back to unit length."""
     if system.is_closed:
         v = SX(motion.v)
-        v[list(system.active)] += at_limits(system, moved.contact, motion)
+        v[list(system.active)] += at_limits(system, response.contact, motion)
         rate = state_rates(system, layout.orientations, (motion.raw, motion.q, v))
     else:
         rate = _steadied_rate(system, motion)
-    return casadi.vertcat(_rows(rate, layout.positions), _rows(moved.a, layout.velocities), devices)
+    return casadi.vertcat(
+        _rows(rate, layout.positions), _rows(response.a, layout.velocities), devices
+    )
 
 
 def _steadied_rate(system: System, motion: TreeMotion) -> SX:
@@ -707,18 +710,18 @@ def _steadied_rate(system: System, motion: TreeMotion) -> SX:
 
 
 def outputs_vector(
-    system: System, layout: MinimalLayout, motion: TreeMotion, moved: Accelerations, shown: SX
+    system: System, layout: MinimalLayout, motion: TreeMotion, response: Accelerations, shown: SX
 ) -> SX:
     """The outputs y that every state equation has."""
-    efforts = moved.contact.efforts if moved.contact else SX(0, 1)
+    efforts = response.contact.efforts if response.contact else SX(0, 1)
     return casadi.vertcat(
-        _rows(moved.a, layout.accelerations),
+        _rows(response.a, layout.accelerations),
         _rows(motion.q, layout.shown),
         _rows(motion.v, layout.passive),
-        _rows(moved.a, layout.passive),
+        _rows(response.a, layout.passive),
         _terminal_pose(system, motion.q),
         shown,
-        _rows(moved.tau, layout.efforts),
+        _rows(response.tau, layout.efforts),
         _rows(efforts, [effort.row for effort in layout.contacts]),
     )
 

@@ -143,11 +143,11 @@ def _check_inputs(
 ) -> None:
     if isinstance(function, Function):
         sizes = [function.numel_in(k) for k in range(function.n_in())]
-        wanted = [symbol.numel() for symbol in point]
-        if sizes != wanted or function.n_out() != 1:
+        expected = [symbol.numel() for symbol in point]
+        if sizes != expected or function.n_out() != 1:
             raise ModelError(
                 f"{system.name}: {signal.name} has inputs of sizes {sizes} and {function.n_out()}"
-                f" outputs; give a Function of (t, q, v), of sizes {wanted}, with one output"
+                f" outputs; give a Function of (t, q, v), of sizes {expected}, with one output"
             )
         return
     try:
@@ -157,12 +157,12 @@ def _check_inputs(
             f"{system.name}: {signal.name} does not take three arguments; give a function of"
             " (t, q, v)"
         ) from None
-    except ValueError:  # no signature is known: the call will tell
+    except ValueError:  # no signature is known: the call will report it
         return
 
 
 def _reason(error: Exception) -> str:
-    """The first sentence of an error; CasADi adds lists of prototypes and places in its code."""
+    """The first sentence of an error; CasADi adds lists of prototypes and lines of its code."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     text = lines[0] if lines else type(error).__name__
     if text.startswith("Wrong number or type of arguments"):

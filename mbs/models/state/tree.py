@@ -76,7 +76,7 @@ def projected(
     """Positions and velocities one Newton step closer, and the largest row before the step.
 
     The step is made on the independent rows of the loops: off the loops a dependent row is
-    almost, not exactly, dependent, and would turn rounding into motion. Close to a singular
+    almost, not exactly, dependent, and would make motion of rounding. Close to a singular
     configuration the same holds for a row that the others nearly imply there: it is left alone, and
     rows count little for as long. The largest row is that of all, dependent ones included.
 
@@ -96,7 +96,7 @@ def projected(
     symbols = SX.sym("q", system.nq)
     norms = norm_rows(system.tree, symbols)
     laws = [motion.law(t) for motion in motions]
-    places = [
+    positions = [
         symbols[motion.position] - law[0]
         for motion, law in zip(motions, laws, strict=True)
         if motion.position is not None
@@ -107,24 +107,26 @@ def projected(
         loops = independent_closure(system, symbols)
         measures = constraint_sizes(system)[kept_rows(system), :]  # (0, 1) where nothing is kept
         J = independent_constraint_rows(system, symbols)
-    distance, place_off, still, slide_off = _touch(system, symbols, v, touch)
-    r = casadi.vertcat(loops, norms, *places, distance)
+    distance, limit_off, still, slide_off = _touch(system, symbols, v, touch)
+    r = casadi.vertcat(loops, norms, *positions, distance)
     J_q = casadi.jacobian(r, symbols)
-    held = [(m.velocity, law[1]) for m, law in zip(motions, laws, strict=True) if m.holds_speed]
-    E = SX(DM.eye(system.nv))[[k for k, _ in held], :]
+    prescribed = [
+        (m.velocity, law[1]) for m, law in zip(motions, laws, strict=True) if m.holds_speed
+    ]
+    E = SX(DM.eye(system.nv))[[k for k, _ in prescribed], :]
     J = casadi.vertcat(J, E)
-    wanted = casadi.vertcat(SX(J.shape[0] - len(held), 1), *(speed for _, speed in held))
+    target = casadi.vertcat(SX(J.shape[0] - len(prescribed), 1), *(v_p for _, v_p in prescribed))
     J = casadi.vertcat(J, casadi.jacobian(still, v))
-    speed = casadi.vertcat(casadi.mtimes(J[: wanted.numel(), :], v) - wanted, still)
+    speed = casadi.vertcat(casadi.mtimes(J[: target.numel(), :], v) - target, still)
     found = scales(system)
     first = found.rows[kept_rows(system)]
-    places_of, speeds_of = (
+    q_scales, v_scales = (
         found.columns([row.unit for row in table]) for table in (system.coordinates, system.speeds)
     )
-    step_q, _ = _shortest(J_q, r, place_off, first[: loops.numel()], places_of)
-    step_v, awake = _shortest(J, speed, slide_off, first, speeds_of)
+    step_q, _ = _shortest(J_q, r, limit_off, first[: loops.numel()], q_scales)
+    step_v, awake = _shortest(J, speed, slide_off, first, v_scales)
     relative = casadi.vertcat(speed[: measures.numel(), 0] / measures, speed[measures.numel() :, 0])
-    rows = casadi.vertcat(relative_rows(system, symbols), *places, distance, relative)
+    rows = casadi.vertcat(relative_rows(system, symbols), *positions, distance, relative)
     residual = casadi.if_else(awake, 1, _ASLEEP) * casadi.mmax(casadi.fabs(rows))
     values = casadi.substitute([*map(casadi.densify, (step_q, step_v)), residual], [symbols], [q])
     return q - values[0], v - values[1], values[2]
@@ -133,15 +135,15 @@ def projected(
 def _touch(
     system: System, q: SX, v: SX, touch: tuple[Contacts, Modes] | None
 ) -> tuple[SX, SX, SX, SX]:
-    """Rows of positions at stops, then of velocities that are held; each with its `_switch`."""
+    """Rows of positions at stops, then of velocities that are stuck; each with its `_switch`."""
     if touch is None:
         return SX(0, 1), SX(0, 1), SX(0, 1), SX(0, 1)
     contacts, modes = touch
     return (
-        contacts.distance(q, modes.place),
-        _switch(modes.place**2),
-        modes.held * contacts.velocity(v),
-        _switch(modes.held),
+        contacts.distance(q, modes.limit),
+        _switch(modes.limit**2),
+        modes.stuck * contacts.velocity(v),
+        _switch(modes.stuck),
     )
 
 
@@ -174,8 +176,8 @@ def _shortest(J: SX, r: SX, off: SX, first: Array, columns: Array) -> tuple[SX, 
 
 def _unit(row: SX, columns: Array) -> float:
     """The scale of a row on one coordinate, or on a quaternion."""
-    places = casadi.sparsify(row).sparsity().get_triplet()[1]
-    return 1 / float(columns[places[0]]) if places else 1.0
+    columns_of_row = casadi.sparsify(row).sparsity().get_triplet()[1]
+    return 1 / float(columns[columns_of_row[0]]) if columns_of_row else 1.0
 
 
 # What steps in local tangent coordinates need of a system: all its rows, inertia and forces.
@@ -227,39 +229,39 @@ def passage(
         casadi.mtimes(casadi.diag(scale), J),
         -scale * bend,
     )
-    count, held = loops[0].numel(), SX(0, 1)
+    count, stuck = loops[0].numel(), SX(0, 1)
     laws = [motion.law(t) for motion in motions]
     unit = SX(DM.eye(nv))
     drives = [m.velocity for m in motions]
-    place = [q[number] - law[0] for number, law in zip(driven, laws, strict=True)]
+    driven_rows = [q[number] - law[0] for number, law in zip(driven, laws, strict=True)]
     braked = SX(tau)
     anchors: list[SX] = []
     E = SX(0, nv)
     if contact is not None:
         modes, contacts = contact.modes, contact.contacts
-        held = modes.held
+        stuck = modes.stuck
         p = casadi.vertcat(p, contact.values)
         for j, number in enumerate(contacts.velocities):
             braked[number] -= modes.slide[j] * contacts.sliding[j]
-            anchors.append(held[j] * q[_position(system, number)])
-        E = casadi.mtimes(casadi.diag(held), unit[list(contacts.velocities), :])
+            anchors.append(stuck[j] * q[_position(system, number)])
+        E = casadi.mtimes(casadi.diag(stuck), unit[list(contacts.velocities), :])
     norms = norm_rows(system.tree, q)
-    places = casadi.vertcat(loops[0], *place, *anchors, norms)
+    positions = casadi.vertcat(loops[0], *driven_rows, *anchors, norms)
     speeds = casadi.vertcat(loops[1], unit[drives, :], E)
     still = SX.zeros(len(anchors))
     b = casadi.vertcat(SX.zeros(count), *(law[1] for law in laws), still)
     c = casadi.vertcat(loops[2], *(law[2] for law in laws), still)
-    turns = nq > nv  # else N is the unit matrix, and J are the slopes of the places
+    has_quaternions = nq > nv  # else N is the unit matrix, and J are the slopes of `positions`
     rate = position_rate(system.tree, q, v)
-    rank = len(closure.rows) + len(motions) + (casadi.sum1(held) if anchors else 0)
+    rank = len(closure.rows) + len(motions) + (casadi.sum1(stuck) if anchors else 0)
     rows = [
-        places,
-        casadi.jacobian(places, q),
-        speeds if turns else SX(0, nv),
+        positions,
+        casadi.jacobian(positions, q),
+        speeds if has_quaternions else SX(0, nv),
         b,
         c,
-        casadi.jacobian(rate, v) if turns else SX(0, nv),
-        casadi.jtimes(rate, q, rate) if turns else SX(0, 1),
+        casadi.jacobian(rate, v) if has_quaternions else SX(0, nv),
+        casadi.jtimes(rate, q, rate) if has_quaternions else SX(0, 1),
         SX(rank),
     ]
     at = [x[:nq], x[nq : nq + nv]]
@@ -272,7 +274,7 @@ def passage(
     measure = _regularity(system, q, unit[drives, :])
     regularity = casadi.substitute(measure, q, at[0])
     txp = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
-    sizes = (nq, nv, rates.numel(), places.numel(), len(anchors))
+    sizes = (nq, nv, rates.numel(), positions.numel(), len(anchors))
     return Passage(
         rows=dense_function("rows", txp, rows),
         forces=dense_function("forces", txp, forces),
@@ -289,13 +291,13 @@ def _position(system: System, number: int) -> int:
 
 
 def _regularity(system: System, q: SX, drives: SX) -> SX:
-    """The smallest sine between a kept row and those before it: near zero, linear in the way."""
+    """The smallest sine between a kept row and those before it: near zero, linear in the path."""
     found = scales(system)
     columns = DM(found.columns([speed.unit for speed in system.speeds]))
     J = casadi.vertcat(
         DM(found.rows[kept_rows(system)]) * independent_constraint_rows(system, q), drives
     )
-    if J.shape[0] == 0:  # the loops hold nothing
+    if J.shape[0] == 0:  # the loops constrain nothing
         return SX(1)
     B = casadi.mtimes(J, casadi.diag(columns))
     squares = casadi.fmax(casadi.sum2(B * B), 1)  # a row may also vanish by itself
@@ -326,7 +328,7 @@ class TreeState:
         states: numbers in X of the states x.
         dependents: numbers in X of the dependents z.
         passive: numbers in X of the velocities of the dependent joints.
-        held: indices in v of the independent velocities.
+        independent: indices in v of the independent velocities.
         units: (nv,) typical velocities, of one size for all joints.
     """
 
@@ -339,7 +341,7 @@ class TreeState:
     states: tuple[int, ...]
     dependents: tuple[int, ...]
     passive: tuple[int, ...]
-    held: tuple[int, ...]
+    independent: tuple[int, ...]
     units: tuple[float, ...]
 
 
@@ -380,12 +382,12 @@ def tree_state(
     else:
         a = contact.a
     active = list(system.active)
-    moved = Accelerations(a[active], a, tau, contact)
-    shown = shown_outputs(system, parts, a, moved.every_effort + load)
+    response = Accelerations(a[active], a, tau, contact)
+    shown = shown_outputs(system, parts, a, response.every_effort + load)
     motion = TreeMotion(q, q, v[active], v, None, SX.zeros(nv))
-    y = outputs_vector(system, layout, motion, moved, shown)
+    y = outputs_vector(system, layout, motion, response, shown)
     if observe is not None:
-        seen = (q, v, a, v[active], a[active], moved.every_effort)
+        seen = (q, v, a, v[active], a[active], response.every_effort)
         y = casadi.vertcat(y, *observe(Seen(s.t, system.p, *seen, external)))
     rate = casadi.vertcat(position_rate(system.tree, q, v), a, rates)
     touch = (contact.contacts, contact.modes) if contact else None
@@ -433,7 +435,7 @@ def tree_state(
         rate=Function("tree_rate", [X], [casadi.densify(position_rate(system.tree, q, v))]),
         dependents=layout.dependents,
         passive=tuple(nq + k for k in layout.passive),
-        held=layout.velocities,
+        independent=layout.velocities,
         units=tuple(scales(system).columns([speed.unit for speed in system.speeds])),
     )
 
@@ -452,8 +454,8 @@ class FullState:
         rhs: `rhs(t, x, p) -> xdot`.
         project: `project(t, x, p) -> (x, residual)`, one Newton step onto loops, unit quaternions
             and prescribed motions, None where there is nothing to keep.
-        observe: `observe(t, x, p) -> a, tau, u, y, held, E, U, openness`, what a result shows
-            beside x: u and y are inputs and outputs of the devices, `held` the efforts of rigid
+        observe: `observe(t, x, p) -> a, tau, u, y, contacts, E, U, openness`, what a result shows
+            beside x: u and y are inputs and outputs of the devices, `contacts` the efforts of rigid
             stops and of Coulomb friction, the last is the largest closure row.
         events: `indicators(t, x, p) -> g` and `jump(t, x, p, fired) -> (x, modes)` of rigid stops
             and Coulomb friction, whose modes are then the last of p; None where there are none.
@@ -506,17 +508,17 @@ def full_state(
     rows = closure_rows(system, q)
     openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
     E, U = outputs_of(system, energy(system, "tree"), q, v)
-    held = contact.efforts if contact else SX(0, 1)
+    contact_efforts = contact.efforts if contact else SX(0, 1)
     y = shown_outputs(system, parts, a, Accelerations(a, a, tau, contact).every_effort)
-    observed = [a, tau, u, y, held, E, U, openness]
+    observed = [a, tau, u, y, contact_efforts, E, U, openness]
     keeps = system.is_closed or motions or touch or quaternion_slices(system.tree)
-    moved = [casadi.vertcat(*kept, z), residual]
+    corrected = [casadi.vertcat(*kept, z), residual]
     p = casadi.vertcat(p, contact.values) if contact else p
     crossed = parts.crossings()
     rate, *observed = with_inputs(system, [rate, *observed], u)
     return FullState(
         rhs=dense_function("rhs", [t, x, p], [rate]),
-        project=dense_function("project", [t, x, p], moved) if keeps else None,
+        project=dense_function("project", [t, x, p], corrected) if keeps else None,
         observe=dense_function("observe", [t, x, p], observed),
         events=_events(system, contact, parts, [t, x, p], u),
         passage=through,
@@ -542,7 +544,7 @@ def _events(
     if contact:
         indicators.append(contact.indicators)
         after, modes = tree_jump(system, contact, x, fired[:count])
-        if own:  # a jump of contacts moves what it need not where none of them asks for it
+        if own:  # a jump of contacts changes what it need not where none of them asks for it
             jumps = casadi.mmax(fired[:count])
             after = casadi.if_else(jumps, after, x)
             modes = casadi.if_else(jumps, modes, contact.values)

@@ -1,4 +1,4 @@
-/* A serial arm of a few joints: its pose, its Jacobian, and the way to a wanted pose.
+/* A serial arm of a few joints: its pose, its Jacobian, and the displacement to a target pose.
  *
  * Re-entrant: no globals and no allocation. Poses are 4x4, row by row, and their last rows are
  * never looked at. Lengths are measured by a length of the arm wherever they meet angles.
@@ -10,8 +10,8 @@ enum { ARM_JOINTS = 7, /* at most */ ARM_STEPS = 60 /* of a descent, at most */ 
 
 typedef struct {
     int n;
-    const double *gaps;          /* (n + 1, 4, 4) constant ways before, between and after joints */
-    const unsigned char *slides; /* (n,) whether each slides along its z axis or turns about it */
+    const double *gaps; /* (n + 1, 4, 4) constant transforms before, between and after joints */
+    const unsigned char *prismatic; /* (n,) whether each is prismatic, else revolute; about z */
     double length;               /* of the arm's size [m] */
 } arm;
 
@@ -20,24 +20,24 @@ typedef struct {
     double q[ARM_JOINTS];    /* rad or m */
     double T[16];            /* its pose */
     double J[ARM_JOINTS][6]; /* motion of the frame for each joint, [V / length; w], in the base;
-                                slides in arm lengths */
-    double gap[6];           /* way to the wanted pose, [translation / length; rotation vector] */
+                                lengths in arm lengths */
+    double gap[6];           /* to the target pose, [translation / length; rotation vector] */
     double cost;             /* |gap|^2 */
 } configuration;
 
 void arm_pose(const arm *a, const double *q, double *T);
 
 /* From p->q, all the rest of p. */
-void arm_examine(const arm *a, const double *wanted, configuration *p);
+void arm_examine(const arm *a, const double *target, configuration *p);
 
-/* max |T - wanted| [m and 1]. */
-double arm_residual(const double *wanted, const double *T);
+/* max |T - target| [m and 1]. */
+double arm_residual(const double *target, const double *T);
 
 /* The same with lengths in arm lengths. */
-double arm_relative_residual(const arm *a, const double *wanted, const double *T);
+double arm_relative_residual(const arm *a, const double *target, const double *T);
 
-/* Whether T is the wanted pose but for rounding: a relative residual below 1e-12. */
-int arm_reaches(const arm *a, const double *wanted, const double *T);
+/* Whether T is the target pose but for rounding: a relative residual below 1e-12. */
+int arm_reaches(const arm *a, const double *target, const double *T);
 
 /* One joint in the unit of its column of the Jacobian. */
 double arm_unit(const arm *a, int joint);
@@ -45,11 +45,11 @@ double arm_unit(const arm *a, int joint);
 /* All angles into (-pi, pi]. */
 void arm_wrap(const arm *a, double *q);
 
-/* Steps of Levenberg and Marquardt from p->q towards the wanted pose. They end where rounding, or a
+/* Steps of Levenberg and Marquardt from p->q towards the target pose. They end where rounding, or a
  * smallest distance greater than zero, lets them go no further. */
-void arm_descend(const arm *a, const double *wanted, configuration *p);
+void arm_descend(const arm *a, const double *target, configuration *p);
 
 /* The solution beside q, or q itself where nothing better was found; gives its residual. */
-double arm_polish(const arm *a, const double *wanted, double *q);
+double arm_polish(const arm *a, const double *target, double *q);
 
 #endif

@@ -8,25 +8,25 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* Polishes q (count, n) for wanted poses (4, 4) that lie `stride` doubles apart; 0: one for all. */
-EXPORT void mbs_polish(const arm *a, const double *wanted, long long stride, long long count,
+/* Polishes q (count, n) for target poses (4, 4) that lie `stride` doubles apart; 0: one for all. */
+EXPORT void mbs_polish(const arm *a, const double *target, long long stride, long long count,
                        double *q, double *residual) {
     long long i;
     for (i = 0; i < count; i++)
-        residual[i] = arm_polish(a, wanted + i * stride, q + i * a->n);
+        residual[i] = arm_polish(a, target + i * stride, q + i * a->n);
 }
 
 /* Fills q (starts, n), residual and hits (starts,); gives how many configurations were found. */
-EXPORT long long mbs_search(const arm *a, const double *wanted, long long starts,
+EXPORT long long mbs_search(const arm *a, const double *target, long long starts,
                             unsigned long long seed, double *q, double *residual,
                             long long *hits) {
     arm_configurations found = {q, residual, hits, 0};
-    arm_search(a, wanted, starts, seed, &found);
+    arm_search(a, target, starts, seed, &found);
     return found.count;
 }
 
 /* Keeps those of q (count, n) that are distinct, in their order; gives how many they are. */
-EXPORT long long mbs_merge(const arm *a, const double *wanted, long long count, double *q,
+EXPORT long long mbs_merge(const arm *a, const double *target, long long count, double *q,
                            double *residual, long long *hits) {
     arm_configurations found = {q, residual, hits, 0};
     double own[ARM_JOINTS];
@@ -34,26 +34,26 @@ EXPORT long long mbs_merge(const arm *a, const double *wanted, long long count, 
     int k;
     for (i = 0; i < count; i++) {
         for (k = 0; k < a->n; k++) own[k] = q[i * a->n + k];
-        arm_add(a, wanted, own, &found);
+        arm_add(a, target, own, &found);
     }
     return found.count;
 }
 
-EXPORT double mbs_nearest(const arm *a, const double *wanted, long long starts,
+EXPORT double mbs_nearest(const arm *a, const double *target, long long starts,
                           unsigned long long seed, double *q) {
-    return arm_nearest(a, wanted, starts, seed, q);
+    return arm_nearest(a, target, starts, seed, q);
 }
 
 /* All solutions for poses (poses, 4, 4): q (room, 6), which pose each is for and how many configurations
  * it comes from. Stops where there might be no room for another pose; *done poses are solved. */
-EXPORT long long mbs_general(const arm *a, const roth_loop *r, const double *wanted,
+EXPORT long long mbs_general(const arm *a, const roth_loop *r, const double *target,
                              long long poses, long long room, double *q, long long *number,
                              long long *hits, long long *done) {
     double residual[ROTH_CONFIGURATIONS];
     long long i, count = 0;
     for (*done = 0; *done < poses && count + ROTH_CONFIGURATIONS <= room; ++*done) {
         arm_configurations found = {q + 6 * count, residual, hits + count, 0};
-        roth_solve(a, r, wanted + 16 * *done, &found);
+        roth_solve(a, r, target + 16 * *done, &found);
         for (i = 0; i < found.count; i++) number[count + i] = *done;
         count += found.count;
     }

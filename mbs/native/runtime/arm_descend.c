@@ -72,26 +72,26 @@ static void orthogonal_step(const arm *a, const configuration *p, double shift, 
     }
 }
 
-/* The configuration that one step leads to. */
-static void attempt(const arm *a, const double *wanted, const configuration *from, double damping,
+/* The configuration after one step. */
+static void attempt(const arm *a, const double *target, const configuration *from, double damping,
                     configuration *to) {
     double dx[ARM_JOINTS], shift = damping * from->cost + LEAST;
     int k;
     if (!normal_step(a, from, shift, dx)) orthogonal_step(a, from, shift, dx);
     for (k = 0; k < a->n; k++) to->q[k] = from->q[k] + arm_unit(a, k) * dx[k];
-    arm_examine(a, wanted, to);
+    arm_examine(a, target, to);
 }
 
 /* The damping is proportional to the cost, which makes the last steps those of Newton
  * (Yamashita and Fukushima 2001), even where the Jacobian loses rank. */
-void arm_descend(const arm *a, const double *wanted, configuration *p) {
+void arm_descend(const arm *a, const double *target, configuration *p) {
     double damping = 0.1;
     int stalls = 0, step;
     configuration next;
-    arm_examine(a, wanted, p);
+    arm_examine(a, target, p);
     for (step = 0; step < ARM_STEPS && p->cost > FINEST && stalls < STALLS; step++) {
         double gain;
-        attempt(a, wanted, p, damping, &next);
+        attempt(a, target, p, damping, &next);
         if (!(next.cost < p->cost)) {
             damping = damping < 1e-3 ? 1e-2 : 4.0 * damping;
             stalls += p->cost < FINE || damping * p->cost > 1e12;
@@ -104,16 +104,16 @@ void arm_descend(const arm *a, const double *wanted, configuration *p) {
     }
 }
 
-double arm_polish(const arm *a, const double *wanted, double *q) {
+double arm_polish(const arm *a, const double *target, double *q) {
     double before, after, T[16];
     configuration p;
     memcpy(p.q, q, (size_t)a->n * sizeof(double));
     arm_pose(a, q, T);
-    before = arm_residual(wanted, T);
-    arm_descend(a, wanted, &p);
+    before = arm_residual(target, T);
+    arm_descend(a, target, &p);
     arm_wrap(a, p.q);
     arm_pose(a, p.q, T);
-    after = arm_residual(wanted, T);
+    after = arm_residual(target, T);
     if (!(after < before)) return before;
     memcpy(q, p.q, (size_t)a->n * sizeof(double));
     return after;

@@ -13,7 +13,7 @@ static const double EQUAL = 1e-6;   /* costs that are closer, relatively, are of
 typedef double matrix[ARM_JOINTS][ARM_JOINTS];
 
 /* Half the gradient of the cost; exact although J is the motion of the frame and not of the
- * rotation vector, because that vector is the axis of its own turn. */
+ * rotation vector, because that vector is the axis of its own rotation. */
 static void slope(const arm *a, const configuration *p, double *g) {
     int j, k;
     for (j = 0; j < a->n; j++) {
@@ -30,16 +30,16 @@ static double norm(const double *v, int n) {
 }
 
 /* Differences of the slope. */
-static void curvature(const arm *a, const double *wanted, const configuration *p, matrix H) {
+static void curvature(const arm *a, const double *target, const configuration *p, matrix H) {
     double ahead[ARM_JOINTS], behind[ARM_JOINTS];
     configuration near = *p;
     int i, k;
     for (k = 0; k < a->n; k++) {
         near.q[k] = p->q[k] + NUDGE * arm_unit(a, k);
-        arm_examine(a, wanted, &near);
+        arm_examine(a, target, &near);
         slope(a, &near, ahead);
         near.q[k] = p->q[k] - NUDGE * arm_unit(a, k);
-        arm_examine(a, wanted, &near);
+        arm_examine(a, target, &near);
         slope(a, &near, behind);
         near.q[k] = p->q[k];
         for (i = 0; i < a->n; i++) H[i][k] = (ahead[i] - behind[i]) / (2.0 * NUDGE);
@@ -68,26 +68,26 @@ static int newton_step(const matrix H, int n, double shift, const double *g, dou
     return 0;
 }
 
-/* Near the bottom costs are alike but for rounding, and the slope tells more. */
+/* Near the bottom costs are alike but for rounding, and the slope is more exact. */
 static int lower(double cost, double slope, double old_cost, double old_slope) {
     return cost < old_cost * (1.0 - ALIKE) ||
            (cost < old_cost * (1.0 + ALIKE) && slope < 0.5 * old_slope);
 }
 
 /* Newton's method to the bottom of the valley that p is in. */
-static void refine(const arm *a, const double *wanted, configuration *p) {
+static void refine(const arm *a, const double *target, configuration *p) {
     double g[ARM_JOINTS], next_g[ARM_JOINTS], dx[ARM_JOINTS], shift = 1e-9;
     int k, step, known = 0;
     configuration next;
     matrix H;
     slope(a, p, g);
     for (step = 0; step < REFINEMENTS && p->cost > FINEST && norm(g, a->n) > FLAT; step++) {
-        if (!known) curvature(a, wanted, p, H);
+        if (!known) curvature(a, target, p, H);
         known = 1;
         if (shift > 1e6) return;
         if (!newton_step((const double(*)[ARM_JOINTS])H, a->n, shift, g, dx)) {
             for (k = 0; k < a->n; k++) next.q[k] = p->q[k] + arm_unit(a, k) * dx[k];
-            arm_examine(a, wanted, &next);
+            arm_examine(a, target, &next);
             slope(a, &next, next_g);
             if (lower(next.cost, norm(next_g, a->n), p->cost, norm(g, a->n))) {
                 *p = next;
@@ -103,28 +103,28 @@ static void refine(const arm *a, const double *wanted, configuration *p) {
 
 /* Keeps the best ones apart, in the order of their costs. */
 static int keep(const configuration *p, configuration *best, int count) {
-    int i, place = 0;
-    while (place < count && best[place].cost <= p->cost) place++;
-    if (place > 0 && p->cost - best[place - 1].cost < EQUAL * p->cost) return count;
-    if (place == KEPT) return count;
+    int i, rank = 0;
+    while (rank < count && best[rank].cost <= p->cost) rank++;
+    if (rank > 0 && p->cost - best[rank - 1].cost < EQUAL * p->cost) return count;
+    if (rank == KEPT) return count;
     if (count < KEPT) count++;
-    for (i = count - 1; i > place; i--) best[i] = best[i - 1];
-    best[place] = *p;
+    for (i = count - 1; i > rank; i--) best[i] = best[i - 1];
+    best[rank] = *p;
     return count;
 }
 
-double arm_nearest(const arm *a, const double *wanted, long long starts, unsigned long long seed,
+double arm_nearest(const arm *a, const double *target, long long starts, unsigned long long seed,
                    double *q) {
     configuration best[KEPT], p;
     int count = 0, i, nearest = 0;
     long long start;
     for (start = 0; start < starts; start++) {
-        arm_start(a, wanted, seed, start, p.q);
-        arm_descend(a, wanted, &p);
+        arm_start(a, target, seed, start, p.q);
+        arm_descend(a, target, &p);
         count = keep(&p, best, count);
     }
     for (i = 0; i < count; i++) {
-        refine(a, wanted, &best[i]);
+        refine(a, target, &best[i]);
         if (best[i].cost < best[nearest].cost) nearest = i;
     }
     memcpy(q, best[nearest].q, (size_t)a->n * sizeof(double));

@@ -14,26 +14,26 @@ typedef struct {
     long long count;
 } arm_configurations;
 
-/* A configuration to start from, the same for the same numbers: angles in (-pi, pi], slides as far as
- * the arm and the wanted pose reach. */
-void arm_start(const arm *a, const double *wanted, unsigned long long seed, long long number,
+/* A configuration to start from, the same for the same numbers: angles in (-pi, pi], lengths as far
+ * as the arm and the target pose reach. */
+void arm_start(const arm *a, const double *target, unsigned long long seed, long long number,
                double *q);
 
-/* Whether two solutions are one: closer than 1e-6, or closer than 1e-2 with a solution half way,
+/* Whether two solutions are one: closer than 1e-6, or closer than 1e-2 with a solution midway,
  * to 1e-13 or as good as they are, as between copies of a multiple root. Angles that differ by
- * whole turns are equal; slides are measured in arm lengths. */
-int arm_same(const arm *a, const double *wanted, const double *q, const double *other);
+ * angles modulo 2 pi are equal; lengths are measured in arm lengths. */
+int arm_same(const arm *a, const double *target, const double *q, const double *other);
 
 /* Puts a solution among the others, the better of two that are one. q is none of theirs. */
-void arm_add(const arm *a, const double *wanted, const double *q, arm_configurations *found);
+void arm_add(const arm *a, const double *target, const double *q, arm_configurations *found);
 
 /* Solutions found from `starts` starts; there must be room for as many. */
-void arm_search(const arm *a, const double *wanted, long long starts, unsigned long long seed,
+void arm_search(const arm *a, const double *target, long long starts, unsigned long long seed,
                 arm_configurations *found);
 
 /* The configuration whose pose is nearest, the gap's cost being the square of the distance; gives that
  * cost. At least one start. */
-double arm_nearest(const arm *a, const double *wanted, long long starts, unsigned long long seed,
+double arm_nearest(const arm *a, const double *target, long long starts, unsigned long long seed,
                    double *q);
 
 #endif

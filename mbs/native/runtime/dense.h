@@ -29,7 +29,7 @@ void dense_reflect(const double *tail, double weight, int count, double *column)
 /* B (rows, count) = Q' B. */
 void dense_turn(const dense_qr *f, double *B, int count);
 
-/* X (columns, count), in the place of the first rows of B (rows, count), such that A X is as near
+/* X (columns, count), in place of the first rows of B (rows, count), such that A X is as near
  * to B as it can be; pivots below `least` times the first one are taken to be of that size. */
 void dense_solve(const dense_qr *f, double *B, int count, double least);
 

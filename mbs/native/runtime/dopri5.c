@@ -59,7 +59,7 @@ static void keep(stepper *s, const double *x, double h) {
 
 static int close(stepper *s, double t) {
     double *next = stage(s, 6);
-    if (s->moved) {
+    if (s->corrected) {
         int status = stepper_evaluate(s, t, stepper_candidate(s), next);
         if (status) return status;
     }

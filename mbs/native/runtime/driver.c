@@ -58,7 +58,7 @@ GENERATED(mbs_regularity);
 
 typedef struct {
     stepper solver;
-    double *p, *memory, *work, *w, *moved;
+    double *p, *memory, *work, *w, *projected;
     const double **arg;
     double **res;
     integer *iw;
@@ -99,10 +99,10 @@ static int project(void *user, double t, double *x) {
 #endif
     for (k = 0; k < ITERATIONS; k++) {
         double residual = 0.0, scale = 1.0;
-        if (call(d, mbs_project, t, x, d->moved, &residual) || !isfinite(residual)) return 1;
+        if (call(d, mbs_project, t, x, d->projected, &residual) || !isfinite(residual)) return 1;
         for (i = 0; i < n; i++) scale = fmax(scale, fabs(x[i]));
-        if (stepper_all_finite(d->moved, n))
-            memcpy(x, d->moved, sizeof(double) * (size_t)n);
+        if (stepper_all_finite(d->projected, n))
+            memcpy(x, d->projected, sizeof(double) * (size_t)n);
         else if (!(residual < TOLERANCE * scale)) /* else x is on the rows, where they depend */
             return 1;
         if (residual < TOLERANCE * scale) return 0;
@@ -131,10 +131,10 @@ static int jump(void *user, double t, double *x, const double *fired) {
     double *modes = d->p + d->n_p - d->n_modes, *next = d->event_work;
     int i;
     d->arg[3] = fired;
-    if (call(d, mbs_jump, t, x, d->moved, next)) return 1;
+    if (call(d, mbs_jump, t, x, d->projected, next)) return 1;
     for (i = 0; i < d->n_modes; i++)
         if (!isfinite(next[i])) return 1;
-    memcpy(x, d->moved, sizeof(double) * (size_t)d->solver.n);
+    memcpy(x, d->projected, sizeof(double) * (size_t)d->solver.n);
     memcpy(modes, next, sizeof(double) * (size_t)d->n_modes);
     return 0;
 }
@@ -143,7 +143,7 @@ static int jump(void *user, double t, double *x, const double *fired) {
 #ifdef MBS_PASSAGE
 static int rows(void *user, double t, const double *x, const passage_rows *r) {
     driver *d = user;
-    double *const to[] = {r->place, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
+    double *const to[] = {r->position, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
     d->arg[0] = &t;
     d->arg[1] = x;
     d->arg[2] = d->p;
@@ -185,7 +185,7 @@ EXPORT void mbs_close(driver *d) {
     free(d->memory);
     free(d->work);
     free(d->w);
-    free(d->moved);
+    free(d->projected);
     free((void *)d->arg);
     free((void *)d->res);
     free(d->iw);
@@ -255,12 +255,12 @@ EXPORT driver *mbs_open(int n, int n_p, const double *p, const double *control, 
     d->p = array(n_p, sizeof *d->p);
     d->memory = array(STEPPER_MEMORY(n), sizeof *d->memory);
     d->work = array(work_size(n), sizeof *d->work);
-    d->moved = array(n, sizeof *d->moved);
+    d->projected = array(n, sizeof *d->projected);
     d->arg = array(size[0], sizeof *d->arg);
     d->res = array(size[1], sizeof *d->res);
     d->iw = array(size[2], sizeof *d->iw);
     d->w = array(size[3], sizeof *d->w);
-    if (!d->p || !d->memory || !d->work || !d->moved || !d->arg || !d->res || !d->iw || !d->w) {
+    if (!d->p || !d->memory || !d->work || !d->projected || !d->arg || !d->res || !d->iw || !d->w) {
         mbs_close(d);
         return NULL;
     }

@@ -8,7 +8,7 @@ enum { LOOKS = 2, TANGENTS = 30, SECANTS = 20, MAX_JUMPS = 20, MAX_IDLE = 100 };
 
 static const double DEPARTURE = 1e-8; /* part of a step in which what rises may become positive */
 
-/* places in memory; then k values each of */
+/* offsets in memory; then k values each of */
 enum { LAST, IDLE, PENDING, UNSEEN, ARRAYS };
 static double *kept(const events *e, int i) {
     return e->memory + ARRAYS + (size_t)i * (size_t)e->count;
@@ -77,14 +77,14 @@ static int look_here(events *e, const double *x) {
     return look(e, x, stepper_time(e->solver), left(e), left_rate(e));
 }
 
-/* It is where an integrator outside had let it come, and a jump of velocities has not moved it. */
+/* It is where an integrator outside had let it come, and a jump of velocities has not changed it. */
 static int is_overshot(const events *e, int k) {
     double below = overshot(e)[k];
     return below > 0.0 && fabs(left(e)[k] + below) <= 1e-9 * below;
 }
 
 /* Which indicators ask for a jump at the present state. One that is zero to the tolerance and does
- * not clearly fall waits: the first look at the next step tells whether it leaves zero. */
+ * not clearly fall waits: the first look at the next step shows whether it leaves zero. */
 static int judge(events *e, const double *x) {
     double t = stepper_time(e->solver), step = stepper_last_step(e->solver);
     double slack = fmax(1e3 * DBL_EPSILON * fabs(t), DEPARTURE * step), zero = e->solver->atol;
@@ -242,7 +242,7 @@ int events_step(events *e, double *x, double limit) {
     return status;
 }
 
-/* What modes hold that last is projected; those in between may hold what they cannot. */
+/* What the last modes constrain is projected; those in between may constrain what they cannot. */
 static int projected(events *e, double *x) {
     stepper *s = e->solver;
     if (!s->project) return STEPPER_OK;

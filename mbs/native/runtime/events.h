@@ -7,7 +7,7 @@
  * there must leave it upwards, else it fires as soon as it is seen below.
  *
  * The indicators and their slopes are looked at twice in each step. What falls at one look and rises
- * at the next may have been below zero between them: tangents tell where to look again.
+ * at the next may have been below zero between them: tangents show where to look again.
  *
  * Source: Cellier and Kofman 2006, chapter 9; Dowell and Jarratt 1971 for the location.
  */

@@ -83,9 +83,9 @@ static void slide_parts(const double *w, double *parts) {
     twice[14] = -w[8];
 }
 
-void pair_parts(int slides, const double *w, double *parts) {
+void pair_parts(int prismatic, const double *w, double *parts) {
     memset(parts, 0, 3 * PAIR * sizeof(double));
-    if (slides)
+    if (prismatic)
         slide_parts(w, parts);
     else
         turn_parts(w, parts);

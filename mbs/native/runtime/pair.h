@@ -14,8 +14,8 @@ void pair_of(const double *T, double *w);
 /* What a displacement T makes of the numbers w. */
 void pair_carry(const double *T, double *w);
 
-/* (3, 15) parts of what a joint makes of w: with 1, cos q, sin q of a turn about z by q, or with
- * 1, r, r^2 of a slide along z by r. */
-void pair_parts(int slides, const double *w, double *parts);
+/* (3, 15) parts of what a joint makes of w: with 1, cos q, sin q of a rotation about z by q, or
+ * with 1, r, r^2 of a translation along z by r. */
+void pair_parts(int prismatic, const double *w, double *parts);
 
 #endif

@@ -18,7 +18,7 @@
 #define BESIDE 4.0    /* floors between neighbours in means: those next to the middle are regular */
 /* Weights of neighbours 1, 2 and 3 on either side: what they give is exact for degree five. */
 static const double MEAN[3] = {0.75, -0.3, 0.05};
-/* sigma_min(C N T), part of its value at the origin, below which the chart has turned too far from
+/* sigma_min(C N T), part of its value at the origin, below which the chart has rotated too far from
  * the motion: its tangents are then 78 degrees away. */
 #define TURNED 0.2
 #define NEWTON 10       /* Newton steps onto the rows; quadratic convergence takes three or four */
@@ -54,7 +54,7 @@ static const double MEAN[3] = {0.75, -0.3, 0.05};
 #define DEPENDENT 1e-6
 #define MASSLESS 1e-10 /* part of the largest pivot of the inertia matrix below which one is none */
 
-/* places in memory */
+/* offsets in memory */
 enum { SIGMA, LARGEST, REGULARITY, RISE, SEEN, SEEN_TIME, BASED, BASE_TIME, BASE };
 
 /* Rows and forces at a point, and the tangents there. */
@@ -90,7 +90,7 @@ struct passage {
     double *across;       /* (5, n) of a step that is tried */
     double *ready_x;
     double ready_time, sigma;
-    double turned; /* how far the tangents have turned from the chart: 1 at its origin, 0 across */
+    double alignment; /* of the tangents with those of the chart: 1 at its origin, 0 across */
     int d, ready, charted, kept, singular, lasting;
     int opened; /* the full step is, at the present state */
     int missed; /* branches that come near each other were met since the last full step */
@@ -138,7 +138,7 @@ static int rows_at(passage *g, double t, const double *x, const passage_rows *ro
     memset(rows->bend, 0, sizeof(double) * (size_t)nv);
     for (j = 0; j < nv; j++) {
         rows->N[j * nv + j] = 1.0;
-        memcpy(rows->J + j * z->speeds, rows->slope + j * z->places,
+        memcpy(rows->J + j * z->speeds, rows->slope + j * z->positions,
                sizeof(double) * (size_t)z->speeds);
     }
     return 0;
@@ -338,18 +338,18 @@ static int coordinates_of_base(passage *g) {
     return 0;
 }
 
-/* Newton steps from q in x onto all rows, xi as given; *moved: how far they went. */
-static int onto_rows(passage *g, double t, const double *xi, double *x, double *moved) {
+/* Newton steps from q in x onto all rows, xi as given; *distance: how far they went. */
+static int onto_rows(passage *g, double t, const double *xi, double *x, double *distance) {
     frame *p = &g->here;
     const double *q0 = g->memory + BASE;
-    int nq = g->size.nq, m = g->size.places, d = g->d, rows = m + d, i, j, k, turn;
+    int nq = g->size.nq, m = g->size.positions, d = g->d, rows = m + d, i, j, k, pass;
     int first = g->size.speeds - g->size.anchors, after = g->size.speeds;
     double *K = g->K, *r = g->r, total = 0.0;
-    for (turn = 0; turn < NEWTON; turn++) {
+    for (pass = 0; pass < NEWTON; pass++) {
         double move = 0.0, least = HUGE_VAL, most = 0.0;
         if (rows_at(g, t, x, &p->rows)) return 1;
-        memcpy(r, p->rows.place, sizeof(double) * (size_t)m);
-        for (i = first; i < after; i++) r[i] -= g->base.rows.place[i];
+        memcpy(r, p->rows.position, sizeof(double) * (size_t)m);
+        for (i = first; i < after; i++) r[i] -= g->base.rows.position[i];
         for (j = 0; j < nq; j++)
             memcpy(K + j * rows, p->rows.slope + j * m, sizeof(double) * (size_t)m);
         for (k = 0; k < d; k++) { /* rows of about unit length */
@@ -381,7 +381,7 @@ static int onto_rows(passage *g, double t, const double *xi, double *x, double *
         total += move;
         if (!isfinite(total)) return 1;
         if (move < LAST_MOVE) {
-            *moved = total;
+            *distance = total;
             return 0;
         }
     }
@@ -435,13 +435,13 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     frame *p = &g->here;
     int nq = g->size.nq, nv = g->size.nv, nz = g->size.nz, d = g->d, i, j, k;
     const double *u = y + d;
-    double moved, size = 0.0, *v = x + nq, *a = xdot + nq;
+    double distance, size = 0.0, *v = x + nq, *a = xdot + nq;
     memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
     if (predict(g, t, y, x)) return STEPPER_SINGULAR;
     memset(v, 0, sizeof(double) * (size_t)nv);
     memcpy(x + nq + nv, y + 2 * d, sizeof(double) * (size_t)nz);
-    if (onto_rows(g, t, y, x, &moved)) return STEPPER_SINGULAR;
-    if (g->guide && moved > REACH) return STEPPER_CHART_LEFT;
+    if (onto_rows(g, t, y, x, &distance)) return STEPPER_SINGULAR;
+    if (g->guide && distance > REACH) return STEPPER_CHART_LEFT;
     if (evaluate(g, p, t, x) || factor(g, p)) return STEPPER_SINGULAR;
     if (p->rank != g->base.rank) return STEPPER_CHART_LEFT;
     /* velocities: v = T (C N T)^-1 (u - C N v_p) + v_p */
@@ -458,8 +458,8 @@ static int lift(passage *g, double t, const double *y, double *x, double *xdot, 
     memcpy(g->K + d * d, g->w, sizeof(double) * (size_t)d);
     if (solve(g->G, d, g->K, d + 1)) return STEPPER_CHART_LEFT;
     for (k = 0; k < d * d; k++) size += g->K[k] * g->K[k];
-    g->turned = sqrt((double)(d ? d : 1) / size);
-    if (!(g->turned > TURNED)) return STEPPER_CHART_LEFT;
+    g->alignment = sqrt((double)(d ? d : 1) / size);
+    if (!(g->alignment > TURNED)) return STEPPER_CHART_LEFT;
     for (k = 0; k < d; k++)
         for (i = 0; i < nv; i++) v[i] += p->T[k * nv + i] * g->K[d * d + k];
     if (g->guide && astray(g, v)) return STEPPER_SINGULAR;
@@ -554,7 +554,7 @@ static double regularity_at(passage *g, double t, const double *x) {
 
 /* A regular state behind a singular one, along its velocity; 1 where no branch has this velocity. */
 static int base_behind(passage *g, double t, const double *x) {
-    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, turn;
+    int nq = g->size.nq, nv = g->size.nv, n = g->s->n, i, j, pass;
     double *q = g->at, *v = g->w, *y = g->y, speed = 0.0, move = HUGE_VAL, behind, part;
     for (i = 0; i < nv; i++) speed = fmax(speed, fabs(x[nq + i]));
     if (!(speed > 0.0) || evaluate(g, &g->here, t, x)) return 1;
@@ -563,10 +563,10 @@ static int base_behind(passage *g, double t, const double *x) {
     for (i = 0; i < nv; i++) v[i] = -x[nq + i] * BACK / speed;
     for (i = 0; i < nq; i++)
         for (j = 0; j < nv; j++) q[i] += g->here.rows.N[j * nq + i] * v[j];
-    for (turn = 0; turn < NEWTON && !(move < LAST_MOVE); turn++) {
+    for (pass = 0; pass < NEWTON && !(move < LAST_MOVE); pass++) {
         if (evaluate(g, &g->base, behind, q) || factor(g, &g->base)) return 1;
         memset(y, 0, sizeof(double) * (size_t)nv);
-        along_rows(g, &g->base, g->base.rows.place, y);
+        along_rows(g, &g->base, g->base.rows.position, y);
         to_velocity(g, &g->base, y);
         move = 0.0;
         for (i = 0; i < nv; i++) move = fmax(move, fabs(y[i]));
@@ -649,13 +649,13 @@ static int prepare(passage *g, double t, const double *x) {
  * or a step of this length makes of them. */
 static int left_branch(const passage *g, const double *x, const double *along, double h, double a) {
     int nq = g->size.nq, nv = g->size.nv, i;
-    double v = h * a, move = 0.0, turn = 0.0, zero = g->s->atol; /* at rest */
+    double v = h * a, move = 0.0, change = 0.0, zero = g->s->atol; /* at rest */
     for (i = 0; i < nv; i++) {
         v = fmax(v, fmax(fabs(x[nq + i]), fabs(along[nq + i])));
-        turn = fmax(turn, fabs(x[nq + i] - along[nq + i]));
+        change = fmax(change, fabs(x[nq + i] - along[nq + i]));
     }
     for (i = 0; i < nq; i++) move = fmax(move, fabs(x[i] - along[i]));
-    return turn > BREAK * v + zero || move > BREAK * h * v + zero;
+    return change > BREAK * v + zero || move > BREAK * h * v + zero;
 }
 
 /* The error of a step in the chart, in coordinates of the tree. */
@@ -737,27 +737,27 @@ static int side_of(const passage *g, const passage_rows *rows) {
 /* How far the rows are from holding where they are dependent: what of them no move of the positions
  * changes there, zero where branches of motion meet. */
 static double gap_of(const passage *g, const passage_rows *rows) {
-    int n = g->size.nv, first = g->size.speeds - g->size.anchors, i, turn;
+    int n = g->size.nv, first = g->size.speeds - g->size.anchors, i, pass;
     double *y = g->y, most = 0.0, sum = 0.0;
     for (i = 0; i < n; i++) y[i] = 1.0;
-    for (turn = 0; turn < 2; turn++) { /* towards the null vectors on the right and on the left */
-        square(g, rows, turn, g->K);
+    for (pass = 0; pass < 2; pass++) { /* towards the null vectors on the right and on the left */
+        square(g, rows, pass, g->K);
         if (solve(g->K, n, y, 1)) return 0.0;
         for (most = 0.0, i = 0; i < n; i++) most = fmax(most, fabs(y[i]));
         for (i = 0; i < n; i++) y[i] /= most;
     }
     for (most = 0.0, i = 0; i < g->base.rank; i++) {
-        int row = g->base.order[i], held = row >= first && row < g->size.speeds;
+        int row = g->base.order[i], anchored = row >= first && row < g->size.speeds;
         most = fmax(most, fabs(y[i]));
-        sum += y[i] * (rows->place[row] - (held ? g->base.rows.place[row] : 0.0));
+        sum += y[i] * (rows->position[row] - (anchored ? g->base.rows.position[row] : 0.0));
     }
     return most > 0.0 ? fabs(sum) / most : 0.0;
 }
 
 /* 1 where a step goes across a singular configuration, though the branches there only come near
- * each other and a motion that stays on its own turns. With f = gap + k s w, s along the one and w
- * along the other, sigma is sqrt(2 k gap) where it turns; what is below AWAY floors is passed as if
- * the branches met. */
+ * each other and a motion that stays on its own reverses. With f = gap + k s w, s along the one and
+ * w along the other, sigma is sqrt(2 k gap) where it reverses; what is below AWAY floors is passed
+ * as if the branches met. */
 static int jumps(passage *g, double t, const double *x, double h, const double *y,
                  const double *first, const double *last) {
     double low = 0.0, high = 1.0, speed = 0.0, gap, *at = g->at, sigma = g->here.sigma;
@@ -929,7 +929,7 @@ void passage_start(passage *g) {
 
 void passage_forget(passage *g) { g->ready = g->kept = g->charted = g->lasting = g->missed = g->opened = 0; }
 
-/* The chart as memory tells it. */
+/* The chart as memory has it. */
 static int restored(passage *g) {
     const double *m = g->memory;
     if (g->lasting) return 0;
@@ -958,7 +958,7 @@ int passage_jumps(passage *g, double t, const double *x, const double *first, do
 }
 
 int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
-                  double *slope_x, double *slope_y, double *turned) {
+                  double *slope_x, double *slope_y, double *alignment) {
     double largest = g->memory[SIGMA];
     int nq = g->size.nq, nv = g->size.nv, i, j, status;
     if (restored(g) || rows_at(g, t, guide, &g->here.rows)) return STEPPER_SINGULAR;
@@ -971,7 +971,7 @@ int passage_state(passage *g, double t, const double *y, const double *guide, do
     status = slope(g, t, y, x, slope_x, slope_y);
     g->guide = NULL;
     g->memory[SIGMA] = largest;
-    *turned = g->turned;
+    *alignment = g->alignment;
     return status;
 }
 
@@ -980,19 +980,19 @@ int passage_singular(passage *g, double t, const double *x) {
 }
 
 int passage_place(passage *g, double t, double *x, const int *loose, int count) {
-    int m = g->size.places, first = g->size.speeds - g->size.anchors, i, j, turn;
+    int m = g->size.positions, first = g->size.speeds - g->size.anchors, i, j, pass;
     double worst = HUGE_VAL, move = HUGE_VAL, *A = g->K, *r = g->r;
-    for (turn = 0; turn <= PLACING; turn++) {
+    for (pass = 0; pass <= PLACING; pass++) {
         if (rows_at(g, t, x, &g->here.rows)) return 1;
         for (worst = 0.0, j = 0; j < m; j++) {
-            int free = j >= first && j < g->size.speeds; /* what stops and friction hold is there */
-            r[j] = free ? 0.0 : -g->here.rows.place[j];
+            int free = j >= first && j < g->size.speeds; /* what stops and friction lock is there */
+            r[j] = free ? 0.0 : -g->here.rows.position[j];
             worst = fmax(worst, fabs(r[j]));
             for (i = 0; i < count; i++)
                 A[j * count + i] = free ? 0.0 : g->here.rows.slope[loose[i] * m + j];
         }
         if (!isfinite(worst) || !stepper_all_finite(A, m * count)) return 1;
-        if (move < LAST_MOVE || turn == PLACING) break;
+        if (move < LAST_MOVE || pass == PLACING) break;
         shortest(g, A, count, m, r, SETTLED, g->y);
         for (move = 0.0, i = 0; i < count; i++) {
             x[loose[i]] += g->y[i];
@@ -1007,11 +1007,11 @@ int passage_velocities(passage *g, double t, double *x, const int *kept, int cou
     double *A = g->K, *r = g->r, *v = x + nq, *y = g->y, speed = 0.0, miss = 0.0;
     if (rows_at(g, t, x, &g->here.rows)) return 1;
     for (j = 0; j < m + count; j++) {
-        int held = j >= m - g->size.anchors && j < m;
+        int anchored = j >= m - g->size.anchors && j < m;
         r[j] = j < m ? g->here.rows.b[j] : v[kept[j - m]];
         for (i = 0; i < nv; i++) {
             double value = j < m ? g->here.rows.J[i * m + j] : i == kept[j - m];
-            A[j * nv + i] = held ? 0.0 : value;
+            A[j * nv + i] = anchored ? 0.0 : value;
         }
     }
     if (!stepper_all_finite(A, (m + count) * nv)) return 1;
@@ -1047,7 +1047,7 @@ int passage_loosest(passage *g, double t, const double *x, const double *unit) {
     if (evaluate(g, &g->here, t, x) || factor(g, &g->here) || !g->here.rank) return -1;
     first = g->here.rank - 1;
     memset(moves, 0, sizeof(double) * (size_t)nv);
-    for (k = first; k < nv; k++) { /* the directions that rows hold least, orthonormal */
+    for (k = first; k < nv; k++) { /* the directions that rows constrain least, orthonormal */
         double *v = B + (k - first) * nv, size = 0.0;
         memset(v, 0, sizeof(double) * (size_t)nv);
         v[k] = 1.0;
@@ -1066,14 +1066,17 @@ int passage_loosest(passage *g, double t, const double *x, const double *unit) {
     return found;
 }
 
-int passage_grip(passage *g, double t, const double *x, const int *held, const double *unit,
+int passage_grip(passage *g, double t, const double *x, const int *independent, const double *unit,
                  double *grip) {
     double *S = g->G, *B = g->K, most = 1.0;
     int nv = g->size.nv, d, i, j, k;
     if (evaluate(g, &g->here, t, x) || factor(g, &g->here)) return 1;
     d = nv - g->here.rank;
-    for (k = 0; k < d; k++) { /* v = T S^-1 v[held], transposed */
-        for (i = 0; i < d; i++) S[i * d + k] = g->here.T[k * nv + held[i]] * unit[held[i]];
+    for (k = 0; k < d; k++) { /* v = T S^-1 v[independent], transposed */
+        for (i = 0; i < d; i++) {
+            int number = independent[i];
+            S[i * d + k] = g->here.T[k * nv + number] * unit[number];
+        }
         for (j = 0; j < nv; j++) B[j * d + k] = g->here.T[k * nv + j] * unit[j];
     }
     *grip = 0.0;
@@ -1095,8 +1098,8 @@ static double *take(double *block, size_t *used, size_t count) {
 }
 
 static void lay_frame(frame *p, const passage_size *z, double *block, size_t *used) {
-    size_t nq = (size_t)z->nq, nv = (size_t)z->nv, m = (size_t)z->speeds, l = (size_t)z->places;
-    p->rows.place = take(block, used, l);
+    size_t nq = (size_t)z->nq, nv = (size_t)z->nv, m = (size_t)z->speeds, l = (size_t)z->positions;
+    p->rows.position = take(block, used, l);
     p->rows.slope = take(block, used, l * nq);
     p->rows.J = take(block, used, m * nv);
     p->rows.b = take(block, used, m);
@@ -1115,7 +1118,7 @@ static void lay_frame(frame *p, const passage_size *z, double *block, size_t *us
 static size_t lay(passage *g, double *block) {
     const passage_size *z = &g->size;
     size_t nq = (size_t)z->nq, nv = (size_t)z->nv, n = (size_t)g->s->n, ny = 2 * nv + (size_t)z->nz;
-    size_t rows = (size_t)z->places + nv, used = 0;
+    size_t rows = (size_t)z->positions + nv, used = 0;
     int k;
     lay_frame(&g->base, z, block, &used);
     lay_frame(&g->here, z, block, &used);
@@ -1152,7 +1155,7 @@ passage *passage_new(stepper *s, const passage_size *size, const passage_model *
     g->model = *model;
     g->memory = memory;
     g->block = calloc(lay(g, NULL), sizeof *g->block);
-    g->orders = calloc(2 * (size_t)size->speeds + (size_t)(size->places + size->nv) + 1,
+    g->orders = calloc(2 * (size_t)size->speeds + (size_t)(size->positions + size->nv) + 1,
                        sizeof *g->orders);
     if (!g->block || !g->orders) {
         passage_free(g);

@@ -23,24 +23,24 @@
 
 /* Part of the largest regularity below which steps are made in the chart. A full step magnifies its
  * errors by 1 / regularity and rounding by its square; at a fifth that is little, and a tenth of the
- * way of a crank lies below it. */
+ * range of a crank lies below it. */
 #define PASSAGE_ON 0.2
 
 typedef struct {
     int nq, nv, nz; /* positions, velocities and other states of x */
-    int places;     /* rows of positions: the first ones belong to those of velocities, the last
+    int positions;  /* rows of positions: the first ones belong to those of velocities, the last
                        ones keep quaternions at unit length */
-    int anchors;    /* those of velocities that hold the coordinate which the last anchors rows of
+    int anchors;    /* those of velocities that lock the coordinate which the last anchors rows of
                        positions before the norms give, wherever it is */
     int speeds;     /* rows of velocities */
     int moving;     /* 1 where rows depend on time */
 } passage_size;
 
-/* place (places,) and its slopes by q (places, nq); J (speeds, nv), b and c with J v = b and
- * J a = c; N (nq, nv) and bend (nq,) with q' = N v and q'' = N a + bend; the rank of J. Where nq is
- * nv the model leaves out J, which are the slopes, N, the unit matrix, and bend, which is zero. */
+/* position (positions,) and its slopes by q (positions, nq); J (speeds, nv), b and c with J v = b
+ * and J a = c; N (nq, nv) and bend (nq,) with q' = N v and q'' = N a + bend; the rank of J. Where nq
+ * is nv the model leaves out J, which are the slopes, N, the unit matrix, and bend, which is zero. */
 typedef struct {
-    double *place, *slope, *J, *b, *c, *N, *bend, *rank;
+    double *position, *slope, *J, *b, *c, *N, *bend, *rank;
 } passage_rows;
 
 typedef struct {
@@ -70,8 +70,8 @@ void passage_start(passage *g);
 /* The memory was replaced: what stands beside it belongs to it no more. */
 void passage_forget(passage *g);
 
-/* Positions and velocities moved onto the rows in the chart of the last step; 1 where there is no
- * such chart, and the projection of the full step is to be used. */
+/* Positions and velocities projected onto the rows in the chart of the last step; 1 where there is
+ * no such chart, and the projection of the full step is to be used. */
 int passage_project(passage *g, double t, double *x);
 
 /* A start where rows may be dependent, before any step. */
@@ -79,7 +79,7 @@ int passage_project(passage *g, double t, double *x);
 /* 1 where they nearly are at a state. */
 int passage_singular(passage *g, double t, const double *x);
 
-/* Positions moved onto all rows, those of x that are loose alone; 1: they do not come there. */
+/* Positions projected onto all rows, those of x that are loose alone; 1: they do not come there. */
 int passage_place(passage *g, double t, double *x, const int *loose, int count);
 
 /* The velocities in x become the smallest on all rows that keep the given ones of them; 1 where no
@@ -91,7 +91,7 @@ int passage_velocities(passage *g, double t, double *x, const int *kept, int cou
  * stepper: undetermined where no branch has these velocities. */
 int passage_slope(passage *g, double t, const double *x, double *xdot, double *on);
 
-/* The velocity that the rows hold least at a state, each in its unit (nv,); -1: no answer. */
+/* The velocity that the rows constrain least at a state, each in its unit (nv,); -1: no answer. */
 int passage_loosest(passage *g, double t, const double *x, const double *unit);
 
 /* Where the steps are made by somebody else, a chart lasts from one call of passage_chart to the
@@ -104,18 +104,18 @@ int passage_chart(passage *g, double t, const double *x);
 int passage_coordinates(passage *g, double t, const double *x, double *y);
 
 /* The state x on the rows at the coordinates y, on the branch of a state guide near it; the slopes of
- * x and y; *turned: how far the tangents are from those at the origin, 1 there and 0 across. */
+ * x and y; *alignment: how far the tangents are from those at the origin, 1 there and 0 across. */
 int passage_state(passage *g, double t, const double *y, const double *guide, double *x,
-                  double *slope_x, double *slope_y, double *turned);
+                  double *slope_x, double *slope_y, double *alignment);
 
-/* Right after passage_state gave y and its slope at t + h: 1 where the way to it from a state x on the
- * motion at t, with its slope, goes across branches that only come near each other. */
+/* Right after passage_state gave y and its slope at t + h: 1 where the path to it from a state x on
+ * the motion at t, with its slope, goes across branches that only come near each other. */
 int passage_jumps(passage *g, double t, const double *x, const double *first, double h,
                   const double *y, const double *last);
 
-/* The inverse of how fast velocities, in their units (nv,), are at most where the held ones, as
- * many as the motion is free, have size one: zero where those determine nothing. 1: no answer. */
-int passage_grip(passage *g, double t, const double *x, const int *held, const double *unit,
+/* The inverse of how fast velocities, in their units (nv,), are at most where the independent ones,
+ * as many as the motion is free, have size one: zero where those determine nothing. 1: no answer. */
+int passage_grip(passage *g, double t, const double *x, const int *independent, const double *unit,
                  double *grip);
 
 /* How independent the rows are, part of the largest value so far. */

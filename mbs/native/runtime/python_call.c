@@ -1,7 +1,7 @@
 /* A builtin of Python that calls one compiled function on arrays of doubles without copies.
  *
  * No header of Python is needed: the few functions of its stable interface come in a table. The
- * builtin answers None for whatever it does not take as it is; the caller then takes another way. */
+ * builtin answers None for whatever it does not take as it is; the caller then calls otherwise. */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -56,7 +56,7 @@ typedef struct {
   long long rows;
   long long columns;
   long long stored;        /* elements that the code writes; fewer than rows x columns if sparse */
-  const long long *places; /* of each stored element in the dense array, or NULL */
+  const long long *indices; /* of each stored element in the dense array, or NULL */
 } shape;
 
 typedef struct {
@@ -130,7 +130,7 @@ static int regular(const double *x, long long count) {
 
 static void scatter(const shape *s, const double *stored, double *dense) {
   memset(dense, 0, (size_t)(s->rows * s->columns) * sizeof(double));
-  for (long long k = 0; k < s->stored; ++k) dense[s->places[k]] = stored[k];
+  for (long long k = 0; k < s->stored; ++k) dense[s->indices[k]] = stored[k];
 }
 
 /* Runs the code in work space `w`, of which the first doubles hold sparse outputs. */
@@ -142,8 +142,8 @@ static int run(const function *f, const view *in, const view *out, double *w, lo
     if (f->finite && !regular(in[k].data, f->in[k].rows * f->in[k].columns)) return 0;
   }
   for (int k = 0; k < f->outputs; ++k) {
-    results[k] = f->out[k].places ? w : out[k].data;
-    if (f->out[k].places) w += f->out[k].stored;
+    results[k] = f->out[k].indices ? w : out[k].data;
+    if (f->out[k].indices) w += f->out[k].stored;
   }
   double *sparse[MOST];
   memcpy(sparse, results, sizeof sparse);
@@ -154,7 +154,7 @@ static int run(const function *f, const view *in, const view *out, double *w, lo
   if (failed) return 0;
   for (int k = 0; k < f->outputs; ++k) {
     const shape *s = &f->out[k];
-    if (s->places) scatter(s, sparse[k], out[k].data);
+    if (s->indices) scatter(s, sparse[k], out[k].data);
     if (f->finite && !regular(out[k].data, s->rows * s->columns)) return 0;
   }
   return 1;
@@ -248,18 +248,18 @@ static void forget(object *capsule) {
   py.decrease(f->empty);
   for (int k = 0; k < f->outputs; ++k) {
     py.decrease(f->new_[k]);
-    free((void *)f->out[k].places);
+    free((void *)f->out[k].indices);
   }
   free(f);
 }
 
-/* A copy of its own of the places of a sparse output; 0 without memory. */
-static int own_places(shape *s) {
-  if (!s->places) return 1;
+/* A copy of its own of the indices of a sparse output; 0 without memory. */
+static int own_indices(shape *s) {
+  if (!s->indices) return 1;
   const size_t bytes = (size_t)s->stored * sizeof(long long);
   long long *copy = malloc(bytes ? bytes : 1);
-  if (copy) memcpy(copy, s->places, bytes);
-  s->places = copy;
+  if (copy) memcpy(copy, s->indices, bytes);
+  s->indices = copy;
   return copy != NULL;
 }
 
@@ -275,7 +275,7 @@ EXPORT object *mbs_builtin(const function *given) {
   py.increase(f->empty);
   for (int k = 0; k < f->outputs; ++k) {
     py.increase(f->new_[k]);
-    complete = own_places(&f->out[k]) && complete;
+    complete = own_indices(&f->out[k]) && complete;
   }
   object *capsule = complete ? py.new_capsule(f, LABEL, forget) : NULL;
   if (!capsule) return NULL;

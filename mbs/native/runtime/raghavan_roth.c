@@ -9,18 +9,18 @@
 
 enum { MONOMIALS = 9, COLUMNS = 3 * MONOMIALS + 1 };
 
-void roth_ways(const roth_loop *r, const double *T, double ways[6][16]) {
-    double pose[16], wanted[16], product[16];
+void roth_transforms(const roth_loop *r, const double *T, double transforms[6][16]) {
+    double pose[16], target[16], product[16];
     int i;
-    memcpy(wanted, T, sizeof wanted);
-    for (i = 3; i < 12; i += 4) wanted[i] /= r->length;
+    memcpy(target, T, sizeof target);
+    for (i = 3; i < 12; i += 4) target[i] /= r->length;
     if (r->sign > 0)
-        rigid_inverse(wanted, pose);
+        rigid_inverse(target, pose);
     else
-        memcpy(pose, wanted, sizeof pose);
-    memcpy(ways, r->ways, sizeof r->ways);
-    rigid_product(r->ways[r->place], pose, product);
-    rigid_product(product, r->after, ways[r->place]);
+        memcpy(pose, target, sizeof pose);
+    memcpy(transforms, r->transforms, sizeof r->transforms);
+    rigid_product(r->transforms[r->index], pose, product);
+    rigid_product(product, r->after, transforms[r->index]);
 }
 
 void roth_weights(int parts, double u, double *weights) {
@@ -30,10 +30,10 @@ void roth_weights(int parts, double u, double *weights) {
 }
 
 /* Parts with 1, x, x^2 of what a joint makes of w: x = tan(q/2), times 1 + x^2, or x = r. */
-static void half_parts(int slides, const double *w, double *parts) {
+static void half_parts(int prismatic, const double *w, double *parts) {
     int i;
-    pair_parts(slides, w, parts);
-    for (i = 0; i < PAIR && !slides; i++) {
+    pair_parts(prismatic, w, parts);
+    for (i = 0; i < PAIR && !prismatic; i++) {
         double rest = parts[i], cosine = parts[PAIR + i];
         parts[i] = rest + cosine;
         parts[PAIR + i] = 2.0 * parts[2 * PAIR + i];
@@ -41,11 +41,11 @@ static void half_parts(int slides, const double *w, double *parts) {
     }
 }
 
-/* Parts with the weights of joint 3; a slide by r = tan(u/2), times cos(u/2) or its square. */
-static void third_parts(int slides, int count, const double *w, double *parts) {
+/* Parts with the weights of joint 3; a translation by r = tan(u/2), times cos(u/2) or its square. */
+static void third_parts(int prismatic, int count, const double *w, double *parts) {
     int i;
-    pair_parts(slides, w, parts);
-    for (i = 0; i < PAIR && slides && count == 3; i++) {
+    pair_parts(prismatic, w, parts);
+    for (i = 0; i < PAIR && prismatic && count == 3; i++) {
         double low = 0.5 * parts[i], middle = 0.5 * parts[PAIR + i];
         double high = 0.5 * parts[2 * PAIR + i];
         parts[i] = low + high;
@@ -55,25 +55,25 @@ static void third_parts(int slides, int count, const double *w, double *parts) {
 }
 
 /* Parts with 1, cos q, sin q or 1, r, r^2 of what the inverse motion of a joint makes of w. */
-static void back_parts(int slides, const double *w, double *parts) {
-    double *odd = parts + (slides ? 1 : 2) * PAIR;
+static void back_parts(int prismatic, const double *w, double *parts) {
+    double *odd = parts + (prismatic ? 1 : 2) * PAIR;
     int i;
-    pair_parts(slides, w, parts);
+    pair_parts(prismatic, w, parts);
     for (i = 0; i < PAIR; i++) odd[i] = -odd[i];
 }
 
 /* (columns, rows) factors of the monomials of joints 1 and 2, of which the first is 1. */
-static void right_side(const roth_loop *r, const double ways[6][16], double *right) {
+static void right_side(const roth_loop *r, const double transforms[6][16], double *right) {
     double w[PAIR], first[3 * PAIR], second[3 * PAIR], back[16];
     int i, j, k, n1 = r->powers[0], n2 = r->powers[1], rows = r->count - 1;
-    rigid_inverse(ways[5], back);
+    rigid_inverse(transforms[5], back);
     pair_of(back, w);
-    back_parts(r->slides[0], w, first);
+    back_parts(r->prismatic[0], w, first);
     for (j = 0; j < n1; j++) {
-        rigid_inverse(ways[0], back);
+        rigid_inverse(transforms[0], back);
         pair_carry(back, first + j * PAIR);
-        back_parts(r->slides[1], first + j * PAIR, second);
-        rigid_inverse(ways[1], back);
+        back_parts(r->prismatic[1], first + j * PAIR, second);
+        rigid_inverse(transforms[1], back);
         for (i = 0; i < n2; i++) {
             double *column = right + (i * n1 + j) * rows;
             pair_carry(back, second + i * PAIR);
@@ -83,17 +83,17 @@ static void right_side(const roth_loop *r, const double ways[6][16], double *rig
 }
 
 /* (weights, monomials, rows) factors of the monomials x4^i x5^j for each weight of joint 3. */
-static void left_side(const roth_loop *r, const double ways[6][16], double *left) {
+static void left_side(const roth_loop *r, const double transforms[6][16], double *left) {
     double w[PAIR], fifth[3 * PAIR], fourth[3 * PAIR], third[3 * PAIR];
     int i, j, k, e, n4 = r->powers[3], n5 = r->powers[4], rows = r->count - 1;
-    pair_of(ways[4], w);
-    half_parts(r->slides[4], w, fifth);
+    pair_of(transforms[4], w);
+    half_parts(r->prismatic[4], w, fifth);
     for (j = 0; j < n5; j++) {
-        pair_carry(ways[3], fifth + j * PAIR);
-        half_parts(r->slides[3], fifth + j * PAIR, fourth);
+        pair_carry(transforms[3], fifth + j * PAIR);
+        half_parts(r->prismatic[3], fifth + j * PAIR, fourth);
         for (i = 0; i < n4; i++) {
-            pair_carry(ways[2], fourth + i * PAIR);
-            third_parts(r->slides[2], r->powers[2], fourth + i * PAIR, third);
+            pair_carry(transforms[2], fourth + i * PAIR);
+            third_parts(r->prismatic[2], r->powers[2], fourth + i * PAIR, third);
             for (k = 0; k < r->powers[2]; k++) {
                 double *column = left + ((k * n4 + i) * n5 + j) * rows;
                 for (e = 0; e < rows; e++) column[e] = third[k * PAIR + r->elements[e + 1]];
@@ -105,9 +105,9 @@ static void left_side(const roth_loop *r, const double ways[6][16], double *left
 /* How much of the number 1 is in a term of the left side. */
 static double unit(const roth_loop *r, int weight, int i, int j) {
     double third = weight ? 0.0 : 1.0;
-    if (r->slides[2] && r->powers[2] == 3) third = weight < 2 ? 0.5 : 0.0;
+    if (r->prismatic[2] && r->powers[2] == 3) third = weight < 2 ? 0.5 : 0.0;
     if (i == 1 || j == 1) return 0.0;
-    return (i == 2 && r->slides[3]) || (j == 2 && r->slides[4]) ? 0.0 : third;
+    return (i == 2 && r->prismatic[3]) || (j == 2 && r->prismatic[4]) ? 0.0 : third;
 }
 
 /* One part of the equations, left - unit * constant, and below them their products by x4 or x5. */
@@ -152,14 +152,14 @@ static void scale(roth_matrix *m) {
         for (i = 0; i < count; i++) m->M[k][i] /= most;
 }
 
-void roth_eliminate(const roth_loop *r, const double ways[6][16], roth_matrix *m) {
+void roth_eliminate(const roth_loop *r, const double transforms[6][16], roth_matrix *m) {
     double right[MONOMIALS * PAIR], left[COLUMNS * PAIR], rows[ROTH_ROWS * ROTH_SIZE];
     int k, all = r->count - 1;
     dense_qr f;
     m->size = r->size;
     m->parts = r->powers[2];
-    right_side(r, ways, right);
-    left_side(r, ways, left);
+    right_side(r, transforms, right);
+    left_side(r, transforms, left);
     f.rows = all;
     f.columns = r->powers[0] * r->powers[1] - 1;
     f.steps = r->rank;

@@ -1,8 +1,8 @@
 /* All configurations of an arm of six joints that reach a pose, by elimination.
  *
- * The loop Z_1 C_1 .. Z_6 C_6 = 1 of the joints' motions Z and constant ways C, one of which holds
- * the wanted pose, may begin at any joint and run either way; what is best for an arm is chosen
- * once, elsewhere. Re-entrant: no globals and no allocation.
+ * The loop Z_1 C_1 .. Z_6 C_6 = 1 of the joints' motions Z and constant transforms C, one of which
+ * contains the target pose, may begin at any joint and run in either direction; what is
+ * best for an arm is chosen once, elsewhere. Re-entrant: no globals and no allocation.
  *
  * Source: Raghavan and Roth 1993; Manocha and Canny 1994.
  */
@@ -22,11 +22,11 @@ enum {
 typedef struct {
     int order[6];            /* the arm's joint that each joint of the loop is */
     int sign;                /* 1; -1 where the loop runs against the arm */
-    int slides[6];           /* of the loop's joints */
+    int prismatic[6];           /* of the loop's joints */
     double offsets[6];       /* from which their angles are counted [rad] */
-    double ways[6][16];      /* (4, 4), row by row, in arm lengths */
-    int place;               /* of the way that ends where the pose begins */
-    double after[16];        /* what comes after the pose in its way */
+    double transforms[6][16];      /* (4, 4), row by row, in arm lengths */
+    int index;               /* of the transform that ends where the pose begins */
+    double after[16];        /* what comes after the pose in its transform */
     double length;           /* of the arm [m] */
     int count;               /* elements of a pair that are used, */
     int elements[15];        /* which ones; the first is the number 1 */
@@ -44,12 +44,12 @@ typedef struct {
     double M[3][ROTH_SIZE * ROTH_SIZE]; /* row by row */
 } roth_matrix;
 
-/* The ways of the loop for a wanted pose. */
-void roth_ways(const roth_loop *r, const double *T, double ways[6][16]);
+/* The transforms of the loop for a target pose. */
+void roth_transforms(const roth_loop *r, const double *T, double transforms[6][16]);
 
 void roth_weights(int parts, double u, double *weights);
 
-void roth_eliminate(const roth_loop *r, const double ways[6][16], roth_matrix *m);
+void roth_eliminate(const roth_loop *r, const double transforms[6][16], roth_matrix *m);
 
 /* Angles u, ascending, where the matrix is singular, or nearly so for a real angle; a double one is
  * there twice. Gives how many they are. */
@@ -61,7 +61,7 @@ int roth_middle(const roth_loop *r, const roth_matrix *m, double u, int count, d
                 double *x5);
 
 /* Positions of all joints of the loop from those of joints 3, 4 and 5: one, two or three rows. */
-int roth_rest(const roth_loop *r, const double ways[6][16], const double *middle,
+int roth_rest(const roth_loop *r, const double transforms[6][16], const double *middle,
               double configurations[3][6]);
 
 /* Configurations (ROTH_CONFIGURATIONS, 6) of the arm that may reach the pose; gives how many they are. */

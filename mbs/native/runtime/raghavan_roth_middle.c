@@ -55,7 +55,7 @@ static double rayleigh(const double *X, const double *V, int n, int count) {
     return sum / count;
 }
 
-/* The directions that X (n, n), column by column, only stretches by a, or turns within their plane
+/* The directions that X (n, n), column by column, only stretches by a, or rotates within their plane
  * by eigenvalues a + ib and a - ib; V (n, 1 or 2). */
 static int directions(const double *X, int n, double a, double b, double *V) {
     block shifted, square;

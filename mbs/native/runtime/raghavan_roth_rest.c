@@ -6,7 +6,7 @@
 #include "rigid.h"
 
 enum { KEPT = 6 };
-static const int BY_TURN[KEPT] = {1, 2, 5, 8, 11, 14}, BY_SLIDE[KEPT] = {3, 4, 6, 7, 8, 11};
+static const int REVOLUTE[KEPT] = {1, 2, 5, 8, 11, 14}, PRISMATIC[KEPT] = {3, 4, 6, 7, 8, 11};
 static const double FLAT = 1e-4;     /* ratio of singular values below which there are two roots too */
 static const double NONE = 1e-9;     /* and below which there is no single root */
 static const double NOTHING = 1e-12; /* singular values, in arm lengths, that are rounding */
@@ -43,9 +43,9 @@ static void decompose(double A[2][KEPT], double *s, double V[2][2]) {
 }
 
 /* Both roots of x cos q + y sin q = g, or of x r + y r^2 = g; the fold where they are not real. */
-static void crossings(int slides, const double *n, double g, double *roots) {
+static void crossings(int prismatic, const double *n, double g, double *roots) {
     double size = hypot(n[0], n[1]), middle = atan2(n[1], n[0]), half, larger, root;
-    if (!slides) {
+    if (!prismatic) {
         half = acos(fmax(-1.0, fmin(1.0, g / fmax(size, 1e-300))));
         roots[0] = middle - half;
         roots[1] = middle + half;
@@ -58,15 +58,15 @@ static void crossings(int slides, const double *n, double g, double *roots) {
 }
 
 /* A (KEPT, 2) times (cos q, sin q) or (r, r^2) of joint 2 is to be b. */
-static void second_equations(const roth_loop *r, const double ways[6][16], const double *beyond,
-                             const double *goal, double A[2][KEPT], double *b) {
-    const int *kept = r->slides[0] ? BY_SLIDE : BY_TURN;
+static void second_equations(const roth_loop *r, const double transforms[6][16],
+                             const double *beyond, const double *goal, double A[2][KEPT], double *b) {
+    const int *kept = r->prismatic[0] ? PRISMATIC : REVOLUTE;
     double w[PAIR], end[PAIR], parts[3 * PAIR];
     int i, k;
     pair_of(beyond, w);
     pair_of(goal, end);
-    pair_parts(r->slides[1], w, parts);
-    for (k = 0; k < 3; k++) pair_carry(ways[0], parts + k * PAIR);
+    pair_parts(r->prismatic[1], w, parts);
+    for (k = 0; k < 3; k++) pair_carry(transforms[0], parts + k * PAIR);
     for (i = 0; i < KEPT; i++) {
         A[0][i] = parts[PAIR + kept[i]];
         A[1][i] = parts[2 * PAIR + kept[i]];
@@ -75,11 +75,11 @@ static void second_equations(const roth_loop *r, const double ways[6][16], const
 }
 
 /* Positions of joint 2: one, and two more where the equations are, or nearly are, but one. */
-static int second_joint(const roth_loop *r, const double ways[6][16], const double *beyond,
+static int second_joint(const roth_loop *r, const double transforms[6][16], const double *beyond,
                         const double *goal, double *q2) {
     double A[2][KEPT], V[2][2], b[KEPT], s[2], g[2] = {0.0, 0.0}, f[2];
     int i, k, count = 0, sharp;
-    second_equations(r, ways, beyond, goal, A, b);
+    second_equations(r, transforms, beyond, goal, A, b);
     decompose(A, s, V);
     for (k = 0; k < 2; k++) {
         sharp = s[k] > fmax(NONE * s[0], NOTHING);
@@ -87,48 +87,48 @@ static int second_joint(const roth_loop *r, const double ways[6][16], const doub
         g[k] = sharp ? g[k] / s[k] : 0.0;
     }
     for (i = 0; i < 2; i++) f[i] = V[0][i] * g[0] + V[1][i] * g[1];
-    if (sharp) q2[count++] = r->slides[1] ? f[0] : atan2(f[1], f[0]);
+    if (sharp) q2[count++] = r->prismatic[1] ? f[0] : atan2(f[1], f[0]);
     if (s[1] > fmax(FLAT * s[0], NOTHING)) return count;
-    crossings(r->slides[1], V[0], g[0], q2 + count);
+    crossings(r->prismatic[1], V[0], g[0], q2 + count);
     return count + 2;
 }
 
 /* The position of joint 1 that takes the origin and the z axis of `near` to those of the goal. */
-static double first_joint(int slides, const double *near, const double *goal) {
+static double first_joint(int prismatic, const double *near, const double *goal) {
     double across, along;
-    if (slides) return goal[11] - near[11];
+    if (prismatic) return goal[11] - near[11];
     across = near[2] * goal[6] - near[6] * goal[2] + near[3] * goal[7] - near[7] * goal[3];
     along = near[2] * goal[2] + near[6] * goal[6] + near[3] * goal[3] + near[7] * goal[7];
     return atan2(across, along);
 }
 
-int roth_rest(const roth_loop *r, const double ways[6][16], const double *middle,
+int roth_rest(const roth_loop *r, const double transforms[6][16], const double *middle,
               double configurations[3][6]) {
-    double beyond[16], goal[16], near[16], turned[16], back[16], q2[3];
+    double beyond[16], goal[16], near[16], pose[16], back[16], q2[3];
     int i, k, count;
-    memcpy(beyond, ways[1], sizeof beyond);
+    memcpy(beyond, transforms[1], sizeof beyond);
     for (k = 2; k < 5; k++) {
-        rigid_move(beyond, middle[k - 2], r->slides[k]);
-        rigid_product(beyond, ways[k], near);
+        rigid_move(beyond, middle[k - 2], r->prismatic[k]);
+        rigid_product(beyond, transforms[k], near);
         memcpy(beyond, near, 12 * sizeof(double));
     }
-    rigid_inverse(ways[5], goal);
-    count = second_joint(r, ways, beyond, goal, q2);
+    rigid_inverse(transforms[5], goal);
+    count = second_joint(r, transforms, beyond, goal, q2);
     for (i = 0; i < count; i++) {
         double *q = configurations[i];
-        memcpy(turned, ways[0], sizeof turned);
-        rigid_move(turned, q2[i], r->slides[1]);
-        rigid_product(turned, beyond, near);
-        q[0] = first_joint(r->slides[0], near, goal);
+        memcpy(pose, transforms[0], sizeof pose);
+        rigid_move(pose, q2[i], r->prismatic[1]);
+        rigid_product(pose, beyond, near);
+        q[0] = first_joint(r->prismatic[0], near, goal);
         q[1] = q2[i];
         memcpy(q + 2, middle, 3 * sizeof(double));
-        memcpy(turned, (const double[16]){1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
-               sizeof turned);
-        rigid_move(turned, q[0], r->slides[0]);
-        rigid_product(turned, near, back);
+        memcpy(pose, (const double[16]){1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
+               sizeof pose);
+        rigid_move(pose, q[0], r->prismatic[0]);
+        rigid_product(pose, near, back);
         rigid_inverse(back, near);
-        rigid_product(near, goal, turned);
-        q[5] = atan2(turned[4] - turned[1], turned[0] + turned[5]);
+        rigid_product(near, goal, pose);
+        q[5] = atan2(pose[4] - pose[1], pose[0] + pose[5]);
     }
     return count;
 }

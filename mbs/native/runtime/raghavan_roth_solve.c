@@ -7,11 +7,11 @@
 /* Gaps between angles that may be one root [rad]: of a multiple one, spread by rounding; of a
  * double one, so that neighbours of its kind are tried apart too. */
 static const double COARSE = 1e-3, FINE = 1e-6;
-static const double FAR = 1e3; /* slides, in reaches, that are taken for infinite */
+static const double FAR = 1e3; /* translations, in reaches, that are taken for infinite */
 
 typedef struct {
     const roth_loop *loop;
-    double ways[6][16];
+    double transforms[6][16];
     roth_matrix matrix;
     double reach; /* [arm lengths] */
     double *q;    /* (ROTH_CONFIGURATIONS, 6) configurations of the arm so far */
@@ -26,8 +26,8 @@ static void add_configuration(solution *s, const double *u) {
     if (s->count == ROTH_CONFIGURATIONS) return;
     for (k = 0; k < 6; k++) {
         double value = r->sign * (u[k] + r->offsets[k]);
-        if (r->slides[k] ? !(fabs(u[k]) < FAR * s->reach) : !(fabs(value) < HUGE_VAL)) return;
-        q[r->order[k]] = r->slides[k] ? value * r->length : remainder(value, 2.0 * PI);
+        if (r->prismatic[k] ? !(fabs(u[k]) < FAR * s->reach) : !(fabs(value) < HUGE_VAL)) return;
+        q[r->order[k]] = r->prismatic[k] ? value * r->length : remainder(value, 2.0 * PI);
     }
     s->count++;
 }
@@ -40,8 +40,8 @@ static void add_shared(solution *s, double u, int count) {
     count = roth_middle(r, &s->matrix, u, count, x[1], x[2]);
     for (i = 0; i < count; i++) {
         x[0][i] = tan(0.5 * u);
-        for (k = 0; k < 3; k++) middle[k] = r->slides[2 + k] ? x[k][i] : 2.0 * atan(x[k][i]);
-        rows = roth_rest(r, (const double(*)[16])s->ways, middle, configurations);
+        for (k = 0; k < 3; k++) middle[k] = r->prismatic[2 + k] ? x[k][i] : 2.0 * atan(x[k][i]);
+        rows = roth_rest(r, (const double(*)[16])s->transforms, middle, configurations);
         for (k = 0; k < rows; k++) add_configuration(s, configurations[k]);
     }
 }
@@ -62,7 +62,7 @@ static double mean(const double *u, int start, int end) {
 
 /* Around the circle, from the widest gap on. */
 static void begin_after_gap(double *u, int count) {
-    double turned[ROTH_ROOTS], widest = u[0] + 2.0 * PI - u[count - 1];
+    double sorted[ROTH_ROOTS], widest = u[0] + 2.0 * PI - u[count - 1];
     int i, start = 0;
     for (i = 1; i < count; i++) {
         if (u[i] - u[i - 1] <= widest) continue;
@@ -70,8 +70,8 @@ static void begin_after_gap(double *u, int count) {
         start = i;
     }
     for (i = 0; i < count; i++)
-        turned[i] = u[(start + i) % count] + (start + i < count ? 0.0 : 2.0 * PI);
-    memcpy(u, turned, (size_t)count * sizeof(double));
+        sorted[i] = u[(start + i) % count] + (start + i < count ? 0.0 : 2.0 * PI);
+    memcpy(u, sorted, (size_t)count * sizeof(double));
 }
 
 int roth_candidates(const roth_loop *r, const double *T, double *q) {
@@ -82,8 +82,8 @@ int roth_candidates(const roth_loop *r, const double *T, double *q) {
     s.q = q;
     s.count = 0;
     s.reach = 1.0 + sqrt(T[3] * T[3] + T[7] * T[7] + T[11] * T[11]) / r->length;
-    roth_ways(r, T, s.ways);
-    roth_eliminate(r, (const double(*)[16])s.ways, &s.matrix);
+    roth_transforms(r, T, s.transforms);
+    roth_eliminate(r, (const double(*)[16])s.transforms, &s.matrix);
     count = roth_roots(&s.matrix, u);
     if (count) begin_after_gap(u, count);
     for (start = 0; start < count; start = end) {

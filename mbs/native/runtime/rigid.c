@@ -19,10 +19,10 @@ void rigid_inverse(const double *T, double *back) {
     }
 }
 
-void rigid_move(double *T, double q, int slides) {
+void rigid_move(double *T, double q, int prismatic) {
     double c, s;
     int i;
-    if (slides) {
+    if (prismatic) {
         for (i = 0; i < 12; i += 4) T[i + 3] += q * T[i + 2];
         return;
     }

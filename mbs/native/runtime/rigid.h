@@ -9,7 +9,7 @@ void rigid_product(const double *A, const double *B, double *T);
 
 void rigid_inverse(const double *T, double *back);
 
-/* T = T times the motion of a joint: a slide along z by q, or a turn about it. */
-void rigid_move(double *T, double q, int slides);
+/* T = T times the motion of a joint: a translation along z by q, or a rotation about it. */
+void rigid_move(double *T, double q, int prismatic);
 
 #endif

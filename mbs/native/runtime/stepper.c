@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-/* places in memory */
+/* offsets in memory */
 enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, SLOPE };
 
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 10.0, BETA = 0.04;
@@ -107,7 +107,7 @@ static int project_candidate(stepper *s, const double *x, double t_new) {
     if (s->project(s->user, t_new, y)) return STEPPER_PROJECTION_FAILED;
     if (!stepper_all_finite(y, s->n)) return STEPPER_NOT_FINITE;
     for (i = 0; i < s->n; i++) move[i] -= y[i];
-    s->moved = norm(s, move, x, y) > UNMOVED;
+    s->corrected = norm(s, move, x, y) > UNMOVED;
     return STEPPER_OK;
 }
 
@@ -116,7 +116,7 @@ static int accept(stepper *s, double *x, double t_new, double h) {
     double *y = stepper_candidate(s);
     int status = STEPPER_OK;
     s->method->keep(s, x, h);
-    s->moved = 0;
+    s->corrected = 0;
     if (s->project && !s->kept_closed) status = project_candidate(s, x, t_new);
     if (status) return status;
     status = s->method->close(s, t_new);

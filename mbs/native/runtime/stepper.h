@@ -5,7 +5,7 @@
  * bit), and `work`, which is scratch except for the dense output of the last step.
  *
  * Source: Hairer, Norsett and Wanner 1993, II.4 to II.6. Unlike their code, the step that error
- * control wants is remembered apart from the one that an end time cut short, and a projection
+ * control asks for is remembered apart from the one that an end time cut short, and a projection
  * onto constraints may follow each accepted step.
  */
 #ifndef MBS_STEPPER_H
@@ -68,7 +68,7 @@ struct stepper {
     double noise;    /* what rounding adds to atol in the last attempt */
     int cut;         /* the present attempt ends at a limit */
     int kept_closed; /* the candidate is on the constraints: nothing projects it */
-    int moved; /* whether the last projection moved the candidate, compared with the tolerances */
+    int corrected;   /* whether the last projection changed the candidate beyond tolerances */
 };
 
 /* What the init of a method calls. max_steps and h_max are then 100000 and infinite. */

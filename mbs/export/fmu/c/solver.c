@@ -62,7 +62,7 @@ static int tree_project(void *user, double t, double *x) {
 
 static int tree_rows(void *user, double t, const double *x, const passage_rows *r) {
     core *c = user;
-    double *const to[] = {r->place, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
+    double *const to[] = {r->position, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
     core_point(c, &t, x, c->z);
     memcpy(c->res, to, sizeof to);
     return mbs_tree_rows(c->arg, c->res, c->iw, c->w, 0);

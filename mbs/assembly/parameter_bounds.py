@@ -10,6 +10,7 @@ from typing import Any
 from casadi import SX
 
 from mbs.components import Box, Component, Cylinder
+from mbs.components.custom import Custom
 from mbs.errors import DescriptionError
 from mbs.expressions import (
     MORE_THAN_ZERO,
@@ -24,7 +25,8 @@ Bounds = tuple[float | None, float | None]
 """The least and the greatest value; None where there is none."""
 
 _BELOW_ZERO = (-1.0, -1e-5)  # far, and nearer than a limit is to zero: refused for the sign
-_ABOVE_ONE = (1.1, 1e3)  # near, and far: what is refused there is refused for being above one
+_ABOVE_ONE = (1.00001, 1.1, 1e3)  # near, and far: what is refused there is above one
+_ABOVE_ZERO = (MORE_THAN_ZERO, 1e-5, 1.0, 1e3)  # of which some are taken where zero is the limit
 
 
 def parameter_bounds(
@@ -46,8 +48,12 @@ def parameter_bounds(
     found: dict[str, Bounds] = {p.name: (p.min, p.max) for p in parameters}
     for component in components:
         for name in sorted(component.parameters() & found.keys()):
-            low, high = _bounds(partial(_with_value, component.without_defaults(), name))
-            found[name] = _tighter(max, low, found[name][0]), _tighter(min, high, found[name][1])
+            own = _bounds(partial(_with_value, component.without_defaults(), name))
+            found[name] = _tighter(found[name], own)
+        for name, bounds in _declared(component):
+            value = getattr(component, name)
+            if isinstance(value, Parameter) and value.name in found:
+                found[value.name] = _tighter(found[value.name], bounds)
     return {name: bounds for name, bounds in found.items() if bounds != (None, None)}
 
 
@@ -76,11 +82,12 @@ def bounded_fields(
         symbols: of its parameters.
     """
     for component in components:
-        unvalued = component.without_defaults()
+        unvalued, declared = component.without_defaults(), dict(_declared(component))
         for f in fields(component):
             value = getattr(component, f.name)
             if f.init and isinstance(value, Operation) and any(parameters_of(value)):
                 bounds = _bounds(partial(_with_field, unvalued, f.name))
+                bounds = _tighter(bounds, declared.get(f.name, (None, None)))
                 if bounds != (None, None):
                     yield BoundedField(f"{component.name}, {f.name}", to_sx(value, symbols), bounds)
         if isinstance(component, (Box, Cylinder)) and isinstance(component.solid_mass, Operation):
@@ -97,15 +104,24 @@ def _with_field(component: Component, name: str, value: float) -> None:
     replace(component, **changed)
 
 
-def _tighter(choose: Callable[[Iterable[float]], float], *bounds: float | None) -> float | None:
-    known = [bound for bound in bounds if bound is not None]
-    return choose(known) if known else None
+def _declared(component: Component) -> Iterator[tuple[str, Bounds]]:
+    """The bounds that a component by its equations declares, by field."""
+    if isinstance(component, Custom):
+        for name in component.names_of("parameter"):
+            yield name, (component.declared[name].low, component.declared[name].high)
+
+
+def _tighter(a: Bounds, b: Bounds) -> Bounds:
+    lows = [bound for bound in (a[0], b[0]) if bound is not None]
+    highs = [bound for bound in (a[1], b[1]) if bound is not None]
+    return max(lows, default=None), min(highs, default=None)
 
 
 def _bounds(check: Callable[[float], object]) -> Bounds:
     """What a rule refuses among values below zero, of zero, and above one."""
     low: float | None = None
-    if all(_refused(check, value) for value in _BELOW_ZERO):
+    taken = not all(_refused(check, value) for value in _ABOVE_ZERO)
+    if taken and all(_refused(check, value) for value in _BELOW_ZERO):
         open_end = _refused(check, 0.0) and not _refused(check, MORE_THAN_ZERO)
         low = MORE_THAN_ZERO if open_end else 0.0
     above = all(_refused(check, value) for value in _ABOVE_ONE)

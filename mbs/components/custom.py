@@ -231,6 +231,9 @@ class _Handle:
     def __init__(self, kind: str, name: str) -> None:
         self.kind, self.name = kind, name
 
+    def __repr__(self) -> str:
+        return f"the {self.kind} {self.name!r} of a class, not of a component"
+
     def __get__(self, owner: Any, kind: type | None = None) -> Any:
         if owner is None:
             return self
@@ -539,7 +542,22 @@ class Custom(OnPoints):
         Component.__post_init__(self)
         for name, what in self.declared.items():
             if what.kind in _KINDS_OF_FIELDS:
+                if not hasattr(self, name):
+                    raise DescriptionError(
+                        f"{self.name}: {type(self).__name__}.__init__ does not set {name!r}; leave"
+                        " __init__ out, since a component is made with what its class declares"
+                    )
                 _CHECKS[what.kind](self, name, what)
+
+    def require_made(self) -> None:
+        """Refuse a component whose class does not look at what it was made with."""
+        for name in self.names_of("frame", "parameter"):
+            given = getattr(self, name)
+            if given is not None and not isinstance(given, (Point, Expression)):
+                raise DescriptionError(
+                    f"{self.name}: {type(self).__name__}.__post_init__ leaves {name!r} unchecked;"
+                    " let it call Custom.__post_init__(self) first"
+                )
 
     # Ports.
 
@@ -718,7 +736,13 @@ _RESERVED = frozenset({"name", "declared", "symbols", "lam", *vars(Custom)})
 
 def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
     """Turn what a class declares into fields of a frozen dataclass, and into handles."""
+    if "__slots__" in vars(cls):
+        raise DescriptionError(f"{cls.__name__}: it has __slots__; leave them out")
     annotations: dict[str, Any] = dict(inspect.get_annotations(cls))
+    # fields with values, declared or not, in the order in which the class has them
+    valued = {
+        name: annotations.pop(name, Any) for name in vars(cls) if name in {*annotations, *own}
+    }
     for name, what in own.items():
         if name in _RESERVED or name.startswith("_"):
             raise DescriptionError(
@@ -726,8 +750,9 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
             )
         if what.kind not in _KINDS_OF_FIELDS:
             setattr(cls, name, _Handle(what.kind, name))
+            valued.pop(name)
             continue
-        annotations[name] = Any
+        valued[name] = Any
         if what.kind in ("state", "mode", "unknown") or (
             what.kind == "frame" and what.default is None
         ):
@@ -738,7 +763,7 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
             setattr(cls, name, what.default)
     if not any(what.kind in _KINDS_OF_FIELDS for what in own.values()):
         return
-    cls.__annotations__ = annotations
+    cls.__annotations__ = annotations | valued
     try:
         dataclass(frozen=True)(cls)
     except TypeError as error:

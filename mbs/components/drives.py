@@ -192,7 +192,7 @@ class DCMotor(Device):
     def check_values(self, values: Mapping[str, float]) -> None:
         """Refuse values that the motor itself would refuse, and a symbol of no inductance."""
         Component.check_values(self, values)
-        if self.state_names and to_float(self.inductance, values) == 0:
+        if "i" in self.state_names and to_float(self.inductance, values) == 0:
             raise DescriptionError(
                 f"{self.name}: inductance is {self.inductance}, which has the value 0, but a"
                 " current that is a state needs more; give it one, or write the number 0 for none"
@@ -205,18 +205,20 @@ class DCMotor(Device):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """The current, unless there is no inductance."""
-        return () if self.inductance == Number(0.0) else ("i",)
+        """The current, unless there is no inductance, and those of a derived class."""
+        every = self.names_of("state", "mode")
+        return tuple(name for name in every if name != "i" or self.inductance != Number(0.0))
 
     @property
     def output_names(self) -> tuple[str, ...]:
         """Torque and speed, and the current where it is no state."""
-        return ("tau", "w") if self.state_names else ("i", "tau", "w")
+        own = self.names_of("output")
+        return own if "i" in self.state_names else ("i", *own)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Of the current."""
         left = at.voltage - at.constant * at.flange.speed - at.resistance * at.i
-        return {"i": left / at.inductance} if self.state_names else {}
+        return {"i": left / at.inductance} if "i" in self.state_names else {}
 
     def loads(self, at: Any) -> Mapping[str, Load]:
         """In proportion to the current."""
@@ -225,11 +227,11 @@ class DCMotor(Device):
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """What it delivers, and how fast it rotates."""
         i = self._current(at)
-        values = {"i": i, "tau": at.constant * i, "w": at.flange.speed}
-        return {name: values[name] for name in self.output_names}
+        values = {"tau": at.constant * i, "w": at.flange.speed}
+        return values if "i" in self.state_names else {"i": i, **values}
 
     def _current(self, at: Any) -> SX:
-        if self.state_names:
+        if "i" in self.state_names:
             return SX(at.i)
         return SX((at.voltage - at.constant * at.flange.speed) / at.resistance)
 

@@ -381,6 +381,7 @@ class Mechanism:
                 " is connected; write connect(point, joint, point)"
             )
         if isinstance(component, Custom):
+            component.require_made()
             if component.lowered or component.has_equations:
                 return
             remedy = "write one of its methods loads, energy, rates, rows, velocity_rows or outputs"

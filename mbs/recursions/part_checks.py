@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.assembly.parts import AttachedPart, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
-from mbs.components.custom import At, Event, FlangeAt, FrameLoad, Row
-from mbs.errors import AssemblyError, MbsError
+from mbs.components.custom import At, Event, FlangeAt, FrameLoad, Row, Signal
+from mbs.errors import AssemblyError, ExpressionError, MbsError
+from mbs.expressions import Expression
 from mbs.recursions.parts import PartsAt
 from mbs.text import did_you_mean, one_line, quoted
 
@@ -31,6 +32,10 @@ _SAME = 1e-8
 laws with steep slopes lose some digits."""
 _NEGATIVE = 1e-9
 """Heat below zero that is rounding, in parts of the other powers."""
+_FROM_AT = "take what is declared from at, such as at.k, and not from self"
+_NO_TRUTH = (
+    "write casadi.if_else, casadi.fmax and casadi.logic_and where if, max and `and` ask a symbol"
+)
 
 
 def check_parts(system: System) -> None:
@@ -86,14 +91,14 @@ class _Check:
 
     def run(self) -> None:
         """All questions."""
+        energy, heat = self._scalar("energy"), self._scalar("dissipation")
+        if energy is not None:
+            self._require_free_of(energy, "energy", self.v, "velocities")
         loads = self._loads()
         modes = self.element.names_of("mode")
         rates = self._named("rates", [name for name in self.part.states if name not in modes])
         self._events(modes)
         self._rows()
-        energy, heat = self._scalar("energy"), self._scalar("dissipation")
-        if energy is not None:
-            self._require_free_of(energy, "energy", self.v, "velocities")
         if self.element.has("crossings"):
             free = casadi.vertcat(self.v, self.system.u)
             for label, value in self._mapping("crossings").items():
@@ -111,12 +116,18 @@ class _Check:
         """What a method returns; an error in it is told by its name."""
         try:
             return getattr(self.element, method)(self.at.at(self.part) if at is None else at)
+        except ExpressionError as error:  # numbers of self times symbols
+            fault = one_line(str(error)).split(";")[0]
+            raise AssemblyError(
+                f"{self._title}: {method} raises {type(error).__name__}: {fault}; {_FROM_AT}"
+            ) from error
         except MbsError:
             raise
         except Exception as error:
+            remedy = _NO_TRUTH if "truth value" in str(error) else "correct it"
             raise AssemblyError(
                 f"{self._title}: {method} raises {type(error).__name__}: {one_line(str(error))};"
-                " correct it"
+                f" {remedy}"
             ) from error
 
     def _mapping(self, method: str, at: At | None = None) -> Mapping[str, Any]:
@@ -252,8 +263,10 @@ class _Check:
             found = SX(0, 0)
         if found.shape != (1, 1):
             shape = "" if found.shape == (0, 0) else f" of the shape {found.shape}"
+            of_self = isinstance(value, (Expression, Signal))
             raise AssemblyError(
-                f"{self._title}: {what} is {_kind(value)}{shape}; give one number or expression"
+                f"{self._title}: {what} is {_kind(value)}{shape};"
+                f" {_FROM_AT if of_self else 'give one number or expression'}"
             )
         self._require_known(found, what)
         self.used.append(found)
@@ -271,6 +284,20 @@ class _Check:
                 raise AssemblyError(
                     f"{self._title}: {what} holds the symbol {symbol.name()!r}, which is none of"
                     " the component; declare it as a parameter, state or input"
+                )
+        graph = Function("asked", [known], [value])
+        for k in range(graph.n_instructions()):
+            if graph.instruction_id(k) == casadi.OP_CALL:
+                raise AssemblyError(
+                    f"{self._title}: {what} calls another Function, such as an interpolant, which"
+                    " models do not take; write it by operations, such as casadi.pw_lin"
+                )
+            if graph.instruction_id(k) == casadi.OP_CONST and np.isnan(
+                graph.instruction_constant(k)
+            ):
+                raise AssemblyError(
+                    f"{self._title}: {what} holds a constant that is not a number; look for what"
+                    " turns symbols into floats, such as math.sin, and write casadi.sin"
                 )
         self.used.append(casadi.vec(value))
 

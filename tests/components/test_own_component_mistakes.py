@@ -1,0 +1,127 @@
+"""Components of one's own, written as users write them: what is taken, and what is refused."""
+
+import math
+
+import casadi
+import numpy as np
+import pytest
+from support.messages import refused
+
+import mbs
+from mbs.components import Body, Custom, DCMotor, Revolute, ShaftDamper, custom
+from mbs.errors import AssemblyError, DescriptionError, ModelError
+
+INERTIA = 0.1  # of the bar about its joint [kg m^2]
+
+
+def bar(*made, **values):
+    """A bar on the joint j, without gravity, with components."""
+    m = mbs.Mechanism("m", gravity=(0, 0, 0))
+    m.values.update({name: mbs.Parameter(name, value) for name, value in values.items()})
+    body = m.add(Body("bar", mass=1.0, inertia=(INERTIA, INERTIA, INERTIA)))
+    m.connect(m.world, Revolute("j", axis="z", actuated=False), body)
+    for make in made:
+        m.add(make(body) if callable(make) else make)
+    return m.assemble()
+
+
+def on_joint(load, **declared):
+    """A class on a coordinate, whose effort is what a function of self and at returns."""
+    methods = {"loads": lambda self, at: {"joint": load(self, at)}}
+    return type("Mine", (Custom,), {"joint": custom.coordinate(), **declared, **methods})
+
+
+@pytest.mark.parametrize(
+    ("load", "told"),
+    [
+        (lambda self, at: math.sin(at.joint.q), "write casadi.sin"),
+        (lambda self, at: at.joint.q * math.nan, "a constant that is not a number"),
+        (lambda self, at: 1 if at.joint.q > 0 else 2, "write casadi.if_else"),
+        (lambda self, at: max(at.joint.q, 0), "casadi.fmax"),
+        (lambda self, at: -self.k * at.joint.q, "from at, such as at.k, and not from self"),
+        (lambda self, at: self.k, "from at, such as at.k, and not from self"),
+        (
+            lambda self, at: casadi.interpolant("table", "linear", [[0, 1]], [0, 1])(at.joint.q),
+            "loads at joint calls another Function, such as an interpolant",
+        ),
+    ],
+)
+def test_what_is_no_expression_of_symbols(load, told):
+    mine = on_joint(load, k=custom.parameter("N.m", 2.0))
+    refused(AssemblyError, "c (Mine): loads", told, by=lambda: bar(mine("c", "j")))
+
+
+def test_an_energy_that_is_a_vector():
+    mine = type("Mine", (Custom,), {"p": custom.frame(), "energy": lambda self, at: at.p.p})
+    told = "energy is an expression of the shape (3, 1)"
+    refused(AssemblyError, "c (Mine)", told, by=lambda: bar(lambda body: mine("c", body)))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "good", "bad"),
+    [
+        (None, 10, 9, 11),
+        (5, None, 6, 4),
+        (None, -2, -3, -1),
+        (2, 8, 3, 9),
+        (None, 1.05, 1.03, 1.06),
+        (-5, -1, -2, -0.5),
+        (-5, -1, -2, -6),
+    ],
+)
+@pytest.mark.parametrize("text", ["C", "2*C"])
+def test_declared_bounds_hold_in_calls(low, high, good, bad, text):
+    scale = 2 if text == "2*C" else 1
+    mine = on_joint(lambda self, at: at.k, k=custom.parameter("N.m", min=low, max=high))
+    system = bar(mine("c", "j", k=text), C=good / scale)
+    if text == "C":
+        assert system.bounds["C"] == (low, high)
+    ddm = mbs.models.direct_dynamics(system)
+    # two divisions in doubles
+    assert float(ddm(0, 0, 0, good / scale)) == pytest.approx(good / INERTIA, rel=1e-14)
+    refused(ModelError, "c: k is", f"{bad:g}", by=lambda: ddm(0, 0, 0, bad / scale))
+
+
+def test_annotated_fields_keep_their_place_among_declarations():
+    class Mine(Custom):
+        joint = custom.coordinate()
+        count: int = 2
+        k = custom.parameter("N.m", 3.0)
+
+        def loads(self, at):
+            return {"joint": self.count * at.k}
+
+    ddm = mbs.models.direct_dynamics(bar(Mine("c", "j", 5, 4.0)))
+    assert float(ddm(0, 0, 0)) == pytest.approx(5 * 4.0 / INERTIA, rel=1e-14)  # rounding
+
+
+def test_classes_that_are_not_made_as_declared():
+    def slotted():
+        return type("Mine", (Custom,), {"__slots__": (), "joint": custom.coordinate()})
+
+    refused(DescriptionError, "Mine", "__slots__", by=slotted)
+    own_init = on_joint(lambda self, at: 1, __init__=lambda self: Custom.__init__(self, "c"))
+    refused(DescriptionError, "c: Mine.__init__", "'joint'", by=own_init)
+    skips = on_joint(
+        lambda self, at: at.k, k=custom.parameter(min=0), __post_init__=lambda self: None
+    )
+    refused(DescriptionError, "c: Mine.__post_init__", "'k'", by=lambda: bar(skips("c", "j", -5)))
+
+
+def test_a_motor_with_a_further_state():
+    class Warm(DCMotor):
+        heat = custom.state("J")
+
+        def rates(self, at):
+            return {**super().rates(at), "heat": at.resistance * at.i**2}
+
+    m = mbs.Mechanism("m")
+    motor = Warm("motor", resistance=2.0, inductance=1e-3, constant=0.1, inertia=1e-3)
+    m.connect(motor.flange, ShaftDamper("load", 0.01).flange)
+    system = m.assemble()
+    assert system.states == (("motor.i", "A"), ("motor.heat", "J"))
+    result = mbs.simulate.run(system, 0.2, u={"motor": 5.0}, step=1e-4, quiet=True)
+    # trapezoids of 1e-4 s, a twentieth of L / R
+    assert result["motor.heat"][-1] == pytest.approx(
+        np.trapezoid(2.0 * result["motor.i"] ** 2, result.time), rel=1e-3
+    )
